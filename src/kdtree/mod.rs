@@ -1,0 +1,15 @@
+//! Which surface does a ray meet first, and is anything in its way? Asked in batches.
+//!
+//! [`SceneTree`] stands above the objects of a scene; a mesh brings a [`MeshTree`] and a cloud of balls a
+//! [`SphereTree`], each built once in the space of its own and shared by all objects that use it.
+//! Knows nothing of materials or entities: positions go in, hits come out.
+
+mod batch;
+mod mesh_tree;
+mod scene_tree;
+mod sphere_tree;
+
+pub use batch::{HitBatch, RayBatch};
+pub use mesh_tree::{BuildPreset, MeshTree};
+pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
+pub use sphere_tree::SphereTree;

@@ -1,0 +1,19 @@
+//! firstlight: an interactive, progressive path tracer whose scene is a bevy_ecs world.
+//!
+//! Rooms, from the ground up; a room imports only from rooms below it (ARCHITECTURE.md has the whole picture):
+//!
+//! | row | room | what lives there |
+//! |---|---|---|
+//! | 0 | [`geometry`], [`sampling`] | rays, boxes, robust arithmetic; sequences, warps, distributions |
+//! | 1 | [`kdtree`], [`mesh`] | build and traversal; mesh data, normals, simplification |
+//! | 2 | [`render`] | snapshot, camera, film, integrators, lights, materials, textures |
+//! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
+//! | 4 | [`frame`] | the ECS schedule in the order in which a frame runs |
+
+pub mod frame;
+pub mod geometry;
+pub mod kdtree;
+pub mod mesh;
+pub mod render;
+pub mod sampling;
+pub mod scene;

@@ -1,0 +1,22 @@
+//! Triangle meshes: data, normals, procedural shapes, simplification. Knows no trees, files or entities.
+
+use glam::{DVec3, Vec2, Vec3};
+
+/// An indexed triangle mesh in a space of its own, stored about its centre so that `f32` suffices.
+///
+/// Vertices that differ in normal or texture coordinates are stored apart with exactly equal positions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Metres, relative to `center`.
+    pub positions: Vec<Vec3>,
+    /// Where the numbers of the file lay: add it to a position to get the file's coordinates.
+    pub center: DVec3,
+    /// Counter-clockwise seen from the front; every index lies within `positions`.
+    pub triangles: Vec<[u32; 3]>,
+    /// One unit shading normal a vertex, or empty for flat shading.
+    pub normals: Vec<Vec3>,
+    /// One texture coordinate a vertex, or empty.
+    pub uvs: Vec<Vec2>,
+    /// One material slot a triangle, or empty when all use slot 0.
+    pub slots: Vec<u16>,
+}
