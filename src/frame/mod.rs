@@ -1,1 +1,6 @@
 //! placeholder
+
+mod command;
+pub mod navigation;
+
+pub use command::Command;

@@ -1,1 +1,5 @@
 //! placeholder
+
+mod view;
+
+pub use view::{Lens, Projection, View, ViewError};
