@@ -2,7 +2,11 @@
 
 /// Name, what it shows, and the text of the scene file.
 pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
-    ("gallery", "glass, mirror, metal and matte things on a checkered floor", include_str!("../../assets/scenes/gallery.ron")),
+    (
+        "gallery",
+        "glass, mirror, metal and matte things on a checkered floor",
+        include_str!("../../assets/scenes/gallery.ron"),
+    ),
     ("cornell", "the box that every renderer is tried on", include_str!("../../assets/scenes/cornell.ron")),
     (
         "cornell-balls",

@@ -21,12 +21,21 @@ use std::sync::Arc;
 #[require(Placement, MaterialSlots)]
 pub enum Shape {
     /// About the origin; metres. Its placement must scale evenly.
-    Sphere { radius: f64 },
+    Sphere {
+        radius: f64,
+    },
     /// Infinite, through the origin.
-    Plane { normal: DVec3 },
+    Plane {
+        normal: DVec3,
+    },
     /// A parallelogram with a corner at the origin; its front looks along `edge_u` × `edge_v`.
-    Quad { edge_u: DVec3, edge_v: DVec3 },
-    Triangle { vertices: [DVec3; 3] },
+    Quad {
+        edge_u: DVec3,
+        edge_v: DVec3,
+    },
+    Triangle {
+        vertices: [DVec3; 3],
+    },
     /// Shared by all objects that use it, together with its tree.
     Mesh(Arc<Mesh>),
     /// Many balls of one material. Its placement must scale evenly.
@@ -82,13 +91,31 @@ pub struct MaterialSlots(pub Vec<Entity>);
 /// What a surface does to light; see [`render::Material`] for the meaning of each number.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub enum Material {
-    Diffuse { albedo: Paint },
-    Mirror { reflectance: Paint },
-    Metal { alpha: Amount, reflectance: Paint, fresnel: Fresnel, compensate: bool },
-    Glass { ior: f32, absorption: Vec3 },
+    Diffuse {
+        albedo: Paint,
+    },
+    Mirror {
+        reflectance: Paint,
+    },
+    Metal {
+        alpha: Amount,
+        reflectance: Paint,
+        fresnel: Fresnel,
+        compensate: bool,
+    },
+    Glass {
+        ior: f32,
+        absorption: Vec3,
+    },
     /// `a` and `b` are material entities and not emissive.
-    Blend { weight: Amount, a: Entity, b: Entity },
-    Emissive { radiance: Paint },
+    Blend {
+        weight: Amount,
+        a: Entity,
+        b: Entity,
+    },
+    Emissive {
+        radiance: Paint,
+    },
 }
 
 impl Material {
@@ -182,14 +209,12 @@ impl PartialEq for SceneEnvironment {
         match (&self.light, &other.light) {
             (Black, Black) => true,
             (Constant(a), Constant(b)) => a == b,
-            (
-                Gradient { zenith: a, horizon: b, ground: c },
-                Gradient { zenith: d, horizon: e, ground: f },
-            ) => a == d && b == e && c == f,
-            (
-                Image { image: a, scale: b, rotation: c },
-                Image { image: d, scale: e, rotation: f },
-            ) => Arc::ptr_eq(a, d) && b == e && c == f,
+            (Gradient { zenith: a, horizon: b, ground: c }, Gradient { zenith: d, horizon: e, ground: f }) => {
+                a == d && b == e && c == f
+            }
+            (Image { image: a, scale: b, rotation: c }, Image { image: d, scale: e, rotation: f }) => {
+                Arc::ptr_eq(a, d) && b == e && c == f
+            }
             _ => false,
         }
     }

@@ -9,7 +9,9 @@ use super::placement::Placement;
 use super::view::{Lens, Projection, View};
 use crate::kdtree::{self, BuildPreset, MeshTree, SphereTree};
 use crate::mesh::Mesh;
-use crate::render::{self, Camera, ColorInput, Geometry, MaterialId, Object, ScalarInput, Shading, Snapshot, TextureId};
+use crate::render::{
+    self, Camera, ColorInput, Geometry, MaterialId, Object, ScalarInput, Shading, Snapshot, TextureId,
+};
 use bevy_ecs::prelude::Entity;
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
 use std::collections::HashMap;
@@ -162,7 +164,9 @@ impl Extraction {
                         keys.push(MaterialKey::Grey);
                     }
                     geometry.0.push(shape);
-                    geometry.1.push(Object { mesh, materials: keys.into_iter().map(|key| materials.id(key)).collect() });
+                    geometry
+                        .1
+                        .push(Object { mesh, materials: keys.into_iter().map(|key| materials.id(key)).collect() });
                     entities.push(object.entity);
                 }
                 Err(reason) => {
@@ -251,11 +255,7 @@ fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: D
 }
 
 /// The shape as the kernel wants it, about `origin`, or why it cannot be had.
-fn shape_of(
-    object: &ObjectInput,
-    trees: &Trees,
-    origin: DVec3,
-) -> Result<(kdtree::Shape, Option<Arc<Mesh>>), String> {
+fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtree::Shape, Option<Arc<Mesh>>), String> {
     let placement = &object.placement;
     let world = placement.affine();
     let determinant = world.matrix3.determinant();
@@ -403,10 +403,7 @@ fn blends_in_a_circle(start: Entity, by_entity: &HashMap<Entity, &Material>) -> 
             return open;
         }
         state.insert(at, true);
-        if depth > MAX_BLEND_DEPTH
-            || visit(*a, by_entity, state, depth + 1)
-            || visit(*b, by_entity, state, depth + 1)
-        {
+        if depth > MAX_BLEND_DEPTH || visit(*a, by_entity, state, depth + 1) || visit(*b, by_entity, state, depth + 1) {
             return true;
         }
         state.insert(at, false);

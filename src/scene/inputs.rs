@@ -1,8 +1,6 @@
 //! What the picture depends on, copied out of the world in a fixed order.
 
-use super::components::{
-    Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape,
-};
+use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
 use bevy_ecs::name::Name;
@@ -102,7 +100,10 @@ impl SceneQueries<'_, '_> {
 impl SceneInputs {
     /// Reads a world outside of a schedule.
     pub fn of(world: &mut World) -> Self {
-        SystemState::<SceneQueries>::new(world).get(world).expect("queries of optional things are always valid").collect()
+        SystemState::<SceneQueries>::new(world)
+            .get(world)
+            .expect("queries of optional things are always valid")
+            .collect()
     }
 }
 
@@ -115,7 +116,8 @@ fn in_order<'a, T, U>(
     items: impl Iterator<Item = Ranked<'a, T>>,
     make: impl Fn(Entity, Option<&'a Name>, T) -> U,
 ) -> Vec<U> {
-    let mut ranked: Vec<_> = items.map(|(entity, rank, name, item)| (order(rank, entity), make(entity, name, item))).collect();
+    let mut ranked: Vec<_> =
+        items.map(|(entity, rank, name, item)| (order(rank, entity), make(entity, name, item))).collect();
     ranked.sort_by_key(|(key, _)| *key);
     ranked.into_iter().map(|(_, item)| item).collect()
 }

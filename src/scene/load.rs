@@ -4,7 +4,9 @@ use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::components::{Balls, Shape};
 use super::error::{Problem, SceneError, suggestion};
 use super::extract::Trees;
-use super::file::{EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, locate};
+use super::file::{
+    EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, locate,
+};
 use super::meshes::{LoadedMesh, load_mesh, plain_io};
 use super::picture::read_picture;
 use super::showcase;
@@ -88,7 +90,9 @@ impl SceneSource {
             Some("ron") => Ok(Self::Scene(path.to_path_buf())),
             Some("obj") => Ok(Self::Model(path.to_path_buf())),
             _ if path.is_dir() => Err(SceneError::in_file(path, "is a folder: name a scene (.ron) or a model (.obj)")),
-            _ if path.exists() => Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)")),
+            _ if path.exists() => {
+                Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)"))
+            }
             _ => {
                 let hint = suggestion(word, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
                 Err(SceneError::in_file(path, format!("neither a file nor a built-in scene{hint}")))

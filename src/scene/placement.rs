@@ -134,14 +134,13 @@ mod tests {
 
     #[test]
     fn turning_agrees_with_quaternions() {
-        for rotation_deg in [DVec3::new(10.0, 20.0, 30.0), DVec3::new(-100.0, 181.0, 720.5), DVec3::new(90.0, -90.0, 180.0)]
+        for rotation_deg in
+            [DVec3::new(10.0, 20.0, 30.0), DVec3::new(-100.0, 181.0, 720.5), DVec3::new(90.0, -90.0, 180.0)]
         {
             let DVec3 { x, y, z } = rotation_deg.map(f64::to_radians);
             let expected = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, z, y, x));
-            let placement = Placement {
-                translation: DVec3::ZERO,
-                linear: Linear::Turned { rotation_deg, scale: DVec3::ONE },
-            };
+            let placement =
+                Placement { translation: DVec3::ZERO, linear: Linear::Turned { rotation_deg, scale: DVec3::ONE } };
             assert!(placement.linear().abs_diff_eq(expected, 1e-12), "{rotation_deg}");
         }
     }

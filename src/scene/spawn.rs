@@ -92,8 +92,7 @@ impl LoadedScene {
             max_depth: file.max_depth.unwrap_or(u32::MAX),
             seed,
         }));
-        let display =
-            Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
+        let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
         world.insert_resource(Developing(display));
     }
 
@@ -105,11 +104,9 @@ impl LoadedScene {
                 Environment::Gradient { zenith: zenith.0, horizon: horizon.0, ground: ground.0 }
             }
             EnvironmentPart::Image { file, scale, rotate } => match self.pictures.get(file) {
-                Some(image) => Environment::Image {
-                    image: image.clone(),
-                    scale: scale.0,
-                    rotation: rotate.to_radians() as f32,
-                },
+                Some(image) => {
+                    Environment::Image { image: image.clone(), scale: scale.0, rotation: rotate.to_radians() as f32 }
+                }
                 None => Environment::Black,
             },
         }
@@ -172,9 +169,9 @@ fn material(
     let paint = |paint: &file::Paint| match paint {
         file::Paint::Rgb(rgb) => Paint::Rgb(*rgb),
         // Only a mesh's own picture can be missing, and that was said in a warning.
-        file::Paint::Texture(name) => {
-            textures.get(name.as_str()).map_or(Paint::Rgb(glam::Vec3::splat(0.5)), |texture| Paint::Texture(texture.clone()))
-        }
+        file::Paint::Texture(name) => textures
+            .get(name.as_str())
+            .map_or(Paint::Rgb(glam::Vec3::splat(0.5)), |texture| Paint::Texture(texture.clone())),
     };
     let amount = |amount: &file::Amount| match amount {
         file::Amount::Number(value) => Amount::Number(*value),

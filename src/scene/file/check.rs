@@ -152,9 +152,15 @@ impl Check<'_> {
                     let path = format!("{path}/{field}");
                     self.material_name(&path, part);
                     if self.reaches(part, name) {
-                        self.wrong(&path, format!("material `{name}` blends itself: a blend must end in plain materials"));
+                        self.wrong(
+                            &path,
+                            format!("material `{name}` blends itself: a blend must end in plain materials"),
+                        );
                     } else if matches!(self.materials.get(part.as_str()), Some(MaterialPart::Emissive { .. })) {
-                        self.wrong(&path, format!("`{part}` is emissive, and light cannot be blended: use another material"));
+                        self.wrong(
+                            &path,
+                            format!("`{part}` is emissive, and light cannot be blended: use another material"),
+                        );
                     }
                 }
             }
@@ -265,7 +271,10 @@ impl Check<'_> {
         let affine = placement.affine();
         let determinant = affine.matrix3.determinant();
         if !affine.is_finite() || affine.translation.abs().max_element() > SceneFile::MAX_COORDINATE {
-            self.wrong(path, format!("the transform must be finite and move by at most {:e} m", SceneFile::MAX_COORDINATE));
+            self.wrong(
+                path,
+                format!("the transform must be finite and move by at most {:e} m", SceneFile::MAX_COORDINATE),
+            );
             None
         } else if !(determinant.abs() > SceneFile::MIN_SIZE.powi(3)) || !determinant.is_finite() {
             self.wrong(path, "the transform squeezes the object flat: no scale may be 0");
@@ -363,7 +372,9 @@ pub fn check_film_size(width: u32, height: u32) -> Result<(), String> {
     let pixels = u64::from(width) * u64::from(height);
     if width == 0 || height == 0 {
         Err(format!("a film of {width} x {height} has no pixels: width and height must be at least 1"))
-    } else if width > SceneFile::MAX_FILM_SIDE || height > SceneFile::MAX_FILM_SIDE || pixels > SceneFile::MAX_FILM_PIXELS
+    } else if width > SceneFile::MAX_FILM_SIDE
+        || height > SceneFile::MAX_FILM_SIDE
+        || pixels > SceneFile::MAX_FILM_PIXELS
     {
         let gib = pixels as f64 * 24.0 / f64::from(1 << 30);
         Err(format!(

@@ -255,10 +255,11 @@ mod tests {
     #[test]
     fn values_are_found_at_their_line() {
         assert_eq!(locate(TEXT, ""), (2, 1));
-        assert_eq!(locate(TEXT, "film/height"), (3, 29));
-        assert_eq!(locate(TEXT, "materials/b/albedo"), (6, 28));
+        // Fields are placed at their names.
+        assert_eq!(locate(TEXT, "film/height"), (3, 22));
+        assert_eq!(locate(TEXT, "materials/b/albedo"), (6, 22));
         assert_eq!(locate(TEXT, "objects/0/center/2"), (9, 31));
-        assert_eq!(locate(TEXT, "objects/1/radius"), (11, 21));
+        assert_eq!(locate(TEXT, "objects/1/radius"), (11, 13));
         assert_eq!(locate(TEXT, "objects/3"), (13, 9));
     }
 

@@ -10,6 +10,7 @@ mod parts;
 mod syntax;
 mod value;
 
+pub use check::check_film_size;
 pub use locate::locate;
 pub use parts::{
     CameraPart, DisplayPart, EnvironmentPart, FilmPart, FresnelPart, IntegratorPart, LightPart, MaterialPart,
@@ -40,11 +41,7 @@ impl SceneFile {
         let file: Self = options().from_str(text).map_err(|error| syntax::explain(&error, text, name))?;
         let problems: Vec<Problem> = check::check(&file)
             .into_iter()
-            .map(|(path, message)| Problem {
-                file: Some(name.to_path_buf()),
-                at: Some(locate(text, &path)),
-                message,
-            })
+            .map(|(path, message)| Problem { file: Some(name.to_path_buf()), at: Some(locate(text, &path)), message })
             .collect();
         if problems.is_empty() { Ok(file) } else { Err(SceneError { problems }) }
     }

@@ -440,9 +440,8 @@ impl<'de> Deserialize<'de> for ScalePart {
             }
 
             fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<DVec3, A::Error> {
-                let mut next = |i| {
-                    seq.next_element::<f64>()?.ok_or_else(|| serde::de::Error::invalid_length(i, &"three factors"))
-                };
+                let mut next =
+                    |i| seq.next_element::<f64>()?.ok_or_else(|| serde::de::Error::invalid_length(i, &"three factors"));
                 Ok(DVec3::new(next(0)?, next(1)?, next(2)?))
             }
         }
