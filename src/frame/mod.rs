@@ -7,4 +7,4 @@ mod picture_file;
 
 pub use command::Command;
 pub use offline::{OfflineReport, Progress, Target, render_offline};
-pub use picture_file::{PictureFormat, check_writable, write_film};
+pub use picture_file::{PictureFormat, check_writable, write_film, write_new_film};

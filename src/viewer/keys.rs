@@ -230,7 +230,10 @@ pub static BINDINGS: &[Group] = &[
                 effect: "brighter, darker by a third of a stop",
             },
             Binding { triggers: &[send("m", Command::NextToneCurve)], effect: "next tone curve" },
-            Binding { triggers: &[text("i", Action::ToggleIntegrator)], effect: "path tracing or the classic Phong model" },
+            Binding {
+                triggers: &[text("i", Action::ToggleIntegrator)],
+                effect: "path tracing or the classic Phong model",
+            },
             Binding { triggers: &[text("p", Action::TogglePause)], effect: "pause, go on" },
             Binding { triggers: &[send("r", Command::Restart)], effect: "begin again" },
             Binding {
@@ -262,7 +265,10 @@ pub static BINDINGS: &[Group] = &[
                 effect: "hide everything but the picture",
             },
             Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen" },
-            Binding { triggers: &[named(NamedKey::Escape, Action::Leave)], effect: "close this list, or else the window" },
+            Binding {
+                triggers: &[named(NamedKey::Escape, Action::Leave)],
+                effect: "close this list, or else the window",
+            },
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
     },
@@ -389,7 +395,10 @@ mod tests {
         for trigger in &all {
             let Trigger::Press(Chord { key: Typed::Text(text), ctrl: false, .. }, _) = trigger else { continue };
             let label = text.to_uppercase();
-            assert!(!all.iter().any(|t| matches!(t, Trigger::Hold(code, _) if format!("{code:?}") == format!("Key{label}"))));
+            assert!(
+                !all.iter()
+                    .any(|t| matches!(t, Trigger::Hold(code, _) if format!("{code:?}") == format!("Key{label}")))
+            );
         }
     }
 
