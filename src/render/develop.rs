@@ -2,9 +2,10 @@
 
 use super::Film;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// How bright light is squeezed into what a screen can show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToneCurve {
     /// Clip at 1: what the numbers say.
     Linear,

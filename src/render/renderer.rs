@@ -1,10 +1,11 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
 use super::{Film, Snapshot};
+use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
 /// The light model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Integrator {
     /// The truth: unbiased path tracing.
     #[default]

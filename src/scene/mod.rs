@@ -28,4 +28,4 @@ pub use extract::{Extraction, Part, Trees};
 pub use inputs::{SceneInputs, SceneQueries};
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 pub use placement::{Linear, Placement};
-pub use view::{Lens, Projection, View};
+pub use view::{Lens, Projection, View, ViewError};
