@@ -7,6 +7,7 @@
 mod builtin;
 mod components;
 mod error;
+mod extent;
 mod extract;
 pub mod file;
 mod inputs;
@@ -24,8 +25,9 @@ pub use components::{
     SceneEnvironment, Shape, SurfaceTexture,
 };
 pub use error::{Problem, SceneError, suggestion};
-pub use extract::{Extraction, Part, Trees};
-pub use inputs::{SceneInputs, SceneQueries};
+pub use extent::{Extent, ExtentCache};
+pub use extract::{Extraction, Part, Trees, origin_for};
+pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 pub use placement::{Linear, Placement};
 pub use view::{Lens, Projection, View, ViewError};
