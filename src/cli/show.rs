@@ -38,9 +38,9 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     use firstlight::viewer::{ViewerOptions, run};
     let source = SceneSource::parse(&args.scene.scene).map_err(|error| Failure::Failed(error.to_string()))?;
     let (width, height) = args.size.unwrap_or((1280, 720));
-    let threads = args.threads.map_or(0, usize::from);
+    let threads = args.threads.map(usize::from);
     let folder = args.save_to.clone();
-    let options = ViewerOptions { source, width, height, threads, seed: args.seed, folder };
+    let options = ViewerOptions { source, width, height, threads, seed: args.seed, up: args.scene.up(), folder };
     run(options).map_err(|error| Failure::Failed(error.to_string()))
 }
 

@@ -33,10 +33,16 @@ pub enum Part {
 pub struct Trees {
     meshes: HashMap<usize, (Arc<Mesh>, Arc<MeshTree>)>,
     balls: HashMap<usize, (Arc<Balls>, Arc<SphereTree>)>,
+    /// What no tree can be built of, and why.
+    unfit: HashMap<usize, (Shape, String)>,
 }
 
 impl Trees {
+    /// Whether there is nothing to build for this shape.
     pub fn has(&self, shape: &Shape) -> bool {
+        if shared(shape).is_some_and(|key| self.unfit.contains_key(&key)) {
+            return true;
+        }
         match shape {
             Shape::Mesh(mesh) => self.meshes.contains_key(&address(mesh)),
             Shape::Spheres(balls) => self.balls.contains_key(&address(balls)),
@@ -68,8 +74,22 @@ impl Trees {
         Ok(())
     }
 
+    /// Remembers that no tree can be built, so that nobody tries again.
+    pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
+        if let Some(key) = shared(shape) {
+            self.unfit.insert(key, (shape.clone(), reason));
+        }
+    }
+
+    /// Why no tree could be built of this shape, if so.
+    fn reason(&self, shape: &Shape) -> String {
+        let reason = shared(shape).and_then(|key| self.unfit.get(&key));
+        reason.map_or("its tree is not built yet".to_owned(), |(_, reason)| reason.clone())
+    }
+
     /// Takes over all trees of `other`.
     pub fn extend(&mut self, other: Self) {
+        self.unfit.extend(other.unfit);
         self.meshes.extend(other.meshes);
         self.balls.extend(other.balls);
     }
@@ -79,6 +99,7 @@ impl Trees {
         let used: std::collections::HashSet<usize> = inputs.objects.iter().filter_map(|o| shared(&o.shape)).collect();
         self.meshes.retain(|key, _| used.contains(key));
         self.balls.retain(|key, _| used.contains(key));
+        self.unfit.retain(|key, _| used.contains(key));
     }
 }
 
@@ -163,6 +184,10 @@ impl Extraction {
                     if keys.is_empty() {
                         keys.push(MaterialKey::Grey);
                     }
+                    let n_slots =
+                        mesh.as_ref().and_then(|mesh| mesh.slots.iter().max()).map_or(1, |&last| usize::from(last) + 1);
+                    let last = keys[keys.len() - 1];
+                    keys.resize(keys.len().max(n_slots), last);
                     geometry.0.push(shape);
                     geometry
                         .1
@@ -296,13 +321,13 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
             kdtree::Shape::Triangle { vertices }
         }
         Shape::Mesh(mesh) => {
-            let (_, tree) = trees.meshes.get(&address(mesh)).ok_or("its mesh could not be used")?;
+            let (_, tree) = trees.meshes.get(&address(mesh)).ok_or_else(|| trees.reason(&object.shape))?;
             let world_from_object = about(world, mesh.center, origin);
             return Ok((kdtree::Shape::Mesh { tree: tree.clone(), world_from_object }, Some(mesh.clone())));
         }
         Shape::Spheres(balls) => {
             even(placement)?;
-            let (_, tree) = trees.balls.get(&address(balls)).ok_or("its balls could not be used")?;
+            let (_, tree) = trees.balls.get(&address(balls)).ok_or_else(|| trees.reason(&object.shape))?;
             kdtree::Shape::Spheres { tree: tree.clone(), world_from_object: about(world, balls.center, origin) }
         }
     };

@@ -6,11 +6,13 @@ use super::view::{Lens, Projection, View};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Query, Res, World};
 use bevy_ecs::system::{SystemParam, SystemState};
+use std::collections::HashSet;
 
 /// All that a snapshot is built from. Cheap to copy: meshes, clouds and pictures are shared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneInputs {
     pub objects: Vec<ObjectInput>,
+    /// Those that the objects use, directly or in a blend.
     pub materials: Vec<MaterialInput>,
     pub lights: Vec<LightInput>,
     /// The first camera.
@@ -65,19 +67,22 @@ pub struct SceneQueries<'w, 's> {
 impl SceneQueries<'_, '_> {
     pub fn collect(&self) -> SceneInputs {
         let text = |name: Option<&Name>| name.map(|name| name.as_str().to_owned());
+        let objects = in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {
+            entity,
+            name: text(name),
+            shape: shape.clone(),
+            placement: *placement,
+            slots: slots.0.clone(),
+        });
+        let used = self.used_materials(&objects);
+        let materials = self.materials.iter().filter(|(entity, ..)| used.contains(entity));
         SceneInputs {
-            objects: in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {
-                entity,
-                name: text(name),
-                shape: shape.clone(),
-                placement: *placement,
-                slots: slots.0.clone(),
-            }),
-            materials: in_order(self.materials.iter(), |entity, name, material| MaterialInput {
+            materials: in_order(materials, |entity, name, material| MaterialInput {
                 entity,
                 name: text(name),
                 material: material.clone(),
             }),
+            objects,
             lights: in_order(self.lights.iter(), |entity, name, (light, placement)| LightInput {
                 entity,
                 name: text(name),
@@ -94,6 +99,20 @@ impl SceneQueries<'_, '_> {
             ),
             environment: self.environment.as_deref().cloned().unwrap_or_default(),
         }
+    }
+
+    /// The materials that objects name, and those that these are blended of.
+    fn used_materials(&self, objects: &[ObjectInput]) -> HashSet<Entity> {
+        let mut used = HashSet::new();
+        let mut open: Vec<Entity> = objects.iter().flat_map(|object| object.slots.iter().copied()).collect();
+        while let Some(entity) = open.pop() {
+            if used.insert(entity)
+                && let Ok((.., Material::Blend { a, b, .. })) = self.materials.get(entity)
+            {
+                open.extend([*a, *b]);
+            }
+        }
+        used
     }
 }
 

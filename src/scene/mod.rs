@@ -7,11 +7,13 @@
 mod builtin;
 mod components;
 mod error;
+mod extent;
 mod extract;
 pub mod file;
 mod inputs;
 mod load;
 mod meshes;
+pub mod obj;
 mod picture;
 mod placement;
 mod showcase;
@@ -24,8 +26,9 @@ pub use components::{
     SceneEnvironment, Shape, SurfaceTexture,
 };
 pub use error::{Problem, SceneError, suggestion};
-pub use extract::{Extraction, Part, Trees};
-pub use inputs::{SceneInputs, SceneQueries};
+pub use extent::{Extent, ExtentCache};
+pub use extract::{Extraction, Part, Trees, origin_for};
+pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 pub use placement::{Linear, Placement};
 pub use view::{Lens, Projection, View, ViewError};

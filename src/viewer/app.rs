@@ -13,11 +13,11 @@ use super::saver::{Saved, Saver};
 use super::status;
 use super::toasts::{Toasts, Tone};
 use super::{camera_text, display, overlay};
-use crate::frame::{Command, PictureFormat, Session, SessionOptions};
+use crate::frame::{Command, MessageKind, PictureFormat, Session, SessionOptions, Target, Waker};
 use crate::render::Integrator;
-use crate::scene::SceneSource;
+use crate::scene::{SceneSource, UpAxis};
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -35,9 +35,11 @@ pub struct ViewerOptions {
     /// Of the window, logical pixels.
     pub width: u32,
     pub height: u32,
-    /// Worker threads; 0 is one for each processor.
-    pub threads: usize,
+    /// One for each processor when not given.
+    pub threads: Option<usize>,
     pub seed: u32,
+    /// Which axis of models points up; guessed when not given.
+    pub up: Option<UpAxis>,
     /// Where kept pictures go.
     pub folder: PathBuf,
 }
@@ -53,6 +55,10 @@ pub enum ViewerError {
     NoWindow(winit::error::OsError),
     #[error("the event loop ended by itself: {0}")]
     EventLoop(winit::error::EventLoopError),
+    #[error("{0}")]
+    Session(String),
+    #[error("{0}")]
+    Scene(String),
     #[error(transparent)]
     Present(#[from] PresentError),
 }
@@ -82,7 +88,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     // The text of the library's own error is a path into its source.
     let event_loop = builder.build().map_err(|_| ViewerError::NoDisplay)?;
     let pending = Arc::new(AtomicBool::new(false));
-    let waker: Arc<dyn Fn() + Send + Sync> = {
+    let waker: Waker = {
         let (proxy, pending) = (event_loop.create_proxy(), pending.clone());
         Arc::new(move || {
             // One event wakes the window; more would only queue up.
@@ -92,7 +98,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
             }
         })
     };
-    let mut app = App::new(options, pending, waker);
+    let mut app = App::new(options, pending, waker)?;
     event_loop.run_app(&mut app).map_err(ViewerError::EventLoop)?;
     for saved in app.saver.finish() {
         app.tell_saved(saved);
@@ -102,6 +108,8 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
 
 struct App {
     options: ViewerOptions,
+    /// The session's clock counts from here.
+    start: Instant,
     /// A wake-up is on its way.
     pending: Arc<AtomicBool>,
     session: Session,
@@ -118,7 +126,7 @@ struct App {
     /// Something happened since the last tick.
     stirred: bool,
     /// The picture on the window.
-    shown_generation: Option<u64>,
+    shown_picture: Option<u64>,
     shown_figures: String,
     last_tick: Option<Instant>,
     last_draw: Option<Instant>,
@@ -130,16 +138,20 @@ struct App {
 }
 
 impl App {
-    fn new(options: ViewerOptions, pending: Arc<AtomicBool>, waker: Arc<dyn Fn() + Send + Sync>) -> Self {
+    fn new(options: ViewerOptions, pending: Arc<AtomicBool>, waker: Waker) -> Result<Self, ViewerError> {
         let mut session = Session::new(SessionOptions {
             width: options.width,
             height: options.height,
             threads: options.threads,
             seed: options.seed,
-            waker: waker.clone(),
-        });
+            target: Target::default(),
+            up: options.up,
+            waker: Some(waker.clone()),
+        })
+        .map_err(ViewerError::Session)?;
         session.open(options.source.clone());
-        Self {
+        Ok(Self {
+            start: Instant::now(),
             pending,
             session,
             saver: Saver::new(&options.folder, waker),
@@ -152,7 +164,7 @@ impl App {
             title: String::new(),
             occluded: false,
             stirred: true,
-            shown_generation: None,
+            shown_picture: None,
             shown_figures: String::new(),
             last_tick: None,
             last_draw: None,
@@ -160,7 +172,7 @@ impl App {
             repaint_at: None,
             failure: None,
             options,
-        }
+        })
     }
 
     fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
@@ -188,15 +200,27 @@ impl App {
     }
 
     /// Hands over what was asked for, lets the session go on, and looks for something new.
-    fn tick(&mut self, now: Instant) {
+    fn tick(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
         self.stirred = false;
         self.last_tick = Some(now);
         for command in self.input.take(now) {
             self.session.send(command);
         }
-        self.session.update(now);
-        for message in self.session.messages() {
-            self.toasts.add(Tone::Problem, message, now);
+        let clock = now - self.start;
+        self.session.update(clock);
+        let status = self.session.status();
+        for message in status.messages.iter().filter(|message| message.at == clock) {
+            let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
+            self.toasts.add(tone, message.text.clone(), now);
+        }
+        // Without a first scene there is nothing to stay for, and the terminal is where the name was typed.
+        if status.scene.is_empty()
+            && status.loading.is_none()
+            && let Some(message) = status.messages.iter().find(|message| message.kind == MessageKind::Error)
+        {
+            self.failure = Some(ViewerError::Scene(message.text.clone()));
+            event_loop.exit();
+            return;
         }
         for saved in self.saver.finished() {
             self.tell_saved(saved);
@@ -209,7 +233,7 @@ impl App {
             window.set_title(&title);
             self.title = title;
         }
-        let new_picture = self.shown_generation != Some(self.session.picture().generation);
+        let new_picture = self.shown_picture != Some(self.session.picture().number);
         let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES);
         let new_figures = self.overlays && self.figures() != self.shown_figures;
         let repaint = self.repaint_at.is_some_and(|at| now >= at) || self.toasts.len() != n_toasts;
@@ -219,10 +243,8 @@ impl App {
         let moving = self.input.is_moving().then(|| now + FRAME);
         let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
-        self.wake_at = [self.session.next_wake(now), self.toasts.next_change(), moving, figures, repaint_at]
-            .into_iter()
-            .flatten()
-            .min();
+        let session = self.session.next_wake(clock).map(|at| self.start + at);
+        self.wake_at = [session, self.toasts.next_change(), moving, figures, repaint_at].into_iter().flatten().min();
     }
 
     fn figures(&self) -> String {
@@ -234,9 +256,9 @@ impl App {
         let figures = self.figures();
         let (Some(presenter), Some(window)) = (&mut self.presenter, &self.window) else { return Ok(()) };
         let picture = self.session.picture();
-        if self.shown_generation != Some(picture.generation) {
+        if self.shown_picture != Some(picture.number) {
             presenter.set_picture(picture)?;
-            self.shown_generation = Some(picture.generation);
+            self.shown_picture = Some(picture.number);
         }
         let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
         let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
@@ -266,7 +288,7 @@ impl App {
         let Err(error) = self.draw(now) else { return };
         log::error!("{error}");
         self.presenter = None;
-        self.shown_generation = None;
+        self.shown_picture = None;
         let again = self.window.clone().map(Presenter::new);
         match again {
             Some(Ok(presenter)) => {
@@ -325,7 +347,10 @@ impl App {
     fn screenshot(&mut self, linear: bool) {
         let format = if linear { PictureFormat::Exr } else { PictureFormat::Png };
         let status = self.session.status();
-        self.saver.save(self.session.film_snapshot(), status.display, &status.scene, format);
+        match self.session.film_snapshot() {
+            Some(film) => self.saver.save(film, status.display, &status.scene, format),
+            None => self.toasts.add(Tone::Problem, "there is no picture yet to be kept", Instant::now()),
+        }
     }
 
     fn tell_saved(&mut self, saved: Saved) {
@@ -428,7 +453,7 @@ impl ApplicationHandler<Wake> for App {
         if self.stirred {
             match self.last_tick.map(|then| then + FRAME).filter(|soon| *soon > now) {
                 Some(soon) => self.wake_at = Some(soon),
-                None => self.tick(now),
+                None => self.tick(now, event_loop),
             }
         }
         event_loop.set_control_flow(self.wake_at.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
@@ -442,5 +467,6 @@ impl ApplicationHandler<Wake> for App {
 }
 
 fn title(scene: &str) -> String {
-    if scene.is_empty() { "firstlight".to_owned() } else { format!("firstlight — {scene}") }
+    let name = Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy());
+    if name.is_empty() { "firstlight".to_owned() } else { format!("firstlight — {name}") }
 }

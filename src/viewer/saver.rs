@@ -1,9 +1,8 @@
 //! Saves pictures on threads of their own, so that the window goes on.
 
-use crate::frame::{PictureFormat, write_new_film};
+use crate::frame::{PictureFormat, Waker, write_new_film};
 use crate::render::{Display, Film};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
@@ -12,7 +11,7 @@ pub type Saved = Result<PathBuf, String>;
 
 pub struct Saver {
     folder: PathBuf,
-    waker: Arc<dyn Fn() + Send + Sync>,
+    waker: Waker,
     sender: Sender<Saved>,
     receiver: Receiver<Saved>,
     threads: Vec<JoinHandle<()>>,
@@ -20,7 +19,7 @@ pub struct Saver {
 
 impl Saver {
     /// Saves into `folder`; `waker` is called when a picture is done.
-    pub fn new(folder: &Path, waker: Arc<dyn Fn() + Send + Sync>) -> Self {
+    pub fn new(folder: &Path, waker: Waker) -> Self {
         let (sender, receiver) = channel();
         Self { folder: folder.to_owned(), waker, sender, receiver, threads: Vec::new() }
     }
@@ -69,6 +68,7 @@ fn file_stem(scene: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]

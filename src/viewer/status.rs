@@ -15,21 +15,21 @@ pub fn figures(status: &Status) -> String {
         "{} spp   {}   {:.2} Mrays/s   {}×{}",
         status.spp,
         seconds(status.seconds),
-        status.mrays_per_second,
-        status.width,
-        status.height
+        status.mrays(),
+        status.film_width,
+        status.film_height
     )
     .expect("a string takes all");
     if status.divider > 1 {
-        write!(line, " at 1/{}", status.divider).expect("a string takes all");
+        write!(line, " (1/{})", status.divider).expect("a string takes all");
     }
-    match status.error {
+    match status.estimated_error {
         Some(error) => write!(line, "   error {}", percent(error)),
         None => write!(line, "   error –"),
     }
     .expect("a string takes all");
-    if !status.cause.is_empty() {
-        write!(line, "   restarted: {}", status.cause).expect("a string takes all");
+    if !status.restart_cause.is_empty() {
+        write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
     }
     line
 }
@@ -106,15 +106,15 @@ mod tests {
 
     #[test]
     fn figures_say_what_matters() {
-        let mut status = Status { spp: 37, seconds: 12.34, mrays_per_second: 4.567, ..Status::default() };
-        (status.width, status.height, status.divider) = (1280, 720, 4);
-        (status.error, status.cause) = (Some(0.0234), "camera moved".to_owned());
+        let mut status = Status { spp: 37, seconds: 12.34, bounce_mrays: 4.567, ..Status::default() };
+        (status.film_width, status.film_height, status.divider) = (320, 180, 4);
+        (status.estimated_error, status.restart_cause) = (Some(0.0234), "camera moved".to_owned());
         assert_eq!(
             figures(&status),
-            "37 spp   12.3 s   4.57 Mrays/s   1280×720 at 1/4   error 2.3 %   restarted: camera moved"
+            "37 spp   12.3 s   4.57 Mrays/s   320×180 (1/4)   error 2.3 %   restarted: camera moved"
         );
-        (status.error, status.divider) = (None, 1);
-        assert!(figures(&status).contains("1280×720   error –"));
+        (status.estimated_error, status.divider) = (None, 1);
+        assert!(figures(&status).contains("320×180   error –"));
     }
 
     #[test]

@@ -67,17 +67,17 @@ impl Check<'_> {
             self.wrong("camera/f_stop", "`lens_radius` and `f_stop` say the same thing: give one of them");
         }
         if let Some(radius) = camera.lens_radius
-            && !(radius >= 0.0 && radius <= SceneFile::MAX_COORDINATE)
+            && !(0.0..=SceneFile::MAX_COORDINATE).contains(&radius)
         {
             self.wrong("camera/lens_radius", format!("`lens_radius` is {radius}, but must be 0 or positive"));
         }
         if let Some(f_stop) = camera.f_stop
-            && !(f_stop > 0.0)
+            && !is_positive(f_stop)
         {
             self.wrong("camera/f_stop", format!("`f_stop` is {f_stop}, but must be positive"));
         }
         if let Some(distance) = camera.focus_distance
-            && !(distance > 0.0)
+            && !is_positive(distance)
         {
             self.wrong("camera/focus_distance", format!("`focus_distance` is {distance}, but must be positive"));
         }
@@ -276,7 +276,7 @@ impl Check<'_> {
                 format!("the transform must be finite and move by at most {:e} m", SceneFile::MAX_COORDINATE),
             );
             None
-        } else if !(determinant.abs() > SceneFile::MIN_SIZE.powi(3)) || !determinant.is_finite() {
+        } else if !(SceneFile::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant.abs()) {
             self.wrong(path, "the transform squeezes the object flat: no scale may be 0");
             None
         } else {
@@ -361,7 +361,7 @@ impl Check<'_> {
     fn area(&mut self, path: &str, what: &str, edge_u: DVec3, edge_v: DVec3) {
         let sine = edge_u.normalize_or_zero().cross(edge_v.normalize_or_zero()).length();
         let both = edge_u.length() >= SceneFile::MIN_SIZE && edge_v.length() >= SceneFile::MIN_SIZE;
-        if both && edge_u.is_finite() && edge_v.is_finite() && !(sine > 1e-9) {
+        if both && edge_u.is_finite() && edge_v.is_finite() && sine <= 1e-9 {
             self.wrong(path, format!("the {what} has no area: its edges are parallel"));
         }
     }
@@ -389,6 +389,11 @@ pub fn check_film_size(width: u32, height: u32) -> Result<(), String> {
 
 fn is_coordinate(point: DVec3) -> bool {
     point.abs().max_element() <= SceneFile::MAX_COORDINATE && point.is_finite()
+}
+
+/// Infinity is; NaN is not.
+fn is_positive(value: f64) -> bool {
+    value > 0.0
 }
 
 fn is_size(size: f64) -> bool {
