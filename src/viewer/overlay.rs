@@ -1,6 +1,6 @@
 //! What is written over the picture: the status line, messages, and the list of keys.
 
-use super::keys::BINDINGS;
+use super::keys::{BINDINGS, Group};
 use super::toasts::{Toast, Tone};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
 
@@ -77,41 +77,45 @@ pub fn toasts(context: &Context, toasts: &[Toast]) {
 /// The list of keys, in the middle; `open` becomes false when its cross is clicked.
 pub fn help(context: &Context, open: &mut bool) {
     let screen = context.content_rect();
-    let column_width = 400.0;
+    let column_width = 430.0;
     let columns = if screen.width() >= 2.0 * column_width + 80.0 { 2 } else { 1 };
+    let room = Vec2::new(screen.width() - 50.0, screen.height() - 110.0).max(Vec2::splat(60.0));
     egui::Window::new("Keys and mouse")
         .open(open)
         .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
         .collapsible(false)
         .resizable(false)
-        .max_height((screen.height() - 80.0).max(80.0))
         .show(context, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| {
+            egui::ScrollArea::both().max_width(room.x).max_height(room.y).show(ui, |ui| {
                 ui.horizontal_top(|ui| {
                     // The first groups fill the left column, the rest the right one.
                     let split = BINDINGS.len().div_ceil(columns);
                     for (i, groups) in BINDINGS.chunks(split).enumerate() {
                         ui.vertical(|ui| {
-                            ui.set_width(column_width.min(screen.width() - 60.0));
-                            egui::Grid::new(("keys", i)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
-                                for group in groups {
-                                    ui.label(RichText::new(group.title).size(TEXT_SIZE + 2.0).strong());
-                                    ui.end_row();
-                                    for binding in group.bindings {
-                                        ui.label(RichText::new(binding.keys()).size(TEXT_SIZE).color(KEY));
-                                        ui.label(RichText::new(binding.effect).size(TEXT_SIZE));
-                                        ui.end_row();
-                                    }
-                                    // An empty row parts the groups.
-                                    ui.label("");
-                                    ui.end_row();
-                                }
-                            });
+                            ui.set_width(column_width);
+                            groups_grid(ui, i, groups);
                         });
                     }
                 });
             });
         });
+}
+
+fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[Group]) {
+    egui::Grid::new(("keys", id)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
+        for group in groups {
+            ui.label(RichText::new(group.title).size(TEXT_SIZE + 2.0).strong());
+            ui.end_row();
+            for binding in group.bindings {
+                ui.label(RichText::new(binding.keys()).size(TEXT_SIZE).color(KEY));
+                ui.label(RichText::new(binding.effect).size(TEXT_SIZE));
+                ui.end_row();
+            }
+            // An empty row parts the groups.
+            ui.label("");
+            ui.end_row();
+        }
+    });
 }
 
 fn glass() -> Frame {

@@ -76,7 +76,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let woken = Arc::new(AtomicUsize::new(0));
         let counter = woken.clone();
-        let mut saver = Saver::new(folder.path(), Arc::new(move || drop(counter.fetch_add(1, Ordering::SeqCst))));
+        let mut saver = Saver::new(
+            folder.path(),
+            Arc::new(move || {
+                counter.fetch_add(1, Ordering::SeqCst);
+            }),
+        );
         for _ in 0..8 {
             saver.save(Film::new(3, 2), Display::default(), "scenes/my room.ron", PictureFormat::Png);
         }

@@ -45,7 +45,7 @@ pub fn settings(status: &Status) -> String {
     }
     let lens = status.rig.lens;
     if lens.enabled {
-        parts.push(format!("focus {}, aperture ⌀ {}", metres(lens.focus_distance), metres(2.0 * lens.radius)));
+        parts.push(format!("focus {}, aperture {} wide", metres(lens.focus_distance), metres(2.0 * lens.radius)));
     }
     if status.display.exposure_stops != 0.0 {
         parts.push(format!("{:+.1} stops", status.display.exposure_stops));
@@ -124,7 +124,7 @@ mod tests {
         status.rig.lens = Lens::thin(0.01, 2.5);
         status.paused = true;
         status.display.exposure_stops = -1.0 / 3.0;
-        assert_eq!(settings(&status), "paused   focus 2.50 m, aperture ⌀ 2.0 cm   -0.3 stops   H: keys");
+        assert_eq!(settings(&status), "paused   focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   H: keys");
     }
 
     #[test]
