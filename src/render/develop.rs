@@ -2,13 +2,9 @@
 
 use super::Film;
 use glam::Vec3;
-<<<<<<< HEAD
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
-=======
-use serde::{Deserialize, Serialize};
->>>>>>> scene
 
 /// How bright light is squeezed into what a screen can show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
