@@ -162,17 +162,6 @@ impl Session {
         &mut self.world
     }
 
-    /// The camera as commands steer it.
-    pub fn rig(&mut self) -> Option<Rig> {
-        use crate::scene::{Lens, Ordinal, Projection, View};
-        use bevy_ecs::prelude::Entity;
-        let mut cameras = self.world.query::<(Entity, Option<&Ordinal>, &View, &Projection, &Lens)>();
-        cameras
-            .iter(&self.world)
-            .min_by_key(|(entity, rank, ..)| (rank.map_or(u32::MAX, |rank| rank.0), *entity))
-            .map(|(_, _, view, projection, lens)| Rig { view: *view, projection: *projection, lens: *lens })
-    }
-
     /// A copy of the film, for saving: linear light at the resolution that it has now. Takes a few milliseconds.
     pub fn film_snapshot(&self) -> Option<Film> {
         self.world.resource::<Renderer>().0.film()

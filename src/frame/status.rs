@@ -1,6 +1,7 @@
 //! What a session has to show: the picture, and how it is getting on.
 
-use crate::render::{BadSample, RayCounts};
+use super::navigation::Rig;
+use crate::render::{BadSample, Display, Integrator, RayCounts};
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -27,6 +28,10 @@ pub struct Picture {
 pub struct Status {
     /// What is open.
     pub scene: String,
+    /// The camera, as commands steer it.
+    pub rig: Rig,
+    pub display: Display,
+    pub integrator: Integrator,
     /// Samples per pixel.
     pub spp: u32,
     /// Seconds of rendering since the restart.

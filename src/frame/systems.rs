@@ -8,10 +8,10 @@ use super::worker::{Job, Worker};
 use super::{Target, navigation};
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal, Placement,
-    PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
+    CameraInput, Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal,
+    Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
 };
-use bevy_ecs::prelude::{Changed, Mut, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
+use bevy_ecs::prelude::{Changed, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
 use bevy_ecs::system::SystemParam;
 use std::sync::Arc;
 use std::time::Duration;
@@ -371,7 +371,6 @@ pub fn present(
     {
         status.say(clock.0, MessageKind::Error, failure.clone());
     }
-    let status: &mut Mut<Status> = &mut status.into();
     status.spp = stats.spp;
     status.seconds = stats.seconds;
     status.rays = stats.rays;
@@ -382,6 +381,10 @@ pub fn present(
     status.n_bad = stats.n_bad;
     status.bad = stats.bad;
     status.threads = stats.threads;
+    if let Some(CameraInput { view, projection, lens, .. }) = shown.inputs.camera {
+        status.rig = navigation::Rig { view, projection, lens };
+    }
+    (status.display, status.integrator) = (shown.display, shown.settings.integrator);
     status.done = stats.done && stats.generation == shown.generation;
     status.paused = paused.0;
     status.loading = beside.progress();

@@ -184,6 +184,10 @@ impl Extraction {
                     if keys.is_empty() {
                         keys.push(MaterialKey::Grey);
                     }
+                    let n_slots =
+                        mesh.as_ref().and_then(|mesh| mesh.slots.iter().max()).map_or(1, |&last| usize::from(last) + 1);
+                    let last = keys[keys.len() - 1];
+                    keys.resize(keys.len().max(n_slots), last);
                     geometry.0.push(shape);
                     geometry
                         .1

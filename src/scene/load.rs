@@ -138,6 +138,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             scene.warnings.extend(mesh.warnings.iter().cloned());
             let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
             scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
+            scene.add_mesh_pictures(options);
             scene
         }
     };
@@ -207,13 +208,12 @@ fn resolve(
         wanted.push(("environment/file".to_owned(), file.clone()));
     }
     for (place, file) in wanted {
-        if let Err(error) = scene.add_picture(&file, options) {
+        let path = scene.folder.join(&file);
+        if let Err(error) = scene.add_picture(&file, &path, options) {
             note(place, error);
         }
     }
-    if let Err(error) = scene.add_mesh_pictures(options) {
-        note("objects".to_owned(), error);
-    }
+    scene.add_mesh_pictures(options);
     if problems.is_empty() { Ok(scene) } else { Err(SceneError { problems }) }
 }
 
@@ -233,36 +233,26 @@ impl LoadedScene {
         }
     }
 
-    fn add_picture(&mut self, file: &str, options: &LoadOptions) -> Result<(), SceneError> {
-        if self.pictures.contains_key(file) {
+    fn add_picture(&mut self, name: &str, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
+        if self.pictures.contains_key(name) {
             return Ok(());
         }
-        options.say(&format!("reading {file}"));
-        let path = self.folder.join(file);
-        let (picture, warning) = read_picture(&path).map_err(|reason| SceneError::in_file(&path, reason))?;
+        options.say(&format!("reading {name}"));
+        let (picture, warning) = read_picture(path).map_err(|reason| SceneError::in_file(path, reason))?;
         self.warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
-        self.pictures.insert(file.to_owned(), Arc::new(picture));
+        self.pictures.insert(name.to_owned(), Arc::new(picture));
         Ok(())
     }
 
     /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
-    fn add_mesh_pictures(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
-        let files: Vec<String> = self
-            .meshes
-            .iter()
-            .flatten()
-            .flat_map(|mesh| &mesh.textures)
-            .filter_map(|(_, texture)| match texture {
-                TexturePart::Image { file, .. } => Some(file.clone()),
-                TexturePart::Checker { .. } => None,
-            })
-            .collect();
-        for file in files {
-            if let Err(error) = self.add_picture(&file, options) {
+    fn add_mesh_pictures(&mut self, options: &LoadOptions) {
+        let textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
+        let files: Vec<(String, PathBuf)> = textures.map(|(name, _, file)| (name.clone(), file.clone())).collect();
+        for (name, path) in files {
+            if let Err(error) = self.add_picture(&name, &path, options) {
                 self.warnings.push(format!("{error}; the surface is left plain"));
             }
         }
-        Ok(())
     }
 
     fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {

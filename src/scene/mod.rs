@@ -13,6 +13,7 @@ pub mod file;
 mod inputs;
 mod load;
 mod meshes;
+pub mod obj;
 mod picture;
 mod placement;
 mod showcase;

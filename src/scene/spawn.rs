@@ -24,7 +24,7 @@ impl LoadedScene {
 
         let mut textures: HashMap<&str, Arc<SurfaceTexture>> = HashMap::new();
         let own_textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
-        for (name, part) in self.file.textures.iter().chain(own_textures.map(|(name, part)| (name.as_str(), part))) {
+        for (name, part) in self.file.textures.iter().chain(own_textures.map(|(name, part, _)| (name.as_str(), part))) {
             if let Some(texture) = self.texture(part) {
                 let texture = SurfaceTexture { name: name.to_owned(), part: part.clone(), texture };
                 textures.entry(name).or_insert_with(|| Arc::new(texture));

@@ -33,32 +33,36 @@ impl Default for SerpentKnot {
 /// Radius of the torus on which the body runs, and of that torus's tube. Metres, like all lengths here.
 const KNOT: DVec2 = dvec2(1.0, 0.46);
 /// Radius of the body.
-const BODY: f64 = 0.235;
+const BODY: f64 = 0.24;
 /// Fins of the crest; scale rows along the body (even: they are staggered); scales around it; belly plates.
-const FINS: f64 = 54.0;
-const SCALE_ROWS: u32 = 216;
+const FINS: f64 = 72.0;
+const SCALE_ROWS: u32 = 200;
 const SCALES_AROUND: f64 = 20.0;
-const BELLY_PLATES: f64 = 108.0;
+const BELLY_PLATES: f64 = 100.0;
 
 /// A knot about 3.4 metres wide and 1.5 high about the origin, lying flat, y up. Closed, manifold, genus 1.
 pub fn serpent_knot(shape: &SerpentKnot) -> Mesh {
     let SerpentKnot { along, around, .. } = *shape;
     assert!(along >= 64 && around >= 8, "the knot needs at least 64 × 8 segments, not {along} × {around}");
+    let knot = ArcLength::new();
     let positions: Vec<DVec3> = (0..along * around)
         .into_par_iter()
         .map(|k| {
             let s = f64::from(k / around) / f64::from(along);
+            let t = knot.parameter_at(s);
             let theta = TAU * f64::from(k % around) / f64::from(around);
             // Twice as many vertices on the back as on the belly: the fins are the thinnest thing here.
-            surface_point(shape, s, theta - 0.5 * theta.sin())
+            surface_point(shape, s, t, theta - 0.5 * theta.sin())
         })
         .collect();
     built(&positions, closed_grid(along, around))
 }
 
-/// - `s`: place along the body, `[0, 1)`; - `angle`: around it, 0 on the back, π on the belly.
-fn surface_point(shape: &SerpentKnot, s: f64, angle: f64) -> DVec3 {
-    let (center, tangent, back, side) = body_frame(s);
+/// - `s`: place along the body as a share of its length, `[0, 1)`.
+/// - `t`: the same place as the knot's own parameter, `[0, 1)`.
+/// - `angle`: around the body, radians, 0 on the back, π on the belly.
+fn surface_point(shape: &SerpentKnot, s: f64, t: f64, angle: f64) -> DVec3 {
+    let (center, tangent, back, side) = body_frame(t);
     let (sin, cos) = angle.sin_cos();
     let outward = cos * back + sin * side;
     let from_back = angle.min(TAU - angle);
@@ -75,14 +79,40 @@ fn surface_point(shape: &SerpentKnot, s: f64, angle: f64) -> DVec3 {
     let grain = ridged_noise(skin * 19.0, 3, shape.seed) - 0.5;
     let soft = fractal_noise(skin * 3.0, 3, shape.seed ^ 0x3c6e);
     let relief =
-        (1.0 - belly) * (1.0 - 0.8 * spine) * 0.024 * scales + belly * 0.02 * plates + 0.0016 * grain + 0.006 * soft;
+        (1.0 - belly) * (1.0 - 0.8 * spine) * 0.034 * scales + belly * 0.024 * plates + 0.0016 * grain + 0.006 * soft;
 
     let (rise, sweep) = fin(s, from_back);
     let lift = shape.relief * (relief + rise);
     skin + outward * lift - tangent * (shape.relief * sweep)
 }
 
-/// The centre line at `s`, and its frame: along the body, to its back, to its side; tangent × side is back.
+/// Places along the centre line by length: the knot's own parameter runs almost twice as fast on the outside.
+struct ArcLength {
+    /// Share of the length up to each of equal steps of the parameter, from 0 to 1.
+    shares: Vec<f64>,
+}
+
+impl ArcLength {
+    fn new() -> Self {
+        let steps: u32 = 4096;
+        let point = |i: u32| body_frame(f64::from(i) / f64::from(steps)).0;
+        let mut shares = vec![0.0];
+        for i in 0..steps {
+            shares.push(shares[i as usize] + point(i).distance(point(i + 1)));
+        }
+        let length = shares[steps as usize];
+        shares.iter_mut().for_each(|share| *share /= length);
+        Self { shares }
+    }
+
+    fn parameter_at(&self, s: f64) -> f64 {
+        let above = self.shares.partition_point(|&share| share <= s).clamp(1, self.shares.len() - 1);
+        let (from, to) = (self.shares[above - 1], self.shares[above]);
+        (above as f64 - 1.0 + (s - from) / (to - from)) / (self.shares.len() - 1) as f64
+    }
+}
+
+/// The centre line at parameter `s`, and its frame: along the body, to its back, to its side; tangent × side is back.
 fn body_frame(s: f64) -> (DVec3, DVec3, DVec3, DVec3) {
     // A (2, 3) torus knot: twice around the axis, three times around the tube. The torus's own normal is a frame
     // that closes on itself, and it turns every fin outwards.
@@ -133,14 +163,14 @@ fn plate_relief(x: f64) -> f64 {
 
 /// Height of the crest's fins and how far they lean back, metres.
 fn fin(s: f64, from_back: f64) -> (f64, f64) {
-    let across = (-(from_back / 0.1).powi(2)).exp();
+    let across = (-(from_back / 0.11).powi(2)).exp();
     let u = s * FINS - (s * FINS).floor();
     // Every third fin is the largest, so that the crest has a rhythm.
     let rhythm = 0.8 + 0.2 * (TAU * s * FINS / 3.0).cos();
     let blade = (0.5 - 0.5 * (TAU * u).cos()).powf(1.5);
-    let base = 0.25;
-    let height = 0.105 * rhythm * across * (base + (1.0 - base) * blade);
-    (height, 0.55 * height * blade)
+    let base = 0.18;
+    let height = 0.12 * rhythm * across * (base + (1.0 - base) * blade);
+    (height, 0.6 * height * blade)
 }
 
 /// 0 below `from`, 1 above `to`, with level ends.
@@ -167,9 +197,10 @@ mod tests {
     #[test]
     fn strands_keep_clear_of_each_other() {
         // Points of the finished surface far apart along the body must be far apart in space as well.
+        let knot = ArcLength::new();
         let points: Vec<(f64, DVec3)> = (0..240)
             .flat_map(|i| (0..24).map(move |j| (f64::from(i) / 240.0, TAU * f64::from(j) / 24.0)))
-            .map(|(s, angle)| (s, surface_point(&SerpentKnot::default(), s, angle)))
+            .map(|(s, angle)| (s, surface_point(&SerpentKnot::default(), s, knot.parameter_at(s), angle)))
             .collect();
         let mut nearest = f64::INFINITY;
         for (i, (s, p)) in points.iter().enumerate() {
