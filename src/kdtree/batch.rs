@@ -1,5 +1,6 @@
 //! Rays and hits as structures of arrays: what a wave of the integrator hands to the kernel and gets back.
 
+use super::Hit;
 use crate::geometry::Ray;
 use glam::Vec3;
 
@@ -94,6 +95,14 @@ impl HitBatch {
 
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
+    }
+
+    /// The answer for ray `i`, `None` for a miss.
+    #[inline]
+    pub fn get(&self, i: usize) -> Option<Hit> {
+        let object = self.object[i];
+        let hit = Hit { t: self.t[i], u: self.u[i], v: self.v[i], prim: self.prim[i], object };
+        (object != Self::MISS).then_some(hit)
     }
 
     /// Makes room for `n` answers, all of them misses.

@@ -5,11 +5,19 @@
 //! Knows nothing of materials or entities: positions go in, hits come out.
 
 mod batch;
+mod build;
 mod mesh_tree;
+mod nodes;
+mod ray;
 mod scene_tree;
 mod sphere_tree;
+mod split;
+mod stats;
+mod surface;
 
 pub use batch::{HitBatch, RayBatch};
 pub use mesh_tree::{BuildPreset, MeshTree};
 pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
 pub use sphere_tree::SphereTree;
+pub use stats::KdTreeStats;
+pub use surface::SurfacePoint;
