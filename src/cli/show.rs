@@ -20,6 +20,7 @@ pub fn run(args: &ShowArgs) -> Result<(), Failure> {
         size: None,
         spp: None,
         time: None,
+        error: None,
         threads: None,
         seed: 0,
         integrator: None,

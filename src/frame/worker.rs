@@ -38,6 +38,8 @@ pub struct Stats {
     pub spp: u32,
     /// Seconds of rendering since the restart.
     pub seconds: f64,
+    /// Relative error of the whole picture, when it is known.
+    pub error: Option<f64>,
     /// Rays of the last steps, and the seconds that they took.
     pub recent_rays: RayCounts,
     pub recent_seconds: f64,
@@ -336,7 +338,9 @@ impl<'a> Loop<'a> {
         stats.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(stats.bad.len())));
         let interrupted = !pass.completed && interrupt.load(Ordering::Relaxed);
         let replaced = interrupted && lock(&self.shared.inbox).job.is_some();
-        let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp() };
+        let error = film.error_estimate().map(|error| error.relative);
+        stats.error = error.filter(|_| divider == 1);
+        let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp(), error };
         self.scheduler.finished(step, report, self.clock.elapsed());
         if film.spp() > 0 {
             self.previous = None;

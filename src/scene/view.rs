@@ -15,6 +15,7 @@ use thiserror::Error;
 /// them so. The pivot is the point on the view axis that orbiting turns about; it is not seen in the picture, so a
 /// change of `pivot_distance` alone restarts nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Component, Serialize, Deserialize)]
+#[require(Projection, Lens)]
 pub struct View {
     pub eye: DVec3,
     pub forward: DVec3,
