@@ -1,6 +1,6 @@
 //! Scattering at a point: one lobe, or several blended by weight.
 //!
-//! [`Bsdf::eval`], [`Bsdf::pdf`] and [`Bsdf::sample`] are one family. Directions are unit, in world space, leaving
+//! [`Scatter::eval`] and [`Scatter::sample`] are one family. Directions are unit, in world space, leaving
 //! the surface; `normal` is the shading normal on the side of `wo`. Perfectly specular lobes have no `eval`: only
 //! sampling finds them.
 
@@ -40,9 +40,25 @@ pub(super) const SMALLEST_ALPHA: f32 = 1e-4;
 /// How many lobes a blend of blends may come to.
 pub(super) const MAX_LOBES: usize = 8;
 
+/// What the integrator asks of a surface, be it one lobe or a blend.
+pub(super) trait Scatter {
+    /// Whether light sampling can find anything: some lobe is not perfectly specular.
+    fn is_smooth(&self) -> bool;
+
+    /// f · cos of all smooth lobes, and the density of sampling `wi` through one of them; zero for `wi` behind
+    /// `normal`.
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
+
+    /// - `u_lobe`: chooses the lobe, and between reflection and refraction; asked for only where there is a choice;
+    /// - `u`: the direction.
+    ///
+    /// `None` when the sample carries no light.
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample>;
+}
+
 /// Lobes with weights that sum to at most 1.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bsdf {
+#[derive(Clone, Debug)]
+pub(super) struct Blend {
     lobes: [WeightedLobe; MAX_LOBES],
     n: usize,
 }
@@ -67,39 +83,32 @@ pub(super) struct BsdfSample {
     pub transmitted: bool,
 }
 
-impl Bsdf {
-    pub fn single(lobe: Lobe) -> Self {
-        Self { lobes: [WeightedLobe { lobe, weight: 1.0, pmf: 1.0 }; MAX_LOBES], n: 1 }
-    }
-
+impl Blend {
     /// From lobes and their weights; at most [`MAX_LOBES`], at least one.
-    pub fn blend(parts: &[(Lobe, f32)]) -> Self {
-        let mut bsdf = Self::single(parts[0].0);
-        bsdf.n = parts.len();
+    pub fn new(parts: &[(Lobe, f32)]) -> Self {
+        let nothing = WeightedLobe { lobe: parts[0].0, weight: 0.0, pmf: 0.0 };
+        let mut blend = Self { lobes: [nothing; MAX_LOBES], n: parts.len() };
         // Chosen by what they reflect; an even share where all is black.
         let strength = |(lobe, weight): &(Lobe, f32)| weight * lobe.albedo_estimate();
         let sum: f32 = parts.iter().map(strength).sum();
-        for (slot, part) in bsdf.lobes.iter_mut().zip(parts) {
+        for (slot, part) in blend.lobes.iter_mut().zip(parts) {
             let pmf = if sum > 0.0 { strength(part) / sum } else { 1.0 / parts.len() as f32 };
             *slot = WeightedLobe { lobe: part.0, weight: part.1, pmf };
         }
-        bsdf
+        blend
     }
 
     fn lobes(&self) -> &[WeightedLobe] {
         &self.lobes[..self.n]
     }
+}
 
-    /// Whether light sampling can find anything: some lobe is not perfectly specular.
-    #[inline]
-    pub fn is_smooth(&self) -> bool {
+impl Scatter for Blend {
+    fn is_smooth(&self) -> bool {
         self.lobes().iter().any(|l| l.lobe.is_smooth())
     }
 
-    /// f · cos of all smooth lobes, and the density of sampling `wi` through one of them; `wi` on the side of
-    /// `normal`.
-    #[inline]
-    pub fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let mut sum = (Vec3::ZERO, 0.0);
         for l in self.lobes().iter().filter(|l| l.lobe.is_smooth()) {
             let (value, pdf) = l.lobe.eval(wo, wi, normal);
@@ -109,16 +118,7 @@ impl Bsdf {
         sum
     }
 
-    /// - `u_lobe`: chooses the lobe, and between reflection and refraction; asked for only where there is a choice;
-    /// - `u`: the direction.
-    ///
-    /// `None` when the sample carries no light.
-    #[inline]
-    pub fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
-        if self.n == 1 {
-            let only = &self.lobes[0];
-            return only.lobe.sample(wo, normal, u_lobe, u).map(|s| BsdfSample { weight: only.weight * s.weight, ..s });
-        }
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
         let mut rest = u_lobe();
         let lobes = self.lobes();
         let chosen = lobes
@@ -147,6 +147,16 @@ impl Bsdf {
 }
 
 impl Lobe {
+    fn albedo_estimate(&self) -> f32 {
+        match self {
+            Self::Diffuse { albedo } => luminance(*albedo),
+            Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => luminance(*reflectance),
+            Self::Glass { .. } => 1.0,
+        }
+    }
+}
+
+impl Scatter for Lobe {
     #[inline]
     fn is_smooth(&self) -> bool {
         match self {
@@ -156,15 +166,6 @@ impl Lobe {
         }
     }
 
-    fn albedo_estimate(&self) -> f32 {
-        match self {
-            Self::Diffuse { albedo } => luminance(*albedo),
-            Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => luminance(*reflectance),
-            Self::Glass { .. } => 1.0,
-        }
-    }
-
-    /// f · cos and pdf; zero for specular lobes.
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let cos = normal.dot(wi);
@@ -280,7 +281,7 @@ mod tests {
     }
 
     /// Share of light returned when all of it comes from a uniformly bright surround.
-    fn furnace(bsdf: &Bsdf, cos: f32) -> Vec3 {
+    fn furnace(bsdf: &impl Scatter, cos: f32) -> Vec3 {
         let n = 1 << 14;
         let mut sum = Vec3::ZERO;
         for i in 0..n {
@@ -296,10 +297,10 @@ mod tests {
     fn white_furnace_loses_nothing_and_makes_nothing() {
         for cos in [1.0, 0.7, 0.3, 0.05, 1e-3] {
             for lobe in [Lobe::Diffuse { albedo: Vec3::ONE }, Lobe::Mirror { reflectance: Vec3::ONE }] {
-                assert!((furnace(&Bsdf::single(lobe), cos) - Vec3::ONE).length() < 1e-4, "{lobe:?} at {cos}");
+                assert!((furnace(&lobe, cos) - Vec3::ONE).length() < 1e-4, "{lobe:?} at {cos}");
             }
             for alpha in [0.001, 0.05, 0.3, 0.6, 1.0] {
-                let plain = furnace(&Bsdf::single(metal(alpha, false)), cos).x;
+                let plain = furnace(&metal(alpha, false), cos).x;
                 assert!(plain <= 1.0 + 1e-4, "α {alpha}, cos {cos}: {plain}");
             }
         }
@@ -309,7 +310,7 @@ mod tests {
     fn compensation_returns_what_single_scattering_lost() {
         for cos in [1.0, 0.7, 0.3] {
             for alpha in [0.3, 0.6, 1.0] {
-                let whole = furnace(&Bsdf::single(metal(alpha, true)), cos).x;
+                let whole = furnace(&metal(alpha, true), cos).x;
                 assert!((whole - 1.0).abs() < 0.02, "α {alpha}, cos {cos}: {whole}");
             }
         }
@@ -318,37 +319,37 @@ mod tests {
     #[test]
     fn sampling_and_evaluation_give_the_same_mean() {
         let coat = [(Lobe::Diffuse { albedo: Vec3::new(0.8, 0.4, 0.1) }, 0.7), (metal(0.2, false), 0.3)];
-        let bsdfs = [
-            Bsdf::single(Lobe::Diffuse { albedo: Vec3::splat(0.6) }),
-            Bsdf::single(metal(0.4, false)),
-            Bsdf::blend(&coat),
-        ];
-        for (case, bsdf) in bsdfs.iter().enumerate() {
-            for cos in [0.9, 0.4, 0.1] {
-                let wo = direction(cos);
-                // ∫ f cos · L with an uneven L, by even directions and by sampling.
-                let light = |w: Vec3| 1.0 + w.x + 0.5 * w.y * w.y;
-                let n = 1 << 16;
-                let (mut even, mut sampled, mut pdf_integral) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-                for i in 0..n {
-                    let sampler = Sampler::new(11, case as u32, 0, i);
-                    let u = sampler.pair(0);
-                    let (r, phi) = ((1.0 - u.x * u.x).sqrt(), std::f32::consts::TAU * u.y);
-                    let wi = Vec3::new(r * phi.cos(), r * phi.sin(), u.x);
-                    let (value, pdf) = bsdf.eval(wo, wi, Vec3::Z);
-                    even += value * light(wi) * std::f32::consts::TAU;
-                    pdf_integral += pdf * std::f32::consts::TAU;
-                    if let Some(s) = bsdf.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(1)) {
-                        sampled += s.weight * light(s.wi);
-                        let (value, pdf) = bsdf.eval(wo, s.wi, Vec3::Z);
-                        assert!((value / pdf - s.weight).length() < 2e-3 * s.weight.length());
-                        assert!((pdf - s.pdf).abs() < 2e-3 * pdf);
-                    }
+        same_mean(0, &Lobe::Diffuse { albedo: Vec3::splat(0.6) });
+        same_mean(1, &metal(0.4, false));
+        same_mean(2, &Blend::new(&coat));
+        same_mean(3, &Blend::new(&coat[..1]));
+    }
+
+    fn same_mean(case: u32, bsdf: &impl Scatter) {
+        for cos in [0.9, 0.4, 0.1] {
+            let wo = direction(cos);
+            // ∫ f cos · L with an uneven L, by even directions and by sampling.
+            let light = |w: Vec3| 1.0 + w.x + 0.5 * w.y * w.y;
+            let n = 1 << 16;
+            let (mut even, mut sampled, mut pdf_integral) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+            for i in 0..n {
+                let sampler = Sampler::new(11, case, 0, i);
+                let u = sampler.pair(0);
+                let (r, phi) = ((1.0 - u.x * u.x).sqrt(), std::f32::consts::TAU * u.y);
+                let wi = Vec3::new(r * phi.cos(), r * phi.sin(), u.x);
+                let (value, pdf) = bsdf.eval(wo, wi, Vec3::Z);
+                even += value * light(wi) * std::f32::consts::TAU;
+                pdf_integral += pdf * std::f32::consts::TAU;
+                if let Some(s) = bsdf.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(1)) {
+                    sampled += s.weight * light(s.wi);
+                    let (value, pdf) = bsdf.eval(wo, s.wi, Vec3::Z);
+                    assert!((value / pdf - s.weight).length() < 2e-3 * s.weight.length());
+                    assert!((pdf - s.pdf).abs() < 2e-3 * pdf);
                 }
-                let (even, sampled) = (even / n as f32, sampled / n as f32);
-                assert!((even - sampled).length() < 0.02 * even.length(), "case {case}, {cos}: {even} {sampled}");
-                assert!(pdf_integral / n as f32 <= 1.01, "case {case}: pdf integrates to more than one");
             }
+            let (even, sampled) = (even / n as f32, sampled / n as f32);
+            assert!((even - sampled).length() < 0.02 * even.length(), "case {case}, {cos}: {even} {sampled}");
+            assert!(pdf_integral / n as f32 <= 1.01, "case {case}: pdf integrates to more than one");
         }
     }
 
@@ -366,7 +367,7 @@ mod tests {
     fn glass_splits_all_light_and_nothing_more() {
         for eta in [1.0 / 1.5, 1.5, 1.0, 1.0 / 1.000_001] {
             for cos in [1.0, 0.6, 0.2, 1e-3] {
-                let bsdf = Bsdf::single(Lobe::Glass { eta });
+                let bsdf = Lobe::Glass { eta };
                 let (reflectance, _) = fresnel(cos, eta);
                 let n = 1000;
                 let reflected = (0..n)

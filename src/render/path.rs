@@ -6,19 +6,19 @@
 //! find them as well as anything could. Paths end by Russian roulette, never by a limit unless one is asked for.
 //! Start reading at [`PathWave::trace`].
 
-use super::bsdf::Bsdf;
+use super::bsdf::Scatter;
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::renderer::RayCounts;
-use super::surface::{Vertex, bsdf_at, material_of};
-use super::{Material, Snapshot};
+use super::surface::{Vertex, blend_at, lobe_at, material_of};
+use super::{Material, MaterialId, Snapshot};
 use crate::geometry::{Ray, robust};
 use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use crate::sampling::Sampler;
 use glam::Vec3;
 
 /// Segments before Russian roulette begins: the first bounces carry most of the light.
-const ROULETTE_DEPTH: u32 = 3;
+const ROULETTE_DEPTH: u32 = 5;
 
 /// From here on even paths that lose nothing are ended now and then: between perfect mirrors they would go on for
 /// ever.
@@ -156,13 +156,23 @@ impl PathWave {
             if depth == max_depth {
                 continue;
             }
-            let Some(bsdf) = bsdf_at(scene, material, &vertex, &path.media) else { continue };
-            let dimension = CAMERA_DIMENSIONS + (depth - 1) * VERTEX_DIMENSIONS;
-            if scene.shading.features.light_sampling && bsdf.is_smooth() {
-                self.sample_light(scene, &path, &vertex, &bsdf, dimension);
+            let step = Step { scene, path: &path, vertex: &vertex, material, depth };
+            if let Material::Blend { .. } = &scene.shading.materials[material as usize] {
+                if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
+                    self.scatter(step, &blend);
+                }
+            } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
+                self.scatter(step, &lobe);
             }
-            self.bounce(scene, path, &vertex, &bsdf, material, depth, dimension);
         }
+    }
+
+    #[inline]
+    fn scatter(&mut self, step: Step, bsdf: &impl Scatter) {
+        if step.scene.shading.features.light_sampling && bsdf.is_smooth() {
+            self.sample_light(&step, bsdf);
+        }
+        self.bounce(&step, bsdf);
     }
 
     /// Hits of one kind of material follow each other, so that the processor finds them all alike.
@@ -193,8 +203,10 @@ impl PathWave {
     }
 
     /// Next-event estimation: one point on one light, and a shadow ray to it.
-    fn sample_light(&mut self, scene: &Snapshot, path: &Path, vertex: &Vertex, bsdf: &Bsdf, dimension: u32) {
-        let sampler = &path.sampler;
+    #[inline]
+    fn sample_light(&mut self, step: &Step, bsdf: &impl Scatter) {
+        let &Step { scene, path, vertex, .. } = step;
+        let (sampler, dimension) = (&path.sampler, step.dimension());
         let u = sampler.pair(dimension + DIM_LIGHT_POINT);
         let shading = &*scene.shading;
         let share = environment_share(scene);
@@ -233,18 +245,11 @@ impl PathWave {
     }
 
     /// Chooses how the path goes on, and whether.
-    #[expect(clippy::too_many_arguments, reason = "the whole state of one step")]
-    fn bounce(
-        &mut self,
-        scene: &Snapshot,
-        mut path: Path,
-        vertex: &Vertex,
-        bsdf: &Bsdf,
-        material: u32,
-        depth: u32,
-        dimension: u32,
-    ) {
-        let sampler = path.sampler;
+    #[inline]
+    fn bounce(&mut self, step: &Step, bsdf: &impl Scatter) {
+        let &Step { scene, vertex, material, depth, .. } = step;
+        let mut path = *step.path;
+        let (sampler, dimension) = (path.sampler, step.dimension());
         let u = sampler.pair(dimension + DIM_DIRECTION);
         let u_lobe = || sampler.single(dimension + DIM_LOBE);
         let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
@@ -278,6 +283,23 @@ impl PathWave {
         let origin = robust::offset_ray_origin(vertex.position, vertex.error, vertex.geometric_normal, sample.wi);
         self.next_rays.push(&Ray::new(origin, sample.wi));
         self.next_paths.push(path);
+    }
+}
+
+/// One vertex of one path.
+struct Step<'a> {
+    scene: &'a Snapshot,
+    path: &'a Path,
+    vertex: &'a Vertex,
+    material: MaterialId,
+    /// Segments so far.
+    depth: u32,
+}
+
+impl Step<'_> {
+    /// The first sample dimension of this vertex.
+    fn dimension(&self) -> u32 {
+        CAMERA_DIMENSIONS + (self.depth - 1) * VERTEX_DIMENSIONS
     }
 }
 

@@ -1,6 +1,6 @@
 //! From a hit to everything that shading needs to know of the place.
 
-use super::bsdf::{Bsdf, Lobe, MAX_LOBES};
+use super::bsdf::{Blend, Lobe, MAX_LOBES};
 use super::light::sphere_uv;
 use super::medium::MediumStack;
 use super::{ColorInput, Material, MaterialId, ScalarInput, Snapshot};
@@ -105,20 +105,15 @@ impl ScalarInput {
     }
 }
 
-/// The scattering at a vertex; `None` where the surface is black.
-#[inline]
-pub(super) fn bsdf_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Bsdf> {
-    let material = &scene.shading.materials[id as usize];
-    if let Material::Blend { .. } = material {
-        let mut parts = [(Lobe::Glass { eta: 1.0 }, 0.0); MAX_LOBES];
-        let mut n = 0;
-        collect(scene, id, vertex, media, 1.0, &mut |lobe, weight| {
-            parts[n] = (lobe, weight);
-            n += 1;
-        });
-        return (n > 0).then(|| Bsdf::blend(&parts[..n]));
-    }
-    lobe_at(scene, id, vertex, media).map(Bsdf::single)
+/// The lobes of a blend at a vertex; `None` where all of it is black.
+pub(super) fn blend_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Blend> {
+    let mut parts = [(Lobe::Glass { eta: 1.0 }, 0.0); MAX_LOBES];
+    let mut n = 0;
+    collect(scene, id, vertex, media, 1.0, &mut |lobe, weight| {
+        parts[n] = (lobe, weight);
+        n += 1;
+    });
+    (n > 0).then(|| Blend::new(&parts[..n]))
 }
 
 fn collect(
@@ -144,8 +139,9 @@ fn collect(
     }
 }
 
+/// The one lobe of a plain material; `None` where the surface is black.
 #[inline]
-fn lobe_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Lobe> {
+pub(super) fn lobe_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Lobe> {
     let uv = vertex.uv;
     match &scene.shading.materials[id as usize] {
         Material::Diffuse { albedo } => Some(Lobe::Diffuse { albedo: albedo.eval(scene, uv) }),

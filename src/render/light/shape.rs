@@ -198,7 +198,7 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
 #[inline]
 pub(in crate::render) fn sphere_uv(normal: Vec3) -> Vec2 {
     use std::f32::consts::{PI, TAU};
-    Vec2::new(0.5 + (-normal.z).atan2(normal.x) / TAU, normal.y.clamp(-1.0, 1.0).acos().mul_add(-1.0 / PI, 1.0))
+    Vec2::new(0.5 + (-normal.z).atan2(normal.x) / TAU, 1.0 - normal.y.clamp(-1.0, 1.0).acos() / PI)
 }
 
 /// Where a shadow ray may end without meeting the light itself.
