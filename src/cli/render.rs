@@ -10,7 +10,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Samples per pixel when neither a number nor a time is given.
+/// Samples per pixel when neither a number, a time nor an error is given.
 const DEFAULT_SPP: u32 = 256;
 
 #[derive(Args, Clone, Debug)]
@@ -23,12 +23,15 @@ pub struct RenderArgs {
     /// Width and height in pixels; the scene's own when not given.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
-    /// Samples per pixel; 256 unless a time is given.
+    /// Samples per pixel; 256 unless a time or an error is given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Stop after so many seconds of rendering.
     #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
     pub time: Option<f64>,
+    /// Stop when the picture's relative error, by its own estimate, is down to this: 0.01 is one per cent.
+    #[arg(long, value_name = "SHARE", value_parser = parse_positive)]
+    pub error: Option<f64>,
     /// Worker threads; all cores when not given. The picture does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -80,12 +83,17 @@ fn render(args: &RenderArgs) -> Result<(), Failure> {
     let FilmSize { width, height } = *world.resource();
     let (width, height) = args.size.unwrap_or((width, height));
     let mut film = Film::new(width, height);
-    let target = Target { spp: args.spp.or(args.time.is_none().then_some(DEFAULT_SPP)), seconds: args.time };
+    let open_ended = args.time.is_none() && args.error.is_none();
+    let target = Target { spp: args.spp.or(open_ended.then_some(DEFAULT_SPP)), seconds: args.time, error: args.error };
     let cpu_before = cpu_seconds();
     let report = render_offline(&extraction.snapshot, &settings, &mut film, target, |now| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
-        bar.set_position((by_spp.max(by_time).min(1.0) * 1000.0) as u64);
+        let by_error = target
+            .error
+            .zip(now.error)
+            .map_or(0.0, |(goal, error)| f64::from(now.spp) / f64::from(error.spp_for(goal)));
+        bar.set_position((by_spp.max(by_time).max(by_error).min(1.0) * 1000.0) as u64);
         let mrays = now.rays.total() as f64 / now.seconds.max(1e-9) * 1e-6;
         bar.set_message(format!("{} samples per pixel, {mrays:.1} Mrays/s", now.spp));
         true
@@ -129,6 +137,7 @@ fn json(
     cpu_seconds: Option<f64>,
     film: &Film,
 ) -> serde_json::Value {
+    let error = film.error_estimate();
     let bad: Vec<_> = report.bad.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect();
     serde_json::json!({
         "scene": scene.source.title(),
@@ -146,7 +155,8 @@ fn json(
             "shadow": report.rays.shadow,
         },
         "mrays_per_s": report.rays.total() as f64 / report.seconds.max(1e-9) * 1e-6,
-        "estimated_error": serde_json::Value::Null,
+        "estimated_error": error.map(|error| error.relative),
+        "estimated_error_95": error.map(|error| [error.low, error.high]),
         "bad_samples": report.n_bad,
         "bad_samples_at": bad,
     })

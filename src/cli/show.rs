@@ -53,6 +53,7 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         size: args.size,
         spp: None,
         time: None,
+        error: None,
         threads: args.threads,
         seed: args.seed,
         integrator: None,

@@ -1,6 +1,6 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
-use crate::render::{BadSample, Film, RayCounts, RenderSettings, Snapshot, advance};
+use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
 use std::time::{Duration, Instant};
 
 /// When a picture is good enough; the first that is reached ends it. Without any, it goes on for ever.
@@ -9,6 +9,17 @@ pub struct Target {
     /// Samples per pixel.
     pub spp: Option<u32>,
     pub seconds: Option<f64>,
+    /// Relative error of the whole picture, as it estimates it itself.
+    pub error: Option<f64>,
+}
+
+impl Target {
+    /// Whether a film with so many samples a pixel, seconds of rendering and relative error is good enough.
+    pub fn reached(&self, spp: u32, seconds: f64, error: Option<f64>) -> bool {
+        self.spp.is_some_and(|goal| spp >= goal)
+            || self.seconds.is_some_and(|goal| seconds >= goal)
+            || self.error.zip(error).is_some_and(|(goal, error)| error <= goal)
+    }
 }
 
 /// How far it is, told a few times a second.
@@ -18,6 +29,7 @@ pub struct Progress {
     pub spp: u32,
     pub seconds: f64,
     pub rays: RayCounts,
+    pub error: Option<ErrorEstimate>,
 }
 
 /// What was done.
@@ -59,8 +71,9 @@ pub fn render_offline(
         report.n_bad += pass.n_bad;
         report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));
         report.seconds = start.elapsed().as_secs_f64();
-        let go_on = progress(Progress { spp: film.spp(), seconds: report.seconds, rays: report.rays });
-        if !go_on || deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+        let (spp, seconds, error) = (film.spp(), report.seconds, film.error_estimate());
+        let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
+        if !go_on || target.reached(spp, seconds, error.map(|error| error.relative)) {
             break;
         }
         // Whole passes as long as a slice, growing gently while the rate is still unknown.

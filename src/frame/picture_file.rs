@@ -48,22 +48,26 @@ pub fn check_writable(path: &Path) -> Result<(), String> {
 
 /// Writes a film as its name asks: to a temporary name first, which then takes the place of `path`.
 pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), String> {
-    let file = encode_beside(film, display, PictureFormat::of(path)?, path)?;
+    let size = (film.width(), film.height());
+    let file = encode_beside(film, display, size, PictureFormat::of(path)?, path)?;
     file.persist(path).map_err(|error| unwritable(path, &error.error))?;
     Ok(())
 }
 
 /// Writes a film into `folder` as `STEM-0001`, or with the first higher number that is free: never over a file that is
 /// there, even one that another program makes at the same moment. Answers with the path.
+///
+/// `size`: pixels of a PNG, which a coarser film is stretched to; linear light stays as it was measured.
 pub fn write_new_film(
     film: &Film,
     display: &Display,
+    size: (u32, u32),
     folder: &Path,
     stem: &str,
     format: PictureFormat,
 ) -> Result<PathBuf, String> {
     let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
-    let mut file = encode_beside(film, display, format, &name(1))?;
+    let mut file = encode_beside(film, display, size, format, &name(1))?;
     for number in 1..=u32::MAX {
         let path = name(number);
         file = match file.persist_noclobber(&path) {
@@ -79,11 +83,11 @@ pub fn write_new_film(
 fn encode_beside(
     film: &Film,
     display: &Display,
+    (width, height): (u32, u32),
     format: PictureFormat,
     path: &Path,
 ) -> Result<tempfile::NamedTempFile, String> {
     let mut out = BufWriter::new(temporary_beside(path)?);
-    let (width, height) = (film.width(), film.height());
     match format {
         PictureFormat::Png => {
             let mut rgba = Vec::new();
@@ -99,7 +103,7 @@ fn encode_beside(
             // The encoder seeks, so it writes to memory first.
             let mut memory = std::io::Cursor::new(Vec::new());
             OpenExrEncoder::new(&mut memory)
-                .write_image(&bytes, width, height, ExtendedColorType::Rgb32F)
+                .write_image(&bytes, film.width(), film.height(), ExtendedColorType::Rgb32F)
                 .map_err(|error| unwritable(path, &error))?;
             out.write_all(memory.get_ref()).map_err(|error| unwritable(path, &error))?;
         }
@@ -143,21 +147,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (film, display) = (Film::new(5, 3), Display::default());
         std::fs::write(folder.path().join("gallery-0002.png"), "not ours").unwrap();
-        let mut save = |format| write_new_film(&film, &display, folder.path(), "gallery", format).unwrap();
+        let mut save = |format| write_new_film(&film, &display, (10, 6), folder.path(), "gallery", format).unwrap();
         let first = save(PictureFormat::Png);
         assert_eq!(first, folder.path().join("gallery-0001.png"));
         assert_eq!(save(PictureFormat::Png), folder.path().join("gallery-0003.png"));
         assert_eq!(save(PictureFormat::Exr), folder.path().join("gallery-0001.exr"));
         assert_eq!(std::fs::read(folder.path().join("gallery-0002.png")).unwrap(), b"not ours");
-        assert_eq!(image::image_dimensions(first).unwrap(), (5, 3));
+        assert_eq!(image::image_dimensions(first).unwrap(), (10, 6));
+        let linear = image::image_dimensions(folder.path().join("gallery-0001.exr")).unwrap();
+        assert_eq!(linear, (5, 3));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4, "nothing temporary is left");
     }
 
     #[test]
     fn a_folder_that_is_not_there_is_named() {
         let folder = tempfile::tempdir().unwrap().path().join("gone");
-        let error =
-            write_new_film(&Film::new(1, 1), &Display::default(), &folder, "a", PictureFormat::Png).unwrap_err();
+        let error = write_new_film(&Film::new(1, 1), &Display::default(), (1, 1), &folder, "a", PictureFormat::Png)
+            .unwrap_err();
         assert!(error.contains("there is no folder") && error.contains("gone"), "{error}");
     }
 }

@@ -55,6 +55,8 @@ pub struct StepReport {
     pub seconds: f64,
     /// Samples that every pixel of the film has now.
     pub spp: u32,
+    /// Relative error of the picture, as far as it is known.
+    pub error: Option<f64>,
 }
 
 /// See the head of this file.
@@ -74,6 +76,8 @@ pub struct Scheduler {
     spent: f64,
     /// Samples that every pixel of the current film has.
     spp: u32,
+    /// Relative error of the current film.
+    error: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +103,7 @@ impl Scheduler {
             restarted_at: Duration::ZERO,
             spent: 0.0,
             spp: 0,
+            error: None,
         };
         scheduler.restart(Duration::ZERO);
         scheduler
@@ -109,7 +114,7 @@ impl Scheduler {
         self.choose_coarse();
         self.phase = if self.coarse == 1 { Phase::Full } else { Phase::Coarse(self.coarse) };
         self.restarted_at = now;
-        (self.spent, self.spp) = (0.0, 0);
+        (self.spent, self.spp, self.error) = (0.0, 0, None);
     }
 
     /// A restart with another size.
@@ -178,7 +183,7 @@ impl Scheduler {
             let measured = report.paths as f64 / report.seconds;
             self.rate = Some(self.rate.map_or(measured, |rate| 0.5 * rate + 0.5 * measured));
         }
-        self.spp = report.spp;
+        (self.spp, self.error) = (report.spp, report.error);
         if divider == 1 {
             self.spent += report.seconds;
         }
@@ -191,19 +196,16 @@ impl Scheduler {
         }
     }
 
-    /// Whether the target of samples or seconds is reached at full resolution.
+    /// Whether the target is reached, at full resolution.
     pub fn reached(&self) -> bool {
-        let Target { spp, seconds } = self.target;
-        self.phase == Phase::Full
-            && self.spp > 0
-            && (spp.is_some_and(|spp| self.spp >= spp) || seconds.is_some_and(|seconds| self.spent >= seconds))
+        self.phase == Phase::Full && self.spp > 0 && self.target.reached(self.spp, self.spent, self.error)
     }
 
     /// On to a film of half the divider, or to the full one when that is near or quick enough.
     fn sharpen(&mut self, divider: u32) {
         let quick = self.seconds_for(1) <= LAST_SLICE;
         self.phase = if divider <= 2 || quick { Phase::Full } else { Phase::Sharpening(divider / 2) };
-        self.spp = 0;
+        (self.spp, self.error) = (0, None);
     }
 
     /// Leaves the coarse divider as it is while its time lies in the band, else takes the finest that fits.
@@ -272,7 +274,10 @@ mod tests {
             self.now += seconds;
             self.paths += seconds * self.rate;
             self.spp = (self.paths / pixels + 1e-6).floor() as u32;
-            let report = StepReport { paths: (seconds * self.rate) as u64, seconds, spp: self.spp };
+            let paths = (seconds * self.rate) as u64;
+            // Independent samples of standard deviation 1.
+            let error = (self.spp > 0).then(|| 1.0 / f64::from(self.spp).sqrt());
+            let report = StepReport { paths, seconds, spp: self.spp, error };
             self.scheduler.finished(step, report, Duration::from_secs_f64(self.now));
             self.shown.push((divider, self.now));
             true
@@ -357,17 +362,20 @@ mod tests {
 
     #[test]
     fn it_stops_exactly_at_the_target_and_sleeps() {
-        let mut machine = Machine::new(64, 64, 1e7, Target { spp: Some(1000), seconds: None });
+        let mut machine = Machine::new(64, 64, 1e7, Target { spp: Some(1000), ..Target::default() });
         while machine.step() {}
         assert_eq!((machine.spp, machine.film), (1000, Some(1)));
         assert!(machine.scheduler.reached());
         // More is asked for: all samples stay.
-        machine.scheduler.set_target(Target { spp: Some(1500), seconds: None });
+        machine.scheduler.set_target(Target { spp: Some(1500), ..Target::default() });
         while machine.step() {}
         assert_eq!(machine.spp, 1500);
-        let mut machine = Machine::new(64, 64, 1e6, Target { spp: None, seconds: Some(3.0) });
+        let mut machine = Machine::new(64, 64, 1e6, Target { seconds: Some(3.0), ..Target::default() });
         while machine.step() {}
         assert!((3.0..3.2).contains(&machine.scheduler.spent()), "{}", machine.scheduler.spent());
+        let mut machine = Machine::new(64, 64, 1e6, Target { error: Some(0.05), ..Target::default() });
+        while machine.step() {}
+        assert!((400..450).contains(&machine.spp), "{}", machine.spp);
     }
 
     #[test]

@@ -212,7 +212,8 @@ pub fn rebuild(
         changes.add(Level::Restart, cause);
     }
     // Touched values are often equal to what they were; only a difference counts.
-    if touched.any() || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
+    let environment_changed = queries.environment() != shown.inputs.environment;
+    if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
         let mut inputs = queries.collect();
         let missing = missing_trees(&inputs, &mut shown.trees);
         if !missing.is_empty() {
@@ -247,9 +248,7 @@ pub fn rebuild(
             }
         }
     }
-    if found.0 != changes {
-        found.0 = changes;
-    }
+    found.0 = changes;
 }
 
 /// Trees that have yet to be built. Small ones are built at once: that takes less than the frame has.
@@ -292,30 +291,30 @@ pub fn reset(size: Res<PictureSize>, mut found: ResMut<Found>, mut shown: ResMut
 
 /// Tells the workers what to add samples to, until when, and with how many threads.
 ///
-/// Reads [`Found`], [`Shown`], [`StopAt`], [`Threads`], [`Paused`]; writes to the [`Renderer`].
+/// Reads [`Shown`], [`StopAt`], [`Threads`], [`Paused`]; writes [`Found`] and to the [`Renderer`].
 pub fn accumulate(
-    found: Res<Found>,
     stop_at: Res<StopAt>,
     threads: Res<Threads>,
     paused: Res<Paused>,
     size: Res<PictureSize>,
     renderer: Res<Renderer>,
     mut shown: ResMut<Shown>,
+    mut found: ResMut<Found>,
 ) {
-    if shown.threads != Some(threads.0) {
-        if shown.threads.is_some() {
-            renderer.0.set_threads(threads.0);
-        }
-        shown.threads = Some(threads.0);
+    // The first frame finds what the worker was started with.
+    if let Some(before) = shown.threads.replace(threads.0).filter(|before| *before != threads.0) {
+        renderer.0.set_threads(threads.0);
+        found.0.add(Level::Reschedule, format!("threads: {before} → {}", threads.0));
     }
-    if shown.target != Some(stop_at.0) {
+    if shown.target.replace(stop_at.0).is_some_and(|before| before != stop_at.0) {
         renderer.0.set_target(stop_at.0);
-        shown.target = Some(stop_at.0);
+        found.0.add(Level::Reschedule, "target");
     }
     let paused = paused.0 || size.is_empty();
     if shown.paused != paused {
         renderer.0.set_paused(paused);
         shown.paused = paused;
+        found.0.add(Level::Reschedule, "pause");
     }
     if found.0.restarts()
         && let (Some(extraction), Some(PictureSize { width, height })) = (&shown.extraction, shown.size)
@@ -374,6 +373,7 @@ pub fn present(
     status.spp = stats.spp;
     status.seconds = stats.seconds;
     status.rays = stats.rays;
+    status.estimated_error = stats.error;
     status.camera_mrays = per_second(stats.recent_rays.camera);
     status.bounce_mrays = per_second(stats.recent_rays.bounce);
     status.shadow_mrays = per_second(stats.recent_rays.shadow);

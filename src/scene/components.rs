@@ -107,7 +107,7 @@ pub enum Material {
         ior: f32,
         absorption: Vec3,
     },
-    /// `a` and `b` are material entities and not emissive.
+    /// Of material entities; at most one part is emissive, and then `weight` is a number.
     Blend {
         weight: Amount,
         a: Entity,
@@ -117,6 +117,9 @@ pub enum Material {
         radiance: Paint,
     },
 }
+
+/// Plain materials that a blend may come to, however it is nested.
+pub const MAX_LOBES: usize = 8;
 
 impl Material {
     /// The one of surfaces that have none.

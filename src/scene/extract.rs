@@ -3,7 +3,7 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`Part`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{Amount, Balls, Material, Paint, Shape, SurfaceTexture};
+use super::components::{Amount, Balls, MAX_LOBES, Material, Paint, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
@@ -403,38 +403,36 @@ fn material_of(
             compensate: *compensate,
         },
         Material::Glass { ior, absorption } => render::Material::Glass { ior: *ior, absorption: *absorption },
-        Material::Blend { weight, a, b } => {
-            let mut part = |entity: Entity| {
-                let unfit = matches!(by_entity.get(&entity), None | Some(Material::Emissive { .. }))
-                    || blends_in_a_circle(entity, by_entity);
-                table.id(if unfit { MaterialKey::Grey } else { MaterialKey::Material(entity) })
-            };
-            render::Material::Blend { a: part(*a), b: part(*b), weight: textures.scalar(weight) }
+        // What blends itself, or too much, is grey.
+        Material::Blend { .. } if !is_fit(material, by_entity) => {
+            render::Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) }
         }
+        Material::Blend { weight, a, b } => render::Material::Blend {
+            weight: textures.scalar(weight),
+            a: table.id(MaterialKey::Material(*a)),
+            b: table.id(MaterialKey::Material(*b)),
+        },
         Material::Emissive { radiance } => render::Material::Emissive { radiance: textures.color(radiance) },
     }
 }
 
-/// Blends within blends at most.
-pub const MAX_BLEND_DEPTH: usize = 32;
-
-/// Whether following blends from `start` leads into a circle, or deeper than anyone should go.
-fn blends_in_a_circle(start: Entity, by_entity: &HashMap<Entity, &Material>) -> bool {
-    type State = HashMap<Entity, bool>;
-    fn visit(at: Entity, by_entity: &HashMap<Entity, &Material>, state: &mut State, depth: usize) -> bool {
-        let Some(Material::Blend { a, b, .. }) = by_entity.get(&at) else { return false };
-        // True: still on the way down from it; false: known to end well.
-        if let Some(&open) = state.get(&at) {
-            return open;
+/// Whether a blend ends in few enough plain materials, at most one of them emissive and then evenly blended.
+fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
+    let (mut lobes, mut glowing, mut textured) = (0, 0, false);
+    let mut open = vec![Some(blend)];
+    // A tree of so many leaves has fewer than twice as many nodes; more steps than that are a circle.
+    for _ in 0..2 * MAX_LOBES {
+        match open.pop() {
+            Some(Some(Material::Blend { weight, a, b })) => {
+                textured |= matches!(weight, Amount::Texture(_));
+                open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
+            }
+            Some(Some(Material::Emissive { .. })) => (lobes, glowing) = (lobes + 1, glowing + 1),
+            Some(_) => lobes += 1,
+            None => break,
         }
-        state.insert(at, true);
-        if depth > MAX_BLEND_DEPTH || visit(*a, by_entity, state, depth + 1) || visit(*b, by_entity, state, depth + 1) {
-            return true;
-        }
-        state.insert(at, false);
-        false
     }
-    visit(start, by_entity, &mut State::new(), 0)
+    open.is_empty() && lobes <= MAX_LOBES && (glowing == 0 || glowing == 1 && !textured)
 }
 
 /// Each texture once, however many materials use it.

@@ -97,8 +97,13 @@ impl SceneQueries<'_, '_> {
                     lens: *lens,
                 },
             ),
-            environment: self.environment.as_deref().cloned().unwrap_or_default(),
+            environment: self.environment(),
         }
+    }
+
+    /// The light around everything; none when the resource is missing.
+    pub fn environment(&self) -> SceneEnvironment {
+        self.environment.as_deref().cloned().unwrap_or_default()
     }
 
     /// The materials that objects name, and those that these are blended of.

@@ -347,10 +347,9 @@ impl App {
     fn screenshot(&mut self, linear: bool) {
         let format = if linear { PictureFormat::Exr } else { PictureFormat::Png };
         let status = self.session.status();
-        match self.session.film_snapshot() {
-            Some(film) => self.saver.save(film, status.display, &status.scene, format),
-            None => self.toasts.add(Tone::Problem, "there is no picture yet to be kept", Instant::now()),
-        }
+        let picture = self.session.picture();
+        let size = (picture.width.max(1), picture.height.max(1));
+        self.saver.save(self.session.keep_film(), status.display, size, &status.scene, format);
     }
 
     fn tell_saved(&mut self, saved: Saved) {

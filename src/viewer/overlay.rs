@@ -5,7 +5,7 @@ use super::toasts::{Toast, Tone};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
 
 /// Dark glass, so that text reads on any picture.
-const GLASS: Color32 = Color32::from_rgba_premultiplied(10, 11, 13, 205);
+const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
 const TEXT: Color32 = Color32::from_gray(228);
 const KEY: Color32 = Color32::from_rgb(250, 205, 125);
 const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
@@ -84,7 +84,7 @@ pub fn help(context: &Context, open: &mut bool) {
         .open(open)
         .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
         .collapsible(false)
-        .resizable(false)
+        .auto_sized()
         .show(context, |ui| {
             egui::ScrollArea::both().max_width(room.x).max_height(room.y).show(ui, |ui| {
                 ui.horizontal_top(|ui| {

@@ -24,13 +24,24 @@ impl Saver {
         Self { folder: folder.to_owned(), waker, sender, receiver, threads: Vec::new() }
     }
 
-    /// Begins to save `film` under the name of `scene` and the next free number.
-    pub fn save(&mut self, film: Film, display: Display, scene: &str, format: PictureFormat) {
+    /// Saves the film that will come, under the name of `scene` and the next free number; a PNG with `size` pixels.
+    pub fn save(
+        &mut self,
+        film: Receiver<Film>,
+        display: Display,
+        size: (u32, u32),
+        scene: &str,
+        format: PictureFormat,
+    ) {
         let (folder, stem) = (self.folder.clone(), file_stem(scene));
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
+            let saved = match film.recv() {
+                Ok(film) => write_new_film(&film, &display, size, &folder, &stem, format),
+                Err(_) => Err("there was no picture to be kept".to_owned()),
+            };
             // The window may be gone, and then nobody needs the news.
-            let _ = sender.send(write_new_film(&film, &display, &folder, &stem, format));
+            let _ = sender.send(saved);
             waker();
         };
         match std::thread::Builder::new().name("save".to_owned()).spawn(work) {
@@ -71,6 +82,12 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    fn ready(film: Film) -> Receiver<Film> {
+        let (sender, receiver) = channel();
+        sender.send(film).unwrap();
+        receiver
+    }
+
     #[test]
     fn pictures_of_one_moment_get_names_of_their_own() {
         let folder = tempfile::tempdir().unwrap();
@@ -83,7 +100,8 @@ mod tests {
             }),
         );
         for _ in 0..8 {
-            saver.save(Film::new(3, 2), Display::default(), "scenes/my room.ron", PictureFormat::Png);
+            let film = ready(Film::new(3, 2));
+            saver.save(film, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
         }
         let mut saved: Vec<PathBuf> = saver.finish().into_iter().map(|saved| saved.unwrap()).collect();
         saved.sort();
@@ -95,9 +113,13 @@ mod tests {
     #[test]
     fn a_failure_is_told() {
         let mut saver = Saver::new(Path::new("/no/such/folder"), Arc::new(|| ()));
-        saver.save(Film::new(1, 1), Display::default(), "gallery", PictureFormat::Exr);
+        saver.save(ready(Film::new(1, 1)), Display::default(), (1, 1), "gallery", PictureFormat::Exr);
         let [Err(error)] = &saver.finish()[..] else { panic!("it cannot have been saved") };
         assert!(error.contains("/no/such/folder"), "{error}");
+
+        let (_, never) = channel();
+        saver.save(never, Display::default(), (1, 1), "gallery", PictureFormat::Png);
+        assert_eq!(saver.finish(), [Err("there was no picture to be kept".to_owned())]);
     }
 
     #[test]

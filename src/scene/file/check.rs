@@ -5,6 +5,7 @@ use super::parts::{
     TexturePart, TransformPart,
 };
 use super::value::{Amount, Paint, Rgb};
+use crate::scene::components::MAX_LOBES;
 use crate::scene::error::suggestion;
 use crate::scene::meshes::BUILTIN_NAMES;
 use crate::scene::placement::Placement;
@@ -152,16 +153,18 @@ impl Check<'_> {
                     let path = format!("{path}/{field}");
                     self.material_name(&path, part);
                     if self.reaches(part, name) {
-                        self.wrong(
-                            &path,
-                            format!("material `{name}` blends itself: a blend must end in plain materials"),
-                        );
-                    } else if matches!(self.materials.get(part.as_str()), Some(MaterialPart::Emissive { .. })) {
-                        self.wrong(
-                            &path,
-                            format!("`{part}` is emissive, and light cannot be blended: use another material"),
-                        );
+                        let message = format!("material `{name}` blends itself: a blend must end in plain materials");
+                        self.wrong(&path, message);
+                        return;
                     }
+                }
+                let (lobes, glowing) = self.lobes(name);
+                if lobes > MAX_LOBES {
+                    self.wrong(&path, format!("the blend has more than {MAX_LOBES} plain materials: nest fewer"));
+                } else if glowing > 1 {
+                    self.wrong(&path, "the blend has more than one emissive part: keep one of them");
+                } else if glowing == 1 && matches!(weight, Amount::Texture(_)) {
+                    self.wrong(&format!("{path}/weight"), "with an emissive part, `weight` must be a number");
                 }
             }
             MaterialPart::Emissive { radiance } => match radiance {
@@ -185,6 +188,24 @@ impl Check<'_> {
             }
         }
         false
+    }
+
+    /// How many plain materials `name` comes to, and how many of them are emissive; stops counting when it is too many.
+    fn lobes(&self, name: &str) -> (usize, usize) {
+        let (mut lobes, mut glowing, mut open) = (0, 0, vec![name]);
+        let mut steps = 0;
+        while let Some(name) = open.pop() {
+            steps += 1;
+            if lobes > MAX_LOBES || steps > 4 * MAX_LOBES {
+                return (MAX_LOBES + 1, glowing);
+            }
+            match self.materials.get(name) {
+                Some(MaterialPart::Blend { a, b, .. }) => open.extend([a.as_str(), b.as_str()]),
+                Some(MaterialPart::Emissive { .. }) => (lobes, glowing) = (lobes + 1, glowing + 1),
+                _ => lobes += 1,
+            }
+        }
+        (lobes, glowing)
     }
 
     fn object(&mut self, path: &str, object: &ObjectPart) {
