@@ -16,6 +16,16 @@ pub(super) struct LaneHits<S: Simd> {
     pub v: S::F,
 }
 
+/// Shears a vertex that is given along the ray's own axes.
+///
+/// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.
+#[inline(always)]
+pub(super) fn shear<S: Simd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::F, sy: S::F) -> Sheared<S> {
+    let (x, y) = (s.sub(vertex[0], origin[0]), s.sub(vertex[1], origin[1]));
+    let z = s.sub(vertex[2], origin[2]);
+    [s.sub(x, s.mul(sx, z)), s.sub(y, s.mul(sy, z)), z]
+}
+
 /// Lanes whose three numbers do not have both signs among them. False for NaN.
 #[inline(always)]
 pub(super) fn same_sign<S: Simd>(s: S, a: S::F, b: S::F, c: S::F) -> Mask {

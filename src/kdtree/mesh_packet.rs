@@ -4,7 +4,7 @@
 //! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
 //! traced in groups.
 
-use super::lanes::{Sheared, may_hit, resolve};
+use super::lanes::{may_hit, resolve, shear};
 use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
 use super::nodes::{MAX_DEPTH, Node};
 use super::ray::{Nearest, WIDEN};
@@ -34,8 +34,6 @@ pub(super) struct NearestLanes {
 
 /// What all rays of a group share, and their reciprocals.
 struct Group<S: Simd> {
-    /// Bit `a`: down axis `a`.
-    octant: usize,
     inv_lo: [S::F; 3],
     inv_hi: [S::F; 3],
     slack: S::F,
@@ -70,15 +68,14 @@ impl<S: Simd> MeshPacket<S> {
 
     #[inline(always)]
     fn trace_group<const ANY: bool>(&mut self, s: S, tree: &MeshTree, lanes: Mask, octant: usize, kz: usize) {
-        let inv = |axis: usize| s.div(s.splat(1.0), self.dir[axis]);
-        let inv = [inv(0), inv(1), inv(2)];
-        let times = |factor: f32| [0, 1, 2].map(|axis: usize| s.mul(inv[axis], s.splat(factor)));
+        let one = s.splat(1.0);
+        let inv = [s.div(one, self.dir[0]), s.div(one, self.dir[1]), s.div(one, self.dir[2])];
+        let (shorter, longer) = (s.splat(1.0 - WIDEN), s.splat(1.0 + WIDEN));
         let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
         let sz = inv[kz];
         let group = Group::<S> {
-            octant,
-            inv_lo: times(1.0 - WIDEN),
-            inv_hi: times(1.0 + WIDEN),
+            inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
+            inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
             slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
             axes,
             sx: s.div(self.dir[axes[0]], self.dir[kz]),
@@ -159,13 +156,9 @@ impl<S: Simd> MeshPacket<S> {
     /// One ray after the other against all triangles.
     #[inline(always)]
     fn test_by_ray(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mut mask: Mask) {
-        let store = |from: S::F| {
-            let mut to = [0.0; LANES];
-            s.store(from, &mut to);
-            to
-        };
-        let origin = group.axes.map(|axis| store(self.origin[axis]));
-        let (sx, sy, sz) = (store(group.sx), store(group.sy), store(group.sz));
+        let [kx, ky, kz] = group.axes;
+        let origin = [stored(s, self.origin[kx]), stored(s, self.origin[ky]), stored(s, self.origin[kz])];
+        let (sx, sy, sz) = (stored(s, group.sx), stored(s, group.sy), stored(s, group.sz));
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % LANES;
             mask &= mask - 1;
@@ -192,12 +185,15 @@ impl<S: Simd> MeshPacket<S> {
     #[inline(always)]
     fn test_triangle(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, lane: usize, mask: Mask) {
         let lane = lane % BLOCK;
-        let shear = |vertex: &[[f32; BLOCK]; 3]| -> Sheared<S> {
-            let moved = |k: usize| s.sub(s.splat(vertex[group.axes[k]][lane]), self.origin[group.axes[k]]);
-            let [x, y, z] = [moved(0), moved(1), moved(2)];
-            [s.sub(x, s.mul(group.sx, z)), s.sub(y, s.mul(group.sy, z)), z]
-        };
-        let [a, b, c] = [shear(&block.vertices[0]), shear(&block.vertices[1]), shear(&block.vertices[2])];
+        let [kx, ky, kz] = group.axes;
+        let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
+        let [a, b, c] = &block.vertices;
+        let a = [s.splat(a[kx][lane]), s.splat(a[ky][lane]), s.splat(a[kz][lane])];
+        let b = [s.splat(b[kx][lane]), s.splat(b[ky][lane]), s.splat(b[kz][lane])];
+        let c = [s.splat(c[kx][lane]), s.splat(c[ky][lane]), s.splat(c[kz][lane])];
+        let a = shear(s, a, origin, group.sx, group.sy);
+        let b = shear(s, b, origin, group.sx, group.sy);
+        let c = shear(s, c, origin, group.sx, group.sy);
         let mask = mask & may_hit(s, &a, &b, &c);
         if mask == 0 {
             return;
@@ -218,4 +214,11 @@ impl<S: Simd> MeshPacket<S> {
         s.store_u(s.select_u(take, prim, old), &mut nearest.prim);
         nearest.found |= take;
     }
+}
+
+#[inline(always)]
+fn stored<S: Simd>(s: S, from: S::F) -> [f32; LANES] {
+    let mut to = [0.0; LANES];
+    s.store(from, &mut to);
+    to
 }

@@ -4,7 +4,7 @@
 //! branch costs less than finding out which ones to leave away, however little the rays have in common.
 
 use super::batch::{HitBatch, RayBatch};
-use super::lanes::{LaneHits, Sheared, may_hit, plain, resolve, same_sign};
+use super::lanes::{LaneHits, Sheared, may_hit, plain, resolve, same_sign, shear};
 use super::scene_tree::Shape;
 use super::simd::{LANES, Mask, Simd};
 use crate::geometry::quad_corners;
@@ -84,10 +84,9 @@ impl SimpleObjects {
 pub(super) struct Packet<S: Simd> {
     pub origin: [S::F; 3],
     pub dir: [S::F; 3],
-    pub t_max: S::F,
     /// Lanes that hold a ray.
     pub lanes: Mask,
-    /// `t_max` until something is hit.
+    /// The ray's `t_max` until something is hit.
     pub t: S::F,
     pub u: S::F,
     pub v: S::F,
@@ -101,21 +100,15 @@ impl<S: Simd> Packet<S> {
     #[inline(always)]
     pub fn load(s: S, rays: &RayBatch, first: usize) -> Self {
         let count = (rays.len() - first).min(LANES);
-        let take = |from: &[f32], idle: f32| match from[first..].first_chunk::<LANES>() {
-            Some(all) => s.load(all),
-            None => {
-                let mut some = [idle; LANES];
-                some[..count].copy_from_slice(&from[first..]);
-                s.load(&some)
-            }
-        };
-        let t_max = take(&rays.t_max, 0.0);
+        let (x, y, z) = (&rays.origin_x[first..], &rays.origin_y[first..], &rays.origin_z[first..]);
+        let origin = [load_some(s, x, 0.0), load_some(s, y, 0.0), load_some(s, z, 0.0)];
+        let (x, y, z) = (&rays.dir_x[first..], &rays.dir_y[first..], &rays.dir_z[first..]);
+        let dir = [load_some(s, x, 1.0), load_some(s, y, 1.0), load_some(s, z, 1.0)];
         Self {
-            origin: [take(&rays.origin_x, 0.0), take(&rays.origin_y, 0.0), take(&rays.origin_z, 0.0)],
-            dir: [take(&rays.dir_x, 1.0), take(&rays.dir_y, 1.0), take(&rays.dir_z, 1.0)],
-            t_max,
+            origin,
+            dir,
             lanes: if count == LANES { Mask::MAX } else { (1 << count) - 1 },
-            t: t_max,
+            t: load_some(s, &rays.t_max[first..], 0.0),
             u: s.splat(0.0),
             v: s.splat(0.0),
             prim: s.splat_u(0),
@@ -130,28 +123,11 @@ impl<S: Simd> Packet<S> {
         let t = s.select(self.found, self.t, s.splat(f32::INFINITY));
         let miss = s.splat_u(HitBatch::MISS);
         let (prim, object) = (s.select_u(self.found, self.prim, miss), s.select_u(self.found, self.object, miss));
-        for (to, from) in [(&mut hits.t, t), (&mut hits.u, self.u), (&mut hits.v, self.v)] {
-            match to[first..].first_chunk_mut::<LANES>() {
-                Some(all) => s.store(from, all),
-                None => {
-                    let mut all = [0.0; LANES];
-                    s.store(from, &mut all);
-                    let rest = &mut to[first..];
-                    rest.copy_from_slice(&all[..rest.len()]);
-                }
-            }
-        }
-        for (to, from) in [(&mut hits.prim, prim), (&mut hits.object, object)] {
-            match to[first..].first_chunk_mut::<LANES>() {
-                Some(all) => s.store_u(from, all),
-                None => {
-                    let mut all = [0; LANES];
-                    s.store_u(from, &mut all);
-                    let rest = &mut to[first..];
-                    rest.copy_from_slice(&all[..rest.len()]);
-                }
-            }
-        }
+        store_some(s, t, &mut hits.t[first..]);
+        store_some(s, self.u, &mut hits.u[first..]);
+        store_some(s, self.v, &mut hits.v[first..]);
+        store_some_u(s, prim, &mut hits.prim[first..]);
+        store_some_u(s, object, &mut hits.object[first..]);
     }
 
     /// Keeps the lanes that are nearer; at equal `t` the lower object.
@@ -175,12 +151,11 @@ impl<S: Simd> Packet<S> {
     /// Tests all simple objects; with `ANY` stops once every ray has hit something.
     #[inline(always)]
     pub fn test_objects<const ANY: bool>(&mut self, s: S, objects: &SimpleObjects) {
-        let done = |packet: &Self| ANY && packet.found & packet.lanes == packet.lanes;
         if !objects.quads.is_empty() || !objects.triangles.is_empty() {
             let frame = ShearFrame::new(s, &self.origin, &self.dir);
             for quad in &objects.quads {
                 self.test_quad(s, &frame, quad);
-                if done(self) {
+                if self.is_done::<ANY>() {
                     return;
                 }
             }
@@ -194,22 +169,27 @@ impl<S: Simd> Packet<S> {
                 }
             }
         }
-        if (!objects.spheres.is_empty() || !objects.planes.is_empty()) && !done(self) {
+        if (!objects.spheres.is_empty() || !objects.planes.is_empty()) && !self.is_done::<ANY>() {
             let wide = WideFrame::new(s, &self.origin, &self.dir);
             for sphere in &objects.spheres {
                 self.test_sphere(s, &wide, sphere);
-                if done(self) {
+                if self.is_done::<ANY>() {
                     return;
                 }
             }
             for plane in &objects.planes {
-                let normal = plane.normal.map(|n| s.splat_d(n));
+                let normal = [s.splat_d(plane.normal[0]), s.splat_d(plane.normal[1]), s.splat_d(plane.normal[2])];
                 let to_point = wide.towards(s, &plane.point);
                 let t = s.narrow(s.div_d(dot(s, &normal, &to_point), dot(s, &normal, &wide.dir)));
                 let zero = s.splat(0.0);
                 self.offer(s, LaneHits { mask: self.lanes, t, u: zero, v: zero }, plane.object);
             }
         }
+    }
+
+    #[inline(always)]
+    fn is_done<const ANY: bool>(&self) -> bool {
+        ANY && self.found & self.lanes == self.lanes
     }
 
     /// Two triangles that share the diagonal `a c`, the first one first (`geometry::intersect_quad`).
@@ -224,10 +204,8 @@ impl<S: Simd> Packet<S> {
         if first | second == 0 {
             return;
         }
-        let choose = |p: &Sheared<S>, q: &Sheared<S>| {
-            [s.select(first, p[0], q[0]), s.select(first, p[1], q[1]), s.select(first, p[2], q[2])]
-        };
-        let mut hits = resolve(s, first | second, &a, &choose(&b, &c), &choose(&c, &d), frame.sz);
+        let (p, q) = (choose(s, first, &b, &c), choose(s, first, &c, &d));
+        let mut hits = resolve(s, first | second, &a, &p, &q, frame.sz);
         let sum = s.min(s.add(hits.u, hits.v), s.splat(1.0));
         let (u, v) = (hits.u, hits.v);
         hits.u = s.select(first, sum, u);
@@ -246,8 +224,11 @@ impl<S: Simd> Packet<S> {
     fn test_sphere(&mut self, s: S, wide: &WideFrame<S>, sphere: &Sphere) {
         let to_center = wide.towards(s, &sphere.center);
         let t_middle = s.mul_d(dot(s, &to_center, &wide.dir), wide.inv_dir_squared);
-        let off = |axis: usize| s.sub_d(to_center[axis], s.mul_d(wide.dir[axis], t_middle));
-        let perpendicular = [off(0), off(1), off(2)];
+        let perpendicular = [
+            s.sub_d(to_center[0], s.mul_d(wide.dir[0], t_middle)),
+            s.sub_d(to_center[1], s.mul_d(wide.dir[1], t_middle)),
+            s.sub_d(to_center[2], s.mul_d(wide.dir[2], t_middle)),
+        ];
         let discriminant = s.sub_d(s.splat_d(sphere.radius_squared), dot(s, &perpendicular, &perpendicular));
         let mask = self.lanes & s.le_d(s.splat_d(0.0), discriminant);
         if mask == 0 {
@@ -279,31 +260,77 @@ impl<S: Simd> ShearFrame<S> {
         let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
         let along_x = s.le(y, x) & s.le(z, x);
         let along_y = !along_x & s.le(z, y);
-        // Along z: (0, 1, 2); along y: (2, 0, 1); along x: (1, 2, 0).
-        let turned = |v: &[S::F; 3]| {
-            let pick =
-                |on_z: usize, on_y: usize, on_x: usize| s.select(along_x, v[on_x], s.select(along_y, v[on_y], v[on_z]));
-            [pick(0, 2, 1), pick(1, 0, 2), pick(2, 1, 0)]
-        };
-        let axis = |on_z: u32, on_y: u32, on_x: u32| {
-            s.select_u(along_x, s.splat_u(on_x), s.select_u(along_y, s.splat_u(on_y), s.splat_u(on_z)))
-        };
-        let d = turned(dir);
-        Self {
-            axes: [axis(0, 2, 1), axis(1, 0, 2), axis(2, 1, 0)],
-            origin: turned(origin),
-            sx: s.div(d[0], d[2]),
-            sy: s.div(d[1], d[2]),
-            sz: s.div(s.splat(1.0), d[2]),
-        }
+        // Across, across, along are x y z, z x y or y z x.
+        let [x, y, z] = *dir;
+        let d = [
+            by_axis(s, along_x, along_y, y, z, x),
+            by_axis(s, along_x, along_y, z, x, y),
+            by_axis(s, along_x, along_y, x, y, z),
+        ];
+        let [x, y, z] = *origin;
+        let o = [
+            by_axis(s, along_x, along_y, y, z, x),
+            by_axis(s, along_x, along_y, z, x, y),
+            by_axis(s, along_x, along_y, x, y, z),
+        ];
+        let (zero, one, two) = (s.splat_u(0), s.splat_u(1), s.splat_u(2));
+        let axes = [
+            s.select_u(along_x, one, s.select_u(along_y, two, zero)),
+            s.select_u(along_x, two, s.select_u(along_y, zero, one)),
+            s.select_u(along_x, zero, s.select_u(along_y, one, two)),
+        ];
+        let (sx, sy, sz) = (s.div(d[0], d[2]), s.div(d[1], d[2]), s.div(s.splat(1.0), d[2]));
+        Self { axes, origin: o, sx, sy, sz }
     }
 
     #[inline(always)]
     fn shear(&self, s: S, vertex: &Point) -> Sheared<S> {
-        let moved = |k: usize| s.sub(s.pick(vertex, self.axes[k]), self.origin[k]);
-        let [x, y, z] = [moved(0), moved(1), moved(2)];
-        [s.sub(x, s.mul(self.sx, z)), s.sub(y, s.mul(self.sy, z)), z]
+        let [kx, ky, kz] = self.axes;
+        let vertex = [s.pick(vertex, kx), s.pick(vertex, ky), s.pick(vertex, kz)];
+        shear(s, vertex, self.origin, self.sx, self.sy)
     }
+}
+
+/// What belongs to the longest axis of each lane.
+#[inline(always)]
+fn by_axis<S: Simd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: S::F, on_z: S::F) -> S::F {
+    s.select(along_x, on_x, s.select(along_y, on_y, on_z))
+}
+
+#[inline(always)]
+fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
+    [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
+}
+
+/// The first sixteen, or all and `idle` for the rest.
+#[inline(always)]
+fn load_some<S: Simd>(s: S, from: &[f32], idle: f32) -> S::F {
+    if let Some(all) = from.first_chunk() {
+        return s.load(all);
+    }
+    let mut some = [idle; LANES];
+    some[..from.len()].copy_from_slice(from);
+    s.load(&some)
+}
+
+#[inline(always)]
+fn store_some<S: Simd>(s: S, from: S::F, to: &mut [f32]) {
+    if let Some(all) = to.first_chunk_mut() {
+        return s.store(from, all);
+    }
+    let mut all = [0.0; LANES];
+    s.store(from, &mut all);
+    to.copy_from_slice(&all[..to.len()]);
+}
+
+#[inline(always)]
+fn store_some_u<S: Simd>(s: S, from: S::U, to: &mut [u32]) {
+    if let Some(all) = to.first_chunk_mut() {
+        return s.store_u(from, all);
+    }
+    let mut all = [0; LANES];
+    s.store_u(from, &mut all);
+    to.copy_from_slice(&all[..to.len()]);
 }
 
 /// The rays in `f64`.
@@ -324,8 +351,11 @@ impl<S: Simd> WideFrame<S> {
 
     #[inline(always)]
     fn towards(&self, s: S, point: &[f64; 3]) -> [S::D; 3] {
-        let towards = |axis: usize| s.sub_d(s.splat_d(point[axis]), self.origin[axis]);
-        [towards(0), towards(1), towards(2)]
+        [
+            s.sub_d(s.splat_d(point[0]), self.origin[0]),
+            s.sub_d(s.splat_d(point[1]), self.origin[1]),
+            s.sub_d(s.splat_d(point[2]), self.origin[2]),
+        ]
     }
 }
 

@@ -242,8 +242,9 @@ impl Simd for Avx2 {
             bits_of(_mm256_castsi256_ps(low), _mm256_castsi256_ps(high))
         }
         fn select_u(mask: Mask, a: Self::U, b: Self::U) -> Self::U {
-            let floats = |a: Self::U| [_mm256_castsi256_ps(a[0]), _mm256_castsi256_ps(a[1])];
-            let [low, high] = blend(mask, floats(a), floats(b));
+            let a = [_mm256_castsi256_ps(a[0]), _mm256_castsi256_ps(a[1])];
+            let b = [_mm256_castsi256_ps(b[0]), _mm256_castsi256_ps(b[1])];
+            let [low, high] = blend(mask, a, b);
             [_mm256_castps_si256(low), _mm256_castps_si256(high)]
         }
         fn splat_d(x: f64) -> Self::D { [_mm256_set1_pd(x); 4] }
@@ -265,8 +266,11 @@ impl Simd for Avx2 {
         fn div_d(a: Self::D, b: Self::D) -> Self::D { halves!(_mm256_div_pd(a, b), 4) }
         fn sqrt_d(a: Self::D) -> Self::D { halves!(_mm256_sqrt_pd(a), 4) }
         fn le_d(a: Self::D, b: Self::D) -> Mask {
-            let quarter = |i: usize| _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[i], b[i])) as Mask;
-            quarter(0) | quarter(1) << 4 | quarter(2) << 8 | quarter(3) << 12
+            let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[0], b[0]))
+                | _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[1], b[1])) << 4;
+            let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[2], b[2]))
+                | _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[3], b[3])) << 4;
+            (low | high << 8) as Mask
         }
         fn descend(node: &WideNode, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
             // The stores below write eight entries each.

@@ -6,7 +6,7 @@
 //!
 //! Start reading at [`run`].
 
-use super::lanes::{Sheared, may_hit, resolve};
+use super::lanes::{may_hit, resolve, shear};
 use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
 use super::ray::{Nearest, WIDEN};
 use super::simd::Simd;
@@ -57,12 +57,13 @@ impl LeafRay {
 /// Tests one ray against a block.
 #[inline(always)]
 pub(super) fn test_block<S: Simd>(s: S, block: &TriangleBlock, ray: &LeafRay, nearest: &mut Nearest) {
-    let shear = |vertex: &[[f32; BLOCK]; 3]| -> Sheared<S> {
-        let moved = |k: usize| s.sub(s.load(&vertex[ray.axes[k]]), s.splat(ray.origin[k]));
-        let [x, y, z] = [moved(0), moved(1), moved(2)];
-        [s.sub(x, s.mul(s.splat(ray.sx), z)), s.sub(y, s.mul(s.splat(ray.sy), z)), z]
-    };
-    let [a, b, c] = [shear(&block.vertices[0]), shear(&block.vertices[1]), shear(&block.vertices[2])];
+    let [kx, ky, kz] = ray.axes.map(|axis| axis % 3);
+    let origin = [s.splat(ray.origin[0]), s.splat(ray.origin[1]), s.splat(ray.origin[2])];
+    let (sx, sy) = (s.splat(ray.sx), s.splat(ray.sy));
+    let [a, b, c] = &block.vertices;
+    let a = shear(s, [s.load(&a[kx]), s.load(&a[ky]), s.load(&a[kz])], origin, sx, sy);
+    let b = shear(s, [s.load(&b[kx]), s.load(&b[ky]), s.load(&b[kz])], origin, sx, sy);
+    let c = shear(s, [s.load(&c[kx]), s.load(&c[ky]), s.load(&c[kz])], origin, sx, sy);
     let mask = may_hit(s, &a, &b, &c);
     if mask == 0 {
         return;

@@ -137,11 +137,15 @@ fn any<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, clas
 /// As `scene_tree::transform_vector`, rounding for rounding.
 #[inline(always)]
 fn transform<S: Simd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
-    let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
-    [0, 1, 2].map(|row| {
-        let part = |column: usize| s.mul(s.splat(columns[column][row]), v[column]);
-        s.add(s.add(part(0), part(1)), part(2))
-    })
+    [transform_row(s, map, 0, v), transform_row(s, map, 1, v), transform_row(s, map, 2, v)]
+}
+
+#[inline(always)]
+fn transform_row<S: Simd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S::F {
+    let x = s.mul(s.splat(map.matrix3.x_axis[row]), v[0]);
+    let y = s.mul(s.splat(map.matrix3.y_axis[row]), v[1]);
+    let z = s.mul(s.splat(map.matrix3.z_axis[row]), v[2]);
+    s.add(s.add(x, y), z)
 }
 
 /// Takes a packet through one mesh.
@@ -159,7 +163,11 @@ fn trace_packet<S: Simd, const ANY: bool>(
     }
     let map = &instance.object_from_world;
     let turned = transform(s, map, &packet.origin);
-    let origin = [0, 1, 2].map(|row: usize| s.add(turned[row], s.splat(map.translation[row])));
+    let origin = [
+        s.add(turned[0], s.splat(map.translation[0])),
+        s.add(turned[1], s.splat(map.translation[1])),
+        s.add(turned[2], s.splat(map.translation[2])),
+    ];
     let dir = transform(s, map, &packet.dir);
     let mut nearest = NearestLanes { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], prim: [0; LANES], found: 0 };
     s.store(packet.t, &mut nearest.t);

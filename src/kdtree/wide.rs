@@ -4,7 +4,6 @@
 //! the plain walk in `nodes` says what must come out.
 
 use super::nodes::{KdNodes, Node};
-use super::simd::Simd;
 
 /// The planes and children of three levels.
 ///
@@ -42,7 +41,7 @@ impl Stack {
     pub const NEW: Self = Self { child: [0; STACK], t0: [0.0; STACK], t1: [0.0; STACK] };
 }
 
-/// A ray as [`Simd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it.
+/// A ray as [`super::simd::Simd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct DescentRay {
@@ -127,7 +126,7 @@ fn visit_order(node: &WideNode, octant: usize, depth: usize, place: usize, plane
     }
 }
 
-/// The plain version of [`Simd::descend`].
+/// The plain version of [`super::simd::Simd::descend`].
 ///
 /// Pushes the children that the ray meets within `t0..=t1`, farthest first, and returns the new height.
 #[inline(always)]
@@ -166,7 +165,7 @@ pub(super) fn descend_plain(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::simd::{InstructionSet, dispatch};
+    use crate::kdtree::simd::{InstructionSet, Simd, dispatch};
 
     #[inline(always)]
     fn run<S: Simd>(s: S, cases: &[(WideNode, DescentRay, f32, f32)], out: &mut Vec<u64>) {
