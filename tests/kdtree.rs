@@ -1,7 +1,9 @@
 //! Every tree, every preset and every traversal against trying all primitives: the same bits.
 
 use firstlight::geometry::{Ray, robust::offset_ray_origin};
-use firstlight::kdtree::{BuildPreset, Hit, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree};
+use firstlight::kdtree::{
+    BuildPreset, Hit, HitBatch, InstructionSet, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree,
+};
 use glam::{Affine3A, EulerRot, Quat, Vec3, vec3};
 use std::sync::Arc;
 
@@ -158,13 +160,16 @@ fn assert_agrees(scene: &SceneTree, rays: &[Ray], what: &str) {
     }
     let batch: RayBatch = rays.iter().collect();
     let (mut hits, mut occluded) = (HitBatch::default(), Vec::new());
-    for class in [RayClass::Coherent, RayClass::Incoherent] {
-        scene.closest_hits(&batch, class, &mut hits);
-        scene.any_hits(&batch, class, &mut occluded);
+    let classes = [RayClass::Coherent, RayClass::Incoherent];
+    for (class, set) in
+        classes.into_iter().flat_map(|class| InstructionSet::available().into_iter().map(move |set| (class, set)))
+    {
+        scene.closest_hits_with(set, &batch, class, &mut hits);
+        scene.any_hits_with(set, &batch, class, &mut occluded);
         assert!(hits.len() == rays.len() && occluded.len() == rays.len());
         for (i, expected) in expected.iter().enumerate() {
-            assert_eq!(bits(hits.get(i)), *expected, "{what}, {class:?} {i}, {:?}", rays[i]);
-            assert_eq!(occluded[i], expected.is_some(), "any, {what}, {class:?} {i}, {:?}", rays[i]);
+            assert_eq!(bits(hits.get(i)), *expected, "{what}, {class:?} {set:?} {i}, {:?}", rays[i]);
+            assert_eq!(occluded[i], expected.is_some(), "any, {what}, {class:?} {set:?} {i}, {:?}", rays[i]);
         }
     }
 }

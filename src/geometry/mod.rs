@@ -14,3 +14,4 @@ pub use quad::{intersect_quad, quad_corners};
 pub use ray::Ray;
 pub use sphere::{intersect_plane, intersect_sphere};
 pub use triangle::{Shear, TriangleHit, intersect_triangle};
+pub(crate) use triangle::{TINY_EDGE, tiny_edges};

@@ -49,7 +49,7 @@ pub struct TriangleHit {
 }
 
 /// Below this an edge function has lost bits to underflow, and the test is done again in `f64`.
-const TINY_EDGE: f32 = f32::MIN_POSITIVE * (1u64 << 60) as f32;
+pub(crate) const TINY_EDGE: f32 = f32::MIN_POSITIVE * (1u64 << 60) as f32;
 
 /// The hit of the line `origin + t · dir`, from either side, with any sign of `t`.
 ///
@@ -93,7 +93,7 @@ fn mixed_signs(a: f32, b: f32, c: f32) -> bool {
 /// The three edge functions in `f64`, where products of two `f32` are exact, scaled so that the largest is ±1.
 /// `None` if the ray misses.
 #[cold]
-fn tiny_edges([[ax, ay], [bx, by], [cx, cy]]: [[f32; 2]; 3]) -> Option<[f32; 3]> {
+pub(crate) fn tiny_edges([[ax, ay], [bx, by], [cx, cy]]: [[f32; 2]; 3]) -> Option<[f32; 3]> {
     let edge = |px: f32, qy: f32, py: f32, qx: f32| f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx);
     let edges = [edge(cx, by, cy, bx), edge(ax, cy, ay, cx), edge(bx, ay, by, ax)];
     let largest = edges.iter().fold(0.0, |largest: f64, edge| largest.max(edge.abs()));

@@ -3,6 +3,7 @@
 use super::build::{BuildConfig, Primitives, build, clip_triangle};
 use super::nodes::KdNodes;
 use super::ray::{Nearest, TreeRay};
+use super::wide::{WideNode, widen};
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
 use glam::Vec3;
 
@@ -50,9 +51,11 @@ pub(super) const BLOCK: usize = 16;
 pub(super) struct TriangleBlock {
     /// `vertices[k][axis][lane]`.
     pub vertices: [[[f32; BLOCK]; 3]; 3],
-    /// Ascending.
-    pub prims: [u32; BLOCK],
+    /// Ascending. The highest bit of the first says that the leaf goes on in the next block.
+    prims: [u32; BLOCK],
 }
+
+const FOLLOWED: u32 = 1 << 31;
 const _: () = assert!(size_of::<TriangleBlock>() == 640);
 
 /// Bit by bit, for the empty lanes are NaN.
@@ -77,6 +80,22 @@ impl TriangleBlock {
         block
     }
 
+    #[inline(always)]
+    pub fn prim(&self, lane: usize) -> u32 {
+        self.prims[lane] & !FOLLOWED
+    }
+
+    /// Whether the leaf goes on in the next block.
+    #[inline(always)]
+    pub fn is_followed(&self) -> bool {
+        self.prims[0] & FOLLOWED != 0
+    }
+
+    /// How many lanes hold a triangle.
+    pub fn len(&self) -> usize {
+        self.prims.iter().filter(|&&prim| prim != u32::MAX).count()
+    }
+
     fn triangle(&self, lane: usize) -> [Vec3; 3] {
         self.vertices.map(|vertex| Vec3::from_array(vertex.map(|axis| axis[lane])))
     }
@@ -87,7 +106,10 @@ impl TriangleBlock {
 pub struct MeshTree {
     pub(super) positions: Vec<Vec3>,
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The tree for packets, picking and as the reference.
     pub(super) nodes: KdNodes,
+    /// The same tree for streams.
+    pub(super) wide: Vec<WideNode>,
     pub(super) blocks: Vec<TriangleBlock>,
     pub(super) extent: f32,
 }
@@ -123,16 +145,21 @@ impl Primitives for Triangles<'_> {
 impl MeshTree {
     /// Indices must lie within `positions`, and positions must be finite.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset) -> Self {
+        assert!(triangles.len() < FOLLOWED as usize, "a mesh of more than 2^31 triangles");
         let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
         let view = Triangles { positions: &positions, triangles: &triangles };
         let mut blocks = Vec::new();
         let nodes = build(&view, &preset.config(BLOCK), |prims| {
             let first = blocks.len() as u32;
             blocks.extend(prims.chunks(BLOCK).map(|prims| TriangleBlock::new(prims, |prim| view.vertices(prim))));
+            let n_followed = blocks.len().saturating_sub(first as usize + 1);
+            blocks[first as usize..][..n_followed]
+                .iter_mut()
+                .for_each(|block: &mut TriangleBlock| block.prims[0] |= FOLLOWED);
             (first, blocks.len() as u32 - first)
         });
-        let extent = nodes.extent();
-        Self { positions, triangles, nodes, blocks, extent }
+        let (extent, wide) = (nodes.extent(), widen(&nodes));
+        Self { positions, triangles, nodes, wide, blocks, extent }
     }
 
     /// The box around all triangles with an area; empty if there are none.
@@ -150,6 +177,11 @@ impl MeshTree {
         self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
     }
 
+    /// Whether the tree outgrows the caches, so that asking for memory in advance pays.
+    pub(super) fn is_large(&self) -> bool {
+        self.blocks.len() * size_of::<TriangleBlock>() > 16 << 20
+    }
+
     /// Offers the triangles along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
         let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.extent);
@@ -157,7 +189,7 @@ impl MeshTree {
             for block in &self.blocks[first as usize..][..count as usize] {
                 for lane in 0..BLOCK {
                     if let Some(hit) = intersect_triangle(ray.origin, shear, &block.triangle(lane)) {
-                        nearest.offer(hit.t, hit.u, hit.v, block.prims[lane]);
+                        nearest.offer(hit.t, hit.u, hit.v, block.prim(lane));
                     }
                 }
             }

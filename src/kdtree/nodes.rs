@@ -60,6 +60,13 @@ impl KdNodes {
         if self.bounds.is_empty() { 0.0 } else { self.bounds.size().max_element() }
     }
 
+    /// Of the deepest leaf; the root has 0.
+    pub fn depth(&self) -> usize {
+        let mut depth = 0;
+        self.visit_cells(&mut |_, _, at| depth = depth.max(at));
+        depth
+    }
+
     /// Calls `visit(first, count)` for the leaves along the ray, front to back, as long as they start no later than
     /// the limit that `visit` returns; the first limit is `t_max`.
     #[inline]

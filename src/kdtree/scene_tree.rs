@@ -4,8 +4,10 @@ use super::build::{BuildConfig, Primitives, build};
 use super::mesh_tree::BuildPreset;
 use super::nodes::KdNodes;
 use super::ray::{Nearest, TreeRay};
+use super::simd::InstructionSet;
 use super::sphere_tree::{WideRay, ball_bounds};
 use super::surface::Instance;
+use super::trace::FlatScene;
 use super::{HitBatch, MeshTree, RayBatch, SphereTree};
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
@@ -75,6 +77,8 @@ pub struct SceneTree {
     /// What the leaves of `nodes` refer to.
     leaf_objects: Vec<u32>,
     extent: f32,
+    /// In scenes of few objects, for batches.
+    flat: Option<FlatScene>,
 }
 
 /// Inverted in `f64`: the result is as good as `f32` can hold.
@@ -161,7 +165,8 @@ impl SceneTree {
             ((leaf_objects.len() - leaf.len()) as u32, leaf.len() as u32)
         });
         let extent = nodes.extent();
-        Self { shapes, instances, planes, nodes: Some(nodes), leaf_objects, extent }
+        let flat = FlatScene::new(&shapes);
+        Self { shapes, instances, planes, nodes: Some(nodes), leaf_objects, extent, flat }
     }
 
     pub fn shapes(&self) -> &[Shape] {
@@ -174,20 +179,38 @@ impl SceneTree {
     }
 
     /// The nearest hit of each ray with `0 < t < t_max`; `hits` is reset to the size of the batch.
-    pub fn closest_hits(&self, rays: &RayBatch, _class: RayClass, hits: &mut HitBatch) {
-        hits.reset(rays.len());
-        for i in 0..rays.len() {
-            if let Some(hit) = self.closest_hit(&rays.get(i)) {
-                (hits.t[i], hits.u[i], hits.v[i]) = (hit.t, hit.u, hit.v);
-                (hits.prim[i], hits.object[i]) = (hit.prim, hit.object);
-            }
-        }
+    pub fn closest_hits(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
+        self.closest_hits_with(InstructionSet::detect(), rays, class, hits);
     }
 
     /// Whether anything lies on each ray with `0 < t < t_max`; `occluded` is resized to the batch.
-    pub fn any_hits(&self, rays: &RayBatch, _class: RayClass, occluded: &mut Vec<bool>) {
-        occluded.clear();
-        occluded.extend((0..rays.len()).map(|i| self.any_hit(&rays.get(i))));
+    pub fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
+        self.any_hits_with(InstructionSet::detect(), rays, class, occluded);
+    }
+
+    /// The same by the instructions of the caller's choice, for tests and benchmarks.
+    ///
+    /// # Panics
+    /// If the processor does not have them.
+    #[doc(hidden)]
+    pub fn closest_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
+        assert!(set.is_available(), "this processor does not have {set:?}");
+        hits.resize(rays.len());
+        match &self.flat {
+            Some(flat) => flat.closest_hits(set, self, rays, class, hits),
+            None => (0..rays.len()).for_each(|i| hits.set(i, self.closest_hit(&rays.get(i)))),
+        }
+    }
+
+    /// As [`Self::closest_hits_with`].
+    #[doc(hidden)]
+    pub fn any_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
+        assert!(set.is_available(), "this processor does not have {set:?}");
+        occluded.resize(rays.len(), false);
+        match &self.flat {
+            Some(flat) => flat.any_hits(set, self, rays, class, occluded),
+            None => (0..rays.len()).for_each(|i| occluded[i] = self.any_hit(&rays.get(i))),
+        }
     }
 
     /// One ray, for the mouse.

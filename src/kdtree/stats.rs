@@ -2,6 +2,7 @@
 
 use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
 use super::nodes::{KdNode, KdNodes, Node};
+use super::wide::WideNode;
 use crate::geometry::Aabb;
 use glam::Vec3;
 use std::mem::size_of;
@@ -32,13 +33,19 @@ impl KdTreeStats {
     }
 }
 
+fn prims_of(block: &TriangleBlock) -> impl Iterator<Item = u32> {
+    (0..block.len()).map(|lane| block.prim(lane))
+}
+
 impl MeshTree {
     pub fn stats(&self) -> KdTreeStats {
         let mut stats = KdTreeStats {
             primitives: self.n_triangles(),
             blocks: self.blocks.len(),
-            references: self.blocks.iter().flat_map(|block| block.prims).filter(|&prim| prim != u32::MAX).count(),
-            bytes: self.nodes.nodes.len() * size_of::<KdNode>() + self.blocks.len() * size_of::<TriangleBlock>(),
+            references: self.blocks.iter().map(TriangleBlock::len).sum(),
+            bytes: self.nodes.nodes.len() * size_of::<KdNode>()
+                + self.wide.len() * size_of::<WideNode>()
+                + self.blocks.len() * size_of::<TriangleBlock>(),
             ..KdTreeStats::default()
         };
         let root_area = f64::from(self.nodes.bounds.area());
@@ -68,7 +75,7 @@ impl MeshTree {
             assert!(!cell.is_empty(), "a cell inside out: {cell:?}");
             if let Node::Leaf { first, count } = node {
                 let blocks = &self.blocks[first as usize..][..count as usize];
-                let prims: Vec<u32> = blocks.iter().flat_map(|block| block.prims).filter(|&p| p != u32::MAX).collect();
+                let prims: Vec<u32> = blocks.iter().flat_map(prims_of).collect();
                 assert!(prims.is_sorted_by(|a, b| a < b), "not ascending: {prims:?}");
                 assert_eq!(prims.len().div_ceil(BLOCK), blocks.len(), "blocks that could be saved");
                 for &prim in &prims {
@@ -89,7 +96,10 @@ impl MeshTree {
             for point in points {
                 assert!(
                     self.nodes.some_leaf_at(point.to_array(), |first, count| {
-                        self.blocks[first as usize..][..count as usize].iter().any(|block| block.prims.contains(&prim))
+                        self.blocks[first as usize..][..count as usize]
+                            .iter()
+                            .flat_map(prims_of)
+                            .any(|other| other == prim)
                     }),
                     "triangle {prim} is missing at {point}"
                 );

@@ -4,13 +4,16 @@
 //! only meshes that pass [`Mesh::validate`]. Start reading at [`Mesh`].
 
 mod build;
+mod deviation;
 mod measure;
 mod normals;
 pub mod procedural;
+pub mod simplify;
 mod topology;
 mod weld;
 
 pub use build::MeshError;
+pub use deviation::{Deviation, Distances};
 pub use normals::NormalWeight;
 pub use topology::Topology;
 pub use weld::Welding;
