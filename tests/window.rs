@@ -184,9 +184,12 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
 }
 
 #[test]
-fn a_picture_asked_for_on_the_way_out_is_kept_and_a_large_screen_gets_large_pictures() {
+fn a_dense_screen_gets_fine_pictures_and_one_asked_for_on_the_way_out_is_kept() {
     let Some(desktop) = Desktop::start() else { return };
-    let program = desktop.open(&["cornell", "--size", "240x180"], &[("WINIT_X11_SCALE_FACTOR", "2")]);
+    let program = desktop.open(
+        &["cornell", "--size", "240x180"],
+        &[("WINIT_X11_SCALE_FACTOR", "2"), ("WAYLAND_DISPLAY", "nobody-listens")],
+    );
     until("the box to be seen", || has_content(&program.pixels()).then_some(()));
     program.key("k");
     program.close();
@@ -217,10 +220,20 @@ fn a_scene_that_is_not_there_is_told_in_the_terminal() {
     for (scene, expected) in
         [("broken.ron", "broken.ron:1"), ("galery", "did you mean `gallery`"), ("no.obj", "no.obj")]
     {
-        let (status, errors) = desktop.fails(&[scene]);
+        let (status, errors) = desktop.fails(&[scene], &[]);
         assert_eq!(status.code(), Some(1), "{scene}: {errors}");
         assert!(errors.contains(expected) && !errors.contains("panicked"), "{scene}: {errors}");
     }
+}
+
+#[test]
+fn without_a_graphics_driver_the_way_out_is_told() {
+    let Some(desktop) = Desktop::start() else { return };
+    let nowhere = [("VK_ICD_FILENAMES", "/nowhere"), ("VK_DRIVER_FILES", "/nowhere"), ("WGPU_BACKEND", "vulkan")];
+    let (status, errors) = desktop.fails(&["cornell"], &nowhere);
+    assert_eq!(status.code(), Some(1), "{errors}");
+    assert!(errors.contains("install one") && errors.contains("firstlight render"), "{errors}");
+    assert!(!errors.contains("panicked"), "{errors}");
 }
 
 #[test]
