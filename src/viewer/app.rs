@@ -302,6 +302,7 @@ impl App {
                 overlay::help(context, help);
             }
         })?;
+        tracing::trace!("drawn in {:.1} ms", now.elapsed().as_secs_f64() * 1e3);
         if presented.again {
             window.request_redraw();
         }
