@@ -1,5 +1,6 @@
 //! Rays and hits as structures of arrays: what a wave of the integrator hands to the kernel and gets back.
 
+use super::Hit;
 use crate::geometry::Ray;
 use glam::Vec3;
 
@@ -94,6 +95,30 @@ impl HitBatch {
 
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
+    }
+
+    /// The answer for ray `i`, `None` for a miss.
+    #[inline]
+    pub fn get(&self, i: usize) -> Option<Hit> {
+        let object = self.object[i];
+        let hit = Hit { t: self.t[i], u: self.u[i], v: self.v[i], prim: self.prim[i], object };
+        (object != Self::MISS).then_some(hit)
+    }
+
+    #[inline]
+    pub(super) fn set(&mut self, i: usize, hit: Option<Hit>) {
+        let miss = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: Self::MISS, object: Self::MISS };
+        let hit = hit.unwrap_or(miss);
+        (self.t[i], self.u[i], self.v[i], self.prim[i], self.object[i]) = (hit.t, hit.u, hit.v, hit.prim, hit.object);
+    }
+
+    /// Makes room for `n` answers, which may still be those of an older batch.
+    pub(super) fn resize(&mut self, n: usize) {
+        self.t.resize(n, f32::INFINITY);
+        self.u.resize(n, 0.0);
+        self.v.resize(n, 0.0);
+        self.prim.resize(n, Self::MISS);
+        self.object.resize(n, Self::MISS);
     }
 
     /// Makes room for `n` answers, all of them misses.

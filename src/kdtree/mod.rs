@@ -5,11 +5,27 @@
 //! Knows nothing of materials or entities: positions go in, hits come out.
 
 mod batch;
+mod build;
+mod lanes;
+mod mesh_packet;
 mod mesh_tree;
+mod nodes;
+mod objects;
+mod ray;
 mod scene_tree;
+mod simd;
 mod sphere_tree;
+mod split;
+mod stats;
+mod stream;
+mod surface;
+mod trace;
+mod wide;
 
 pub use batch::{HitBatch, RayBatch};
 pub use mesh_tree::{BuildPreset, MeshTree};
 pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
+pub use simd::InstructionSet;
 pub use sphere_tree::SphereTree;
+pub use stats::KdTreeStats;
+pub use surface::SurfacePoint;

@@ -1,18 +1,79 @@
 //! Kd-tree over many balls that share one material, in the space of their object.
 
-use glam::Vec3;
+use super::build::{BuildConfig, Primitives, build};
+use super::mesh_tree::BuildPreset;
+use super::nodes::KdNodes;
+use super::ray::{Nearest, TreeRay};
+use crate::geometry::{Aabb, Ray, Shear, intersect_sphere};
+use glam::{DVec3, Vec3};
 
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct SphereTree {
     pub(super) centers: Vec<Vec3>,
     pub(super) radii: Vec<f32>,
+    pub(super) nodes: KdNodes,
+    /// What the leaves refer to.
+    pub(super) prims: Vec<u32>,
+    pub(super) extent: f32,
+}
+
+struct Balls<'a> {
+    centers: &'a [Vec3],
+    radii: &'a [f32],
+}
+
+/// The box around a ball, rounded outwards.
+pub(super) fn ball_bounds(center: Vec3, radius: f32) -> Aabb {
+    let (min, max) = (center - radius, center + radius);
+    let slack = super::ray::WIDEN * (center.abs() + radius);
+    Aabb { min: min - slack, max: max + slack }
+}
+
+impl Primitives for Balls<'_> {
+    fn len(&self) -> usize {
+        self.centers.len()
+    }
+
+    fn bounds(&self, prim: u32) -> Aabb {
+        ball_bounds(self.centers[prim as usize], self.radii[prim as usize])
+    }
+
+    /// The box around the cap: its rim may be narrower than the ball.
+    fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
+        let (center, radius) = (self.centers[prim as usize], self.radii[prim as usize]);
+        let mut bounds = self.bounds(prim);
+        // How far the plane cuts beyond the centre, towards the side that is kept.
+        let height = if below { center[axis] - limit } else { limit - center[axis] };
+        if height > 0.0 {
+            let rim = (f64::from(radius).powi(2) - f64::from(height).powi(2)).max(0.0).sqrt() as f32;
+            let reach = rim + padding + super::ray::WIDEN * (center.abs().max_element() + radius);
+            for other in [(axis + 1) % 3, (axis + 2) % 3] {
+                bounds.min[other] = bounds.min[other].max(center[other] - reach);
+                bounds.max[other] = bounds.max[other].min(center[other] + reach);
+            }
+        }
+        Some(bounds)
+    }
 }
 
 impl SphereTree {
     /// One radius per centre; radii positive, all numbers finite.
     pub fn build(centers: &[Vec3], radii: &[f32]) -> Self {
         assert_eq!(centers.len(), radii.len(), "each ball needs a centre and a radius");
-        Self { centers: centers.to_vec(), radii: radii.to_vec() }
+        let (centers, radii) = (centers.to_vec(), radii.to_vec());
+        let mut prims = Vec::new();
+        let config = BuildConfig { block_cost: 2.0, ..BuildPreset::Best.config(4) };
+        let nodes = build(&Balls { centers: &centers, radii: &radii }, &config, |leaf| {
+            prims.extend_from_slice(leaf);
+            ((prims.len() - leaf.len()) as u32, leaf.len() as u32)
+        });
+        let extent = nodes.extent();
+        Self { centers, radii, nodes, prims, extent }
+    }
+
+    /// The box around all balls; empty if there are none.
+    pub fn bounds(&self) -> Aabb {
+        self.nodes.bounds
     }
 
     /// Centre and radius of one ball, in the space of the object.
@@ -27,5 +88,50 @@ impl SphereTree {
 
     pub fn is_empty(&self) -> bool {
         self.centers.is_empty()
+    }
+
+    /// Offers the balls along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
+    pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.extent);
+        let wide = WideRay::new(ray);
+        self.nodes.walk(&tree_ray, nearest.t, |first, count| {
+            for &prim in &self.prims[first as usize..][..count as usize] {
+                let (center, radius) = self.sphere(prim);
+                wide.offer_sphere(center, radius, prim, nearest);
+            }
+            if any && nearest.found { f32::NEG_INFINITY } else { nearest.t }
+        });
+    }
+
+    /// The same by trying every ball.
+    pub(super) fn offer_hits_naive(&self, ray: &Ray, nearest: &mut Nearest) {
+        let wide = WideRay::new(ray);
+        for prim in 0..self.len() as u32 {
+            let (center, radius) = self.sphere(prim);
+            wide.offer_sphere(center, radius, prim, nearest);
+        }
+    }
+}
+
+/// A ray in `f64`, for spheres and planes.
+pub(super) struct WideRay {
+    pub origin: DVec3,
+    pub dir: DVec3,
+    inv_dir_squared: f64,
+}
+
+impl WideRay {
+    #[inline]
+    pub fn new(ray: &Ray) -> Self {
+        let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+        Self { origin, dir, inv_dir_squared: 1.0 / (dir.x * dir.x + dir.y * dir.y + dir.z * dir.z) }
+    }
+
+    #[inline]
+    pub fn offer_sphere(&self, center: Vec3, radius: f32, prim: u32, nearest: &mut Nearest) {
+        if let Some((near, far)) = intersect_sphere(self.origin, self.dir, self.inv_dir_squared, center, radius) {
+            // The far side only counts from inside: outside, it is never in front.
+            nearest.offer(if near > 0.0 { near } else { far }, 0.0, 0.0, prim);
+        }
     }
 }

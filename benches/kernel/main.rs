@@ -1,0 +1,170 @@
+//! How fast the ray kernel is, and how fast others are on the same rays.
+//!
+//! ```text
+//! cargo bench --bench kernel -- [FILTER] [--rounds N] [--quick] [--small]
+//! ```
+//!
+//! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
+//! - `FIRSTLIGHT_EMBREE`: a libembree4 shared object to compare with (see `scripts/compare_embree.sh`).
+//!
+//! Times are CPU time of one thread, engines take turns in every round, and the figure is the median over the rounds
+//! of the ratio in the same round: the machine may be busy and its clock may wander. Before anything is timed,
+//! every hit is checked: against the plain traversal for all rays, bit for bit, and against trying every
+//! triangle for some.
+
+mod clock;
+#[cfg(unix)]
+mod embree;
+mod meshes;
+mod rays;
+mod small;
+
+use clock::{cpu_seconds, median};
+use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, SceneTree, Shape};
+use glam::Affine3A;
+use rays::RaySet;
+use std::sync::Arc;
+
+/// Rays that are handed over at a time, as a wave of the integrator does.
+const WAVE: usize = 4096;
+
+struct Options {
+    filter: String,
+    rounds: usize,
+    preset: BuildPreset,
+}
+
+fn main() {
+    let mut options = Options { filter: String::new(), rounds: 7, preset: BuildPreset::Best };
+    let mut only_small = false;
+    // Builds too run on this thread alone, whose clock is read.
+    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().unwrap();
+    let mut args = std::env::args().skip(1);
+    while let Some(arg) = args.next() {
+        match arg.as_str() {
+            "--bench" => {}
+            "--quick" => options.preset = BuildPreset::Quick,
+            "--median" => options.preset = BuildPreset::Median,
+            "--small" => only_small = true,
+            "--rounds" => options.rounds = args.next().and_then(|n| n.parse().ok()).expect("--rounds wants a number"),
+            filter => options.filter = filter.to_string(),
+        }
+    }
+    if only_small || options.filter.is_empty() {
+        small::run(options.rounds);
+    }
+    if only_small {
+        return;
+    }
+    #[cfg(unix)]
+    let embree = std::env::var("FIRSTLIGHT_EMBREE").ok().map(|path| embree::Embree::open(&path).unwrap());
+    #[cfg(unix)]
+    if embree.is_some() {
+        println!("figures in ns a ray (x: how many times faster than Embree, one ray at a time)");
+    }
+    let mut totals: Vec<(&str, f64, usize)> = Vec::new();
+    for mesh in meshes::all(&options.filter) {
+        let mut build = Vec::new();
+        let mut tree = None;
+        for _ in 0..3 {
+            let start = cpu_seconds();
+            tree = Some(MeshTree::build(&mesh.positions, &mesh.triangles, options.preset));
+            build.push(cpu_seconds() - start);
+        }
+        let tree = Arc::new(tree.unwrap());
+        let stats = tree.stats();
+        print!(
+            "{:10} {:7} tri  build {:.3} s  {:.1} MB  {:.2} refs/tri  depth {} ",
+            mesh.name,
+            mesh.triangles.len(),
+            median(&mut build),
+            stats.bytes as f64 / 1e6,
+            stats.references_per_primitive(),
+            stats.depth
+        );
+        #[cfg(unix)]
+        let rival = embree.as_ref().map(|embree| {
+            let start = cpu_seconds();
+            let scene = embree.scene(&mesh.positions, &mesh.triangles);
+            print!(" embree {:.3} s {:.1} MB", cpu_seconds() - start, scene.bytes() as f64 / 1e6);
+            scene
+        });
+        println!();
+        let scene = SceneTree::build(vec![Shape::Mesh { tree, world_from_object: Affine3A::IDENTITY }]);
+        for set in rays::classes(&scene, &mesh) {
+            check(&scene, &set);
+            let mut hits = HitBatch::default();
+            let mut occluded = Vec::new();
+            #[cfg(unix)]
+            let prepared = rival.as_ref().map(|rival| rival.prepare(&set));
+            let (mut own, mut any, mut theirs, mut packets) = (vec![], vec![], vec![], vec![]);
+            for _ in 0..options.rounds {
+                let per_ray = |seconds: f64| 1e9 * seconds / set.len() as f64;
+                let start = cpu_seconds();
+                for wave in &set.waves {
+                    scene.closest_hits(wave, set.class, &mut hits);
+                    std::hint::black_box(&mut hits);
+                }
+                own.push(per_ray(cpu_seconds() - start));
+                let start = cpu_seconds();
+                for wave in &set.waves {
+                    scene.any_hits(wave, set.class, &mut occluded);
+                    std::hint::black_box(&mut occluded);
+                }
+                any.push(per_ray(cpu_seconds() - start));
+                #[cfg(unix)]
+                if let (Some(rival), Some(prepared)) = (&rival, &prepared) {
+                    theirs.push(per_ray(rival.trace(prepared)));
+                    packets.push(per_ray(rival.trace_packets(prepared)));
+                }
+            }
+            let ratio = median(&mut theirs.iter().zip(&own).map(|(theirs, own)| theirs / own).collect::<Vec<_>>());
+            let packet_ratio =
+                median(&mut theirs.iter().zip(&packets).map(|(theirs, own)| theirs / own).collect::<Vec<_>>());
+            print!("    {:9} closest {:6.1}  any {:6.1}", set.name, median(&mut own), median(&mut any));
+            if !theirs.is_empty() {
+                print!(
+                    "   x{ratio:.2}   embree {:6.1}, packet 16 {:6.1} (x{packet_ratio:.2})",
+                    median(&mut theirs),
+                    median(&mut packets)
+                );
+                #[cfg(unix)]
+                if let (Some(rival), Some(prepared)) = (&rival, &prepared) {
+                    print!("   differ: {}", rival.differences(prepared, &scene, &set));
+                }
+                match totals.iter_mut().find(|total| total.0 == set.name) {
+                    Some(total) => (total.1, total.2) = (total.1 + ratio.ln(), total.2 + 1),
+                    None => totals.push((set.name, ratio.ln(), 1)),
+                }
+            }
+            println!();
+        }
+    }
+    for (name, sum, count) in totals {
+        println!("geometric mean over {count} meshes, {name}: x{:.2}", (sum / count as f64).exp());
+    }
+}
+
+/// Every hit of every ray against the plain traversal, and some against no tree at all.
+fn check(scene: &SceneTree, set: &RaySet) {
+    let mut hits = HitBatch::default();
+    let mut occluded = Vec::new();
+    for (w, wave) in set.waves.iter().enumerate() {
+        scene.closest_hits(wave, set.class, &mut hits);
+        scene.any_hits(wave, set.class, &mut occluded);
+        for i in 0..wave.len() {
+            let expected = scene.closest_hit(&wave.get(i));
+            assert_eq!(hits.get(i), expected, "{} {:?}", set.name, wave.get(i));
+            assert_eq!(occluded[i], expected.is_some(), "{} {:?}", set.name, wave.get(i));
+            if (w * WAVE + i).is_multiple_of(20_011) {
+                assert_eq!(expected, scene.closest_hit_naive(&wave.get(i)), "{} {:?}", set.name, wave.get(i));
+            }
+        }
+    }
+}
+
+/// The rays of a set in one piece.
+#[cfg(unix)]
+fn all_rays(set: &RaySet) -> impl Iterator<Item = firstlight::geometry::Ray> {
+    set.waves.iter().flat_map(|wave: &RayBatch| (0..wave.len()).map(|i| wave.get(i)))
+}

@@ -1,0 +1,340 @@
+//! The builder of every kd-tree here: surface area heuristic over references that are clipped to their cells.
+//!
+//! Top-down. Large nodes bin their references along each axis, small ones try every face of every reference. A split must lower
+//! the expected cost, so that a fan of thousands of triangles around one vertex ends as one leaf, and the
+//! number of references is bounded besides ([`BuildConfig::max_growth`]). Large subtrees are built in parallel; what is built
+//! never depends on the number of threads.
+//!
+//! Sources: Wald and Havran 2006 for cost and clipping; Hunt, Mark and Stoll 2006 for bins.
+//! Start reading at [`build`].
+
+use super::nodes::{KdNode, KdNodes};
+use super::split::{Split, find_split, median_split};
+use crate::geometry::Aabb;
+use glam::Vec3;
+
+/// What the builder weighs; [`super::BuildPreset`] has the values.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BuildConfig {
+    /// Splits tried per axis in large nodes.
+    pub bins: usize,
+    /// Nodes with at most this many references try every face instead.
+    pub exact_below: usize,
+    /// Primitives tested at once.
+    pub block: usize,
+    /// Cost of testing a block, in visits of an inner node.
+    pub block_cost: f32,
+    /// Factor on the cost of a split that cuts off empty space.
+    pub empty_factor: f32,
+    /// Depth of the deepest leaf.
+    pub max_depth: u32,
+    /// References per primitive that the whole tree may add.
+    pub max_growth: f32,
+    /// Shrink references to their part in the cell.
+    pub clip: bool,
+    /// Split at the median of the longest axis and ignore the cost.
+    pub median: bool,
+}
+
+/// What the tree is built over.
+pub(super) trait Primitives: Sync {
+    fn len(&self) -> usize;
+    /// Box of a primitive; empty if no ray can hit it.
+    fn bounds(&self, prim: u32) -> Aabb;
+    /// Box of the part of the primitive with `axis <= limit` (`below`) or `axis >= limit`, padded by `padding`.
+    fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb>;
+}
+
+/// A primitive in a cell: the box of what the cell holds of it.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Reference {
+    pub min: [f32; 3],
+    pub prim: u32,
+    pub max: [f32; 3],
+    unused: u32,
+}
+const _: () = assert!(size_of::<Reference>() == 32);
+
+impl Reference {
+    fn new(bounds: &Aabb, prim: u32) -> Self {
+        Self { min: bounds.min.into(), prim, max: bounds.max.into(), unused: 0 }
+    }
+
+    fn bounds(&self) -> Aabb {
+        Aabb { min: self.min.into(), max: self.max.into() }
+    }
+
+    /// A flat reference inside the plane goes below.
+    #[inline]
+    pub fn is_below(&self, axis: usize, split: f32) -> bool {
+        self.min[axis] < split || self.max[axis] <= split
+    }
+
+    #[inline]
+    pub fn is_above(&self, axis: usize, split: f32) -> bool {
+        self.max[axis] > split
+    }
+}
+
+/// How far the box of a clipped primitive reaches beyond it.
+///
+/// Covers the rounding of the clip and what the watertight test moves an edge by (see `super::ray`).
+fn clip_padding(bounds: &Aabb) -> f32 {
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    super::ray::WIDEN * (bounds.size().max_element() + 0.25 * largest)
+}
+
+/// Builds the nodes and hands every leaf's primitives, ascending, to `make_leaf`, in the order of the leaves.
+///
+/// `make_leaf` returns the two numbers that its leaf node stores.
+pub(super) fn build(
+    primitives: &impl Primitives,
+    config: &BuildConfig,
+    mut make_leaf: impl FnMut(&[u32]) -> (u32, u32),
+) -> KdNodes {
+    let mut references = Vec::with_capacity(primitives.len());
+    let mut bounds = Aabb::EMPTY;
+    for prim in 0..primitives.len() as u32 {
+        let prim_bounds = primitives.bounds(prim);
+        if !prim_bounds.is_empty() {
+            bounds = bounds.union(prim_bounds);
+            references.push(Reference::new(&prim_bounds, prim));
+        }
+    }
+    let growth = (references.len() as f32 * config.max_growth) as usize + 64;
+    let builder = Builder { primitives, config, padding: clip_padding(&bounds) };
+    let root = builder.subtree(references, bounds, growth, 0);
+    let mut nodes = vec![KdNode::leaf(0, 0)];
+    root.flatten(0, &mut nodes, &mut make_leaf);
+    KdNodes { nodes, bounds }
+}
+
+/// A finished part of the tree, before it gets its place in the arrays.
+enum Part {
+    Fork { axis: usize, split: f32, children: Box<[Part; 2]> },
+    Done(Arena),
+}
+
+impl Part {
+    fn flatten(&self, slot: usize, nodes: &mut Vec<KdNode>, make_leaf: &mut impl FnMut(&[u32]) -> (u32, u32)) {
+        match self {
+            Self::Fork { axis, split, children } => {
+                let first = nodes.len();
+                nodes.extend([KdNode::leaf(0, 0); 2]);
+                nodes[slot] = KdNode::inner(*axis, *split, first as u32);
+                children[0].flatten(first, nodes, make_leaf);
+                children[1].flatten(first + 1, nodes, make_leaf);
+            }
+            Self::Done(arena) => arena.flatten(0, slot, nodes, make_leaf),
+        }
+    }
+}
+
+/// A subtree built by one thread.
+#[derive(Default)]
+struct Arena {
+    nodes: Vec<ArenaNode>,
+    prims: Vec<u32>,
+}
+
+enum ArenaNode {
+    /// The lower child is the next node.
+    Inner {
+        axis: usize,
+        split: f32,
+        above: u32,
+    },
+    Leaf {
+        first: u32,
+        count: u32,
+    },
+}
+
+impl Arena {
+    fn flatten(
+        &self,
+        index: usize,
+        slot: usize,
+        nodes: &mut Vec<KdNode>,
+        make_leaf: &mut impl FnMut(&[u32]) -> (u32, u32),
+    ) {
+        match self.nodes[index] {
+            ArenaNode::Inner { axis, split, above } => {
+                let first = nodes.len();
+                nodes.extend([KdNode::leaf(0, 0); 2]);
+                nodes[slot] = KdNode::inner(axis, split, first as u32);
+                self.flatten(index + 1, first, nodes, make_leaf);
+                self.flatten(above as usize, first + 1, nodes, make_leaf);
+            }
+            ArenaNode::Leaf { first, count } => {
+                let (first, count) = make_leaf(&self.prims[first as usize..][..count as usize]);
+                nodes[slot] = KdNode::leaf(first, count);
+            }
+        }
+    }
+}
+
+struct Builder<'a, P> {
+    primitives: &'a P,
+    config: &'a BuildConfig,
+    padding: f32,
+}
+
+/// Subtrees with more references than this are built side by side.
+const FORK_ABOVE: usize = 4096;
+
+impl<P: Primitives> Builder<'_, P> {
+    /// - `growth`: references that this subtree may add to those given.
+    fn subtree(&self, references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Part {
+        if references.len() > FORK_ABOVE
+            && let Some(split) = self.choose(&references, &cell, depth)
+        {
+            let (mut below, mut above) = (Vec::new(), Vec::new());
+            for reference in &references {
+                let (lower, upper) = self.divide(reference, &split);
+                below.extend(lower);
+                above.extend(upper);
+            }
+            if let Some((growth_below, growth_above)) = share(growth, references.len(), below.len(), above.len()) {
+                drop(references);
+                let (cell_below, cell_above) = split_cell(&cell, &split);
+                let (lower, upper) = rayon::join(
+                    || self.subtree(below, cell_below, growth_below, depth + 1),
+                    || self.subtree(above, cell_above, growth_above, depth + 1),
+                );
+                return Part::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
+            }
+        }
+        let mut arena = Arena::default();
+        let mut stack = references;
+        self.sequential(&mut stack, 0, cell, growth, depth, &mut arena);
+        Part::Done(arena)
+    }
+
+    /// Builds the subtree over `stack[start..]`, which it consumes.
+    fn sequential(
+        &self,
+        stack: &mut Vec<Reference>,
+        start: usize,
+        cell: Aabb,
+        growth: usize,
+        depth: u32,
+        arena: &mut Arena,
+    ) {
+        let end = stack.len();
+        let count = end - start;
+        if let Some(split) = self.choose(&stack[start..], &cell, depth) {
+            // Upper parts are packed where the references lie, lower parts pile up behind them.
+            let mut kept = start;
+            for i in start..end {
+                let (lower, upper) = self.divide(&stack[i], &split);
+                if let Some(upper) = upper {
+                    stack[kept] = upper;
+                    kept += 1;
+                }
+                stack.extend(lower);
+            }
+            let (n_above, n_below) = (kept - start, stack.len() - end);
+            if let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) {
+                stack.copy_within(end.., kept);
+                stack.truncate(kept + n_below);
+                let (cell_below, cell_above) = split_cell(&cell, &split);
+                let index = arena.nodes.len();
+                arena.nodes.push(ArenaNode::Inner { axis: split.axis, split: split.at, above: 0 });
+                self.sequential(stack, kept, cell_below, growth_below, depth + 1, arena);
+                let above = arena.nodes.len() as u32;
+                arena.nodes[index] = ArenaNode::Inner { axis: split.axis, split: split.at, above };
+                self.sequential(stack, start, cell_above, growth_above, depth + 1, arena);
+                return;
+            }
+            // Too many copies. Every primitive is in one of the two lists: they make up the leaf together.
+            stack.copy_within(end.., kept);
+            stack.truncate(kept + n_below);
+        }
+        let first = arena.prims.len();
+        arena.prims.extend(stack[start..].iter().map(|reference| reference.prim));
+        stack.truncate(start);
+        arena.prims[first..].sort_unstable();
+        // Both halves of a rejected split may name the same primitive.
+        let mut length = first;
+        for i in first..arena.prims.len() {
+            if length == first || arena.prims[length - 1] != arena.prims[i] {
+                arena.prims[length] = arena.prims[i];
+                length += 1;
+            }
+        }
+        arena.prims.truncate(length);
+        arena.nodes.push(ArenaNode::Leaf { first: first as u32, count: (length - first) as u32 });
+    }
+
+    fn choose(&self, references: &[Reference], cell: &Aabb, depth: u32) -> Option<Split> {
+        if depth >= self.config.max_depth || references.len() <= 1 {
+            return None;
+        }
+        if self.config.median {
+            median_split(references, cell, self.config)
+        } else {
+            find_split(references, cell, self.config)
+        }
+    }
+
+    /// The parts of a reference on either side; none where its primitive does not reach.
+    #[inline]
+    fn divide(&self, reference: &Reference, split: &Split) -> (Option<Reference>, Option<Reference>) {
+        match (reference.is_below(split.axis, split.at), reference.is_above(split.axis, split.at)) {
+            (true, false) => (Some(*reference), None),
+            (false, _) => (None, Some(*reference)),
+            (true, true) => (self.part(reference, split, true), self.part(reference, split, false)),
+        }
+    }
+
+    fn part(&self, reference: &Reference, split: &Split, below: bool) -> Option<Reference> {
+        let mut bounds = reference.bounds();
+        if self.config.clip {
+            // A point of the primitive within the padding of the plane may be moved across it.
+            let limit = if below { split.at + self.padding } else { split.at - self.padding };
+            let clipped = self.primitives.clipped(reference.prim, split.axis, limit, below, self.padding)?;
+            bounds = bounds.intersection(clipped);
+        }
+        if below {
+            bounds.max[split.axis] = bounds.max[split.axis].min(split.at);
+        } else {
+            bounds.min[split.axis] = bounds.min[split.axis].max(split.at);
+        }
+        (!bounds.is_empty()).then(|| Reference::new(&bounds, reference.prim))
+    }
+}
+
+/// Divides what is left of the allowed growth among the children; `None` if the split takes more than that or separates nothing.
+fn share(growth: usize, count: usize, below: usize, above: usize) -> Option<(usize, usize)> {
+    let left = (growth + count).checked_sub(below + above)?;
+    if below.min(above) == count {
+        return None;
+    }
+    let for_below = (left as u128 * below as u128 / (below + above).max(1) as u128) as usize;
+    Some((for_below, left - for_below))
+}
+
+fn split_cell(cell: &Aabb, split: &Split) -> (Aabb, Aabb) {
+    let (mut below, mut above) = (*cell, *cell);
+    below.max[split.axis] = split.at;
+    above.min[split.axis] = split.at;
+    (below, above)
+}
+
+/// Box of the part of a triangle with `axis <= limit` or `axis >= limit`, padded.
+pub(super) fn clip_triangle(vertices: &[Vec3; 3], axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
+    let mut bounds = Aabb::EMPTY;
+    for i in 0..3 {
+        let (p, q) = (vertices[i], vertices[(i + 1) % 3]);
+        let inside = |p: Vec3| if below { p[axis] <= limit } else { p[axis] >= limit };
+        if inside(p) {
+            bounds = bounds.grown_by(p);
+        }
+        if inside(p) != inside(q) {
+            bounds = bounds.grown_by(p + (q - p) * ((limit - p[axis]) / (q[axis] - p[axis])));
+        }
+    }
+    (!bounds.is_empty()).then(|| Aabb { min: bounds.min - padding, max: bounds.max + padding })
+}

@@ -1,0 +1,100 @@
+//! The tests of `geometry`, sixteen at a time: one shape against sixteen rays, or one ray against sixteen triangles.
+//!
+//! Every operation is that of the scalar test, in its order, so the bits are the same.
+
+use super::simd::{LANES, Mask, Simd};
+use crate::geometry::{TINY_EDGE, tiny_edges};
+
+/// Vertices in the ray's sheared frame: across, across, along.
+pub(super) type Sheared<S> = [<S as Simd>::F; 3];
+
+/// Lanes that hit, with their `t`, `u`, `v`; other lanes hold anything.
+pub(super) struct LaneHits<S: Simd> {
+    pub mask: Mask,
+    pub t: S::F,
+    pub u: S::F,
+    pub v: S::F,
+}
+
+/// Shears a vertex that is given along the ray's own axes.
+///
+/// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.
+#[inline(always)]
+pub(super) fn shear<S: Simd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::F, sy: S::F) -> Sheared<S> {
+    let (x, y) = (s.sub(vertex[0], origin[0]), s.sub(vertex[1], origin[1]));
+    let z = s.sub(vertex[2], origin[2]);
+    [s.sub(x, s.mul(sx, z)), s.sub(y, s.mul(sy, z)), z]
+}
+
+/// Lanes whose three numbers do not have both signs among them. False for NaN.
+#[inline(always)]
+pub(super) fn same_sign<S: Simd>(s: S, a: S::F, b: S::F, c: S::F) -> Mask {
+    let zero = s.splat(0.0);
+    s.le(zero, s.min(a, s.min(b, c))) | s.le(s.max(a, s.max(b, c)), zero)
+}
+
+/// The plain cross product in the plane, whose sign is never wrong but may be lost.
+#[inline(always)]
+pub(super) fn plain<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
+    s.sub(s.mul(p[0], q[1]), s.mul(p[1], q[0]))
+}
+
+#[inline(always)]
+fn exact<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
+    let cd = s.mul(p[1], q[0]);
+    let rounding = s.neg_mul_add(p[1], q[0], cd);
+    s.add(s.mul_sub(p[0], q[1], cd), rounding)
+}
+
+/// Lanes that may hit, by the plain edge functions.
+#[inline(always)]
+pub(super) fn may_hit<S: Simd>(s: S, a: &Sheared<S>, b: &Sheared<S>, c: &Sheared<S>) -> Mask {
+    same_sign(s, plain(s, c, b), plain(s, a, c), plain(s, b, a))
+}
+
+/// The rest of the triangle test, for lanes that may hit.
+#[inline(always)]
+pub(super) fn resolve<S: Simd>(
+    s: S,
+    mut mask: Mask,
+    a: &Sheared<S>,
+    b: &Sheared<S>,
+    c: &Sheared<S>,
+    sz: S::F,
+) -> LaneHits<S> {
+    let mut edges = [exact(s, c, b), exact(s, a, c), exact(s, b, a)];
+    let smallest = s.min(s.abs(edges[0]), s.min(s.abs(edges[1]), s.abs(edges[2])));
+    let tiny = mask & s.lt(smallest, s.splat(TINY_EDGE));
+    if tiny != 0 {
+        mask &= resolve_tiny(s, tiny, &mut edges, [a, b, c]);
+    }
+    let [e0, e1, e2] = edges;
+    mask &= same_sign(s, e0, e1, e2);
+    let inv = s.div(s.splat(1.0), s.add(s.add(e0, e1), e2));
+    let (w, u, v) = (s.mul(e0, inv), s.mul(e1, inv), s.mul(e2, inv));
+    let depth = s.add(s.add(s.mul(w, a[2]), s.mul(u, b[2])), s.mul(v, c[2]));
+    LaneHits { mask, t: s.mul(depth, sz), u, v }
+}
+
+/// Does the lanes of `tiny` again in `f64`; returns the lanes that are still hit, all others included.
+#[inline(never)]
+fn resolve_tiny<S: Simd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&Sheared<S>; 3]) -> Mask {
+    let mut stored = [[0.0; LANES]; 3];
+    let mut points = [[[0.0; LANES]; 2]; 3];
+    for k in 0..3 {
+        s.store(edges[k], &mut stored[k]);
+        s.store(corners[k][0], &mut points[k][0]);
+        s.store(corners[k][1], &mut points[k][1]);
+    }
+    let mut hit = Mask::MAX;
+    for lane in (0..LANES).filter(|lane| tiny >> lane & 1 != 0) {
+        match tiny_edges(points.map(|[x, y]| [x[lane], y[lane]])) {
+            Some(again) => (0..3).for_each(|k| stored[k][lane] = again[k]),
+            None => hit &= !(1 << lane),
+        }
+    }
+    for k in 0..3 {
+        edges[k] = s.load(&stored[k]);
+    }
+    hit
+}

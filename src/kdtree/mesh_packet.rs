@@ -1,0 +1,224 @@
+//! Sixteen rays side by side through one mesh: for rays that go the same way.
+//!
+//! All rays of a packet visit a node together, as long as one of them has business there. Rays of different octants
+//! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
+//! traced in groups.
+
+use super::lanes::{may_hit, resolve, shear};
+use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
+use super::nodes::{MAX_DEPTH, Node};
+use super::ray::{Nearest, WIDEN};
+use super::simd::{LANES, Mask, Simd};
+use super::stream::{LeafRay, test_block};
+
+/// Sixteen rays in the mesh's own space, and what they have hit so far.
+pub(super) struct MeshPacket<S: Simd> {
+    pub origin: [S::F; 3],
+    pub dir: [S::F; 3],
+    /// Lanes that hold a ray.
+    pub lanes: Mask,
+    pub nearest: NearestLanes,
+}
+
+/// [`Nearest`] of sixteen rays; in memory, for single lanes are read and written too.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct NearestLanes {
+    pub t: [f32; LANES],
+    pub u: [f32; LANES],
+    pub v: [f32; LANES],
+    /// At equal `t` only a lower index wins.
+    pub prim: [u32; LANES],
+    pub found: Mask,
+}
+
+/// What all rays of a group share, and their reciprocals.
+struct Group<S: Simd> {
+    inv_lo: [S::F; 3],
+    inv_hi: [S::F; 3],
+    slack: S::F,
+    /// Axes across, across and along.
+    axes: [usize; 3],
+    sx: S::F,
+    sy: S::F,
+    sz: S::F,
+}
+
+impl<S: Simd> MeshPacket<S> {
+    /// Finds the nearest hits; with `ANY` a ray ends at its first hit.
+    #[inline(always)]
+    pub fn trace<const ANY: bool>(&mut self, s: S, tree: &MeshTree) {
+        let [x, y, z] = [s.abs(self.dir[0]), s.abs(self.dir[1]), s.abs(self.dir[2])];
+        let along_x = s.le(y, x) & s.le(z, x);
+        let along_y = !along_x & s.le(z, y);
+        let down = [s.negative(self.dir[0]), s.negative(self.dir[1]), s.negative(self.dir[2])];
+        let mut left = self.lanes;
+        while left != 0 {
+            let first = left.trailing_zeros();
+            let mut group = left;
+            for mask in [along_x, along_y, down[0], down[1], down[2]] {
+                group &= if mask >> first & 1 != 0 { mask } else { !mask };
+            }
+            left &= !group;
+            let octant = (0..3).fold(0, |octant, axis| octant | usize::from(down[axis] >> first & 1) << axis);
+            let kz = if along_x >> first & 1 != 0 { 0 } else { 2 - usize::from(along_y >> first & 1) };
+            self.trace_group::<ANY>(s, tree, group, octant, kz);
+        }
+    }
+
+    #[inline(always)]
+    fn trace_group<const ANY: bool>(&mut self, s: S, tree: &MeshTree, lanes: Mask, octant: usize, kz: usize) {
+        let one = s.splat(1.0);
+        let inv = [s.div(one, self.dir[0]), s.div(one, self.dir[1]), s.div(one, self.dir[2])];
+        let (shorter, longer) = (s.splat(1.0 - WIDEN), s.splat(1.0 + WIDEN));
+        let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
+        let sz = inv[kz];
+        let group = Group::<S> {
+            inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
+            inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
+            slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
+            axes,
+            sx: s.div(self.dir[axes[0]], self.dir[kz]),
+            sy: s.div(self.dir[axes[1]], self.dir[kz]),
+            sz,
+        };
+        let bounds = [tree.nodes.bounds.min, tree.nodes.bounds.max];
+        let (mut t0, mut t1) = (s.splat(0.0), s.load(&self.nearest.t));
+        for axis in 0..3 {
+            let down = octant >> axis & 1;
+            // NaN as the first argument loses against the second.
+            t0 = s.max(self.crossing(s, &group, axis, bounds[down][axis]).0, t0);
+            t1 = s.min(self.crossing(s, &group, axis, bounds[1 - down][axis]).1, t1);
+        }
+        let mut mask = lanes & s.le(t0, t1);
+        let mut stack = [(0u32, 0 as Mask, t0, t1); MAX_DEPTH];
+        let mut height = 0;
+        let mut index = 0u32;
+        while mask != 0 {
+            match tree.nodes.nodes[index as usize].unpack() {
+                Node::Inner { axis, split, first_child } => {
+                    let (lo, hi) = self.crossing(s, &group, axis, split);
+                    let down = (octant >> axis & 1) as u32;
+                    let (near, far) = (first_child + down, first_child + 1 - down);
+                    let (near_mask, far_mask) = (mask & !s.lt(hi, t0), mask & !s.lt(t1, lo));
+                    if near_mask == 0 {
+                        (index, mask, t0) = (far, far_mask, s.max(lo, t0));
+                    } else {
+                        if far_mask != 0 {
+                            stack[height % MAX_DEPTH] = (far, far_mask, s.max(lo, t0), t1);
+                            height += 1;
+                        }
+                        (index, mask, t1) = (near, near_mask, s.min(hi, t1));
+                    }
+                    if mask != 0 {
+                        continue;
+                    }
+                }
+                Node::Leaf { first, count } => {
+                    for block in &tree.blocks[first as usize..][..count as usize] {
+                        self.test_leaf(s, &group, block, mask);
+                    }
+                }
+            }
+            mask = 0;
+            while height > 0 && mask == 0 {
+                height -= 1;
+                (index, mask, t0, t1) = stack[height % MAX_DEPTH];
+                let limit = s.load(&self.nearest.t);
+                mask &= s.le(t0, limit);
+                if ANY {
+                    mask &= !self.nearest.found;
+                }
+                t1 = s.min(t1, limit);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn crossing(&self, s: S, group: &Group<S>, axis: usize, split: f32) -> (S::F, S::F) {
+        let distance = s.sub(s.splat(split), self.origin[axis]);
+        let lo = s.sub(s.mul(distance, group.inv_lo[axis]), group.slack);
+        (lo, s.add(s.mul(distance, group.inv_hi[axis]), group.slack))
+    }
+
+    #[inline(always)]
+    fn test_leaf(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mask: Mask) {
+        let n_triangles = block.len();
+        if (mask.count_ones() as usize) < n_triangles {
+            self.test_by_ray(s, group, block, mask);
+        } else {
+            for lane in 0..n_triangles {
+                self.test_triangle(s, group, block, lane, mask);
+            }
+        }
+    }
+
+    /// One ray after the other against all triangles.
+    #[inline(always)]
+    fn test_by_ray(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mut mask: Mask) {
+        let [kx, ky, kz] = group.axes;
+        let origin = [stored(s, self.origin[kx]), stored(s, self.origin[ky]), stored(s, self.origin[kz])];
+        let (sx, sy, sz) = (stored(s, group.sx), stored(s, group.sy), stored(s, group.sz));
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize % LANES;
+            mask &= mask - 1;
+            let ray = LeafRay {
+                axes: group.axes,
+                origin: [origin[0][lane], origin[1][lane], origin[2][lane]],
+                sx: sx[lane],
+                sy: sy[lane],
+                sz: sz[lane],
+            };
+            let lanes = &mut self.nearest;
+            let (t, prim) = (lanes.t[lane], lanes.prim[lane]);
+            let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
+            test_block(s, block, &ray, &mut nearest);
+            if nearest.found {
+                (lanes.t[lane], lanes.u[lane], lanes.v[lane]) = (nearest.t, nearest.u, nearest.v);
+                lanes.prim[lane] = nearest.prim;
+                lanes.found |= 1 << lane;
+            }
+        }
+    }
+
+    /// One triangle against all rays.
+    #[inline(always)]
+    fn test_triangle(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, lane: usize, mask: Mask) {
+        let lane = lane % BLOCK;
+        let [kx, ky, kz] = group.axes;
+        let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
+        let [a, b, c] = &block.vertices;
+        let a = [s.splat(a[kx][lane]), s.splat(a[ky][lane]), s.splat(a[kz][lane])];
+        let b = [s.splat(b[kx][lane]), s.splat(b[ky][lane]), s.splat(b[kz][lane])];
+        let c = [s.splat(c[kx][lane]), s.splat(c[ky][lane]), s.splat(c[kz][lane])];
+        let a = shear(s, a, origin, group.sx, group.sy);
+        let b = shear(s, b, origin, group.sx, group.sy);
+        let c = shear(s, c, origin, group.sx, group.sy);
+        let mask = mask & may_hit(s, &a, &b, &c);
+        if mask == 0 {
+            return;
+        }
+        let hits = resolve(s, mask, &a, &b, &c, group.sz);
+        let best = s.load(&self.nearest.t);
+        let ahead = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, best);
+        if ahead == 0 {
+            return;
+        }
+        let prim = s.splat_u(block.prim(lane));
+        let old = s.load_u(&self.nearest.prim);
+        let take = ahead & (s.lt(hits.t, best) | s.lt_u(prim, old));
+        let nearest = &mut self.nearest;
+        s.store(s.select(take, hits.t, best), &mut nearest.t);
+        s.store(s.select(take, hits.u, s.load(&nearest.u)), &mut nearest.u);
+        s.store(s.select(take, hits.v, s.load(&nearest.v)), &mut nearest.v);
+        s.store_u(s.select_u(take, prim, old), &mut nearest.prim);
+        nearest.found |= take;
+    }
+}
+
+#[inline(always)]
+fn stored<S: Simd>(s: S, from: S::F) -> [f32; LANES] {
+    let mut to = [0.0; LANES];
+    s.store(from, &mut to);
+    to
+}

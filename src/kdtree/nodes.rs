@@ -1,0 +1,122 @@
+//! The binary tree in 8-byte nodes, and the plain walk through it that is the reference for the fast ones.
+
+use super::ray::TreeRay;
+use crate::geometry::Aabb;
+
+/// One node in 8 bytes, so that a cache line holds eight.
+///
+/// | field  | inner node                                            | leaf                                        |
+/// |--------|-------------------------------------------------------|---------------------------------------------|
+/// | `data` | bits of the split position (`f32`, the tree's metres) | how many blocks or objects                  |
+/// | `tag`  | low 2 bits: axis; rest: lower child, the upper follows | low 2 bits: 3; rest: first block or object |
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct KdNode {
+    data: u32,
+    tag: u32,
+}
+const _: () = assert!(size_of::<KdNode>() == 8);
+
+/// A node, taken apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Node {
+    Inner { axis: usize, split: f32, first_child: u32 },
+    Leaf { first: u32, count: u32 },
+}
+
+impl KdNode {
+    pub fn inner(axis: usize, split: f32, first_child: u32) -> Self {
+        assert!(first_child < 1 << 30, "a tree of more than 2^30 nodes");
+        Self { data: split.to_bits(), tag: axis as u32 | first_child << 2 }
+    }
+
+    pub fn leaf(first: u32, count: u32) -> Self {
+        assert!(first < 1 << 30, "a tree of more than 2^30 leaf blocks");
+        Self { data: count, tag: 3 | first << 2 }
+    }
+
+    #[inline]
+    pub fn unpack(self) -> Node {
+        match self.tag & 3 {
+            3 => Node::Leaf { first: self.tag >> 2, count: self.data },
+            axis => Node::Inner { axis: axis as usize, split: f32::from_bits(self.data), first_child: self.tag >> 2 },
+        }
+    }
+}
+
+/// Depth of the deepest leaf that any walk must be ready for.
+pub(super) const MAX_DEPTH: usize = 64;
+
+/// The nodes, root first, and the box around everything in them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct KdNodes {
+    pub nodes: Vec<KdNode>,
+    pub bounds: Aabb,
+}
+
+impl KdNodes {
+    /// The largest side of the bounds; 0 for an empty tree.
+    pub fn extent(&self) -> f32 {
+        if self.bounds.is_empty() { 0.0 } else { self.bounds.size().max_element() }
+    }
+
+    /// Of the deepest leaf; the root has 0.
+    pub fn depth(&self) -> usize {
+        let mut depth = 0;
+        self.visit_cells(&mut |_, _, at| depth = depth.max(at));
+        depth
+    }
+
+    /// Calls `visit(first, count)` for the leaves along the ray, front to back, as long as they start no later than
+    /// the limit that `visit` returns; the first limit is `t_max`.
+    #[inline]
+    pub fn walk(&self, ray: &TreeRay, t_max: f32, mut visit: impl FnMut(u32, u32) -> f32) {
+        let (mut t0, mut t1) = ray.clip(&self.bounds, t_max);
+        if t0 > t1 {
+            return;
+        }
+        let mut limit = t_max;
+        let mut stack = [(0u32, 0.0f32, 0.0f32); MAX_DEPTH];
+        let mut height = 0;
+        let mut index = 0u32;
+        loop {
+            match self.nodes[index as usize].unpack() {
+                Node::Inner { axis, split, first_child } => {
+                    let (lo, hi) = ray.crossing(axis, split);
+                    let near = first_child + ray.down[axis] as u32;
+                    let far = first_child + 1 - ray.down[axis] as u32;
+                    // Written so that NaN, a ray inside the plane, goes both ways.
+                    let skip_near = hi < t0;
+                    let skip_far = lo > t1;
+                    if skip_near {
+                        // Both can only be skipped if the cell was empty: then any one will do.
+                        (index, t0) = (far, t0.max(lo));
+                    } else if skip_far {
+                        (index, t1) = (near, t1.min(hi));
+                    } else {
+                        stack[height] = (far, t0.max(lo), t1);
+                        height += 1;
+                        (index, t1) = (near, t1.min(hi));
+                    }
+                    continue;
+                }
+                Node::Leaf { first, count } => {
+                    if count > 0 {
+                        limit = visit(first, count);
+                    }
+                }
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                (index, t0, t1) = stack[height];
+                if t0 <= limit {
+                    break;
+                }
+            }
+            t1 = t1.min(limit);
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! The simple objects of a scene as flat records, and the packet of sixteen rays that is tested against them.
+//!
+//! Most scenes have a handful of walls and balls. Testing sixteen rays against each of them without any
+//! branch costs less than finding out which ones to leave away, however little the rays have in common.
+
+use super::batch::{HitBatch, RayBatch};
+use super::lanes::{LaneHits, Sheared, may_hit, plain, resolve, same_sign, shear};
+use super::scene_tree::Shape;
+use super::simd::{LANES, Mask, Simd};
+use crate::geometry::quad_corners;
+use glam::Vec3;
+
+/// A point that [`Simd::pick`] can take axes from.
+type Point = [f32; 4];
+
+fn point(p: Vec3) -> Point {
+    [p.x, p.y, p.z, 0.0]
+}
+
+#[derive(Debug)]
+struct Quad {
+    corners: [Point; 4],
+    object: u32,
+}
+
+#[derive(Debug)]
+struct Triangle {
+    vertices: [Point; 3],
+    object: u32,
+}
+
+#[derive(Debug)]
+struct Sphere {
+    center: [f64; 3],
+    radius_squared: f64,
+    object: u32,
+}
+
+#[derive(Debug)]
+struct Plane {
+    point: [f64; 3],
+    normal: [f64; 3],
+    object: u32,
+}
+
+/// All objects of a scene that are not instances, by kind.
+#[derive(Debug, Default)]
+pub(super) struct SimpleObjects {
+    quads: Vec<Quad>,
+    triangles: Vec<Triangle>,
+    spheres: Vec<Sphere>,
+    planes: Vec<Plane>,
+}
+
+impl SimpleObjects {
+    /// - `objects`: which shapes to take.
+    pub fn new(shapes: &[Shape], objects: impl Iterator<Item = u32>) -> Self {
+        let mut simple = Self::default();
+        for object in objects {
+            match &shapes[object as usize] {
+                Shape::Quad { corner, edge_u, edge_v } => {
+                    let corners = quad_corners(*corner, *edge_u, *edge_v).map(point);
+                    simple.quads.push(Quad { corners, object });
+                }
+                Shape::Triangle { vertices } => {
+                    simple.triangles.push(Triangle { vertices: vertices.map(point), object });
+                }
+                Shape::Sphere { center, radius } => {
+                    let center = center.as_dvec3().to_array();
+                    simple.spheres.push(Sphere { center, radius_squared: f64::from(*radius).powi(2), object });
+                }
+                Shape::Plane { point, normal } => {
+                    let (point, normal) = (point.as_dvec3().to_array(), normal.as_dvec3().to_array());
+                    simple.planes.push(Plane { point, normal, object });
+                }
+                Shape::Mesh { .. } | Shape::Spheres { .. } => {}
+            }
+        }
+        simple
+    }
+}
+
+/// Sixteen rays and the nearest hit of each so far.
+pub(super) struct Packet<S: Simd> {
+    pub origin: [S::F; 3],
+    pub dir: [S::F; 3],
+    /// Lanes that hold a ray.
+    pub lanes: Mask,
+    /// The ray's `t_max` until something is hit.
+    pub t: S::F,
+    pub u: S::F,
+    pub v: S::F,
+    pub prim: S::U,
+    pub object: S::U,
+    pub found: Mask,
+}
+
+impl<S: Simd> Packet<S> {
+    /// Rays `first..first + 16`, or as many as there are.
+    #[inline(always)]
+    pub fn load(s: S, rays: &RayBatch, first: usize) -> Self {
+        let count = (rays.len() - first).min(LANES);
+        let (x, y, z) = (&rays.origin_x[first..], &rays.origin_y[first..], &rays.origin_z[first..]);
+        let origin = [load_some(s, x, 0.0), load_some(s, y, 0.0), load_some(s, z, 0.0)];
+        let (x, y, z) = (&rays.dir_x[first..], &rays.dir_y[first..], &rays.dir_z[first..]);
+        let dir = [load_some(s, x, 1.0), load_some(s, y, 1.0), load_some(s, z, 1.0)];
+        Self {
+            origin,
+            dir,
+            lanes: if count == LANES { Mask::MAX } else { (1 << count) - 1 },
+            t: load_some(s, &rays.t_max[first..], 0.0),
+            u: s.splat(0.0),
+            v: s.splat(0.0),
+            prim: s.splat_u(0),
+            object: s.splat_u(0),
+            found: 0,
+        }
+    }
+
+    /// Writes the nearest hits into the batch.
+    #[inline(always)]
+    pub fn store(&self, s: S, hits: &mut HitBatch, first: usize) {
+        let t = s.select(self.found, self.t, s.splat(f32::INFINITY));
+        let miss = s.splat_u(HitBatch::MISS);
+        let (prim, object) = (s.select_u(self.found, self.prim, miss), s.select_u(self.found, self.object, miss));
+        store_some(s, t, &mut hits.t[first..]);
+        store_some(s, self.u, &mut hits.u[first..]);
+        store_some(s, self.v, &mut hits.v[first..]);
+        store_some_u(s, prim, &mut hits.prim[first..]);
+        store_some_u(s, object, &mut hits.object[first..]);
+    }
+
+    /// Keeps the lanes that are nearer; at equal `t` the lower object.
+    #[inline(always)]
+    fn offer(&mut self, s: S, hits: LaneHits<S>, object: u32) {
+        let ahead = hits.mask & s.lt(s.splat(0.0), hits.t);
+        let tie = s.eq(hits.t, self.t);
+        let mut nearer = s.lt(hits.t, self.t);
+        if ahead & tie != 0 {
+            nearer |= tie & s.lt_u(s.splat_u(object), self.object);
+        }
+        let take = ahead & nearer;
+        self.t = s.select(take, hits.t, self.t);
+        self.u = s.select(take, hits.u, self.u);
+        self.v = s.select(take, hits.v, self.v);
+        self.prim = s.select_u(take, s.splat_u(0), self.prim);
+        self.object = s.select_u(take, s.splat_u(object), self.object);
+        self.found |= take;
+    }
+
+    /// Tests all simple objects; with `ANY` stops once every ray has hit something.
+    #[inline(always)]
+    pub fn test_objects<const ANY: bool>(&mut self, s: S, objects: &SimpleObjects) {
+        if !objects.quads.is_empty() || !objects.triangles.is_empty() {
+            let frame = ShearFrame::new(s, &self.origin, &self.dir);
+            for quad in &objects.quads {
+                self.test_quad(s, &frame, quad);
+                if self.is_done::<ANY>() {
+                    return;
+                }
+            }
+            for triangle in &objects.triangles {
+                let [a, b, c] = &triangle.vertices;
+                let [a, b, c] = [frame.shear(s, a), frame.shear(s, b), frame.shear(s, c)];
+                let mask = self.lanes & may_hit(s, &a, &b, &c);
+                if mask != 0 {
+                    let hits = resolve(s, mask, &a, &b, &c, frame.sz);
+                    self.offer(s, hits, triangle.object);
+                }
+            }
+        }
+        if (!objects.spheres.is_empty() || !objects.planes.is_empty()) && !self.is_done::<ANY>() {
+            let wide = WideFrame::new(s, &self.origin, &self.dir);
+            for sphere in &objects.spheres {
+                self.test_sphere(s, &wide, sphere);
+                if self.is_done::<ANY>() {
+                    return;
+                }
+            }
+            for plane in &objects.planes {
+                let normal = [s.splat_d(plane.normal[0]), s.splat_d(plane.normal[1]), s.splat_d(plane.normal[2])];
+                let to_point = wide.towards(s, &plane.point);
+                let t = s.narrow(s.div_d(dot(s, &normal, &to_point), dot(s, &normal, &wide.dir)));
+                let zero = s.splat(0.0);
+                self.offer(s, LaneHits { mask: self.lanes, t, u: zero, v: zero }, plane.object);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn is_done<const ANY: bool>(&self) -> bool {
+        ANY && self.found & self.lanes == self.lanes
+    }
+
+    /// Two triangles that share the diagonal `a c`, the first one first (`geometry::intersect_quad`).
+    #[inline(always)]
+    fn test_quad(&mut self, s: S, frame: &ShearFrame<S>, quad: &Quad) {
+        let [a, b, c, d] = &quad.corners;
+        let [a, b, c, d] = [frame.shear(s, a), frame.shear(s, b), frame.shear(s, c), frame.shear(s, d)];
+        let diagonal = plain(s, &a, &c);
+        let back = s.sub(s.splat(0.0), diagonal);
+        let first = self.lanes & same_sign(s, plain(s, &c, &b), diagonal, plain(s, &b, &a));
+        let second = self.lanes & same_sign(s, plain(s, &d, &c), plain(s, &a, &d), back);
+        if first | second == 0 {
+            return;
+        }
+        let (p, q) = (choose(s, first, &b, &c), choose(s, first, &c, &d));
+        let mut hits = resolve(s, first | second, &a, &p, &q, frame.sz);
+        let sum = s.min(s.add(hits.u, hits.v), s.splat(1.0));
+        let (u, v) = (hits.u, hits.v);
+        hits.u = s.select(first, sum, u);
+        hits.v = s.select(first, v, sum);
+        // On the diagonal the plain signs may name the first triangle where only the second is hit.
+        let again = first & second & !hits.mask;
+        self.offer(s, hits, quad.object);
+        if again != 0 {
+            let mut hits = resolve(s, again, &a, &c, &d, frame.sz);
+            hits.v = s.min(s.add(hits.u, hits.v), s.splat(1.0));
+            self.offer(s, hits, quad.object);
+        }
+    }
+
+    #[inline(always)]
+    fn test_sphere(&mut self, s: S, wide: &WideFrame<S>, sphere: &Sphere) {
+        let to_center = wide.towards(s, &sphere.center);
+        let t_middle = s.mul_d(dot(s, &to_center, &wide.dir), wide.inv_dir_squared);
+        let perpendicular = [
+            s.sub_d(to_center[0], s.mul_d(wide.dir[0], t_middle)),
+            s.sub_d(to_center[1], s.mul_d(wide.dir[1], t_middle)),
+            s.sub_d(to_center[2], s.mul_d(wide.dir[2], t_middle)),
+        ];
+        let discriminant = s.sub_d(s.splat_d(sphere.radius_squared), dot(s, &perpendicular, &perpendicular));
+        let mask = self.lanes & s.le_d(s.splat_d(0.0), discriminant);
+        if mask == 0 {
+            return;
+        }
+        let half_chord = s.sqrt_d(s.mul_d(discriminant, wide.inv_dir_squared));
+        let near = s.narrow(s.sub_d(t_middle, half_chord));
+        let far = s.narrow(s.add_d(t_middle, half_chord));
+        let zero = s.splat(0.0);
+        let t = s.select(s.lt(zero, near), near, far);
+        self.offer(s, LaneHits { mask, t, u: zero, v: zero }, sphere.object);
+    }
+}
+
+/// The rays' shears (`geometry::Shear`), each with axes of its own.
+pub(super) struct ShearFrame<S: Simd> {
+    /// For each lane the axes across, across and along.
+    axes: [S::U; 3],
+    /// The origin along these axes.
+    origin: [S::F; 3],
+    sx: S::F,
+    sy: S::F,
+    pub sz: S::F,
+}
+
+impl<S: Simd> ShearFrame<S> {
+    #[inline(always)]
+    fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
+        let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
+        let along_x = s.le(y, x) & s.le(z, x);
+        let along_y = !along_x & s.le(z, y);
+        // Across, across, along are x y z, z x y or y z x.
+        let [x, y, z] = *dir;
+        let d = [
+            by_axis(s, along_x, along_y, y, z, x),
+            by_axis(s, along_x, along_y, z, x, y),
+            by_axis(s, along_x, along_y, x, y, z),
+        ];
+        let [x, y, z] = *origin;
+        let o = [
+            by_axis(s, along_x, along_y, y, z, x),
+            by_axis(s, along_x, along_y, z, x, y),
+            by_axis(s, along_x, along_y, x, y, z),
+        ];
+        let (zero, one, two) = (s.splat_u(0), s.splat_u(1), s.splat_u(2));
+        let axes = [
+            s.select_u(along_x, one, s.select_u(along_y, two, zero)),
+            s.select_u(along_x, two, s.select_u(along_y, zero, one)),
+            s.select_u(along_x, zero, s.select_u(along_y, one, two)),
+        ];
+        let (sx, sy, sz) = (s.div(d[0], d[2]), s.div(d[1], d[2]), s.div(s.splat(1.0), d[2]));
+        Self { axes, origin: o, sx, sy, sz }
+    }
+
+    #[inline(always)]
+    fn shear(&self, s: S, vertex: &Point) -> Sheared<S> {
+        let [kx, ky, kz] = self.axes;
+        let vertex = [s.pick(vertex, kx), s.pick(vertex, ky), s.pick(vertex, kz)];
+        shear(s, vertex, self.origin, self.sx, self.sy)
+    }
+}
+
+/// What belongs to the longest axis of each lane.
+#[inline(always)]
+fn by_axis<S: Simd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: S::F, on_z: S::F) -> S::F {
+    s.select(along_x, on_x, s.select(along_y, on_y, on_z))
+}
+
+#[inline(always)]
+fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
+    [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
+}
+
+/// The first sixteen, or all and `idle` for the rest.
+#[inline(always)]
+fn load_some<S: Simd>(s: S, from: &[f32], idle: f32) -> S::F {
+    if let Some(all) = from.first_chunk() {
+        return s.load(all);
+    }
+    let mut some = [idle; LANES];
+    some[..from.len()].copy_from_slice(from);
+    s.load(&some)
+}
+
+#[inline(always)]
+fn store_some<S: Simd>(s: S, from: S::F, to: &mut [f32]) {
+    if let Some(all) = to.first_chunk_mut() {
+        return s.store(from, all);
+    }
+    let mut all = [0.0; LANES];
+    s.store(from, &mut all);
+    to.copy_from_slice(&all[..to.len()]);
+}
+
+#[inline(always)]
+fn store_some_u<S: Simd>(s: S, from: S::U, to: &mut [u32]) {
+    if let Some(all) = to.first_chunk_mut() {
+        return s.store_u(from, all);
+    }
+    let mut all = [0; LANES];
+    s.store_u(from, &mut all);
+    to.copy_from_slice(&all[..to.len()]);
+}
+
+/// The rays in `f64`.
+struct WideFrame<S: Simd> {
+    origin: [S::D; 3],
+    dir: [S::D; 3],
+    inv_dir_squared: S::D,
+}
+
+impl<S: Simd> WideFrame<S> {
+    #[inline(always)]
+    fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
+        let origin = [s.widen(origin[0]), s.widen(origin[1]), s.widen(origin[2])];
+        let dir = [s.widen(dir[0]), s.widen(dir[1]), s.widen(dir[2])];
+        let inv_dir_squared = s.div_d(s.splat_d(1.0), dot(s, &dir, &dir));
+        Self { origin, dir, inv_dir_squared }
+    }
+
+    #[inline(always)]
+    fn towards(&self, s: S, point: &[f64; 3]) -> [S::D; 3] {
+        [
+            s.sub_d(s.splat_d(point[0]), self.origin[0]),
+            s.sub_d(s.splat_d(point[1]), self.origin[1]),
+            s.sub_d(s.splat_d(point[2]), self.origin[2]),
+        ]
+    }
+}
+
+#[inline(always)]
+fn dot<S: Simd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
+    s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
+}

@@ -1,0 +1,149 @@
+//! What a tree looks like: counts for reports, and the invariants that tests rely on.
+
+use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
+use super::nodes::{KdNode, KdNodes, Node};
+use super::wide::WideNode;
+use crate::geometry::Aabb;
+use glam::Vec3;
+use std::mem::size_of;
+
+/// Counts over one tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct KdTreeStats {
+    pub primitives: usize,
+    pub inner_nodes: usize,
+    /// Leaves with something in them.
+    pub leaves: usize,
+    pub empty_leaves: usize,
+    /// Of the deepest leaf; the root has 0.
+    pub depth: usize,
+    /// Entries in leaves; a primitive in several cells counts several times.
+    pub references: usize,
+    pub blocks: usize,
+    pub bytes: usize,
+    /// Inner nodes, leaves and blocks that a line through the bounds crosses on average if nothing stops it.
+    pub expected_inner_visits: f64,
+    pub expected_leaf_visits: f64,
+    pub expected_block_tests: f64,
+}
+
+impl KdTreeStats {
+    pub fn references_per_primitive(&self) -> f64 {
+        self.references as f64 / self.primitives.max(1) as f64
+    }
+}
+
+fn prims_of(block: &TriangleBlock) -> impl Iterator<Item = u32> {
+    (0..block.len()).map(|lane| block.prim(lane))
+}
+
+impl MeshTree {
+    pub fn stats(&self) -> KdTreeStats {
+        let mut stats = KdTreeStats {
+            primitives: self.n_triangles(),
+            blocks: self.blocks.len(),
+            references: self.blocks.iter().map(TriangleBlock::len).sum(),
+            bytes: self.nodes.nodes.len() * size_of::<KdNode>()
+                + self.wide.len() * size_of::<WideNode>()
+                + self.blocks.len() * size_of::<TriangleBlock>(),
+            ..KdTreeStats::default()
+        };
+        let root_area = f64::from(self.nodes.bounds.area());
+        self.nodes.visit_cells(&mut |node, cell, depth| {
+            let share = if root_area > 0.0 { f64::from(cell.area()) / root_area } else { 1.0 };
+            stats.depth = stats.depth.max(depth);
+            match node {
+                Node::Inner { .. } => {
+                    stats.inner_nodes += 1;
+                    stats.expected_inner_visits += share;
+                }
+                Node::Leaf { count: 0, .. } => stats.empty_leaves += 1,
+                Node::Leaf { count, .. } => {
+                    stats.leaves += 1;
+                    stats.expected_leaf_visits += share;
+                    stats.expected_block_tests += share * f64::from(count);
+                }
+            }
+        });
+        stats
+    }
+
+    /// Panics unless every triangle with an area is in every leaf whose cell it passes through.
+    pub fn check_invariants(&self) {
+        let mut seen = vec![false; self.n_triangles()];
+        self.nodes.visit_cells(&mut |node, cell, _| {
+            assert!(!cell.is_empty(), "a cell inside out: {cell:?}");
+            if let Node::Leaf { first, count } = node {
+                let blocks = &self.blocks[first as usize..][..count as usize];
+                let prims: Vec<u32> = blocks.iter().flat_map(prims_of).collect();
+                assert!(prims.is_sorted_by(|a, b| a < b), "not ascending: {prims:?}");
+                assert_eq!(prims.len().div_ceil(BLOCK), blocks.len(), "blocks that could be saved");
+                for &prim in &prims {
+                    seen[prim as usize] = true;
+                    let around = Aabb::from_points(self.vertices(prim));
+                    assert!(!around.intersection(*cell).is_empty(), "triangle {prim} is not in {cell:?}");
+                }
+            }
+        });
+        for (prim, seen) in (0u32..).zip(seen) {
+            // In f64 these points are exact.
+            let [a, b, c] = self.vertices(prim).map(Vec3::as_dvec3);
+            let points = [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + 2.0 * c) / 4.0];
+            if a == b || b == c || c == a {
+                continue;
+            }
+            assert!(seen, "triangle {prim} is in no leaf");
+            for point in points {
+                assert!(
+                    self.nodes.some_leaf_at(point.to_array(), |first, count| {
+                        self.blocks[first as usize..][..count as usize]
+                            .iter()
+                            .flat_map(prims_of)
+                            .any(|other| other == prim)
+                    }),
+                    "triangle {prim} is missing at {point}"
+                );
+            }
+        }
+    }
+}
+
+impl KdNodes {
+    pub(super) fn visit_cells(&self, visit: &mut impl FnMut(Node, &Aabb, usize)) {
+        if !self.bounds.is_empty() {
+            self.visit_cell(0, self.bounds, 0, visit);
+        }
+    }
+
+    fn visit_cell(&self, index: u32, cell: Aabb, depth: usize, visit: &mut impl FnMut(Node, &Aabb, usize)) {
+        let node = self.nodes[index as usize].unpack();
+        visit(node, &cell, depth);
+        if let Node::Inner { axis, split, first_child } = node {
+            let (mut below, mut above) = (cell, cell);
+            below.max[axis] = split;
+            above.min[axis] = split;
+            self.visit_cell(first_child, below, depth + 1, visit);
+            self.visit_cell(first_child + 1, above, depth + 1, visit);
+        }
+    }
+
+    /// Whether `test` holds for any of the leaves whose closed cells contain the point.
+    fn some_leaf_at(&self, point: [f64; 3], test: impl Fn(u32, u32) -> bool) -> bool {
+        let mut stack = vec![0];
+        while let Some(index) = stack.pop() {
+            match self.nodes[index as usize].unpack() {
+                Node::Inner { axis, split, first_child } => {
+                    if point[axis] <= f64::from(split) {
+                        stack.push(first_child);
+                    }
+                    if point[axis] >= f64::from(split) {
+                        stack.push(first_child + 1);
+                    }
+                }
+                Node::Leaf { first, count } if test(first, count) => return true,
+                Node::Leaf { .. } => {}
+            }
+        }
+        false
+    }
+}
