@@ -62,14 +62,17 @@ impl From<IntegratorArg> for Integrator {
 }
 
 impl SceneArgs {
+    fn up(&self) -> Option<UpAxis> {
+        self.up.map(|up| match up {
+            UpArg::Y => UpAxis::Y,
+            UpArg::Z => UpAxis::Z,
+        })
+    }
+
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
         let source = SceneSource::parse(&self.scene).map_err(|error| Failure::Failed(error.to_string()))?;
-        let up = self.up.map(|up| match up {
-            UpArg::Y => UpAxis::Y,
-            UpArg::Z => UpAxis::Z,
-        });
-        let options = LoadOptions { up, aspect, progress: Some(progress) };
+        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
             eprintln!("warning: {warning}");
@@ -106,10 +109,12 @@ pub fn main() -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Warnings go to the terminal; `RUST_LOG` asks for more.
+/// Warnings go to the terminal, those of the window libraries only when something fails; `RUST_LOG` asks for more.
 fn start_log() {
     use tracing_subscriber::EnvFilter;
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
+        EnvFilter::new("warn,winit=error,egui_wgpu=error,wgpu_core=error,wgpu_hal=error,naga=error")
+    });
     // Only a second logger can fail, and then the first one does the work.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
 }

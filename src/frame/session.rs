@@ -15,6 +15,7 @@ use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneSource, UpAx
 use bevy_ecs::prelude::{IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
 use bevy_ecs::system::ScheduleSystem;
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 /// How to start.
@@ -165,6 +166,13 @@ impl Session {
     /// A copy of the film, for saving: linear light at the resolution that it has now. Takes a few milliseconds.
     pub fn film_snapshot(&self) -> Option<Film> {
         self.world.resource::<Renderer>().0.film()
+    }
+
+    /// The film of what is seen now, to be kept; never waits. It comes as soon as every pixel has a sample at full
+    /// resolution; a coarser one comes if the view changes or the workers rest before that. Without any, the other
+    /// end is closed.
+    pub fn keep_film(&self) -> Receiver<Film> {
+        self.world.resource::<Renderer>().0.keep_film()
     }
 
     /// Nothing will come unless something is changed: the workers sleep and nothing is being read.

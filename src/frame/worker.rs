@@ -8,7 +8,7 @@ use super::scheduler::{Scheduler, Step, StepReport};
 use super::{Picture, Target};
 use crate::render::{BadSample, Display, Film, RayCounts, RenderSettings, Snapshot, advance, develop};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -65,6 +65,7 @@ struct Inbox {
     paused: Option<bool>,
     threads: Option<usize>,
     film_wanted: Vec<Sender<Film>>,
+    to_keep: Vec<Sender<Film>>,
     quit: bool,
 }
 
@@ -153,6 +154,13 @@ impl Worker {
         receiver.recv_timeout(Duration::from_secs(5)).ok()
     }
 
+    /// The film of what is seen now, worth keeping: see [`Session::keep_film`](super::Session::keep_film).
+    pub fn keep_film(&self) -> Receiver<Film> {
+        let (sender, receiver) = channel();
+        self.post(|inbox| inbox.to_keep.push(sender));
+        receiver
+    }
+
     /// Takes the newest picture, if there is a new one, in exchange for an old one's memory.
     pub fn take(&self, picture: &mut Picture) -> bool {
         let mut outbox = lock(&self.shared.outbox);
@@ -213,6 +221,8 @@ struct Loop<'a> {
     spare: Picture,
     /// The picture that was shown last is not of these settings.
     redraw: bool,
+    /// Who waits for a film worth keeping.
+    to_keep: Vec<Sender<Film>>,
 }
 
 impl<'a> Loop<'a> {
@@ -228,6 +238,7 @@ impl<'a> Loop<'a> {
             stats: Stats { asleep: true, ..Stats::default() },
             spare: Picture::default(),
             redraw: false,
+            to_keep: Vec::new(),
         }
     }
 
@@ -274,6 +285,9 @@ impl<'a> Loop<'a> {
                 let _ = sender.send(film.clone());
             }
         }
+        self.to_keep.extend(inbox.to_keep);
+        // What is seen now is about to go.
+        self.hand_out(inbox.job.is_some());
         if let Some(job) = inbox.job {
             let size = (job.width, job.height);
             self.scheduler.resize(size.0, size.1, self.clock.elapsed());
@@ -345,8 +359,25 @@ impl<'a> Loop<'a> {
         if film.spp() > 0 {
             self.previous = None;
         }
+        self.hand_out(false);
         if !replaced && (self.redraw || self.previous.is_none()) {
             self.show(false);
+        }
+    }
+
+    /// Gives the film to who wants to keep it: at full resolution, or as it is if there will be `no_better` one.
+    fn hand_out(&mut self, no_better: bool) {
+        if self.to_keep.is_empty() {
+            return;
+        }
+        if let Some((divider, film)) = self.visible()
+            && (*divider == 1 || no_better)
+        {
+            let film = film.clone();
+            for sender in self.to_keep.drain(..) {
+                // Whoever asked may have gone.
+                let _ = sender.send(film.clone());
+            }
         }
     }
 
@@ -394,6 +425,9 @@ impl<'a> Loop<'a> {
 
     /// Shows the final state and waits for the next message.
     fn sleep(&mut self) {
+        self.hand_out(true);
+        // Without a film, asking in vain beats waiting in vain.
+        self.to_keep.clear();
         let shown = {
             let outbox = lock(&self.shared.outbox);
             outbox.stats.asleep && outbox.stats.generation == self.stats.generation

@@ -120,7 +120,14 @@ impl Input {
     }
 
     /// A key went down (again, if `repeat`) or up; answers with what is to be done besides moving.
-    pub fn key(&mut self, physical: PhysicalKey, typed: &Key, pressed: bool, repeat: bool, now: Instant) -> Option<Action> {
+    pub fn key(
+        &mut self,
+        physical: PhysicalKey,
+        typed: &Key,
+        pressed: bool,
+        repeat: bool,
+        now: Instant,
+    ) -> Option<Action> {
         if let Some(motion) = motion_of(physical) {
             if !pressed {
                 self.release(motion, now);
@@ -458,7 +465,9 @@ mod tests {
         assert!(!input.wheel(1.0));
         input.set_modifiers(ModifiersState::SHIFT);
         assert!(!input.wheel(-1.0));
-        let [Command::Dolly { factor: dolly }, Command::Zoom { factor: zoom }] = input.take(start)[..] else { panic!() };
+        let [Command::Dolly { factor: dolly }, Command::Zoom { factor: zoom }] = input.take(start)[..] else {
+            panic!()
+        };
         assert!((dolly * ZOOM_NOTCH - 1.0).abs() < 1e-12 && (zoom / ZOOM_NOTCH - 1.0).abs() < 1e-12);
         input.set_modifiers(NONE);
         for _ in 0..1000 {
@@ -470,7 +479,8 @@ mod tests {
     #[test]
     fn steps_repeat_and_toggles_do_not() {
         let (mut input, start) = input();
-        let mut repeat = |code, text: &str| input.key(PhysicalKey::Code(code), &Key::Character(text.into()), true, true, start);
+        let mut repeat =
+            |code, text: &str| input.key(PhysicalKey::Code(code), &Key::Character(text.into()), true, true, start);
         assert!(repeat(KeyCode::BracketLeft, "[").is_some());
         assert_eq!(repeat(KeyCode::KeyO, "o"), None);
         assert_eq!(repeat(KeyCode::KeyK, "k"), None);

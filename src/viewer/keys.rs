@@ -138,7 +138,7 @@ pub static BINDINGS: &[Group] = &[
                 triggers: &[hold(KeyCode::KeyE, Motion::Up), hold(KeyCode::KeyQ, Motion::Down)],
                 effect: "fly up, down",
             },
-            Binding { triggers: &[Trigger::Mouse("Shift, held")], effect: "four times as fast" },
+            Binding { triggers: &[Trigger::Mouse("Shift")], effect: "four times as fast, while held" },
             Binding { triggers: &[Trigger::Mouse("Wheel")], effect: "flying speed" },
             Binding { triggers: &[Trigger::Mouse("Drag")], effect: "look about" },
         ],
@@ -155,9 +155,12 @@ pub static BINDINGS: &[Group] = &[
                 ],
                 effect: "move around the pivot",
             },
-            Binding { triggers: &[Trigger::Mouse("Alt+drag, middle drag")], effect: "move around the pivot" },
             Binding {
-                triggers: &[Trigger::Mouse("Right drag, Shift+middle drag, Shift+arrows")],
+                triggers: &[Trigger::Mouse("Middle drag"), Trigger::Mouse("Alt+drag")],
+                effect: "move around the pivot",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Right drag"), Trigger::Mouse("Shift+arrows")],
                 effect: "move sideways",
             },
             Binding {
@@ -176,8 +179,8 @@ pub static BINDINGS: &[Group] = &[
         bindings: &[
             Binding {
                 triggers: &[
-                    ctrl("+", Action::Send(ZOOM_IN)),
                     ctrl("=", Action::Send(ZOOM_IN)),
+                    ctrl("+", Action::Send(ZOOM_IN)),
                     ctrl("-", Action::Send(ZOOM_OUT)),
                     Trigger::Mouse("Shift+wheel"),
                 ],
@@ -213,7 +216,7 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding { triggers: &[send("o", Command::ToggleDepthOfField)], effect: "depth of field on, off" },
             Binding {
-                triggers: &[Trigger::Mouse("Shift+click, Shift+drag")],
+                triggers: &[Trigger::Mouse("Shift+click"), Trigger::Mouse("Shift+drag")],
                 effect: "focus on what is under the mouse",
             },
             Binding { triggers: &[Trigger::Mouse("Double click")], effect: "focus there, and orbit at that depth" },
@@ -230,7 +233,10 @@ pub static BINDINGS: &[Group] = &[
                 effect: "brighter, darker by a third of a stop",
             },
             Binding { triggers: &[send("m", Command::NextToneCurve)], effect: "next tone curve" },
-            Binding { triggers: &[text("i", Action::ToggleIntegrator)], effect: "path tracing or the classic Phong model" },
+            Binding {
+                triggers: &[text("i", Action::ToggleIntegrator)],
+                effect: "path tracing or the classic Phong model",
+            },
             Binding { triggers: &[text("p", Action::TogglePause)], effect: "pause, go on" },
             Binding { triggers: &[send("r", Command::Restart)], effect: "begin again" },
             Binding {
@@ -262,7 +268,10 @@ pub static BINDINGS: &[Group] = &[
                 effect: "hide everything but the picture",
             },
             Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen" },
-            Binding { triggers: &[named(NamedKey::Escape, Action::Leave)], effect: "close this list, or else the window" },
+            Binding {
+                triggers: &[named(NamedKey::Escape, Action::Leave)],
+                effect: "close this list, or else the window",
+            },
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
     },
@@ -324,10 +333,10 @@ impl Binding {
             .iter()
             .map(|trigger| match trigger {
                 Trigger::Hold(code, _) => match code {
-                    KeyCode::ArrowLeft => "←".to_owned(),
-                    KeyCode::ArrowRight => "→".to_owned(),
-                    KeyCode::ArrowUp => "↑".to_owned(),
-                    KeyCode::ArrowDown => "↓".to_owned(),
+                    KeyCode::ArrowLeft => "⬅".to_owned(),
+                    KeyCode::ArrowRight => "➡".to_owned(),
+                    KeyCode::ArrowUp => "⬆".to_owned(),
+                    KeyCode::ArrowDown => "⬇".to_owned(),
                     _ => format!("{code:?}").replace("Key", ""),
                 },
                 Trigger::Press(chord, _) => chord.label(),
@@ -389,7 +398,10 @@ mod tests {
         for trigger in &all {
             let Trigger::Press(Chord { key: Typed::Text(text), ctrl: false, .. }, _) = trigger else { continue };
             let label = text.to_uppercase();
-            assert!(!all.iter().any(|t| matches!(t, Trigger::Hold(code, _) if format!("{code:?}") == format!("Key{label}"))));
+            assert!(
+                !all.iter()
+                    .any(|t| matches!(t, Trigger::Hold(code, _) if format!("{code:?}") == format!("Key{label}")))
+            );
         }
     }
 

@@ -116,8 +116,9 @@ impl Surface {
         live.map(|(t, &vertices)| (t, vertices, wedges.get(t).copied()))
     }
 
-    pub fn is_alive(&self, vertex: u32) -> bool {
-        self.valence[vertex as usize] > 0
+    /// How many live triangles have a vertex of this kind.
+    pub fn faces_at(&self, kind: Kind) -> usize {
+        self.live_triangles().filter(|(_, t, _)| t.iter().any(|&v| self.kinds[v as usize] == kind)).count()
     }
 
     /// The live triangles around a vertex, as (vertex's corner, next vertex, one after).
