@@ -14,7 +14,7 @@ use super::wide::{DescentRay, LEAF, STACK, Stack, WideNode};
 use crate::geometry::{Ray, Shear};
 
 /// Rays in flight.
-const SLOTS: usize = 16;
+const SLOTS: usize = 32;
 
 /// Where the stream gets its rays, in the mesh's own space, and leaves what they hit.
 pub(super) trait Source {
