@@ -179,7 +179,7 @@ impl MeshTree {
 
     /// Whether the tree outgrows the caches, so that asking for memory in advance pays.
     pub(super) fn is_large(&self) -> bool {
-        self.blocks.len() * size_of::<TriangleBlock>() > 16 << 20
+        self.blocks.len() * size_of::<TriangleBlock>() > 1 << 20
     }
 
     /// Offers the triangles along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
