@@ -237,7 +237,8 @@ impl App {
         let n_toasts = self.toasts.len();
         self.toasts.at(now);
         let Some(window) = &self.window else { return };
-        if title != self.title {
+        // Until the first scene is there, the window is called after what it will show.
+        if title != self.title && !self.session.status().scene.is_empty() {
             window.set_title(&title);
             self.title = title;
         }
