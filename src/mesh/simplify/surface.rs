@@ -34,7 +34,7 @@ impl Wedge {
 
 /// More triangles than this around a new vertex are not allowed: it bounds the work on meshes with a hub.
 const MAX_VALENCE: u32 = 256;
-/// Cosine of the largest turn of a triangle, 75°.
+/// Cosine of the largest turn of a triangle, about 75°.
 const MIN_TURN: f64 = 0.25;
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -114,6 +114,11 @@ impl Surface {
         let wedges = self.corner_wedge.as_chunks::<3>().0;
         let live = self.corner_vertex.as_chunks::<3>().0.iter().enumerate().filter(|(_, t)| t[0] != NONE);
         live.map(|(t, &vertices)| (t, vertices, wedges.get(t).copied()))
+    }
+
+    /// Whether a vertex has too many triangles to collapse.
+    pub fn is_hub(&self, vertex: u32) -> bool {
+        self.valence[vertex as usize] > MAX_VALENCE
     }
 
     /// How many live triangles have a vertex of this kind.
