@@ -57,10 +57,10 @@ impl Quadric {
     /// The place of least error near `guess`.
     ///
     /// Where planes are all but parallel their common point lies far away or nowhere; a pull towards `guess`, a
-    /// millionth of the weight, decides what they leave open and moves nothing that they determine.
+    /// hundred-millionth of the weight, decides what they leave open and moves nothing that they determine.
     #[inline]
     pub fn minimum_near(&self, guess: DVec3) -> DVec3 {
-        let pull = 1e-6 * self.weight;
+        let pull = 1e-8 * self.weight;
         let [xx, yy, zz, xy, xz, yz] = self.a;
         let (xx, yy, zz) = (xx + pull, yy + pull, zz + pull);
         // Solves for the step away from the guess: (A + pull) step = −gradient / 2, by Cramer's rule.
