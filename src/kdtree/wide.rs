@@ -217,7 +217,7 @@ mod tests {
                     WideNode { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
                 let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
-                (0..7).for_each(|plane| node.axes |= next() % 3 << (3 * plane));
+                (0..7).for_each(|plane| node.axes |= (next() % 3) << (3 * plane));
                 if next() % 4 == 0 {
                     node.splits[2] = f32::INFINITY;
                 }
