@@ -9,6 +9,7 @@
 //! | 2 | [`render`] | snapshot, camera, film, integrators, lights, materials, textures |
 //! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
 //! | 4 | [`frame`] | the ECS schedule in the order in which a frame runs |
+//! | 5 | `viewer` (feature) | the window: input, overlays, presenting |
 
 pub mod frame;
 pub mod geometry;
@@ -17,3 +18,5 @@ pub mod mesh;
 pub mod render;
 pub mod sampling;
 pub mod scene;
+#[cfg(feature = "viewer")]
+pub mod viewer;

@@ -1,4 +1,22 @@
 //! Triangle meshes: data, normals, procedural shapes, simplification. Knows no trees, files or entities.
+//!
+//! A [`Mesh`] comes from [`Mesh::from_f64`] (an importer), from [`procedural`], or from another mesh; each gives
+//! only meshes that pass [`Mesh::validate`]. Start reading at [`Mesh`].
+
+mod build;
+mod deviation;
+mod measure;
+mod normals;
+pub mod procedural;
+pub mod simplify;
+mod topology;
+mod weld;
+
+pub use build::MeshError;
+pub use deviation::{Deviation, Distances};
+pub use normals::NormalWeight;
+pub use topology::Topology;
+pub use weld::Welding;
 
 use glam::{DVec3, Vec2, Vec3};
 

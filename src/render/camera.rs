@@ -1,6 +1,8 @@
 //! Thin-lens camera: from a point on the film and a point on the lens to a ray.
 
-use glam::Vec3;
+use crate::geometry::Ray;
+use crate::sampling::{polygon_disc, uniform_disc};
+use glam::{Vec2, Vec3};
 
 /// A thin-lens camera in the space of the snapshot. The focal *plane* is perpendicular to `forward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,4 +22,81 @@ pub struct Camera {
     pub blades: u32,
     /// Radians, counter-clockwise seen from behind the camera.
     pub blade_rotation: f32,
+}
+
+impl Camera {
+    /// The ray through a point of the film, with a unit direction.
+    ///
+    /// - `film`: pixels from the upper left corner; `size`: width and height of the film in pixels.
+    /// - `lens`: two numbers in `[0, 1)`; unused by a pinhole.
+    #[inline]
+    pub fn ray(&self, film: Vec2, size: Vec2, lens: Vec2) -> Ray {
+        let direction = self.film_direction(film, size);
+        if self.lens_radius == 0.0 {
+            return Ray::new(self.eye, direction.normalize());
+        }
+        let point =
+            if self.blades < 3 { uniform_disc(lens) } else { polygon_disc(lens, self.blades, self.blade_rotation) };
+        let offset = self.lens_radius * (point.x * self.right + point.y * self.up);
+        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye.
+        Ray::new(self.eye + offset, (direction - offset / self.focus_distance).normalize())
+    }
+
+    /// From the eye through a point of the film to the plane one metre ahead; not unit.
+    #[inline]
+    pub fn film_direction(&self, film: Vec2, size: Vec2) -> Vec3 {
+        let x = (2.0 * film.x - size.x) / size.y * self.tan_half_vfov;
+        let y = (size.y - 2.0 * film.y) / size.y * self.tan_half_vfov;
+        self.forward + x * self.right + y * self.up
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(lens_radius: f32, focus_distance: f32) -> Camera {
+        Camera {
+            eye: Vec3::new(1.0, 2.0, 3.0),
+            right: Vec3::X,
+            up: Vec3::Y,
+            forward: Vec3::NEG_Z,
+            tan_half_vfov: 0.5,
+            lens_radius,
+            focus_distance,
+            blades: 0,
+            blade_rotation: 0.0,
+        }
+    }
+
+    #[test]
+    fn corners_of_the_film_span_the_field_of_view() {
+        let size = Vec2::new(200.0, 100.0);
+        let ray = camera(0.0, 1.0).ray(Vec2::ZERO, size, Vec2::ZERO);
+        let expected = Vec3::new(-1.0, 0.5, -1.0).normalize();
+        assert!((ray.dir - expected).length() < 1e-6, "{}", ray.dir);
+    }
+
+    #[test]
+    fn all_points_of_the_lens_meet_in_the_focal_plane() {
+        let camera = camera(0.3, 4.0);
+        let (film, size) = (Vec2::new(20.0, 70.0), Vec2::new(200.0, 100.0));
+        let target = camera.eye + 4.0 * camera.film_direction(film, size);
+        for i in 0..64 {
+            let ray = camera.ray(film, size, Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0);
+            let t = (target - ray.origin).dot(ray.dir);
+            assert!((ray.at(t) - target).length() < 1e-5);
+            assert!((ray.origin - camera.eye).length() <= 0.3 * 1.000_001);
+        }
+    }
+
+    #[test]
+    fn focus_at_infinity_gives_parallel_rays() {
+        let camera = camera(0.3, f32::INFINITY);
+        let (film, size) = (Vec2::new(20.0, 70.0), Vec2::new(200.0, 100.0));
+        let a = camera.ray(film, size, Vec2::new(0.1, 0.9));
+        let b = camera.ray(film, size, Vec2::new(0.9, 0.2));
+        assert_eq!(a.dir, b.dir);
+        assert_ne!(a.origin, b.origin);
+    }
 }

@@ -1,5 +1,6 @@
 //! Where light is summed up: linear, unclamped, in tiles that workers own one at a time.
 
+use super::estimate::{ErrorEstimate, TileConvergence};
 use glam::{DVec3, UVec2, Vec3};
 
 /// Sums and counts of one picture.
@@ -25,6 +26,10 @@ pub(super) struct FilmTile {
     pub spp: u32,
     /// Sum of radiance a pixel, W·m⁻²·sr⁻¹.
     pub sums: Vec<DVec3>,
+    /// Pixel (index in this tile) and number of each sample that was left out because it was not finite.
+    pub bad: Vec<(u32, u32)>,
+    /// What the error estimate needs.
+    pub convergence: TileConvergence,
 }
 
 impl Film {
@@ -44,7 +49,7 @@ impl Film {
             .map(|i| {
                 let origin = UVec2::new(i % tiles_x, i / tiles_x) * tile_size;
                 let size = (UVec2::new(width, height) - origin).min(UVec2::splat(tile_size));
-                FilmTile { origin, size, spp: 0, sums: vec![DVec3::ZERO; (size.x * size.y) as usize] }
+                FilmTile::new(origin, size)
             })
             .collect();
         Self { width, height, tiles, tiles_x, tile_size }
@@ -65,14 +70,75 @@ impl Film {
 
     /// Mean radiance of a pixel, row 0 at the top; black where there is no sample yet.
     pub fn mean(&self, x: u32, y: u32) -> Vec3 {
-        let tile = &self.tiles[(y / self.tile_size * self.tiles_x + x / self.tile_size) as usize];
-        let local = UVec2::new(x, y) - tile.origin;
-        let sum = tile.sums[(local.y * tile.size.x + local.x) as usize];
-        if tile.spp == 0 { Vec3::ZERO } else { (sum / f64::from(tile.spp)).as_vec3() }
+        let (tile, local) = self.locate(x, y);
+        tile.mean(local).as_vec3()
+    }
+
+    /// Mean radiance of the pixels of one row, from the left.
+    pub fn row(&self, y: u32) -> impl Iterator<Item = Vec3> {
+        let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
+        tiles.iter().flat_map(move |tile| {
+            let first = ((y - tile.origin.y) * tile.size.x) as usize;
+            (first..first + tile.size.x as usize).map(move |local| tile.mean(local).as_vec3())
+        })
     }
 
     /// Mean radiance of all pixels, row by row from the top.
     pub fn means(&self) -> Vec<Vec3> {
-        (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.mean(x, y))).collect()
+        (0..self.height).flat_map(|y| self.row(y)).collect()
+    }
+
+    /// Samples taken of a pixel so far.
+    pub fn samples(&self, x: u32, y: u32) -> u32 {
+        self.locate(x, y).0.spp
+    }
+
+    /// How wrong the picture still is, as far as its own samples tell; `None` before the fourth sample of a pixel.
+    pub fn error_estimate(&self) -> Option<ErrorEstimate> {
+        ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
+    }
+
+    fn locate(&self, x: u32, y: u32) -> (&FilmTile, usize) {
+        let tile = &self.tiles[(y / self.tile_size * self.tiles_x + x / self.tile_size) as usize];
+        let local = UVec2::new(x, y) - tile.origin;
+        (tile, (local.y * tile.size.x + local.x) as usize)
+    }
+}
+
+impl FilmTile {
+    fn new(origin: UVec2, size: UVec2) -> Self {
+        let n = (size.x * size.y) as usize;
+        let sums = vec![DVec3::ZERO; n];
+        Self { origin, size, spp: 0, sums, bad: Vec::new(), convergence: TileConvergence::default() }
+    }
+
+    pub fn n_pixels(&self) -> usize {
+        self.sums.len()
+    }
+
+    pub fn mean(&self, local: usize) -> DVec3 {
+        let n_bad = self.bad.iter().filter(|(pixel, _)| *pixel as usize == local).count() as u32;
+        match self.spp - n_bad {
+            0 => DVec3::ZERO,
+            n => self.sums[local] / f64::from(n),
+        }
+    }
+
+    /// Adds one sample of every pixel, in the order of `sums`; `sample` is its number.
+    pub fn add_sample(&mut self, sample: u32, radiance: impl Iterator<Item = Vec3>) {
+        debug_assert_eq!(sample, self.spp, "samples come in order, so that sums do not depend on threads");
+        for (local, (sum, radiance)) in self.sums.iter_mut().zip(radiance).enumerate() {
+            if radiance.is_finite() {
+                *sum += radiance.as_dvec3();
+            } else {
+                self.bad.push((local as u32, sample));
+            }
+        }
+        self.spp += 1;
+        if self.spp.is_power_of_two() {
+            let mut convergence = std::mem::take(&mut self.convergence);
+            convergence.record(self.spp, (0..self.n_pixels()).map(|local| self.mean(local)));
+            self.convergence = convergence;
+        }
     }
 }

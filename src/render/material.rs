@@ -44,8 +44,52 @@ pub enum Material {
     },
     /// Smooth dielectric with exact Fresnel; `absorption` per metre inside (Beer–Lambert).
     Glass { ior: f32, absorption: Vec3 },
-    /// f = (1 − weight) f_a + weight f_b; `a` and `b` are not emissive.
+    /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
+    /// is constant: see [`Emission::of`].
     Blend { weight: ScalarInput, a: MaterialId, b: MaterialId },
     /// A black body: emits on its front (a sphere outwards, a face along its normal), reflects nothing.
     Emissive { radiance: ColorInput },
+}
+
+impl Material {
+    pub(super) const KINDS: usize = 6;
+
+    /// A number below [`Self::KINDS`] for each kind, to sort by.
+    #[inline]
+    pub(super) fn kind(&self) -> usize {
+        match self {
+            Self::Emissive { .. } => 0,
+            Self::Diffuse { .. } => 1,
+            Self::Mirror { .. } => 2,
+            Self::Glass { .. } => 3,
+            Self::Metal { .. } => 4,
+            Self::Blend { .. } => 5,
+        }
+    }
+}
+
+/// The light that a material adds itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    pub radiance: ColorInput,
+    /// Share of an emissive part in a blend.
+    pub scale: f32,
+}
+
+impl Emission {
+    /// The emission of a material, looked for in blends; `None` for one that does not shine.
+    pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
+        match &materials[id as usize] {
+            Material::Emissive { radiance: ColorInput::Constant(Vec3::ZERO) } => None,
+            Material::Emissive { radiance } => Some(Self { radiance: *radiance, scale: 1.0 }),
+            Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
+                let part = |id, share: f32| {
+                    let emission = Self::of(materials, id)?;
+                    (share > 0.0).then_some(Self { scale: share * emission.scale, ..emission })
+                };
+                part(*a, 1.0 - weight).or_else(|| part(*b, *weight))
+            }
+            _ => None,
+        }
+    }
 }

@@ -1,21 +1,31 @@
 //! From a read-only snapshot of the scene to light on the film. Knows no entities, files or windows.
 //!
-//! Start reading at [`Snapshot`] (what is rendered) and [`Film`] (where it goes).
+//! Start reading at [`Snapshot`] (what is rendered), [`advance`] (how) and [`Film`] (where it goes).
 
+mod bsdf;
 mod camera;
 mod develop;
+mod dielectric;
 mod environment;
+mod estimate;
 mod film;
+mod ggx;
+mod light;
 mod material;
+mod medium;
+mod path;
 mod renderer;
 mod snapshot;
+mod surface;
 mod texture;
 
 pub use camera::Camera;
-pub use develop::{Display, ToneCurve, develop, develop_pixel};
+pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
 pub use environment::Environment;
+pub use estimate::ErrorEstimate;
 pub use film::Film;
-pub use material::{ColorInput, Fresnel, Material, MaterialId, ScalarInput};
-pub use renderer::{BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance};
-pub use snapshot::{Geometry, Object, Shading, Snapshot};
+pub use light::LightTable;
+pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
+pub use renderer::{BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, replay_sample};
+pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};
 pub use texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};

@@ -1,10 +1,17 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
-use super::{Film, Snapshot};
+use super::Snapshot;
+use super::film::{Film, FilmTile};
+use super::path::{CameraPath, PathWave};
+use crate::geometry::Ray;
+use crate::sampling::Sampler;
+use glam::{UVec2, Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
 /// The light model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Integrator {
     /// The truth: unbiased path tracing.
     #[default]
@@ -72,16 +79,113 @@ pub struct PassReport {
 
 /// Takes samples until every pixel has `target_spp` of them, or until `stop` says so.
 ///
-/// `stop` is asked often, from all workers; what a stopped tile had not finished is dropped, never half kept.
+/// Tiles are spread over the current rayon pool. `stop` is asked often, from all workers; what a wave had not
+/// finished is dropped, never half kept.
 pub fn advance(
-    _snapshot: &Snapshot,
-    _settings: &RenderSettings,
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
     film: &mut Film,
     target_spp: u32,
-    _stop: &(dyn Fn() -> bool + Sync),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
-    for tile in &mut film.tiles {
-        tile.spp = tile.spp.max(target_spp);
+    let size = UVec2::new(film.width(), film.height());
+    let reports: Vec<PassReport> = film
+        .tiles
+        .par_iter_mut()
+        .map_init(PathWave::default, |wave, tile| advance_tile(snapshot, settings, size, tile, target_spp, stop, wave))
+        .collect();
+    let mut total = PassReport { completed: true, ..PassReport::default() };
+    for report in reports {
+        total.completed &= report.completed;
+        total.rays += report.rays;
+        total.n_bad += report.n_bad;
+        total.bad.extend(report.bad.into_iter().take(MAX_LISTED_BAD - total.bad.len()));
     }
-    PassReport { completed: true, ..PassReport::default() }
+    total
+}
+
+/// How many bad samples a report names.
+const MAX_LISTED_BAD: usize = 16;
+
+/// Paths in flight at once: enough to keep the kernel busy, few enough for their state to stay in the cache.
+const WAVE_SIZE: usize = 4096;
+
+fn advance_tile(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film_size: UVec2,
+    tile: &mut FilmTile,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+    wave: &mut PathWave,
+) -> PassReport {
+    let mut report = PassReport { completed: true, ..PassReport::default() };
+    let n_pixels = tile.n_pixels();
+    let order = pixels_in_blocks(tile.size);
+    let mut radiance = Vec::new();
+    while tile.spp < target_spp {
+        let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
+        radiance.clear();
+        radiance.resize(n_samples * n_pixels, Vec3::ZERO);
+        let first = tile.spp;
+        let camera_paths = (0..n_samples).flat_map(|s| {
+            let (tile, order) = (&*tile, &order);
+            order.iter().map(move |&local| {
+                let pixel = tile.origin + UVec2::new(local % tile.size.x, local / tile.size.x);
+                let (ray, sampler) = camera_ray(snapshot, settings, film_size, pixel, first + s as u32);
+                CameraPath { ray, sampler, slot: s as u32 * n_pixels as u32 + local }
+            })
+        });
+        let Some(rays) = wave.trace(snapshot, settings.max_depth, camera_paths, &mut radiance, stop) else {
+            report.completed = false;
+            break;
+        };
+        report.rays += rays;
+        let n_bad_before = tile.bad.len();
+        for (s, sample) in radiance.chunks_exact(n_pixels).enumerate() {
+            tile.add_sample(first + s as u32, sample.iter().copied());
+        }
+        let new_bad = &tile.bad[n_bad_before..];
+        report.n_bad += new_bad.len() as u64;
+        let room = MAX_LISTED_BAD - report.bad.len();
+        report.bad.extend(new_bad.iter().take(room).map(|&(local, sample)| {
+            let pixel = tile.origin + UVec2::new(local % tile.size.x, local / tile.size.x);
+            BadSample { x: pixel.x, y: pixel.y, sample }
+        }));
+    }
+    report
+}
+
+/// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film.
+pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
+    let (ray, sampler) = camera_ray(snapshot, settings, film_size, UVec2::new(at.x, at.y), at.sample);
+    let mut radiance = [Vec3::ZERO];
+    let path = CameraPath { ray, sampler, slot: 0 };
+    PathWave::default().trace(snapshot, settings.max_depth, std::iter::once(path), &mut radiance, &|| false);
+    radiance[0]
+}
+
+/// A ray through a uniform point of the pixel's square (box filter) and of the lens.
+#[inline]
+fn camera_ray(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film_size: UVec2,
+    pixel: UVec2,
+    sample: u32,
+) -> (Ray, Sampler) {
+    let sampler = Sampler::new(settings.seed, pixel.x, pixel.y, sample);
+    let film = pixel.as_vec2() + sampler.pair(0);
+    let lens = if snapshot.camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
+    (snapshot.camera.ray(film, film_size.as_vec2(), lens), sampler)
+}
+
+/// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.
+fn pixels_in_blocks(size: UVec2) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..size.x * size.y).collect();
+    order.sort_by_key(|i| {
+        let (x, y) = (i % size.x, i / size.x);
+        (y / 4, x / 4, y, x)
+    });
+    order
 }

@@ -3,7 +3,9 @@
 //! It comes in three parts with lives of their own, so that a change replaces no more than it must: a moved camera
 //! keeps [`Geometry`] and [`Shading`], a new material keeps [`Geometry`].
 
-use super::{Camera, Environment, Material, MaterialId, Texture};
+use super::environment::EnvironmentSampler;
+use super::light::LightTable;
+use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
 use crate::kdtree::{SceneTree, Shape};
 use crate::mesh::Mesh;
 use std::sync::Arc;
@@ -37,6 +39,22 @@ pub struct Shading {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub environment: Environment,
+    /// What each material adds itself.
+    pub(super) emission: Vec<Option<Emission>>,
+    pub lights: LightTable,
+    pub(super) environment_sampler: Option<EnvironmentSampler>,
+    pub features: Features,
+}
+
+/// What the scene uses: what it does not use costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Features {
+    /// Some surface can send a path through itself, so paths keep track of what they are inside of.
+    pub glass: bool,
+    /// Some light can be found by choosing a point or direction on it.
+    pub light_sampling: bool,
+    /// The surroundings shine.
+    pub environment: bool,
 }
 
 impl Geometry {
@@ -49,12 +67,22 @@ impl Geometry {
 
 impl Shading {
     /// Collects the lights of `geometry` under these materials.
+    ///
+    /// Material and texture ids lie within their lists, and a blend comes to no cycle and at most eight lobes.
     pub fn build(
-        _geometry: &Geometry,
+        geometry: &Geometry,
         materials: Vec<Material>,
         textures: Vec<Texture>,
         environment: Environment,
     ) -> Self {
-        Self { materials, textures, environment }
+        let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(&materials, id)).collect();
+        let lights = LightTable::build(geometry, &emission, &textures);
+        let environment_sampler = EnvironmentSampler::build(&environment);
+        let features = Features {
+            glass: materials.iter().any(|material| matches!(material, Material::Glass { .. })),
+            light_sampling: !lights.is_empty() || environment_sampler.is_some(),
+            environment: !matches!(environment, Environment::Black),
+        };
+        Self { materials, textures, environment, emission, lights, environment_sampler, features }
     }
 }

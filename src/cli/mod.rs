@@ -1,0 +1,147 @@
+//! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not understood.
+
+mod info;
+mod render;
+mod show;
+mod simplify;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use firstlight::render::Integrator;
+use firstlight::scene::{BUILTIN_SCENES, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+use std::process::ExitCode;
+
+/// An interactive, progressive path tracer: open a model, fly through it, watch it converge.
+#[derive(Parser)]
+#[command(name = "firstlight", version, args_conflicts_with_subcommands = true, after_help = builtin_help())]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    show: show::ShowArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene to a picture, without a window.
+    Render(render::RenderArgs),
+    /// Tell what is in a scene, what it uses and what is not modelled.
+    Info(info::InfoArgs),
+    /// Write a model with fewer triangles, and measure how far it is from the original.
+    Simplify(simplify::SimplifyArgs),
+}
+
+/// What to open, and how.
+#[derive(Args, Clone, Debug)]
+struct SceneArgs {
+    /// A built-in scene, a scene file (.ron) or a model (.obj).
+    #[arg(value_name = "SCENE|MODEL", default_value = "gallery")]
+    scene: String,
+    /// Which axis of a model points up; guessed from how it would stand when not given.
+    #[arg(long, value_enum)]
+    up: Option<UpArg>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum UpArg {
+    Y,
+    Z,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum IntegratorArg {
+    /// Unbiased path tracing.
+    Path,
+    /// The classic local model with shadows, mirrors and glass.
+    Phong,
+}
+
+impl From<IntegratorArg> for Integrator {
+    fn from(arg: IntegratorArg) -> Self {
+        match arg {
+            IntegratorArg::Path => Self::Path,
+            IntegratorArg::Phong => Self::Phong,
+        }
+    }
+}
+
+impl SceneArgs {
+    fn up(&self) -> Option<UpAxis> {
+        self.up.map(|up| match up {
+            UpArg::Y => UpAxis::Y,
+            UpArg::Z => UpAxis::Z,
+        })
+    }
+
+    /// Loads the scene, or says why it cannot be had.
+    fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
+        let source = SceneSource::parse(&self.scene).map_err(|error| Failure::Failed(error.to_string()))?;
+        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
+        let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
+        for warning in &scene.warnings {
+            eprintln!("warning: {warning}");
+        }
+        Ok(scene)
+    }
+}
+
+/// Why a command did not do its work; each line becomes a message of its own.
+enum Failure {
+    /// The command itself cannot be right.
+    Usage(String),
+    Failed(String),
+}
+
+/// Runs what the command line asks for.
+pub fn main() -> ExitCode {
+    start_log();
+    // clap itself ends with status 2 and the nearest known option when it does not understand.
+    let line = CommandLine::parse();
+    let result = match line.command {
+        Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Simplify(args)) => simplify::run(&args),
+        None => show::run(&line.show),
+    };
+    let (message, code) = match result {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Usage(message)) => (message, 2),
+        Err(Failure::Failed(message)) => (message, 1),
+    };
+    for line in message.lines() {
+        eprintln!("error: {line}");
+    }
+    ExitCode::from(code)
+}
+
+/// Warnings go to the terminal, those of the window libraries only when something fails; `RUST_LOG` asks for more.
+fn start_log() {
+    use tracing_subscriber::EnvFilter;
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
+        EnvFilter::new("warn,winit=error,egui_wgpu=error,wgpu_core=error,wgpu_hal=error,naga=error")
+    });
+    // Only a second logger can fail, and then the first one does the work.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+}
+
+/// `640x480` as a width and a height.
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or("write it as WIDTHxHEIGHT, such as 1280x720")?;
+    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a number of pixels"));
+    let (width, height) = (number(width)?, number(height)?);
+    firstlight::scene::file::check_film_size(width, height)?;
+    Ok((width, height))
+}
+
+/// A positive, finite number.
+fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("must be a positive number".to_owned()),
+    }
+}
+
+fn builtin_help() -> String {
+    let width = BUILTIN_SCENES.iter().map(|(name, _, _)| name.len()).max().unwrap_or(0);
+    let rows: String = BUILTIN_SCENES.iter().map(|(name, about, _)| format!("\n  {name:width$}  {about}")).collect();
+    format!("Built-in scenes:{rows}")
+}

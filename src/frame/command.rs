@@ -1,0 +1,118 @@
+//! Everything that a person can ask of a session, as data.
+//!
+//! A window, a script or a recording produces commands; the session carries them out, in order, at the next frame.
+//! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
+//! so the same list of commands always leads to the same picture.
+
+use crate::render::{Integrator, ToneCurve};
+use crate::scene::{Lens, Projection, View};
+use bevy_ecs::message::Message;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// One request. Signs follow the picture: right, up and forward are positive.
+///
+/// Positions in the picture are fractions of its size, `(0, 0)` the upper left corner, `(1, 1)` the lower right, so
+/// that they mean the same at any resolution.
+#[derive(Clone, Debug, PartialEq, Message, Serialize, Deserialize)]
+pub enum Command {
+    /// Look about from where the eye is, degrees; positive yaw looks to the right, positive pitch upwards.
+    Turn {
+        yaw_deg: f64,
+        pitch_deg: f64,
+    },
+    /// Move along the view's own axes, in strides (see [`super::navigation::stride`]), which fit the scene's size.
+    Fly {
+        right: f64,
+        up: f64,
+        forward: f64,
+    },
+    /// Move the eye around the pivot, degrees; positive yaw moves it to the right, positive pitch upwards.
+    Orbit {
+        yaw_deg: f64,
+        pitch_deg: f64,
+    },
+    /// Move sideways, in heights of the picture at the pivot: what lies there moves with the mouse.
+    Pan {
+        right: f64,
+        up: f64,
+    },
+    /// Multiply the distance to the pivot, which stays where it is; positive.
+    Dolly {
+        factor: f64,
+    },
+    /// Multiply the size of what the picture takes in, by changing the field of view; positive.
+    Zoom {
+        factor: f64,
+    },
+    /// Lean the head to the right, degrees.
+    Roll {
+        angle_deg: f64,
+    },
+    /// Take the roll out: the horizon is level again.
+    Level,
+    /// Turn about the vertical, keeping the horizon, or freely about the picture's own axes.
+    ToggleTurntable,
+    /// The camera as it was when the scene was opened.
+    Home,
+    /// Keep the direction, step back until the whole scene is in the picture, and focus on its middle.
+    FrameAll,
+    SetView(View),
+    SetProjection(Projection),
+    SetLens(Lens),
+    /// Put the pivot at the depth of what is at this place in the picture.
+    PivotAt {
+        x: f64,
+        y: f64,
+    },
+    /// Multiply the distance of the focal plane; positive.
+    ScaleFocus {
+        factor: f64,
+    },
+    /// Metres along the view axis, positive, may be infinite.
+    SetFocus {
+        distance: f64,
+    },
+    /// Put the focal plane through what is at this place in the picture.
+    FocusAt {
+        x: f64,
+        y: f64,
+    },
+    /// Multiply the radius of the aperture; switches depth of field on.
+    ScaleAperture {
+        factor: f64,
+    },
+    /// Metres, at least 0; switches depth of field on.
+    SetAperture {
+        radius: f64,
+    },
+    ToggleDepthOfField,
+    /// Add to the exposure, factors of two.
+    AdjustExposure {
+        stops: f32,
+    },
+    SetExposure {
+        stops: f32,
+    },
+    SetToneCurve(ToneCurve),
+    /// The next tone curve of the list, and after the last the first.
+    NextToneCurve,
+    /// The size of the picture in pixels. A size without pixels (a minimised window) keeps the film and pauses.
+    Resize {
+        width: u32,
+        height: u32,
+    },
+    Pause,
+    Resume,
+    /// Drop all samples and begin again.
+    Restart,
+    SetIntegrator(Integrator),
+    /// Worker threads; 0 is one for each processor.
+    SetThreads {
+        threads: usize,
+    },
+    /// Open a scene file, a model or, when there is no such file, the built-in scene of that name.
+    Open {
+        path: PathBuf,
+    },
+}

@@ -1,0 +1,479 @@
+//! How a person moves a camera: pure functions from one view to the next.
+//!
+//! Each keeps the axes of the view orthonormal to rounding, without drift over millions of steps, and answers
+//! amounts that make no sense (not finite, a factor of zero) with the view it was given. All is f64 in the scene's
+//! own frame, so a camera a million metres from the origin moves as smoothly as one at it.
+//!
+//! Two ways of turning: on a turntable, where the horizon keeps its lean and the view stops short of straight up and
+//! down, and freely about the picture's own axes. Start reading at [`steer`].
+
+use super::Command;
+use crate::scene::{Lens, Projection, View};
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_2;
+
+/// The direction that a turntable turns about: scenes are Y up.
+pub const VERTICAL: DVec3 = DVec3::Y;
+
+/// On a turntable, how near to straight up or down a person can turn: nearer, yaw would spin the picture in place.
+const MAX_ELEVATION: f64 = 89.0 * (FRAC_PI_2 / 90.0);
+
+/// The field of view that zooming stays within, degrees: a strong telescope, and the widest flat picture of any use.
+const VFOV_RANGE_DEG: (f64, f64) = (0.1, 150.0);
+
+/// The aperture that a lens without one opens to, as a part of the focus distance: a blur that is seen, not more.
+const FIRST_APERTURE: f64 = 0.01;
+
+/// All that a person steers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rig {
+    pub view: View,
+    pub projection: Projection,
+    pub lens: Lens,
+}
+
+/// What turning keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Turning {
+    /// Yaw is about the vertical and the horizon keeps its lean.
+    #[default]
+    Turntable,
+    /// Yaw and pitch are about the picture's own axes, without limits.
+    Free,
+}
+
+/// What the amounts of a command are measured by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// A sphere around everything finite in the scene; radius 0 when there is nothing.
+    pub center: DVec3,
+    pub radius: f64,
+    /// Where [`Command::Home`] leads.
+    pub home: Rig,
+    /// Width of the picture by its height.
+    pub aspect: f64,
+    pub turning: Turning,
+}
+
+/// Carries out a command that needs nothing but the camera and its surroundings; `None` for every other command.
+pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig> {
+    let Rig { view, projection, lens } = *rig;
+    let with_view = |view| Some(Rig { view, ..*rig });
+    let with_lens = |lens| Some(Rig { lens, ..*rig });
+    match *command {
+        Command::Turn { yaw_deg, pitch_deg } => {
+            with_view(turn(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
+        }
+        Command::Fly { right, up, forward } => {
+            with_view(fly(&view, DVec3::new(right, up, forward) * stride(&view, around.radius)))
+        }
+        Command::Orbit { yaw_deg, pitch_deg } => {
+            with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
+        }
+        Command::Pan { right, up } => with_view(pan(&view, &projection, right, up)),
+        Command::Dolly { factor } => with_view(dolly(&view, factor)),
+        Command::Zoom { factor } => Some(Rig { projection: zoom(&projection, factor), ..*rig }),
+        Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),
+        Command::Level => with_view(level(&view)),
+        Command::Home => Some(around.home),
+        Command::FrameAll => {
+            let view = frame_sphere(&view, &projection, around.aspect, around.center, around.radius);
+            Some(Rig { view, lens: focus_at(&lens, view.pivot_distance), ..*rig })
+        }
+        Command::SetView(view) => with_view(view),
+        Command::SetProjection(projection) => Some(Rig { projection, ..*rig }),
+        Command::SetLens(lens) => with_lens(lens),
+        Command::ScaleFocus { factor } => with_lens(scale_focus(&lens, factor, view.pivot_distance)),
+        Command::SetFocus { distance } => with_lens(focus_at(&lens, distance)),
+        Command::ScaleAperture { factor } => with_lens(scale_aperture(&lens, factor)),
+        Command::SetAperture { radius } => with_lens(set_aperture(&lens, radius)),
+        Command::ToggleDepthOfField => with_lens(toggle_depth_of_field(&lens)),
+        _ => None,
+    }
+}
+
+/// How far a person flies in a second at speed 1, metres: half of the smaller of the distance looked at and the
+/// scene's radius, so that neither a room seen from inside nor a model seen from afar is left in one step.
+pub fn stride(view: &View, scene_radius: f64) -> f64 {
+    let size = if scene_radius > 0.0 { scene_radius.min(view.pivot_distance) } else { view.pivot_distance };
+    0.5 * size
+}
+
+/// Looks about from the eye; radians to the right and upwards in the picture.
+pub fn turn(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
+    finite_or(view, rotated(view, yaw, pitch, turning))
+}
+
+/// Moves the eye around the pivot, at the same distance; radians to the right and upwards in the picture.
+pub fn orbit(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
+    // The eye moving right means that the direction turns left.
+    let turned = rotated(view, -yaw, -pitch, turning);
+    finite_or(view, View { eye: view.pivot() - turned.forward * view.pivot_distance, ..turned })
+}
+
+/// Moves along the view's own axes: x right, y up, z forward, metres.
+pub fn fly(view: &View, step: DVec3) -> View {
+    finite_or(view, View { eye: view.eye + view.right() * step.x + view.up * step.y + view.forward * step.z, ..*view })
+}
+
+/// Moves sideways by heights of the picture at the pivot.
+pub fn pan(view: &View, projection: &Projection, right: f64, up: f64) -> View {
+    let height = 2.0 * projection.tan_half_vfov() * view.pivot_distance;
+    fly(view, DVec3::new(right * height, up * height, 0.0))
+}
+
+/// Multiplies the distance to the pivot, which stays where it is.
+pub fn dolly(view: &View, factor: f64) -> View {
+    let pivot_distance = view.pivot_distance * factor;
+    if !(pivot_distance.is_normal() && pivot_distance > 0.0) {
+        return *view;
+    }
+    finite_or(view, View { eye: view.pivot() - view.forward * pivot_distance, pivot_distance, ..*view })
+}
+
+/// Multiplies the height of what is seen at a given distance, within the limits of [`VFOV_RANGE_DEG`].
+pub fn zoom(projection: &Projection, factor: f64) -> Projection {
+    if !(factor.is_finite() && factor > 0.0) {
+        return *projection;
+    }
+    let (lowest, highest) = VFOV_RANGE_DEG;
+    let wanted = 2.0 * (projection.tan_half_vfov() * factor).atan().to_degrees();
+    // A scene may start outside of the limits; then it can only come nearer.
+    let vfov_deg = wanted.clamp(lowest.min(projection.vfov_deg), highest.max(projection.vfov_deg));
+    Projection { vfov_deg }
+}
+
+/// Leans the head to the right, radians.
+pub fn roll(view: &View, angle: f64) -> View {
+    let up = DQuat::from_axis_angle(view.forward, angle) * view.up;
+    finite_or(view, View { up, ..*view }.orthonormalized())
+}
+
+/// Takes the roll out. A view straight up or down has no horizon and stays.
+pub fn level(view: &View) -> View {
+    if elevation(view).abs() > MAX_ELEVATION {
+        return *view;
+    }
+    View { up: VERTICAL, ..*view }.orthonormalized()
+}
+
+/// Keeps the direction and places the eye so that the sphere just fits into a picture of this `aspect` (width by
+/// height); the centre becomes the pivot. A sphere without a size keeps the distance.
+pub fn frame_sphere(view: &View, projection: &Projection, aspect: f64, center: DVec3, radius: f64) -> View {
+    let pivot_distance = if radius > 0.0 {
+        // The sphere touches the cone whose half angle is the smaller one of the picture.
+        let tan_half = projection.tan_half_vfov() * aspect.min(1.0);
+        radius / tan_half.atan().sin()
+    } else {
+        view.pivot_distance
+    };
+    finite_or(view, View { eye: center - view.forward * pivot_distance, pivot_distance, ..*view })
+}
+
+/// Puts the focal plane at `distance` metres, if that is a distance.
+pub fn focus_at(lens: &Lens, distance: f64) -> Lens {
+    if distance > 0.0 { Lens { focus_distance: distance, ..*lens } } else { *lens }
+}
+
+/// Multiplies the focus distance; from infinity the plane comes back to `near`, metres.
+pub fn scale_focus(lens: &Lens, factor: f64, near: f64) -> Lens {
+    if lens.focus_distance.is_infinite() {
+        return if factor < 1.0 { focus_at(lens, near) } else { *lens };
+    }
+    let distance = lens.focus_distance * factor;
+    if distance.is_normal() { focus_at(lens, distance) } else { *lens }
+}
+
+/// Multiplies the aperture and switches depth of field on; a closed aperture opens first.
+pub fn scale_aperture(lens: &Lens, factor: f64) -> Lens {
+    let open = with_aperture(lens);
+    if !lens.enabled {
+        return open;
+    }
+    let radius = open.radius * factor;
+    if radius.is_normal() { set_aperture(&open, radius) } else { *lens }
+}
+
+/// Sets the radius of the aperture, metres, and switches depth of field on; 0 switches it off.
+pub fn set_aperture(lens: &Lens, radius: f64) -> Lens {
+    if !(radius.is_finite() && radius >= 0.0) {
+        return *lens;
+    }
+    Lens { radius, enabled: radius > 0.0, ..*lens }
+}
+
+pub fn toggle_depth_of_field(lens: &Lens) -> Lens {
+    if lens.enabled { Lens { enabled: false, ..*lens } } else { with_aperture(lens) }
+}
+
+/// Depth of field on, with an aperture that shows.
+fn with_aperture(lens: &Lens) -> Lens {
+    let radius = match (lens.radius > 0.0, lens.focus_distance.is_finite()) {
+        (true, _) => lens.radius,
+        (false, true) => FIRST_APERTURE * lens.focus_distance,
+        // Nothing else to measure by: 1 cm.
+        (false, false) => FIRST_APERTURE,
+    };
+    Lens { radius, enabled: true, ..*lens }
+}
+
+/// The view turned on the spot by radians to the right and upwards in the picture.
+fn rotated(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
+    let rotation = match turning {
+        Turning::Free => DQuat::from_axis_angle(view.right(), pitch) * DQuat::from_axis_angle(view.up, -yaw),
+        Turning::Turntable => turntable_rotation(view, yaw, pitch),
+    };
+    let turned = View { forward: rotation * view.forward, up: rotation * view.up, ..*view };
+    // Not finite: left for the caller to refuse, since normalising it would be meaningless.
+    if turned.is_finite() { turned.orthonormalized() } else { turned }
+}
+
+fn turntable_rotation(view: &View, yaw: f64, pitch: f64) -> DQuat {
+    let now = elevation(view);
+    // Beyond the limit (a scene may start so) the horizon is nowhere, and the picture's own right takes its place.
+    let level_right = if now.abs() > MAX_ELEVATION { view.right() } else { view.forward.cross(VERTICAL).normalize() };
+    // A leaning head sees the horizon leaning; amounts are along the picture's axes, whatever its lean.
+    let (sin_lean, cos_lean) = (view.right().dot(level_right.cross(view.forward)), view.right().dot(level_right));
+    let (yaw, pitch) = (yaw * cos_lean - pitch * sin_lean, yaw * sin_lean + pitch * cos_lean);
+    let wanted = (now + pitch).clamp(now.min(-MAX_ELEVATION), now.max(MAX_ELEVATION));
+    DQuat::from_axis_angle(VERTICAL, -yaw) * DQuat::from_axis_angle(level_right, wanted - now)
+}
+
+/// Angle of the view direction above the horizontal, radians in [-π/2, π/2].
+fn elevation(view: &View) -> f64 {
+    // Unlike the arc sine, exact near the poles too.
+    view.forward.dot(VERTICAL).atan2(view.forward.cross(VERTICAL).length())
+}
+
+fn finite_or(view: &View, candidate: View) -> View {
+    if candidate.is_finite() { candidate } else { *view }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+
+    fn start() -> View {
+        View::look_at(DVec3::new(3.0, 2.0, 4.0), DVec3::new(0.5, 0.25, -0.5), DVec3::Y).unwrap()
+    }
+
+    fn around(turning: Turning) -> Surroundings {
+        Surroundings { center: DVec3::new(1.0, 0.0, 2.0), radius: 3.0, home: Rig::default(), aspect: 1.5, turning }
+    }
+
+    fn close(a: DVec3, b: DVec3, tolerance: f64) -> bool {
+        (a - b).length() <= tolerance
+    }
+
+    /// A fixed sequence in [-1, 1), good enough to move a camera about.
+    fn wander(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    #[test]
+    fn signs_follow_the_picture() {
+        let view = View::default();
+        for turning in [Turning::Turntable, Turning::Free] {
+            assert!(turn(&view, 0.1, 0.0, turning).forward.x > 0.0, "yaw looks right");
+            assert!(turn(&view, 0.0, 0.1, turning).forward.y > 0.0, "pitch looks up");
+            assert!(orbit(&view, 0.1, 0.0, turning).eye.x > 0.0, "the eye moves right");
+            assert!(orbit(&view, 0.0, 0.1, turning).eye.y > 0.0, "the eye moves up");
+        }
+        assert_eq!(fly(&view, DVec3::new(1.0, 2.0, 3.0)).eye, view.eye + DVec3::new(1.0, 2.0, -3.0));
+        assert!(roll(&view, 0.1).up.x > 0.0, "the head leans right");
+        assert!(pan(&view, &Projection::default(), 0.5, 0.0).eye.x > 0.0);
+        assert!(zoom(&Projection::default(), 0.5).vfov_deg < Projection::default().vfov_deg);
+        assert!(dolly(&view, 0.5).eye.z < view.eye.z);
+    }
+
+    #[test]
+    fn a_million_steps_leave_the_axes_clean_and_the_pivot_where_it_was() {
+        for (turning, offset) in [(Turning::Turntable, 0.0), (Turning::Free, 5e6)] {
+            let first = View { eye: start().eye + DVec3::splat(offset), ..start() };
+            let (mut view, mut state) = (first, 7);
+            for _ in 0..1_000_000 {
+                view = orbit(&view, wander(&mut state), wander(&mut state), turning);
+                view = roll(&view, 0.01 * wander(&mut state));
+            }
+            assert!((view.forward.length() - 1.0).abs() < 1e-15, "{view:?}");
+            assert!((view.up.length() - 1.0).abs() < 1e-15, "{view:?}");
+            assert!(view.forward.dot(view.up).abs() < 1e-15, "{view:?}");
+            assert_eq!(view.pivot_distance, first.pivot_distance);
+            // Each step rounds the eye once or twice: a random walk of a thousand times that, here with room to spare.
+            let rounding = f64::EPSILON * first.eye.length().max(1.0);
+            assert!(
+                close(view.pivot(), first.pivot(), 20_000.0 * rounding),
+                "{} away",
+                (view.pivot() - first.pivot()).length()
+            );
+        }
+    }
+
+    #[test]
+    fn a_full_circle_comes_back() {
+        let view = start();
+        for turning in [Turning::Turntable, Turning::Free] {
+            let (mut orbited, mut turned, mut rolled) = (view, view, view);
+            for _ in 0..720 {
+                orbited = orbit(&orbited, TAU / 720.0, 0.0, turning);
+                turned = turn(&turned, -TAU / 720.0, 0.0, turning);
+                rolled = roll(&rolled, TAU / 720.0);
+                let distance = (orbited.eye - view.pivot()).length();
+                assert!((distance - view.pivot_distance).abs() < 1e-12, "orbiting keeps the distance");
+            }
+            for back in [orbited, turned, rolled] {
+                assert!(close(back.eye, view.eye, 1e-12) && close(back.up, view.up, 1e-12), "{back:?}");
+            }
+        }
+        let half = orbit(&view, PI, 0.0, Turning::Turntable);
+        assert!((half.eye.y - view.eye.y).abs() < 1e-14, "a turntable keeps the height");
+    }
+
+    #[test]
+    fn a_turntable_keeps_the_lean_and_stops_before_the_pole() {
+        let lean = |view: &View| view.right().y.atan2(view.up.y);
+        let mut view = roll(&start(), 0.3);
+        let before = lean(&view);
+        for _ in 0..50 {
+            view = turn(&view, 0.07, 0.0, Turning::Turntable);
+            view = orbit(&view, -0.11, 0.02, Turning::Turntable);
+        }
+        assert!((lean(&view) - before).abs() < 1e-9, "{} then {}", before, lean(&view));
+
+        let up = turn(&level(&view), 0.0, 10.0, Turning::Turntable);
+        assert!((elevation(&up) - MAX_ELEVATION).abs() < 1e-12);
+        assert!(up.up.y > 0.0 && up.right().y.abs() < 1e-12, "neither upside down nor leaning: {up:?}");
+        let free = turn(&start(), 0.0, PI, Turning::Free);
+        assert!(free.up.y < 0.0, "free turning goes over the top");
+    }
+
+    #[test]
+    fn a_leaning_picture_still_moves_with_the_mouse() {
+        let view = roll(&View::default(), 0.5);
+        for (yaw, pitch) in [(1e-4, 0.0), (0.0, 1e-4), (2e-4, -1e-4)] {
+            let turned = turn(&view, yaw, pitch, Turning::Turntable);
+            let (x, y) = (turned.forward.dot(view.right()), turned.forward.dot(view.up));
+            assert!((x - yaw).abs() < 1e-7 && (y - pitch).abs() < 1e-7, "asked ({yaw}, {pitch}), moved ({x}, {y})");
+        }
+    }
+
+    #[test]
+    fn a_view_that_starts_straight_down_can_be_turned_away() {
+        let down = View::look_at(DVec3::new(0.0, 5.0, 0.0), DVec3::ZERO, DVec3::NEG_Z).unwrap();
+        assert_eq!(level(&down), down);
+        let turned = orbit(&down, 0.0, -0.5, Turning::Turntable);
+        assert!((turned.eye - DVec3::new(0.0, 5.0 * 0.5f64.cos(), 5.0 * 0.5f64.sin())).length() < 1e-12, "{turned:?}");
+        assert!(close(orbit(&down, 0.0, 0.5, Turning::Turntable).eye, down.eye, 1e-12), "and not over the pole");
+        let spun = orbit(&down, 0.25, 0.0, Turning::Turntable);
+        assert!(close(spun.eye, down.eye, 1e-12) && !close(spun.up, down.up, 0.2), "{spun:?}");
+    }
+
+    #[test]
+    fn panning_moves_what_is_at_the_pivot_by_the_amount_asked() {
+        let (view, projection) = (start(), Projection { vfov_deg: 50.0 });
+        let panned = pan(&view, &projection, 0.25, -0.5);
+        let seen = view.pivot() - panned.eye;
+        let depth = seen.dot(panned.forward);
+        let height = 2.0 * projection.tan_half_vfov() * depth;
+        assert!((seen.dot(panned.right()) / height + 0.25).abs() < 1e-14);
+        assert!((seen.dot(panned.up) / height - 0.5).abs() < 1e-14);
+    }
+
+    #[test]
+    fn framing_fits_the_sphere_exactly() {
+        for aspect in [0.4, 1.0, 2.5] {
+            let projection = Projection { vfov_deg: 60.0 };
+            let view = frame_sphere(&start(), &projection, aspect, DVec3::new(1.0, 0.0, 2.0), 3.0);
+            assert_eq!(view.forward, start().forward);
+            assert!(close(view.pivot(), DVec3::new(1.0, 0.0, 2.0), 1e-14 * view.pivot_distance));
+            let half_angle = (3.0 / view.pivot_distance).asin();
+            let smaller = (projection.tan_half_vfov() * aspect).atan().min(30f64.to_radians());
+            assert!((half_angle - smaller).abs() < 1e-14, "aspect {aspect}");
+        }
+        assert_eq!(frame_sphere(&start(), &Projection::default(), 1.0, DVec3::ZERO, 0.0).pivot(), DVec3::ZERO);
+    }
+
+    #[test]
+    fn zoom_scales_the_picture_and_stays_in_range() {
+        let halved = zoom(&Projection { vfov_deg: 40.0 }, 0.5);
+        assert!((halved.tan_half_vfov() * 2.0 - 20f64.to_radians().tan()).abs() < 1e-15);
+        let mut projection = Projection::default();
+        for _ in 0..10_000 {
+            projection = zoom(&projection, 1.1);
+        }
+        assert_eq!(projection.vfov_deg, VFOV_RANGE_DEG.1);
+        let fisheye = Projection { vfov_deg: 170.0 };
+        assert!((zoom(&fisheye, 2.0).vfov_deg - 170.0).abs() < 1e-9, "outside of the range it does not jump");
+    }
+
+    #[test]
+    fn strides_fit_the_scene() {
+        let view = start();
+        assert_eq!(stride(&view, 0.0), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 1e9), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 0.5), 0.25);
+    }
+
+    #[test]
+    fn focus_and_aperture_go_by_factors_and_survive_the_ends() {
+        let lens = Lens::pinhole(4.0);
+        assert_eq!(scale_focus(&lens, 1.5, 1.0).focus_distance, 6.0);
+        let far = focus_at(&lens, f64::INFINITY);
+        assert_eq!(scale_focus(&far, 2.0, 3.0), far);
+        assert_eq!(scale_focus(&far, 0.5, 3.0).focus_distance, 3.0);
+        let on = toggle_depth_of_field(&lens);
+        assert!(on.enabled && on.effective_radius() > 0.0, "a pinhole opens: {on:?}");
+        assert_eq!(toggle_depth_of_field(&on).effective_radius(), 0.0);
+        assert_eq!(toggle_depth_of_field(&toggle_depth_of_field(&on)), on);
+        assert_eq!(scale_aperture(&lens, 2.0), on, "the first press shows the blur");
+        assert_eq!(scale_aperture(&on, 2.0).radius, 2.0 * on.radius);
+        assert!(!set_aperture(&on, 0.0).enabled);
+        for nonsense in [f64::NAN, -1.0, 0.0, f64::INFINITY] {
+            assert_eq!(scale_aperture(&on, nonsense), on);
+            assert_eq!(scale_focus(&lens, nonsense, 1.0), lens);
+            assert_eq!(zoom(&Projection::default(), nonsense), Projection::default());
+            assert_eq!(dolly(&start(), nonsense), start());
+        }
+    }
+
+    #[test]
+    fn amounts_that_are_not_numbers_change_nothing() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for turning in [Turning::Turntable, Turning::Free] {
+                assert_eq!(turn(&start(), bad, 0.0, turning), start());
+                assert_eq!(orbit(&start(), 0.0, bad, turning), start());
+            }
+            assert_eq!(fly(&start(), DVec3::new(0.0, bad, 0.0)), start());
+            assert_eq!(roll(&start(), bad), start());
+            assert_eq!(pan(&start(), &Projection::default(), bad, 0.0), start());
+        }
+        let (mut near, mut far) = (start(), start());
+        for _ in 0..5000 {
+            near = dolly(&near, 0.5);
+            far = dolly(&far, 2.0);
+            assert!(near.pivot_distance > 0.0 && near.is_finite() && far.is_finite());
+        }
+    }
+
+    #[test]
+    fn commands_reach_the_right_part_of_the_rig() {
+        let rig = Rig { view: start(), ..Rig::default() };
+        let around = around(Turning::Turntable);
+        let go = |command| steer(&rig, &command, &around).unwrap();
+        assert_eq!(
+            go(Command::Turn { yaw_deg: 90.0, pitch_deg: 0.0 }).view,
+            turn(&rig.view, FRAC_PI_2, 0.0, Turning::Turntable)
+        );
+        assert_eq!(go(Command::Home), around.home);
+        let flown = go(Command::Fly { right: 0.0, up: 0.0, forward: 2.0 }).view;
+        assert!(((flown.eye - rig.view.eye).length() - 2.0 * stride(&rig.view, 3.0)).abs() < 1e-14);
+        let framed = go(Command::FrameAll);
+        assert_eq!(framed.lens.focus_distance, framed.view.pivot_distance, "what is framed is sharp");
+        assert_eq!(go(Command::ScaleFocus { factor: 2.0 }).view, rig.view);
+        assert_eq!(steer(&rig, &Command::Restart, &around), None);
+        assert_eq!(steer(&rig, &Command::FocusAt { x: 0.5, y: 0.5 }, &around), None);
+    }
+}

@@ -1,0 +1,85 @@
+//! Rendering without a window: until a target is reached, on the current rayon pool.
+
+use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
+use std::time::{Duration, Instant};
+
+/// When a picture is good enough; the first that is reached ends it. Without any, it goes on for ever.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Target {
+    /// Samples per pixel.
+    pub spp: Option<u32>,
+    pub seconds: Option<f64>,
+    /// Relative error of the whole picture, as it estimates it itself.
+    pub error: Option<f64>,
+}
+
+impl Target {
+    /// Whether a film with so many samples a pixel, seconds of rendering and relative error is good enough.
+    pub fn reached(&self, spp: u32, seconds: f64, error: Option<f64>) -> bool {
+        self.spp.is_some_and(|goal| spp >= goal)
+            || self.seconds.is_some_and(|goal| seconds >= goal)
+            || self.error.zip(error).is_some_and(|(goal, error)| error <= goal)
+    }
+}
+
+/// How far it is, told a few times a second.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Samples that every pixel has.
+    pub spp: u32,
+    pub seconds: f64,
+    pub rays: RayCounts,
+    pub error: Option<ErrorEstimate>,
+}
+
+/// What was done.
+#[derive(Clone, Debug, Default)]
+pub struct OfflineReport {
+    /// Wall time.
+    pub seconds: f64,
+    pub rays: RayCounts,
+    /// Samples that were not finite and were left out.
+    pub n_bad: u64,
+    /// The first few of them.
+    pub bad: Vec<BadSample>,
+}
+
+/// Adds samples to `film` until `target`; `progress` returns false to stop early.
+///
+/// Given a time, at least one sample a pixel is taken, and the film may end with a part of a pass.
+pub fn render_offline(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film: &mut Film,
+    target: Target,
+    mut progress: impl FnMut(Progress) -> bool,
+) -> OfflineReport {
+    /// Seconds between reports, about.
+    const SLICE: f64 = 0.25;
+    let start = Instant::now();
+    let deadline =
+        target.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).map(|limit| start + limit);
+    let goal = target.spp.unwrap_or(u32::MAX);
+    let mut report = OfflineReport::default();
+    let mut step = 1;
+    while film.spp() < goal {
+        let slice_start = Instant::now();
+        let before = film.spp();
+        let late = || before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        let pass = advance(snapshot, settings, film, before.saturating_add(step).min(goal), &late);
+        report.rays += pass.rays;
+        report.n_bad += pass.n_bad;
+        report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));
+        report.seconds = start.elapsed().as_secs_f64();
+        let (spp, seconds, error) = (film.spp(), report.seconds, film.error_estimate());
+        let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
+        if !go_on || target.reached(spp, seconds, error.map(|error| error.relative)) {
+            break;
+        }
+        // Whole passes as long as a slice, growing gently while the rate is still unknown.
+        let rate = f64::from(step) / slice_start.elapsed().as_secs_f64().max(1e-9);
+        step = ((rate * SLICE) as u32).clamp(1, step.saturating_mul(4));
+    }
+    report.seconds = start.elapsed().as_secs_f64();
+    report
+}

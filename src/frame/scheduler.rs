@@ -1,0 +1,390 @@
+//! What to render next, decided without threads and without a clock: it is told the times.
+//!
+//! After a restart comes a coarse picture that is there within a frame, then sharper ones, then samples at full
+//! resolution in slices, so that the picture is shown ten to twenty times a second, until the target is reached.
+//! The resolution while things move follows from the measured speed, with a band in which it stays as it is.
+//!
+//! The one who renders asks [`Scheduler::next`], does it, tells [`Scheduler::finished`], and asks again.
+
+use super::Target;
+use std::time::Duration;
+
+/// A film side is divided by one of these.
+const DIVIDERS: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
+
+/// A coarse picture must take no longer than this, seconds: two frames of a 60 Hz screen.
+const SLOWEST: f64 = 1.0 / 30.0;
+/// A finer one is tried when it would take less than this, seconds.
+const FASTEST: f64 = 1.0 / 60.0;
+/// What a fresh choice aims at: between the two, so that it does not change at once.
+const AIM: f64 = 1.0 / 45.0;
+
+/// So long after the last restart things are taken to have come to rest, and the picture sharpens. Shorter, and the
+/// resolution would jump between two events of a slow mouse.
+const QUIET: Duration = Duration::from_millis(120);
+
+/// Seconds between pictures at full resolution: lively at first, then less often, since less changes.
+const FIRST_SLICE: f64 = 0.05;
+const LAST_SLICE: f64 = 0.1;
+
+/// Camera paths per second, before anything has been measured.
+const GUESSED_RATE: f64 = 1e6;
+
+/// One thing to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Samples for a film whose sides are divided by `divider`; 1 is full resolution.
+    ///
+    /// A film of another divider than the one before, or the first after a restart, begins empty.
+    Render {
+        divider: u32,
+        /// Until every pixel has so many samples…
+        target_spp: u32,
+        /// …or so much time has passed.
+        at_most: Option<Duration>,
+    },
+    /// Nothing to do until something changes.
+    Sleep,
+}
+
+/// How a step went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Camera paths traced.
+    pub paths: u64,
+    pub seconds: f64,
+    /// Samples that every pixel of the film has now.
+    pub spp: u32,
+    /// Relative error of the picture, as far as it is known.
+    pub error: Option<f64>,
+}
+
+/// See the head of this file.
+#[derive(Clone, Debug)]
+pub struct Scheduler {
+    width: u32,
+    height: u32,
+    target: Target,
+    paused: bool,
+    /// Camera paths per second.
+    rate: Option<f64>,
+    /// What coarse pictures use; stays from one restart to the next.
+    coarse: u32,
+    phase: Phase,
+    restarted_at: Duration,
+    /// Seconds spent at full resolution since the restart.
+    spent: f64,
+    /// Samples that every pixel of the current film has.
+    spp: u32,
+    /// Relative error of the current film.
+    error: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// At this divider, which is above 1, since things move or have just moved.
+    Coarse(u32),
+    /// On the way to full resolution.
+    Sharpening(u32),
+    Full,
+}
+
+impl Scheduler {
+    /// Width and height of the whole picture, at least 1 each.
+    pub fn new(width: u32, height: u32, target: Target) -> Self {
+        let mut scheduler = Self {
+            width,
+            height,
+            target,
+            paused: false,
+            rate: None,
+            coarse: 1,
+            phase: Phase::Full,
+            restarted_at: Duration::ZERO,
+            spent: 0.0,
+            spp: 0,
+            error: None,
+        };
+        scheduler.restart(Duration::ZERO);
+        scheduler
+    }
+
+    /// All samples are worthless from `now` on.
+    pub fn restart(&mut self, now: Duration) {
+        self.choose_coarse();
+        self.phase = if self.coarse == 1 { Phase::Full } else { Phase::Coarse(self.coarse) };
+        self.restarted_at = now;
+        (self.spent, self.spp, self.error) = (0.0, 0, None);
+    }
+
+    /// A restart with another size.
+    pub fn resize(&mut self, width: u32, height: u32, now: Duration) {
+        (self.width, self.height) = (width, height);
+        self.restart(now);
+    }
+
+    /// Keeps all samples.
+    pub fn set_target(&mut self, target: Target) {
+        self.target = target;
+    }
+
+    /// Keeps all samples.
+    pub fn set_paused(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
+    /// Another number of threads renders at another speed.
+    pub fn forget_speed(&mut self) {
+        self.rate = None;
+    }
+
+    /// Seconds spent at full resolution since the last restart.
+    pub fn spent(&self) -> f64 {
+        self.spent
+    }
+
+    pub fn next(&mut self, now: Duration) -> Step {
+        if self.paused && self.spp > 0 {
+            return Step::Sleep;
+        }
+        if let Phase::Coarse(divider) = self.phase
+            && self.spp > 0
+            && now.saturating_sub(self.restarted_at) >= QUIET
+        {
+            self.sharpen(divider);
+        }
+        match self.phase {
+            Phase::Coarse(divider) | Phase::Sharpening(divider) => {
+                Step::Render { divider, target_spp: self.spp + 1, at_most: None }
+            }
+            Phase::Full if self.reached() => Step::Sleep,
+            // Nothing can be shown before every pixel has a sample.
+            Phase::Full if self.spp == 0 => Step::Render { divider: 1, target_spp: 1, at_most: None },
+            Phase::Full => {
+                let slice = (FIRST_SLICE + 0.1 * self.spent).min(LAST_SLICE);
+                let passes = (slice * self.speed() / self.pixels(1)).floor().clamp(1.0, 65_536.0) as u32;
+                let goal = self.target.spp.unwrap_or(u32::MAX);
+                // A pass that takes longer than a slice is shown unfinished.
+                let at_most = Duration::from_secs_f64(1.5 * slice);
+                Step::Render {
+                    divider: 1,
+                    target_spp: self.spp.saturating_add(passes).min(goal),
+                    at_most: Some(at_most),
+                }
+            }
+        }
+    }
+
+    /// Takes note of a step that was not cut short by a restart.
+    pub fn finished(&mut self, step: Step, report: StepReport, now: Duration) {
+        let Step::Render { divider, .. } = step else { return };
+        // Very short steps measure the start of the threads more than the speed of the rays.
+        if report.paths >= 256 && report.seconds > 0.0 {
+            let measured = report.paths as f64 / report.seconds;
+            self.rate = Some(self.rate.map_or(measured, |rate| 0.5 * rate + 0.5 * measured));
+        }
+        (self.spp, self.error) = (report.spp, report.error);
+        if divider == 1 {
+            self.spent += report.seconds;
+        }
+        match self.phase {
+            Phase::Coarse(divider) if report.spp > 0 && now.saturating_sub(self.restarted_at) >= QUIET => {
+                self.sharpen(divider);
+            }
+            Phase::Sharpening(divider) if report.spp > 0 => self.sharpen(divider),
+            _ => {}
+        }
+    }
+
+    /// Whether the target is reached, at full resolution.
+    pub fn reached(&self) -> bool {
+        self.phase == Phase::Full && self.spp > 0 && self.target.reached(self.spp, self.spent, self.error)
+    }
+
+    /// On to a film of half the divider, or to the full one when that is near or quick enough.
+    fn sharpen(&mut self, divider: u32) {
+        let quick = self.seconds_for(1) <= LAST_SLICE;
+        self.phase = if divider <= 2 || quick { Phase::Full } else { Phase::Sharpening(divider / 2) };
+        (self.spp, self.error) = (0, None);
+    }
+
+    /// Leaves the coarse divider as it is while its time lies in the band, else takes the finest that fits.
+    fn choose_coarse(&mut self) {
+        let finer = DIVIDERS.iter().rev().find(|&&divider| divider < self.coarse).copied();
+        let too_slow = self.seconds_for(self.coarse) > SLOWEST;
+        let finer_fits = finer.is_some_and(|divider| self.seconds_for(divider) < FASTEST);
+        if too_slow || finer_fits {
+            let coarsest = DIVIDERS[DIVIDERS.len() - 1];
+            self.coarse = DIVIDERS.into_iter().find(|&divider| self.seconds_for(divider) <= AIM).unwrap_or(coarsest);
+        }
+    }
+
+    fn speed(&self) -> f64 {
+        self.rate.unwrap_or(GUESSED_RATE)
+    }
+
+    /// Seconds for one sample of every pixel.
+    fn seconds_for(&self, divider: u32) -> f64 {
+        self.pixels(divider) / self.speed()
+    }
+
+    fn pixels(&self, divider: u32) -> f64 {
+        f64::from(self.width.div_ceil(divider)) * f64::from(self.height.div_ceil(divider))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A renderer that takes `1 / rate` seconds a path, and nothing else.
+    struct Machine {
+        scheduler: Scheduler,
+        rate: f64,
+        now: f64,
+        spp: u32,
+        /// Paths that are in the film.
+        paths: f64,
+        film: Option<u32>,
+        /// Divider and end time of each step.
+        shown: Vec<(u32, f64)>,
+    }
+
+    impl Machine {
+        fn new(width: u32, height: u32, rate: f64, target: Target) -> Self {
+            let scheduler = Scheduler::new(width, height, target);
+            Self { scheduler, rate, now: 0.0, spp: 0, paths: 0.0, film: None, shown: Vec::new() }
+        }
+
+        fn restart(&mut self) {
+            self.scheduler.restart(Duration::from_secs_f64(self.now));
+            self.film = None;
+        }
+
+        /// Does one step; false when there is nothing to do.
+        fn step(&mut self) -> bool {
+            let step = self.scheduler.next(Duration::from_secs_f64(self.now));
+            let Step::Render { divider, target_spp, at_most } = step else { return false };
+            if self.film != Some(divider) {
+                (self.film, self.paths) = (Some(divider), 0.0);
+            }
+            let pixels = self.scheduler.pixels(divider);
+            let wanted = (f64::from(target_spp) * pixels - self.paths) / self.rate;
+            let seconds = wanted.min(at_most.map_or(f64::INFINITY, |limit| limit.as_secs_f64()));
+            self.now += seconds;
+            self.paths += seconds * self.rate;
+            self.spp = (self.paths / pixels + 1e-6).floor() as u32;
+            let paths = (seconds * self.rate) as u64;
+            // Independent samples of standard deviation 1.
+            let error = (self.spp > 0).then(|| 1.0 / f64::from(self.spp).sqrt());
+            let report = StepReport { paths, seconds, spp: self.spp, error };
+            self.scheduler.finished(step, report, Duration::from_secs_f64(self.now));
+            self.shown.push((divider, self.now));
+            true
+        }
+    }
+
+    #[test]
+    fn while_moving_pictures_come_within_a_frame_or_two_and_keep_their_resolution() {
+        for rate in [3e5, 1e6, 4e6, 3e7] {
+            let mut machine = Machine::new(1280, 720, rate, Target::default());
+            // Come to rest first, so that the speed is known.
+            while machine.now < 2.0 {
+                machine.step();
+            }
+            let mut dividers = Vec::new();
+            for event in 0..60 {
+                let at = machine.now.max(2.0 + f64::from(event) * 0.02);
+                machine.now = at;
+                machine.restart();
+                machine.shown.clear();
+                while machine.shown.is_empty() {
+                    assert!(machine.step());
+                }
+                let (divider, shown) = machine.shown[0];
+                assert!(shown - at <= SLOWEST * 1.001, "{rate:e}: {} s", shown - at);
+                dividers.push(divider);
+            }
+            assert!(dividers.iter().all(|divider| *divider == dividers[0]), "{rate:e}: {dividers:?}");
+        }
+    }
+
+    #[test]
+    fn a_little_more_or_less_speed_does_not_change_the_resolution() {
+        let mut machine = Machine::new(1280, 720, 2e6, Target::default());
+        while machine.now < 2.0 {
+            machine.step();
+        }
+        machine.restart();
+        let first = machine.scheduler.coarse;
+        for i in 0..200 {
+            // The time a divider takes may wander by a third either way without leaving the band.
+            machine.rate = 2e6 * (1.0 + 0.3 * (f64::from(i) * 0.7).sin());
+            machine.step();
+            machine.restart();
+            assert_eq!(machine.scheduler.coarse, first, "event {i}");
+        }
+        machine.rate = 2e5;
+        for _ in 0..8 {
+            machine.step();
+            machine.restart();
+        }
+        assert!(machine.scheduler.coarse > first, "ten times slower is not a little");
+    }
+
+    #[test]
+    fn at_rest_the_picture_sharpens_to_full_resolution_and_never_back() {
+        let mut machine = Machine::new(1920, 1080, 1e6, Target::default());
+        while machine.now < 6.0 {
+            assert!(machine.step());
+        }
+        let dividers: Vec<u32> = machine.shown.iter().map(|(divider, _)| *divider).collect();
+        assert!(dividers[0] > 4, "{dividers:?}");
+        assert!(dividers.is_sorted_by(|a, b| a >= b), "{dividers:?}");
+        assert_eq!(*dividers.last().unwrap(), 1);
+        // The way there costs less than one more pass.
+        let first_full = machine.shown.iter().find(|(divider, _)| *divider == 1).unwrap().1;
+        assert!(first_full < 0.15 + 2.0 * 1920.0 * 1080.0 / 1e6, "{first_full}");
+    }
+
+    #[test]
+    fn converging_pictures_are_shown_about_ten_to_twenty_times_a_second() {
+        for (rate, width) in [(5e5, 1280), (3e6, 1280), (2e7, 320)] {
+            let mut machine = Machine::new(width, 720, rate, Target::default());
+            while machine.now < 10.0 {
+                machine.step();
+            }
+            let late: Vec<f64> = machine.shown.iter().map(|(_, at)| *at).filter(|at| *at > 4.0).collect();
+            let per_second = late.len() as f64 / 6.0;
+            assert!((6.0..=21.0).contains(&per_second), "{rate:e}: {per_second} pictures a second");
+        }
+    }
+
+    #[test]
+    fn it_stops_exactly_at_the_target_and_sleeps() {
+        let mut machine = Machine::new(64, 64, 1e7, Target { spp: Some(1000), ..Target::default() });
+        while machine.step() {}
+        assert_eq!((machine.spp, machine.film), (1000, Some(1)));
+        assert!(machine.scheduler.reached());
+        // More is asked for: all samples stay.
+        machine.scheduler.set_target(Target { spp: Some(1500), ..Target::default() });
+        while machine.step() {}
+        assert_eq!(machine.spp, 1500);
+        let mut machine = Machine::new(64, 64, 1e6, Target { seconds: Some(3.0), ..Target::default() });
+        while machine.step() {}
+        assert!((3.0..3.2).contains(&machine.scheduler.spent()), "{}", machine.scheduler.spent());
+        let mut machine = Machine::new(64, 64, 1e6, Target { error: Some(0.05), ..Target::default() });
+        while machine.step() {}
+        assert!((400..450).contains(&machine.spp), "{}", machine.spp);
+    }
+
+    #[test]
+    fn a_pause_still_shows_what_changed_and_then_rests() {
+        let mut machine = Machine::new(1280, 720, 1e6, Target::default());
+        machine.scheduler.set_paused(true);
+        assert!(machine.step(), "one picture after a restart");
+        assert!(!machine.step());
+        machine.scheduler.set_paused(false);
+        assert!(machine.step());
+    }
+}

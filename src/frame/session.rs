@@ -1,0 +1,193 @@
+//! One scene, its picture, and everything between: what a window or a script holds on to.
+
+use super::beside::Beside;
+use super::input::{CommandQueue, ModelUp, input};
+use super::navigation::{Rig, Turning};
+use super::status::{Picture, Status};
+use super::systems::{
+    Around, Clock, Found, Paused, PictureSize, Renderer, Shown, StopAt, Threads, accumulate, adopt, develop, edit,
+    present, rebuild, reset,
+};
+use super::worker::{Waker, Worker};
+use super::{Command, Target};
+use crate::render::{Film, RenderSettings};
+use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneSource, UpAxis};
+use bevy_ecs::prelude::{IntoScheduleConfigs, World};
+use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
+use bevy_ecs::system::ScheduleSystem;
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+/// How to start.
+#[derive(Clone, Default)]
+pub struct SessionOptions {
+    /// Pixels of the picture; 0 means that there is none yet, and the session waits for a size.
+    pub width: u32,
+    pub height: u32,
+    /// One a processor when not given.
+    pub threads: Option<usize>,
+    pub seed: u32,
+    pub target: Target,
+    /// Which axis of models points up; guessed when not given.
+    pub up: Option<UpAxis>,
+    /// Called from another thread when [`Session::update`] would find something new.
+    pub waker: Option<Waker>,
+}
+
+/// The parts of a frame, in the order in which they run. Systems of a user's own fit in with `.in_set(…)`.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Commands become changes.
+    Input,
+    /// Scenes that were read take their place; a user's systems change what they like.
+    Edit,
+    /// What changed is found, and the part of the snapshot that depends on it made anew.
+    Rebuild,
+    /// The samples are dropped if they are worthless.
+    Reset,
+    /// The workers get their job.
+    Accumulate,
+    /// The workers are told how to develop it.
+    Develop,
+    /// Finished pictures are fetched.
+    Present,
+}
+
+#[derive(ScheduleLabel, Clone, Debug, PartialEq, Eq, Hash)]
+struct Frame;
+
+/// A world, its schedule, and the threads that render it.
+pub struct Session {
+    world: World,
+    frame: Schedule,
+}
+
+impl Session {
+    /// A session without a scene: [`open`](Self::open) one, or spawn entities into its [`world_mut`](Self::world_mut).
+    ///
+    /// # Errors
+    /// When the threads cannot be started.
+    pub fn new(options: SessionOptions) -> Result<Self, String> {
+        let threads = options.threads.unwrap_or(0);
+        let worker = Worker::start(threads, options.target, options.waker.clone())?;
+        let mut world = World::new();
+        world.insert_resource(Renderer(worker));
+        world.insert_resource(Beside::new(options.waker));
+        world.insert_resource(PictureSize { width: options.width, height: options.height });
+        world.insert_resource(Rendering(RenderSettings { seed: options.seed, ..RenderSettings::default() }));
+        world.insert_resource(StopAt(options.target));
+        world.insert_resource(Threads(threads));
+        world.insert_resource(ModelUp(options.up));
+        let around = Around { extent: Extent::default(), home: Rig::default(), turning: Turning::default() };
+        world.insert_resource(around);
+        world.init_resource::<Clock>();
+        world.init_resource::<Paused>();
+        world.init_resource::<Developing>();
+        world.init_resource::<CommandQueue>();
+        world.init_resource::<Shown>();
+        world.init_resource::<Found>();
+        world.init_resource::<Picture>();
+        world.init_resource::<Status>();
+
+        let mut frame = Schedule::new(Frame);
+        frame.configure_sets(
+            (
+                Stage::Input,
+                Stage::Edit,
+                Stage::Rebuild,
+                Stage::Reset,
+                Stage::Accumulate,
+                Stage::Develop,
+                Stage::Present,
+            )
+                .chain(),
+        );
+        frame.add_systems((
+            input.in_set(Stage::Input),
+            edit.in_set(Stage::Edit),
+            rebuild.in_set(Stage::Rebuild),
+            reset.in_set(Stage::Reset),
+            accumulate.in_set(Stage::Accumulate),
+            develop.in_set(Stage::Develop),
+            present.in_set(Stage::Present),
+        ));
+        Ok(Self { world, frame })
+    }
+
+    /// Begins to read a scene beside the old picture. It takes its place in a later [`update`](Self::update); when it
+    /// cannot be read, that is a message in the [`status`](Self::status), and the old scene stays.
+    pub fn open(&mut self, source: SceneSource) {
+        let aspect = self.world.resource::<PictureSize>().aspect();
+        let up = self.world.resource::<ModelUp>().0;
+        let pool = self.world.resource::<Renderer>().0.pool();
+        self.world.resource::<Beside>().load(source, up, aspect, pool);
+    }
+
+    /// Takes over a scene that has been read already.
+    pub fn adopt(&mut self, scene: LoadedScene) {
+        let now = self.world.resource::<Clock>().0;
+        adopt(&mut self.world, scene, now);
+    }
+
+    /// Will be carried out at the next [`update`](Self::update), in order.
+    pub fn send(&mut self, command: Command) {
+        self.world.resource_mut::<CommandQueue>().0.push(command);
+    }
+
+    /// Adds systems of a user's own; name the stage with `.in_set(…)`.
+    pub fn add_systems<M>(&mut self, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
+        self.frame.add_systems(systems);
+    }
+
+    /// Runs one frame. Never waits for the picture; `now` counts from any moment, and never goes back.
+    pub fn update(&mut self, now: Duration) {
+        self.world.resource_mut::<Clock>().0 = now;
+        self.frame.run(&mut self.world);
+        self.world.clear_trackers();
+    }
+
+    /// The newest picture; empty before the first.
+    pub fn picture(&self) -> &Picture {
+        self.world.resource()
+    }
+
+    pub fn status(&self) -> &Status {
+        self.world.resource()
+    }
+
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// A copy of the film, for saving: linear light at the resolution that it has now. Takes a few milliseconds.
+    pub fn film_snapshot(&self) -> Option<Film> {
+        self.world.resource::<Renderer>().0.film()
+    }
+
+    /// The film of what is seen now, to be kept; never waits. It comes as soon as every pixel has a sample at full
+    /// resolution; a coarser one comes if the view changes or the workers rest before that. Without any, the other
+    /// end is closed.
+    pub fn keep_film(&self) -> Receiver<Film> {
+        self.world.resource::<Renderer>().0.keep_film()
+    }
+
+    /// Nothing will come unless something is changed: the workers sleep and nothing is being read.
+    pub fn is_idle(&self) -> bool {
+        let renderer = &self.world.resource::<Renderer>().0;
+        let nothing_to_show = !renderer.has_picture();
+        let asleep = renderer.is_asleep();
+        let no_commands = self.world.resource::<CommandQueue>().0.is_empty();
+        asleep && nothing_to_show && no_commands && self.world.resource::<Beside>().is_idle()
+    }
+
+    /// When [`update`](Self::update) should be called even if nothing calls the waker; `None` for never.
+    ///
+    /// Everything that happens beside the session calls the waker, so only commands that wait need a frame.
+    pub fn next_wake(&self, now: Duration) -> Option<Duration> {
+        (!self.world.resource::<CommandQueue>().0.is_empty()).then_some(now)
+    }
+}

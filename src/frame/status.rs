@@ -1,0 +1,107 @@
+//! What a session has to show: the picture, and how it is getting on.
+
+use super::navigation::Rig;
+use crate::render::{BadSample, Display, Integrator, RayCounts};
+use bevy_ecs::prelude::Resource;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// A developed picture, as large as the session's size when it was asked for.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
+pub struct Picture {
+    /// sRGB-encoded, row by row from the top, 4 bytes a pixel; empty before the first picture.
+    pub rgba: Vec<u8>,
+    pub width: u32,
+    pub height: u32,
+    /// Grows with every restart.
+    pub generation: u64,
+    /// By what the sides of the film behind it were divided.
+    pub divider: u32,
+    /// Samples per pixel of the film behind it.
+    pub spp: u32,
+    /// Grows with every picture, also within a generation.
+    pub number: u64,
+}
+
+/// How the session is getting on.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Status {
+    /// What is open.
+    pub scene: String,
+    /// The camera, as commands steer it.
+    pub rig: Rig,
+    pub display: Display,
+    pub integrator: Integrator,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Seconds of rendering since the restart.
+    pub seconds: f64,
+    /// Rays since the restart.
+    pub rays: RayCounts,
+    /// Millions of rays a second lately, by class.
+    pub camera_mrays: f64,
+    pub bounce_mrays: f64,
+    pub shadow_mrays: f64,
+    /// Pixels of the film behind the picture.
+    pub film_width: u32,
+    pub film_height: u32,
+    /// By what its sides are divided; 1 is full resolution.
+    pub divider: u32,
+    /// Relative error of the whole picture, when it is known.
+    pub estimated_error: Option<f64>,
+    /// Why the samples were last dropped.
+    pub restart_cause: String,
+    /// How often they were.
+    pub restarts: u64,
+    /// What is being read or built beside the picture.
+    pub loading: Option<String>,
+    /// The newest last.
+    pub messages: VecDeque<Message>,
+    /// Samples that were not finite and were left out.
+    pub n_bad: u64,
+    /// The first few of them.
+    pub bad: Vec<BadSample>,
+    pub threads: usize,
+    pub paused: bool,
+    /// The target is reached.
+    pub done: bool,
+}
+
+/// Something that a person should read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// When, on the clock of [`Session::update`](super::Session::update).
+    pub at: Duration,
+    pub kind: MessageKind,
+    pub text: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MessageKind {
+    Note,
+    Warning,
+    Error,
+}
+
+impl Status {
+    /// Messages that are kept.
+    const MAX_MESSAGES: usize = 100;
+
+    /// Millions of rays a second, all classes together.
+    pub fn mrays(&self) -> f64 {
+        self.camera_mrays + self.bounce_mrays + self.shadow_mrays
+    }
+
+    pub fn say(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>) {
+        let text = text.into();
+        match kind {
+            MessageKind::Note => tracing::info!("{text}"),
+            MessageKind::Warning => tracing::warn!("{text}"),
+            MessageKind::Error => tracing::error!("{text}"),
+        }
+        if self.messages.len() == Self::MAX_MESSAGES {
+            self.messages.pop_front();
+        }
+        self.messages.push_back(Message { at, kind, text });
+    }
+}

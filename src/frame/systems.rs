@@ -1,0 +1,391 @@
+//! The systems of a frame, in the order in which they run. Each says what it reads and what it writes.
+
+use super::beside::{Beside, Finished};
+use super::navigation::Surroundings;
+use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
+use super::status::{MessageKind, Picture, Status};
+use super::worker::{Job, Worker};
+use super::{Target, navigation};
+use crate::render::{Display, RenderSettings};
+use crate::scene::{
+    CameraInput, Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal,
+    Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
+};
+use bevy_ecs::prelude::{Changed, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
+use bevy_ecs::system::SystemParam;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The time of this frame, on the clock of whoever runs it.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct Clock(pub Duration);
+
+/// The size of the picture, pixels. Without pixels (a minimised window) the last film is kept and rendering rests.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PictureSize {
+    pub width: u32,
+    pub height: u32,
+}
+
+impl PictureSize {
+    pub fn is_empty(self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+
+    /// Width over height; 1 without pixels.
+    pub fn aspect(self) -> f64 {
+        if self.is_empty() { 1.0 } else { f64::from(self.width) / f64::from(self.height) }
+    }
+}
+
+/// When the picture is good enough.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct StopAt(pub Target);
+
+/// Worker threads; 0 is one a processor.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Threads(pub usize);
+
+/// Rendering rests, and all samples are kept.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Paused(pub bool);
+
+/// The far end of the pipe.
+#[derive(Resource)]
+pub struct Renderer(pub Worker);
+
+/// What the scene is, seen by who moves through it.
+#[derive(Resource, Clone, Debug)]
+pub struct Around {
+    pub extent: Extent,
+    pub home: navigation::Rig,
+    pub turning: navigation::Turning,
+}
+
+impl Around {
+    pub fn surroundings(&self, aspect: f64) -> Surroundings {
+        let Extent { center, radius } = self.extent;
+        Surroundings { center, radius, home: self.home, aspect, turning: self.turning }
+    }
+}
+
+/// The scene that is open, for saving and reopening.
+#[derive(Resource, Clone)]
+pub struct CurrentScene(pub Arc<LoadedScene>);
+
+/// What the workers have been given, to compare with.
+#[derive(Resource, Default)]
+pub struct Shown {
+    pub inputs: SceneInputs,
+    pub extraction: Option<Extraction>,
+    pub trees: Trees,
+    extents: ExtentCache,
+    settings: RenderSettings,
+    display: Display,
+    size: Option<PictureSize>,
+    target: Option<Target>,
+    threads: Option<usize>,
+    paused: bool,
+    /// The world has changes that wait for a tree.
+    waiting: bool,
+    /// Drop all samples at the next frame, for this reason.
+    pub(super) restart: Option<&'static str>,
+    generation: u64,
+    pictures: u64,
+}
+
+/// What this frame found to be different.
+#[derive(Resource, Default)]
+pub struct Found(pub Changes);
+
+/// Whether any component that the picture depends on was touched, came or went since the last frame.
+#[derive(SystemParam)]
+pub struct Touched<'w, 's> {
+    #[allow(clippy::type_complexity)]
+    touched: Query<
+        'w,
+        's,
+        (),
+        Or<(
+            Changed<Shape>,
+            Changed<Placement>,
+            Changed<MaterialSlots>,
+            Changed<Material>,
+            Changed<PointLight>,
+            Changed<View>,
+            Changed<Projection>,
+            Changed<Lens>,
+            Changed<Ordinal>,
+        )>,
+    >,
+    shapes: RemovedComponents<'w, 's, Shape>,
+    placements: RemovedComponents<'w, 's, Placement>,
+    slots: RemovedComponents<'w, 's, MaterialSlots>,
+    materials: RemovedComponents<'w, 's, Material>,
+    lights: RemovedComponents<'w, 's, PointLight>,
+    views: RemovedComponents<'w, 's, View>,
+    projections: RemovedComponents<'w, 's, Projection>,
+    lenses: RemovedComponents<'w, 's, Lens>,
+    ordinals: RemovedComponents<'w, 's, Ordinal>,
+}
+
+impl Touched<'_, '_> {
+    /// Empties the readers of removals, so that nothing is told twice.
+    pub fn any(&mut self) -> bool {
+        let removed = self.shapes.read().count()
+            + self.placements.read().count()
+            + self.slots.read().count()
+            + self.materials.read().count()
+            + self.lights.read().count()
+            + self.views.read().count()
+            + self.projections.read().count()
+            + self.lenses.read().count()
+            + self.ordinals.read().count();
+        removed > 0 || !self.touched.is_empty()
+    }
+}
+
+/// Puts finished work into the world: a scene that was read takes the place of the old one.
+///
+/// Reads [`Beside`]; writes entities, the resources of the scene, [`CurrentScene`], [`Status`].
+pub fn edit(world: &mut World) {
+    let now = world.resource::<Clock>().0;
+    for finished in world.resource::<Beside>().take() {
+        match finished {
+            Finished::Trees(trees) => {
+                let mut shown = world.resource_mut::<Shown>();
+                shown.trees.extend(trees);
+                shown.waiting = true;
+            }
+            Finished::Scene { result: Ok(scene), .. } => adopt(world, *scene, now),
+            Finished::Scene { source, result: Err(error) } => {
+                let mut status = world.resource_mut::<Status>();
+                for problem in &error.problems {
+                    status.say(now, MessageKind::Error, problem.to_string());
+                }
+                tracing::warn!("{} could not be opened", source.title());
+            }
+        }
+    }
+}
+
+/// Makes `scene` the scene of `world`.
+pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
+    scene.spawn(world);
+    let home = world.query::<(&View, &Projection, &Lens)>().iter(world).next().map_or_else(
+        navigation::Rig::default,
+        |(view, projection, lens)| navigation::Rig { view: *view, projection: *projection, lens: *lens },
+    );
+    world.resource_mut::<Around>().home = home;
+    let mut shown = world.resource_mut::<Shown>();
+    shown.trees.extend(scene.trees.clone());
+    shown.restart = Some(SCENE_OPENED);
+    let mut status = world.resource_mut::<Status>();
+    status.scene = scene.source.title();
+    for warning in &scene.warnings {
+        status.say(now, MessageKind::Warning, warning.clone());
+    }
+    world.insert_resource(CurrentScene(Arc::new(scene)));
+}
+
+/// Finds out what changed, and makes anew that part of the snapshot and no other.
+///
+/// Reads everything that the picture depends on; writes [`Shown`], [`Found`], [`Around`], [`Status`].
+#[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
+pub fn rebuild(
+    mut touched: Touched,
+    queries: SceneQueries,
+    rendering: Option<Res<Rendering>>,
+    beside: Res<Beside>,
+    renderer: Res<Renderer>,
+    clock: Res<Clock>,
+    mut shown: ResMut<Shown>,
+    mut found: ResMut<Found>,
+    mut around: ResMut<Around>,
+    mut status: ResMut<Status>,
+) {
+    let mut changes = Changes::default();
+    let settings = rendering.map(|rendering| rendering.0).unwrap_or_default();
+    compare_settings(&shown.settings, &settings, &mut changes);
+    shown.settings = settings;
+    if let Some(cause) = shown.restart.take() {
+        changes.add(Level::Restart, cause);
+    }
+    // Touched values are often equal to what they were; only a difference counts.
+    let environment_changed = queries.environment() != shown.inputs.environment;
+    if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
+        let mut inputs = queries.collect();
+        let missing = missing_trees(&inputs, &mut shown.trees);
+        if !missing.is_empty() {
+            // The old picture stays until the trees are there, and the camera keeps moving in it.
+            beside.build(missing, renderer.0.pool());
+            inputs = SceneInputs { camera: inputs.camera, ..shown.inputs.clone() };
+        }
+        let differences = compare(&shown.inputs, &inputs);
+        let part = differences.part();
+        let structure = differences.0.iter().any(|change| change.level >= Level::TopTree);
+        changes.0.extend(differences.0);
+        shown.inputs = inputs;
+        let Shown { inputs, extraction, trees, extents, .. } = &mut *shown;
+        let rebuilt = match (extraction.as_mut(), part) {
+            (None, _) => {
+                *extraction = Some(Extraction::new(inputs, trees));
+                true
+            }
+            (Some(extraction), Some(part)) => {
+                if extraction.update(part, inputs, trees) {
+                    changes.add(Level::TopTree, "origin followed the camera");
+                }
+                structure
+            }
+            (Some(_), None) => false,
+        };
+        if rebuilt {
+            trees.keep_used(inputs);
+            around.extent = extents.extent(inputs);
+            for problem in extraction.iter().flat_map(|extraction| &extraction.problems) {
+                status.say(clock.0, MessageKind::Warning, problem.clone());
+            }
+        }
+    }
+    found.0 = changes;
+}
+
+/// Trees that have yet to be built. Small ones are built at once: that takes less than the frame has.
+fn missing_trees(inputs: &SceneInputs, trees: &mut Trees) -> Vec<Shape> {
+    const AT_ONCE: usize = 2_000;
+    let mut missing: Vec<Shape> = Vec::new();
+    for object in &inputs.objects {
+        let size = match &object.shape {
+            Shape::Mesh(mesh) => mesh.triangles.len(),
+            Shape::Spheres(balls) => balls.centers.len(),
+            _ => continue,
+        };
+        if trees.has(&object.shape) || missing.contains(&object.shape) {
+            continue;
+        }
+        if size > AT_ONCE {
+            missing.push(object.shape.clone());
+        } else if let Err(reason) = trees.add(&object.shape) {
+            trees.mark_unfit(&object.shape, reason);
+        }
+    }
+    missing
+}
+
+/// Drops the samples when they are worthless, and says why.
+///
+/// Reads [`Found`], [`PictureSize`]; writes [`Shown`], [`Status`].
+pub fn reset(size: Res<PictureSize>, mut found: ResMut<Found>, mut shown: ResMut<Shown>, mut status: ResMut<Status>) {
+    if !size.is_empty() && shown.size != Some(*size) {
+        found.0.add(Level::Resize, if shown.size.is_some() { "size" } else { "start" });
+        shown.size = Some(*size);
+    }
+    if found.0.restarts() {
+        shown.generation += 1;
+        status.restarts += 1;
+        status.restart_cause = found.0.to_string();
+        tracing::debug!("restart {}: {}", shown.generation, status.restart_cause);
+    }
+}
+
+/// Tells the workers what to add samples to, until when, and with how many threads.
+///
+/// Reads [`Shown`], [`StopAt`], [`Threads`], [`Paused`]; writes [`Found`] and to the [`Renderer`].
+pub fn accumulate(
+    stop_at: Res<StopAt>,
+    threads: Res<Threads>,
+    paused: Res<Paused>,
+    size: Res<PictureSize>,
+    renderer: Res<Renderer>,
+    mut shown: ResMut<Shown>,
+    mut found: ResMut<Found>,
+) {
+    // The first frame finds what the worker was started with.
+    if let Some(before) = shown.threads.replace(threads.0).filter(|before| *before != threads.0) {
+        renderer.0.set_threads(threads.0);
+        found.0.add(Level::Reschedule, format!("threads: {before} → {}", threads.0));
+    }
+    if shown.target.replace(stop_at.0).is_some_and(|before| before != stop_at.0) {
+        renderer.0.set_target(stop_at.0);
+        found.0.add(Level::Reschedule, "target");
+    }
+    let paused = paused.0 || size.is_empty();
+    if shown.paused != paused {
+        renderer.0.set_paused(paused);
+        shown.paused = paused;
+        found.0.add(Level::Reschedule, "pause");
+    }
+    if found.0.restarts()
+        && let (Some(extraction), Some(PictureSize { width, height })) = (&shown.extraction, shown.size)
+    {
+        renderer.0.set_job(Job {
+            generation: shown.generation,
+            snapshot: extraction.snapshot.clone(),
+            settings: shown.settings,
+            width,
+            height,
+        });
+    }
+}
+
+/// Tells the workers how to develop the film; no sample is lost.
+///
+/// Reads [`Developing`]; writes [`Shown`], [`Found`], and to the [`Renderer`].
+pub fn develop(
+    developing: Option<Res<Developing>>,
+    renderer: Res<Renderer>,
+    mut shown: ResMut<Shown>,
+    mut found: ResMut<Found>,
+) {
+    let display = developing.map(|developing| developing.0).unwrap_or_default();
+    if shown.display != display {
+        compare_displays(&shown.display, &display, &mut found.0);
+        renderer.0.set_display(display);
+        shown.display = display;
+    }
+}
+
+/// Fetches what the workers have finished.
+///
+/// Reads the [`Renderer`] and [`Beside`]; writes [`Picture`] and [`Status`].
+pub fn present(
+    renderer: Res<Renderer>,
+    beside: Res<Beside>,
+    clock: Res<Clock>,
+    paused: Res<Paused>,
+    mut picture: ResMut<Picture>,
+    mut shown: ResMut<Shown>,
+    mut status: ResMut<Status>,
+) {
+    if renderer.0.has_picture() && renderer.0.take(&mut picture) {
+        shown.pictures += 1;
+        picture.number = shown.pictures;
+    }
+    let stats = renderer.0.stats();
+    let per_second =
+        |rays: u64| if stats.recent_seconds > 0.0 { rays as f64 / stats.recent_seconds * 1e-6 } else { 0.0 };
+    if let Some(failure) = &stats.failure
+        && status.messages.back().is_none_or(|last| last.text != *failure)
+    {
+        status.say(clock.0, MessageKind::Error, failure.clone());
+    }
+    status.spp = stats.spp;
+    status.seconds = stats.seconds;
+    status.rays = stats.rays;
+    status.estimated_error = stats.error;
+    status.camera_mrays = per_second(stats.recent_rays.camera);
+    status.bounce_mrays = per_second(stats.recent_rays.bounce);
+    status.shadow_mrays = per_second(stats.recent_rays.shadow);
+    (status.film_width, status.film_height, status.divider) = (stats.film_width, stats.film_height, stats.divider);
+    status.n_bad = stats.n_bad;
+    status.bad = stats.bad;
+    status.threads = stats.threads;
+    if let Some(CameraInput { view, projection, lens, .. }) = shown.inputs.camera {
+        status.rig = navigation::Rig { view, projection, lens };
+    }
+    (status.display, status.integrator) = (shown.display, shown.settings.integrator);
+    status.done = stats.done && stats.generation == shown.generation;
+    status.paused = paused.0;
+    status.loading = beside.progress();
+}

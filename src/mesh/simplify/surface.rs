@@ -1,0 +1,355 @@
+//! Triangles that can lose edges: who touches whom, which collapses are allowed, and doing them.
+//!
+//! Each vertex has a ring list of its corners (corner 3t + k is corner k of triangle t). Corners of dead triangles
+//! stay in the lists of vertices that were not collapsed and are skipped.
+
+use glam::{Vec2, Vec3};
+
+/// What a vertex may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    /// Inside a smooth sheet: goes anywhere.
+    Free,
+    /// On one border, seam or material edge: slides along it.
+    Curve,
+    /// Where such lines end or meet, and wherever the surface is not a manifold: stays.
+    Fixed,
+    /// On the rim of a part that is worked on alone: not touched, not even by its neighbours.
+    Frozen,
+}
+
+/// Shading data of a wedge: the corners at one vertex that share it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Wedge {
+    pub normal: Vec3,
+    pub uv: Vec2,
+}
+
+impl Wedge {
+    fn between(self, other: Self, t: f32) -> Self {
+        let normal = self.normal.lerp(other.normal, t);
+        Self { normal: normal.try_normalize().unwrap_or(other.normal), uv: self.uv.lerp(other.uv, t) }
+    }
+}
+
+/// More triangles than this around a new vertex are not allowed: it bounds the work on meshes with a hub.
+const MAX_VALENCE: u32 = 256;
+/// Cosine of the largest turn of a triangle, about 75°.
+const MIN_TURN: f64 = 0.25;
+pub(super) const NONE: u32 = u32::MAX;
+
+#[derive(Debug)]
+pub(super) struct Surface {
+    pub positions: Vec<Vec3>,
+    pub kinds: Vec<Kind>,
+    /// The vertex of each corner; `NONE` in the first corner of a dead triangle.
+    corner_vertex: Vec<u32>,
+    next_corner: Vec<u32>,
+    first_corner: Vec<u32>,
+    valence: Vec<u32>,
+    /// Empty when nothing but position matters; else the wedge of each corner.
+    corner_wedge: Vec<u32>,
+    pub wedges: Vec<Wedge>,
+    pub face_count: usize,
+    marks: Vec<u32>,
+    stamp: u32,
+    /// Wedges that the checked collapse would join: from, to.
+    joins: Vec<(u32, u32)>,
+    scratch: Vec<u32>,
+}
+
+/// A wedge that takes another one in, and what it is then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct WedgeJoin {
+    pub from: u32,
+    pub to: u32,
+    pub wedge: Wedge,
+}
+
+impl Surface {
+    /// - `triangles`: three different vertices each.
+    /// - `corner_wedges`: empty, or one a corner, indices into `wedges`.
+    pub fn new(
+        triangles: &[[u32; 3]],
+        positions: Vec<Vec3>,
+        kinds: Vec<Kind>,
+        corner_wedges: Vec<u32>,
+        wedges: Vec<Wedge>,
+    ) -> Self {
+        let count = positions.len();
+        let corner_vertex = triangles.as_flattened().to_vec();
+        let mut first_corner = vec![NONE; count];
+        let mut next_corner = vec![NONE; corner_vertex.len()];
+        let mut valence = vec![0; count];
+        for (corner, &vertex) in corner_vertex.iter().enumerate() {
+            let first = &mut first_corner[vertex as usize];
+            if *first == NONE {
+                next_corner[corner] = corner as u32;
+                *first = corner as u32;
+            } else {
+                next_corner[corner] = next_corner[*first as usize];
+                next_corner[*first as usize] = corner as u32;
+            }
+            valence[vertex as usize] += 1;
+        }
+        Self {
+            positions,
+            kinds,
+            corner_vertex,
+            next_corner,
+            first_corner,
+            valence,
+            corner_wedge: corner_wedges,
+            wedges,
+            face_count: triangles.len(),
+            marks: vec![0; count],
+            stamp: 0,
+            joins: Vec::new(),
+            scratch: Vec::new(),
+        }
+    }
+
+    /// Live triangles: number, vertices, and wedges when there are any.
+    pub fn live_triangles(&self) -> impl Iterator<Item = (usize, [u32; 3], Option<[u32; 3]>)> {
+        let wedges = self.corner_wedge.as_chunks::<3>().0;
+        let live = self.corner_vertex.as_chunks::<3>().0.iter().enumerate().filter(|(_, t)| t[0] != NONE);
+        live.map(|(t, &vertices)| (t, vertices, wedges.get(t).copied()))
+    }
+
+    /// Whether a vertex has too many triangles to collapse.
+    pub fn is_hub(&self, vertex: u32) -> bool {
+        self.valence[vertex as usize] > MAX_VALENCE
+    }
+
+    /// How many live triangles have a vertex of this kind.
+    pub fn faces_at(&self, kind: Kind) -> usize {
+        self.live_triangles().filter(|(_, t, _)| t.iter().any(|&v| self.kinds[v as usize] == kind)).count()
+    }
+
+    /// The live triangles around a vertex, as (vertex's corner, next vertex, one after).
+    #[inline]
+    pub fn fan(&self, vertex: u32) -> Fan<'_> {
+        let first = self.first_corner[vertex as usize];
+        Fan { surface: self, first, corner: first }
+    }
+
+    /// Calls `f` once for each neighbour.
+    pub fn for_each_neighbor(&mut self, vertex: u32, mut f: impl FnMut(u32)) {
+        let stamp = self.new_stamps(1);
+        let mut marks = std::mem::take(&mut self.marks);
+        for (_, b, c) in self.fan(vertex) {
+            for other in [b, c] {
+                if marks[other as usize] != stamp {
+                    marks[other as usize] = stamp;
+                    f(other);
+                }
+            }
+        }
+        self.marks = marks;
+    }
+
+    /// Whether `from` may go into `to` and both be at `position`; leaves the wedge joins for [`Self::collapse`].
+    ///
+    /// Refused: what would change the topology (Dey et al. 1999, link condition), move a border or seam off its
+    /// line, fold or flatten a triangle, or tear shading data apart.
+    pub fn may_collapse(&mut self, from: u32, to: u32, position: Vec3) -> bool {
+        let (kind, kept) = (self.kinds[from as usize], self.kinds[to as usize]);
+        debug_assert!(kind <= kept && kept != Kind::Frozen && kind < Kind::Fixed);
+        if self.valence[from as usize] + self.valence[to as usize] > MAX_VALENCE {
+            return false;
+        }
+        // Marks: `near` for neighbours of `from`, `common` for those of both.
+        let near = self.new_stamps(2);
+        let common = near + 1;
+        let mut marks = std::mem::take(&mut self.marks);
+        let mut shared = 0;
+        for (_, b, c) in self.fan(from) {
+            marks[b as usize] = near;
+            marks[c as usize] = near;
+            shared += u32::from(b == to || c == to);
+        }
+        let mut both = 0;
+        for (_, b, c) in self.fan(to) {
+            for other in [b, c] {
+                if marks[other as usize] == near && other != from {
+                    marks[other as usize] = common;
+                    both += 1;
+                }
+            }
+        }
+        // A triangle opposite the edge on both sides would become the same triangle twice.
+        let opposite = |vertex: u32, end: u32| {
+            self.fan(vertex)
+                .any(|(_, b, c)| b != end && c != end && marks[b as usize] == common && marks[c as usize] == common)
+        };
+        let linked = shared == both && (1..=2).contains(&shared);
+        let allowed = linked && !(shared == 2 && opposite(from, to) && opposite(to, from));
+        self.marks = marks;
+        allowed
+            && (kind == Kind::Free || self.is_constraint(from, to, shared))
+            && (shared == 2 || kind == Kind::Curve)
+            && self.keeps_orientation(from, to, position)
+            && self.keeps_orientation(to, from, position)
+            && self.plan_wedges(from, to)
+    }
+
+    /// Whether the edge itself is border, seam or material edge; `shared` triangles lie at it.
+    fn is_constraint(&self, from: u32, to: u32, shared: u32) -> bool {
+        if shared == 1 {
+            return true;
+        }
+        if self.corner_wedge.is_empty() {
+            return false;
+        }
+        let mut sides = self.edge_wedges(from, to);
+        let (Some(first), Some(second)) = (sides.next(), sides.next()) else { return false };
+        first.0 != second.0 || first.1 != second.1
+    }
+
+    /// For each triangle at the edge the wedges at its two ends.
+    fn edge_wedges(&self, from: u32, to: u32) -> impl Iterator<Item = (u32, u32)> {
+        self.fan(from).filter(move |&(_, b, c)| b == to || c == to).map(move |(corner, b, _)| {
+            let other = if b == to { next_in_triangle(corner) } else { next_in_triangle(next_in_triangle(corner)) };
+            (self.corner_wedge[corner as usize], self.corner_wedge[other as usize])
+        })
+    }
+
+    /// Whether the triangles at `vertex` and not at `other` keep an area and roughly their direction.
+    fn keeps_orientation(&self, vertex: u32, other: u32, position: Vec3) -> bool {
+        let old = self.positions[vertex as usize].as_dvec3();
+        let new = position.as_dvec3();
+        self.fan(vertex).filter(|&(_, b, c)| b != other && c != other).all(|(_, b, c)| {
+            let b = self.positions[b as usize].as_dvec3();
+            let c = self.positions[c as usize].as_dvec3();
+            let side = c - b;
+            let (before, after) = (side.cross(old - b), side.cross(new - b));
+            let (length2, scale2) = (after.length_squared(), before.length_squared());
+            let turn = before.dot(after);
+            length2 > 0.0 && (scale2 == 0.0 || (turn > 0.0 && turn * turn >= MIN_TURN * MIN_TURN * scale2 * length2))
+        })
+    }
+
+    /// Pairs the wedges of the two ends over the triangles that vanish. Fails when one at `from` has no partner or
+    /// two of them.
+    fn plan_wedges(&mut self, from: u32, to: u32) -> bool {
+        if self.corner_wedge.is_empty() {
+            return true;
+        }
+        let mut joins = std::mem::take(&mut self.joins);
+        joins.clear();
+        joins.extend(self.edge_wedges(from, to));
+        joins.sort_unstable();
+        joins.dedup();
+        // Both ways: a wedge of `to` that took two in would glue them together.
+        let unique = joins.windows(2).all(|pair| pair[0].0 != pair[1].0)
+            && joins.iter().enumerate().all(|(i, p)| joins[i + 1..].iter().all(|q| p.1 != q.1));
+        let complete =
+            self.fan(from).all(|(corner, ..)| joins.iter().any(|join| join.0 == self.corner_wedge[corner as usize]));
+        self.joins = joins;
+        unique && complete
+    }
+
+    /// Moves `to` to `position` and hands it all triangles of `from` but those at the edge, which die.
+    ///
+    /// - `t`: where between `from` (0) and `to` (1) the place lies, for shading data.
+    ///
+    /// Call it only after [`Self::may_collapse`] has allowed the very same. Appends wedge joins to `joins`; returns
+    /// how many triangles died.
+    pub fn collapse(&mut self, from: u32, to: u32, position: Vec3, t: f32, joins: &mut Vec<WedgeJoin>) -> usize {
+        if !self.corner_wedge.is_empty() {
+            for &(gone, kept) in &self.joins {
+                let wedge = self.wedges[gone as usize].between(self.wedges[kept as usize], t);
+                self.wedges[kept as usize] = wedge;
+                joins.push(WedgeJoin { from: gone, to: kept, wedge });
+            }
+        }
+        let mut corners = std::mem::take(&mut self.scratch);
+        corners.clear();
+        let mut died = 0;
+        let first = self.first_corner[from as usize];
+        let mut corner = first;
+        loop {
+            let base = (corner - corner % 3) as usize;
+            let triangle = [0, 1, 2].map(|k| self.corner_vertex[base + k]);
+            if triangle[0] != NONE {
+                if triangle.contains(&to) {
+                    self.corner_vertex[base] = NONE;
+                    died += 1;
+                    for vertex in triangle {
+                        self.valence[vertex as usize] -= 1;
+                    }
+                } else {
+                    self.corner_vertex[corner as usize] = to;
+                    corners.push(corner);
+                    if !self.corner_wedge.is_empty() {
+                        let wedge = &mut self.corner_wedge[corner as usize];
+                        *wedge = self.joins.iter().find(|join| join.0 == *wedge).map_or(*wedge, |join| join.1);
+                    }
+                }
+            }
+            corner = self.next_corner[corner as usize];
+            if corner == first {
+                break;
+            }
+        }
+        corners.extend(self.fan(to).map(|(corner, ..)| corner));
+        for (i, &corner) in corners.iter().enumerate() {
+            self.next_corner[corner as usize] = corners[(i + 1) % corners.len()];
+        }
+        self.first_corner[to as usize] = corners.first().copied().unwrap_or(NONE);
+        self.first_corner[from as usize] = NONE;
+        self.valence[to as usize] = corners.len() as u32;
+        self.valence[from as usize] = 0;
+        self.positions[to as usize] = position;
+        self.face_count -= died;
+        self.scratch = corners;
+        died
+    }
+
+    fn new_stamps(&mut self, count: u32) -> u32 {
+        if self.stamp > u32::MAX - 2 * count {
+            self.marks.fill(0);
+            self.stamp = 0;
+        }
+        let stamp = self.stamp + 1;
+        self.stamp += count;
+        stamp
+    }
+}
+
+#[inline]
+fn next_in_triangle(corner: u32) -> u32 {
+    if corner % 3 == 2 { corner - 2 } else { corner + 1 }
+}
+
+/// See [`Surface::fan`].
+pub(super) struct Fan<'a> {
+    surface: &'a Surface,
+    first: u32,
+    corner: u32,
+}
+
+impl Iterator for Fan<'_> {
+    type Item = (u32, u32, u32);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.corner != NONE {
+            let corner = self.corner;
+            let after = self.surface.next_corner[corner as usize];
+            self.corner = if after == self.first { NONE } else { after };
+            let k = corner % 3;
+            let base = (corner - k) as usize;
+            let vertices = &self.surface.corner_vertex[base..base + 3];
+            if vertices[0] != NONE {
+                let (b, c) = match k {
+                    0 => (vertices[1], vertices[2]),
+                    1 => (vertices[2], vertices[0]),
+                    _ => (vertices[0], vertices[1]),
+                };
+                return Some((corner, b, c));
+            }
+        }
+        None
+    }
+}

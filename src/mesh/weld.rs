@@ -1,0 +1,93 @@
+//! Vertices at exactly the same place, found and numbered.
+
+use glam::Vec3;
+
+/// Which vertices share a place: texture seams and duplicated vertices vanish in it.
+///
+/// Places are equal when all coordinates compare equal (so −0 is 0); nothing is ever moved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Welding {
+    /// The place of each vertex, numbered in the order in which places first appear.
+    pub place: Vec<u32>,
+    /// The first vertex at each place.
+    pub first: Vec<u32>,
+}
+
+impl Welding {
+    /// Linear time on average. `positions` must hold no NaN and at most `u32::MAX` entries.
+    pub fn of(positions: &[Vec3]) -> Self {
+        // Open addressing at half load: the standard map spends most of its time on a hash that resists attack;
+        // here a bad input can only cost time, and the finaliser below leaves no cheap way to collide.
+        const FREE: u32 = u32::MAX;
+        let mask = (positions.len() * 2).next_power_of_two().max(2) - 1;
+        let mut table = vec![FREE; mask + 1];
+        let mut place = Vec::with_capacity(positions.len());
+        let mut first: Vec<u32> = Vec::with_capacity(positions.len());
+        for (vertex, &position) in positions.iter().enumerate() {
+            let mut cell = hash(position) as usize & mask;
+            let found = loop {
+                match table[cell] {
+                    FREE => {
+                        table[cell] = first.len() as u32;
+                        first.push(vertex as u32);
+                        break table[cell];
+                    }
+                    other if positions[first[other as usize] as usize] == position => break other,
+                    _ => cell = (cell + 1) & mask,
+                }
+            };
+            place.push(found);
+        }
+        Self { place, first }
+    }
+
+    /// How many different places there are.
+    pub fn len(&self) -> usize {
+        self.first.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.first.is_empty()
+    }
+
+    /// The places of a triangle's corners.
+    #[inline]
+    pub fn places(&self, triangle: [u32; 3]) -> [u32; 3] {
+        triangle.map(|vertex| self.place[vertex as usize])
+    }
+}
+
+/// Equal for positions that compare equal. The mixing steps are those of SplitMix64 (Steele, Lea, Flood 2014).
+fn hash(position: Vec3) -> u64 {
+    // Adding zero turns −0 into 0 and changes nothing else.
+    let [x, y, z] = (position + Vec3::ZERO).to_array().map(|v| u64::from(v.to_bits()));
+    let mix = |mut h: u64| {
+        h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        h = (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        h ^ (h >> 31)
+    };
+    mix(mix(x | y << 32).wrapping_add(z.wrapping_mul(0x9e37_79b9_7f4a_7c15)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3;
+
+    #[test]
+    fn equal_places_share_a_number_and_signs_of_zero_do_not_matter() {
+        let points = [vec3(0.0, 1.0, 2.0), vec3(1.0, 0.0, 0.0), vec3(-0.0, 1.0, 2.0), vec3(1.0, -0.0, 0.0)];
+        assert_eq!(Welding::of(&points), Welding { place: vec![0, 1, 0, 1], first: vec![0, 1] });
+    }
+
+    #[test]
+    fn agrees_with_comparing_all_pairs() {
+        let points: Vec<Vec3> =
+            (0..600_u32).map(|i| vec3((i * 7 % 5) as f32, (i * 11 % 6) as f32, (i * 13 % 4) as f32)).collect();
+        let welding = Welding::of(&points);
+        for (i, p) in points.iter().enumerate() {
+            let simplest = points.iter().position(|q| q == p).unwrap();
+            assert_eq!(welding.first[welding.place[i] as usize] as usize, simplest);
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! How wrong is the picture? Told from its own samples, without giving up any of their evenness.
+//!
+//! Let Iₙ be a pixel's mean over the first n = 2ᵏ samples. Its samples are an Owen-scrambled net, and so are the next
+//! n, with the same distribution. Then E|Iₙ − I₂ₙ|² = var Iₙ − var I₂ₙ exactly, however the two halves correlate:
+//! I₂ₙ is the mean of both, so cov(Iₙ, I₂ₙ) = var I₂ₙ. Summed over the picture these differences of consecutive
+//! doublings are large sums and tell both the error and how fast it falls: where it falls as n^−a, they do too, and
+//! var I₂ₙ is the difference over 2ᵃ − 1. Independent batches would tell the same, and cost the evenness between them.
+
+use glam::DVec3;
+
+/// The error of the whole picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorEstimate {
+    /// Root of relMSE, the mean over pixels and channels of variance / (mean² + 0.01).
+    pub relative: f64,
+    /// Bounds of an interval that holds the true value with about 95 % probability.
+    pub low: f64,
+    pub high: f64,
+    /// relMSE falls as samples^−`exponent` from doubling to doubling; 1 for independent samples.
+    pub exponent: f64,
+    /// relMSE of a single sample, extended down from what was seen last.
+    variance_of_one: f64,
+}
+
+impl ErrorEstimate {
+    /// Relative error at a number of samples a pixel, at least 1.
+    ///
+    /// Between powers of two the samples are several nets of different size, one for each bit of their number, and
+    /// each counts with its share: where errors fall fast, 96 samples are no better than 64.
+    pub fn relative_at(&self, spp: u32) -> f64 {
+        let spp = spp.max(1);
+        let nets = (0..32).filter(|bit| spp >> bit & 1 == 1).map(|bit| f64::from(1u32 << bit));
+        let share = |n: f64| (n / f64::from(spp)).powi(2) * n.powf(-self.exponent);
+        (self.variance_of_one * nets.map(share).sum::<f64>()).sqrt()
+    }
+
+    /// Samples a pixel that bring the relative error down to `target`, to within an eighth; `u32::MAX` if none do.
+    pub fn spp_for(&self, target: f64) -> u32 {
+        let candidates = (3..29).flat_map(|bit| (8..16u32).map(move |eighths| eighths << bit >> 3));
+        (1..8).chain(candidates).find(|&spp| self.relative_at(spp) <= target).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn from_tiles<'a>(tiles: impl Iterator<Item = &'a TileConvergence> + Clone, spp: u32) -> Option<Self> {
+        // The last doubling that every tile has seen.
+        let n_levels = tiles.clone().map(|tile| tile.steps.len()).min()?;
+        let level = n_levels.checked_sub(1)?;
+        let n_values: f64 = tiles.clone().map(|tile| tile.n_values).sum();
+        let step = |k: usize| tiles.clone().map(|tile| tile.steps[k]).sum::<f64>() / n_values;
+        let last = step(level);
+        // The first steps say little of how fast later ones fall; independent samples where there is only one.
+        let exponent = if level >= 1 && last > 0.0 {
+            let span = level.min(2);
+            ((step(level - span) / last).log2() / span as f64).clamp(MIN_EXPONENT, MAX_EXPONENT)
+        } else {
+            MIN_EXPONENT
+        };
+        let spp_at_level = f64::from(2u32 << level);
+        let variance_of_one = last / (exponent.exp2() - 1.0) * spp_at_level.powf(exponent);
+        // Tiles are independent of each other: their scatter is the uncertainty of the sum.
+        let n_tiles = tiles.clone().count() as f64;
+        let scatter: f64 = tiles.map(|tile| (tile.steps[level] - last * tile.n_values).powi(2)).sum();
+        let sigma = if n_tiles > 1.0 && last > 0.0 {
+            (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * last)
+        } else {
+            1.0
+        };
+        // On the logarithm, where the sum of positive terms is closer to symmetric.
+        let factor = (0.5 * 1.96 * sigma).exp();
+        let mut estimate = Self { relative: 0.0, low: 0.0, high: 0.0, exponent, variance_of_one };
+        estimate.relative = estimate.relative_at(spp);
+        (estimate.low, estimate.high) = (estimate.relative / factor, estimate.relative * factor);
+        Some(estimate)
+    }
+}
+
+/// Between plain random sampling and the best that scrambled nets do on smooth integrands (Owen 1997).
+const MIN_EXPONENT: f64 = 1.0;
+const MAX_EXPONENT: f64 = 3.0;
+
+/// The steps of one tile's pixels from doubling to doubling.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TileConvergence {
+    /// Means at the last power of two.
+    checkpoint: Vec<DVec3>,
+    /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (I₂ₙ² + 0.01), n = 2ᵏ.
+    steps: Vec<f64>,
+    /// Pixels times channels.
+    n_values: f64,
+}
+
+impl TileConvergence {
+    /// Takes the means after `spp` samples, a power of two.
+    pub fn record(&mut self, spp: u32, means: impl Iterator<Item = DVec3>) {
+        let before = std::mem::replace(&mut self.checkpoint, means.collect());
+        self.n_values = 3.0 * self.checkpoint.len() as f64;
+        if spp > 1 {
+            let pairs = before.iter().zip(&self.checkpoint);
+            self.steps.push(pairs.map(|(a, b)| ((*a - *b).powf(2.0) / (*b * *b + 0.01)).element_sum()).sum());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+
+    /// Runs pixels with a known mean and compares the estimate with the true error.
+    fn run(spp: u32, integrand: impl Fn(glam::Vec2) -> f64, mean: f64) -> (ErrorEstimate, f64) {
+        let n_tiles = 64;
+        let mut tiles = vec![TileConvergence::default(); n_tiles];
+        let mut true_error = 0.0;
+        for (t, tile) in tiles.iter_mut().enumerate() {
+            let mut sums = vec![DVec3::ZERO; 64];
+            for s in 0..spp {
+                for (p, sum) in sums.iter_mut().enumerate() {
+                    *sum += DVec3::splat(integrand(Sampler::new(2, t as u32, p as u32, s).pair(0)));
+                }
+                if (s + 1).is_power_of_two() {
+                    tile.record(s + 1, sums.iter().map(|sum| *sum / f64::from(s + 1)));
+                }
+            }
+            for sum in sums {
+                true_error += (sum.x / f64::from(spp) - mean).powi(2) / (mean * mean + 0.01);
+            }
+        }
+        let estimate = ErrorEstimate::from_tiles(tiles.iter(), spp).unwrap();
+        (estimate, (true_error / (64 * n_tiles) as f64).sqrt())
+    }
+
+    #[test]
+    fn estimate_matches_the_true_error() {
+        let smooth = |u: glam::Vec2| f64::from(u.x * u.y + u.x) * 4.0 / 3.0;
+        let edge = |u: glam::Vec2| if u.x + 0.7 * u.y < 0.8 { 1.0 } else { 0.0 };
+        // ∫ of the edge: the line meets y = 1 at x = 0.1, x = 0.8 at y = 0.
+        let edge_mean = 0.45;
+        for spp in [8, 16, 64, 128, 96] {
+            for (name, (estimate, truth)) in [("smooth", run(spp, smooth, 1.0)), ("edge", run(spp, edge, edge_mean))] {
+                let ratio = estimate.relative / truth;
+                assert!((0.8..1.25).contains(&ratio), "{name} at {spp} spp: {estimate:?} for {truth}");
+            }
+        }
+    }
+
+    #[test]
+    fn prediction_inverts_itself() {
+        let (estimate, _) = run(64, |u| f64::from(u.x * u.x), 1.0 / 3.0);
+        for target in [0.05, 0.01, 1e-3] {
+            let spp = estimate.spp_for(target);
+            assert!(estimate.relative_at(spp) <= target && estimate.relative_at(spp / 2) > target);
+        }
+        assert_eq!(estimate.spp_for(0.0), u32::MAX);
+    }
+}

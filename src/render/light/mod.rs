@@ -1,0 +1,185 @@
+//! Finite lights: what shines, which of them to ask at a point, and where on it.
+//!
+//! [`LightTable::sample`] and [`LightTable::pdf`] are one family: the second gives the density with which the first
+//! would have found a point that a ray hit by itself, which is what multiple importance sampling needs.
+
+mod selection;
+mod shape;
+
+use super::{ColorInput, Emission, Geometry, Texture};
+use crate::kdtree::Shape;
+use glam::{Vec2, Vec3};
+use selection::Selection;
+use shape::LightShape;
+pub(super) use shape::sphere_uv;
+
+/// One emitter: a sphere, a quad or a triangle.
+#[derive(Clone, Debug)]
+pub(super) struct Light {
+    pub shape: LightShape,
+    pub emission: Emission,
+    /// Mean over the surface, luminance.
+    pub mean_radiance: f32,
+}
+
+/// All finite emitters of a scene.
+#[derive(Debug, Default)]
+pub struct LightTable {
+    lights: Vec<Light>,
+    /// For each object: where its primitives stand among the lights.
+    by_object: Vec<ObjectLights>,
+    selection: Selection,
+}
+
+/// Which lights the primitives of an object are.
+#[derive(Clone, Debug)]
+enum ObjectLights {
+    None,
+    /// Primitive `i` is light `first + i`.
+    All(u32),
+    /// One entry a primitive; `u32::MAX` for those that do not shine.
+    Some(Vec<u32>),
+}
+
+/// A point on a light as seen from a shading point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightSample {
+    /// Where a shadow ray ends: on the light, lifted off its front by the bound of its own error.
+    pub target: Vec3,
+    /// Unit, towards the light.
+    pub wi: Vec3,
+    /// Per steradian at the shading point, the choice of the light included.
+    pub pdf: f32,
+    /// W·m⁻²·sr⁻¹, towards the shading point.
+    pub radiance: Vec3,
+}
+
+impl LightTable {
+    /// Finds the emitters among the objects; `emission` of each material.
+    pub(super) fn build(geometry: &Geometry, emission: &[Option<Emission>], textures: &[Texture]) -> Self {
+        let mut lights = Vec::new();
+        let by_object = geometry
+            .objects
+            .iter()
+            .zip(geometry.tree.shapes())
+            .map(|(object, shape)| {
+                let emission: Vec<_> = object.materials.iter().map(|&m| emission[m as usize]).collect();
+                if emission.iter().all(Option::is_none) {
+                    return ObjectLights::None;
+                }
+                let mean = |emission: Emission| {
+                    emission.scale
+                        * match emission.radiance {
+                            ColorInput::Constant(radiance) => luminance(radiance),
+                            ColorInput::Texture(id) => luminance(textures[id as usize].mean()),
+                        }
+                };
+                let first = lights.len() as u32;
+                let mut push = |emission: Emission, shape: LightShape| {
+                    lights.push(Light { shape, emission, mean_radiance: mean(emission) });
+                    lights.len() as u32 - 1
+                };
+                let only = emission[0].filter(|_| emission.len() == 1);
+                match (shape, only) {
+                    (Shape::Mesh { tree: _, world_from_object }, _) => {
+                        let mesh = object.mesh.as_ref().expect("a mesh shape brings its mesh");
+                        let corner = |i: u32| world_from_object.transform_point3(mesh.positions[i as usize]);
+                        let ids: Vec<u32> = (0..mesh.triangles.len())
+                            .map(|t| {
+                                let slot = mesh.slots.get(t).map_or(0, |&s| usize::from(s));
+                                let vertices = mesh.triangles[t].map(corner);
+                                emission
+                                    .get(slot)
+                                    .copied()
+                                    .flatten()
+                                    .map_or(u32::MAX, |emission| push(emission, LightShape::triangle(vertices)))
+                            })
+                            .collect();
+                        if only.is_some() { ObjectLights::All(first) } else { ObjectLights::Some(ids) }
+                    }
+                    (Shape::Spheres { tree, world_from_object }, Some(emission)) => {
+                        let scale = world_from_object.matrix3.x_axis.length();
+                        for i in 0..tree.len() as u32 {
+                            let (center, radius) = tree.sphere(i);
+                            let center = world_from_object.transform_point3(center);
+                            push(emission, LightShape::Sphere { center, radius: radius * scale });
+                        }
+                        ObjectLights::All(first)
+                    }
+                    (Shape::Sphere { center, radius }, Some(emission)) => {
+                        push(emission, LightShape::Sphere { center: *center, radius: *radius });
+                        ObjectLights::All(first)
+                    }
+                    (Shape::Quad { corner, edge_u, edge_v }, Some(emission)) => {
+                        push(emission, LightShape::quad(*corner, *edge_u, *edge_v));
+                        ObjectLights::All(first)
+                    }
+                    (Shape::Triangle { vertices }, Some(emission)) => {
+                        push(emission, LightShape::triangle(*vertices));
+                        ObjectLights::All(first)
+                    }
+                    // An infinite plane shines, but has no area to choose from: rays find it by themselves.
+                    _ => ObjectLights::None,
+                }
+            })
+            .collect();
+        let selection = Selection::build(&lights);
+        Self { lights, by_object, selection }
+    }
+
+    pub fn len(&self) -> usize {
+        self.lights.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
+    /// The light that a primitive is, if it is one.
+    #[inline]
+    pub(super) fn light_of(&self, object: u32, prim: u32) -> Option<u32> {
+        match &self.by_object[object as usize] {
+            ObjectLights::None => None,
+            ObjectLights::All(first) => Some(first + prim),
+            ObjectLights::Some(ids) => Some(ids[prim as usize]).filter(|&id| id != u32::MAX),
+        }
+    }
+
+    /// A point on some light, or `None` when the choice fell on one that cannot be seen from `position`.
+    ///
+    /// - `normal`: unit; only light from its side matters.
+    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`.
+    #[inline]
+    pub(super) fn sample(
+        &self,
+        textures: &[Texture],
+        position: Vec3,
+        normal: Vec3,
+        u_select: impl FnOnce() -> f32,
+        u: Vec2,
+    ) -> Option<LightSample> {
+        let (id, pmf) = self.selection.sample(&self.lights, position, normal, u_select)?;
+        let light = &self.lights[id as usize];
+        let point = light.shape.sample(position, u)?;
+        let radiance = light.emission.scale
+            * match light.emission.radiance {
+                ColorInput::Constant(radiance) => radiance,
+                ColorInput::Texture(texture) => textures[texture as usize].eval(point.uv),
+            };
+        Some(LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance })
+    }
+
+    /// The density with which [`Self::sample`] at `position` finds the point of light `id` in direction `wi`,
+    /// `distance` metres away; per steradian.
+    #[inline]
+    pub(super) fn pdf(&self, id: u32, position: Vec3, normal: Vec3, wi: Vec3, distance: f32) -> f32 {
+        let pmf = self.selection.pmf(&self.lights, id, position, normal);
+        pmf * self.lights[id as usize].shape.pdf(position, wi, distance)
+    }
+}
+
+/// Relative luminance of a linear Rec. 709 colour.
+#[inline]
+pub(crate) fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}

@@ -1,0 +1,138 @@
+//! Which light to ask: a few lights by what each could send to the point, many by their power.
+
+use super::{Light, LightShape};
+use crate::sampling::AliasTable;
+use glam::Vec3;
+
+/// Up to this many lights their contributions are estimated one by one; more would cost more than they save.
+const MAX_ESTIMATED: usize = 16;
+
+#[derive(Debug, Default)]
+pub(super) struct Selection {
+    /// Bounds for the estimate; empty when there are too many lights.
+    bounds: Vec<LightBounds>,
+    /// By power, when there are many.
+    alias: AliasTable,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct LightBounds {
+    center: Vec3,
+    radius: f32,
+    /// Of a flat light; zero for a sphere.
+    normal: Vec3,
+    /// Mean radiance times the area that can face a point.
+    intensity: f32,
+}
+
+impl Selection {
+    pub fn build(lights: &[Light]) -> Self {
+        if lights.len() <= MAX_ESTIMATED {
+            return Self { bounds: lights.iter().map(LightBounds::new).collect(), alias: AliasTable::default() };
+        }
+        let powers: Vec<f64> =
+            lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
+        Self { bounds: Vec::new(), alias: AliasTable::new(&powers) }
+    }
+
+    /// A light and the probability of the choice; `None` when no light can reach the point.
+    #[inline]
+    pub fn sample(
+        &self,
+        lights: &[Light],
+        position: Vec3,
+        normal: Vec3,
+        u: impl FnOnce() -> f32,
+    ) -> Option<(u32, f32)> {
+        match lights.len() {
+            0 => None,
+            1 => Some((0, 1.0)),
+            n if n <= MAX_ESTIMATED => {
+                let (estimates, sum) = self.estimates(position, normal);
+                let mut rest = u() * sum;
+                let chosen = (0..n).find(|&i| {
+                    rest -= estimates[i];
+                    rest < 0.0
+                });
+                // Rounding may leave a rest after the last light that counts.
+                let chosen = chosen.or_else(|| (0..n).rev().find(|&i| estimates[i] > 0.0))?;
+                (estimates[chosen] > 0.0).then(|| (chosen as u32, estimates[chosen] / sum))
+            }
+            _ => {
+                let (id, pmf, _) = self.alias.sample(u());
+                Some((id, pmf))
+            }
+        }
+    }
+
+    /// The probability that [`Self::sample`] picks light `id`.
+    #[inline]
+    pub fn pmf(&self, lights: &[Light], id: u32, position: Vec3, normal: Vec3) -> f32 {
+        match lights.len() {
+            0 => 0.0,
+            1 => 1.0,
+            n if n <= MAX_ESTIMATED => {
+                let (estimates, sum) = self.estimates(position, normal);
+                if sum > 0.0 { estimates[id as usize] / sum } else { 0.0 }
+            }
+            _ => self.alias.pmf(id),
+        }
+    }
+
+    #[inline]
+    fn estimates(&self, position: Vec3, normal: Vec3) -> ([f32; MAX_ESTIMATED], f32) {
+        let mut estimates = [0.0; MAX_ESTIMATED];
+        let mut sum = 0.0;
+        for (estimate, bounds) in estimates.iter_mut().zip(&self.bounds) {
+            *estimate = bounds.estimate(position, normal);
+            sum += *estimate;
+        }
+        (estimates, sum)
+    }
+}
+
+impl LightBounds {
+    fn new(light: &Light) -> Self {
+        let (center, radius, normal, projected) = match light.shape {
+            LightShape::Sphere { center, radius } => (center, radius, Vec3::ZERO, 0.25 * light.shape.area()),
+            LightShape::Quad { corner, edge_u, edge_v, normal, area, .. } => {
+                let radius = 0.5 * (edge_u + edge_v).length().max((edge_u - edge_v).length());
+                (corner + 0.5 * (edge_u + edge_v), radius, normal, area)
+            }
+            LightShape::Triangle { vertices, normal, area } => {
+                let center = (vertices[0] + vertices[1] + vertices[2]) / 3.0;
+                let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f32::max);
+                (center, radius, normal, area)
+            }
+        };
+        Self { center, radius, normal, intensity: light.mean_radiance * projected }
+    }
+
+    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
+    #[inline]
+    fn estimate(&self, position: Vec3, normal: Vec3) -> f32 {
+        let offset = self.center - position;
+        let distance2 = offset.length_squared();
+        let r2 = self.radius * self.radius;
+        if distance2 <= r2 {
+            // Within the bounds of the light anything can happen.
+            return self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE);
+        }
+        let distance = distance2.sqrt();
+        let wi = offset / distance;
+        let sin_u = self.radius / distance;
+        let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
+        // The largest cosine of any direction to the bounding sphere, a little more so that rounding hides none.
+        let bound = |cos: f32| {
+            if cos >= cos_u {
+                1.0
+            } else {
+                let sin = (1.0 - cos * cos).max(0.0).sqrt();
+                (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).clamp(0.0, 1.0)
+            }
+        };
+        let receiver = bound(wi.dot(normal));
+        let emitter = if self.normal == Vec3::ZERO { 1.0 } else { bound(-wi.dot(self.normal)) };
+        self.intensity * receiver * emitter / distance2
+    }
+}

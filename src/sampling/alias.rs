@@ -1,0 +1,121 @@
+//! Discrete choice in constant time.
+
+/// Picks index `i` with probability proportional to its weight (Walker 1977, Vose 1991).
+#[derive(Clone, Debug, Default)]
+pub struct AliasTable {
+    bins: Vec<Bin>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    /// Below it the bin's own index is taken, from it on the alias.
+    threshold: f32,
+    alias: u32,
+    pmf: f32,
+}
+
+impl AliasTable {
+    /// Weights are finite and not negative. If all are zero, every index is equally likely.
+    pub fn new(weights: &[f64]) -> Self {
+        let n = weights.len();
+        debug_assert!(weights.iter().all(|w| w.is_finite() && *w >= 0.0));
+        let sum: f64 = weights.iter().sum();
+        let pmf: Vec<f64> = weights.iter().map(|w| if sum > 0.0 { w / sum } else { 1.0 / n as f64 }).collect();
+        let mut bins: Vec<_> =
+            pmf.iter().enumerate().map(|(i, &p)| Bin { threshold: 1.0, alias: i as u32, pmf: p as f32 }).collect();
+        let mut scaled: Vec<f64> = pmf.iter().map(|p| p * n as f64).collect();
+        let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| scaled[i] < 1.0);
+        while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
+            small.pop();
+            bins[s].threshold = scaled[s] as f32;
+            bins[s].alias = l as u32;
+            scaled[l] -= 1.0 - scaled[s];
+            if scaled[l] < 1.0 {
+                large.pop();
+                small.push(l);
+            }
+        }
+        // What is left over differs from 1 by rounding alone; but a weight of zero must never be picked.
+        for i in small {
+            if pmf[i] == 0.0
+                && let Some(other) = pmf.iter().position(|&p| p > 0.0)
+            {
+                bins[i].threshold = 0.0;
+                bins[i].alias = other as u32;
+            }
+        }
+        Self { bins }
+    }
+
+    /// Index, its probability, and a fresh number in `[0, 1)` made of what the choice left of `u`.
+    #[inline]
+    pub fn sample(&self, u: f32) -> (u32, f32, f32) {
+        let n = self.bins.len();
+        let scaled = u * n as f32;
+        let i = (scaled as usize).min(n - 1);
+        let rest = (scaled - i as f32).min(1.0f32.next_down());
+        let bin = self.bins[i];
+        let (index, fresh) = if rest < bin.threshold {
+            (i as u32, rest / bin.threshold)
+        } else {
+            (bin.alias, (rest - bin.threshold) / (1.0 - bin.threshold))
+        };
+        (index, self.bins[index as usize].pmf, fresh.clamp(0.0, 1.0f32.next_down()))
+    }
+
+    #[inline]
+    pub fn pmf(&self, index: u32) -> f32 {
+        self.bins[index as usize].pmf
+    }
+
+    pub fn len(&self) -> usize {
+        self.bins.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.bins.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_follow_the_weights() {
+        let weights = [0.0, 3.0, 1.0, 0.0, 0.5, 12.0, 1e-3];
+        let table = AliasTable::new(&weights);
+        let sum: f64 = weights.iter().sum();
+        let n = 1 << 20;
+        let mut counts = [0u32; 7];
+        for i in 0..n {
+            let (index, pmf, fresh) = table.sample((i as f32 + 0.5) / n as f32);
+            counts[index as usize] += 1;
+            assert_eq!(pmf, table.pmf(index));
+            assert!((0.0..1.0).contains(&fresh));
+        }
+        for (i, &w) in weights.iter().enumerate() {
+            // Evenly spaced u: off by rounding at bin borders only.
+            let expected = w / sum * f64::from(n);
+            assert!((f64::from(counts[i]) - expected).abs() < 4.0, "index {i}: {} for {expected}", counts[i]);
+        }
+    }
+
+    #[test]
+    fn what_is_left_of_u_is_even() {
+        let table = AliasTable::new(&[0.2, 0.5, 0.3]);
+        let n = 1 << 16;
+        let mut counts = [0u32; 16];
+        for i in 0..n {
+            let (_, _, fresh) = table.sample((i as f32 + 0.5) / n as f32);
+            counts[(fresh * 16.0) as usize] += 1;
+        }
+        assert!(counts.iter().all(|&c| c.abs_diff(n / 16) < 64), "{counts:?}");
+    }
+
+    #[test]
+    fn all_zero_weights_are_even() {
+        let table = AliasTable::new(&[0.0; 4]);
+        assert!((0..4).all(|i| table.pmf(i) == 0.25));
+    }
+}

@@ -1,0 +1,106 @@
+//! Points in the unit square with the density of a picture.
+
+use glam::Vec2;
+
+/// A piecewise constant density over the unit square, sampled by inversion so that even points stay even.
+#[derive(Clone, Debug)]
+pub struct PictureDistribution {
+    width: usize,
+    height: usize,
+    /// Running sums of the rows, normalised: row y holds `width + 1` numbers from 0 to 1.
+    rows: Vec<f32>,
+    /// Running sum over the rows, normalised: `height + 1` numbers.
+    columns: Vec<f32>,
+}
+
+impl PictureDistribution {
+    /// `weights` row by row, finite and not negative. `None` when all are zero.
+    pub fn new(width: usize, height: usize, weights: &[f32]) -> Option<Self> {
+        assert_eq!(weights.len(), width * height);
+        let mut rows = Vec::with_capacity((width + 1) * height);
+        let mut row_sums = Vec::with_capacity(height);
+        for row in weights.chunks_exact(width) {
+            let sum = push_cumulative(&mut rows, row.iter().map(|&w| f64::from(w)));
+            row_sums.push(sum);
+        }
+        let mut columns = Vec::with_capacity(height + 1);
+        let total = push_cumulative(&mut columns, row_sums.iter().copied());
+        (total > 0.0).then_some(Self { width, height, rows, columns })
+    }
+
+    /// A point and its density with respect to area on the unit square.
+    #[inline]
+    pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
+        let (y, dy, py) = invert(&self.columns, u.y);
+        let row = &self.rows[y * (self.width + 1)..][..self.width + 1];
+        let (x, dx, px) = invert(row, u.x);
+        let point = Vec2::new((x as f32 + dx) / self.width as f32, (y as f32 + dy) / self.height as f32);
+        (point, px * py * (self.width * self.height) as f32)
+    }
+
+    /// Density with respect to area on the unit square.
+    #[inline]
+    pub fn pdf(&self, point: Vec2) -> f32 {
+        let x = ((point.x * self.width as f32) as usize).min(self.width - 1);
+        let y = ((point.y * self.height as f32) as usize).min(self.height - 1);
+        let row = &self.rows[y * (self.width + 1)..];
+        let (px, py) = (row[x + 1] - row[x], self.columns[y + 1] - self.columns[y]);
+        px * py * (self.width * self.height) as f32
+    }
+}
+
+/// Appends 0 and the running sums scaled to end at 1 (even ones where all weights are zero); returns the sum.
+fn push_cumulative(target: &mut Vec<f32>, weights: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
+    let sum: f64 = weights.clone().sum();
+    let n = weights.len() as f64;
+    let mut running = 0.0;
+    target.push(0.0);
+    for (i, weight) in weights.enumerate() {
+        running += weight;
+        target.push(if sum > 0.0 { (running / sum) as f32 } else { ((i + 1) as f64 / n) as f32 });
+    }
+    // Rounding must not leave a gap at the end, and a last weight of zero must keep its zero width.
+    let last = *target.last().expect("just pushed");
+    let start = target.len() - (n as usize + 1);
+    target[start..].iter_mut().rev().take_while(|x| **x == last).for_each(|x| *x = 1.0);
+    sum
+}
+
+/// The interval that holds `u`, where in it, and its width.
+#[inline]
+fn invert(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
+    let after = cumulative.partition_point(|&c| c <= u).clamp(1, cumulative.len() - 1);
+    let (low, high) = (cumulative[after - 1], cumulative[after]);
+    let width = high - low;
+    let inside = if width > 0.0 { ((u - low) / width).clamp(0.0, 1.0f32.next_down()) } else { 0.5 };
+    (after - 1, inside, width)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_have_the_density_that_pdf_says() {
+        let weights = [0.0, 1.0, 5.0, 0.0, 2.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let distribution = PictureDistribution::new(4, 3, &weights).unwrap();
+        let n = 512;
+        let mut counts = [0u32; 12];
+        for i in 0..n * n {
+            let u = Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32;
+            let (point, pdf) = distribution.sample(u);
+            assert!((distribution.pdf(point) - pdf).abs() < 1e-5 * pdf);
+            counts[(point.y * 3.0) as usize * 4 + (point.x * 4.0) as usize] += 1;
+        }
+        for (count, weight) in counts.iter().zip(weights) {
+            let expected = weight / 8.5 * (n * n) as f32;
+            assert!((*count as f32 - expected).abs() <= 2.0 * n as f32, "{count} for {expected}");
+            assert!(weight > 0.0 || *count == 0, "a point where the density is zero");
+        }
+    }
+
+    #[test]
+    fn black_pictures_have_no_distribution() {
+        assert!(PictureDistribution::new(2, 2, &[0.0; 4]).is_none());
+    }
+}

@@ -1,0 +1,194 @@
+//! A rectangle as seen from a point: its solid angle, and directions uniform in it.
+
+use glam::{Vec2, Vec3};
+
+/// A rectangle seen from a reference point, ready to be sampled by solid angle.
+///
+/// Source: Ureña, Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical Rectangles". The solid
+/// angle comes from van Oosterom and Strackee 1983 instead: a sum of four angles less 2π cancels when it is small.
+#[derive(Clone, Copy, Debug)]
+pub struct SphericalQuad {
+    /// Nearest and farthest corner in the frame of the rectangle, about the reference point; `z` is not positive.
+    x0: f32,
+    y0: f32,
+    z0: f32,
+    x1: f32,
+    y1: f32,
+    solid_angle: f32,
+}
+
+impl SphericalQuad {
+    /// - `corner`: relative to the reference point;
+    /// - `unit_u`, `unit_v`: unit, at right angles; `length_u`, `length_v`: sides in metres.
+    #[inline]
+    pub fn new(corner: Vec3, unit_u: Vec3, length_u: f32, unit_v: Vec3, length_v: f32) -> Self {
+        let (x0, y0) = (corner.dot(unit_u), corner.dot(unit_v));
+        let z0 = -corner.dot(unit_u.cross(unit_v)).abs();
+        let (x1, y1) = (x0 + length_u, y0 + length_v);
+        let mut quad = Self { x0, y0, z0, x1, y1, solid_angle: 0.0 };
+        quad.solid_angle = quad.compute_solid_angle(length_u * length_v);
+        quad
+    }
+
+    /// Steradians.
+    #[inline]
+    pub fn solid_angle(&self) -> f32 {
+        self.solid_angle
+    }
+
+    fn compute_solid_angle(&self, area: f32) -> f32 {
+        // In units of the distance to the first corner, so that products of six lengths stay in range.
+        let unit = Vec3::new(self.x0, self.y0, self.z0).length().max(f32::MIN_POSITIVE).recip();
+        let corner = |x, y| Vec3::new(x, y, self.z0) * unit;
+        let [a, b, c, d] =
+            [corner(self.x0, self.y0), corner(self.x1, self.y0), corner(self.x1, self.y1), corner(self.x0, self.y1)];
+        let [la, lb, lc, ld] = [a, b, c, d].map(Vec3::length);
+        // The triple product of both halves: exact up to rounding, however small the rectangle looks.
+        let triple = area * unit * unit * (-self.z0 * unit);
+        let half = |p: Vec3, lp: f32, q: Vec3, lq: f32, r: Vec3, lr: f32| {
+            lp * lq * lr + p.dot(q) * lr + q.dot(r) * lp + r.dot(p) * lq
+        };
+        let (first, second) = (half(a, la, b, lb, c, lc), half(a, la, c, lc, d, ld));
+        // Each half is twice the angle of (denominator, triple); the product of the two as complex numbers adds them.
+        2.0 * (triple * (first + second)).atan2(first * second - triple * triple)
+    }
+
+    /// Where on the rectangle, `[0, 1]²` along its sides, a direction uniform in solid angle meets it.
+    #[inline]
+    pub fn sample(&self, u: Vec2) -> Vec2 {
+        let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
+        // Heights of the four edge planes' normals; the angles between them are those of the spherical rectangle. Of
+        // each, the square of what it lacks to 1 is known without cancellation.
+        let z2 = z0 * z0;
+        let height = |y: f32| {
+            let h2 = z2 + y * y;
+            (y / h2.sqrt(), z2 / h2)
+        };
+        let ((h0, r0), (b1, r1), (h3, r3)) = (height(y0), height(y1), height(x0));
+        let (b0, n3) = (-h0, -h3);
+        // Cosine and sine of the two angles at the far side of x0, and of their sum.
+        let (cos_2, sin_2) = (-b1 * n3, (r1 + b1 * b1 * r3).sqrt());
+        let (cos_3, sin_3) = (-n3 * b0, (r0 + b0 * b0 * r3).sqrt());
+        let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
+        // The slice of the wanted area ends at the plane with angle u · area − sum (mod 2π).
+        let (sin_part, cos_part) = (u.x * solid_angle).sin_cos();
+        let cos_au = cos_part * cos_sum + sin_part * sin_sum;
+        let sin_au = sin_part * cos_sum - cos_part * sin_sum;
+        // cos · b0 − b1: all three may be near 1, and then only what each lacks to 1 tells them apart.
+        let (product, lack_0, lack_1) = (cos_au * b0, r0 / (1.0 + b0.abs()), r1 / (1.0 + b1.abs()));
+        let lack_au = sin_au * sin_au / (1.0 + cos_au.abs());
+        let difference = if product * b1 > 0.0 {
+            (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * b1.signum()
+        } else {
+            product - b1
+        };
+        let fu = difference / sin_au;
+        // Where that plane meets the rectangle: cu = ±1 / √(fu² + b0²), written so that 1 − cu² does not cancel.
+        let xu = (-z0).copysign(fu) / (fu * fu - r0).max(f32::MIN_POSITIVE).sqrt();
+        let xu = if xu.is_nan() { x0 } else { xu.clamp(x0, x1) };
+        let d2 = xu * xu + z0 * z0;
+        let h0 = y0 / (d2 + y0 * y0).sqrt();
+        let h1 = y1 / (d2 + y1 * y1).sqrt();
+        let hv = h0 + u.y * (h1 - h0);
+        let hv2 = hv * hv;
+        let yv = if hv2 < 1.0 - 1e-6 { (hv * d2.sqrt()) / (1.0 - hv2).sqrt() } else { y1 };
+        Vec2::new((xu - x0) / (x1 - x0), (yv.clamp(y0, y1) - y0) / (y1 - y0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Solid angle in f64 by adding up small pieces.
+    fn solid_angle_by_parts(corner: Vec3, u: Vec3, v: Vec3) -> f64 {
+        let (corner, u, v) = (corner.as_dvec3(), u.as_dvec3(), v.as_dvec3());
+        let n = 400;
+        let normal = u.cross(v);
+        let mut sum = 0.0;
+        for i in 0..n * n {
+            let (a, b) = ((f64::from(i % n) + 0.5) / f64::from(n), (f64::from(i / n) + 0.5) / f64::from(n));
+            let p = corner + a * u + b * v;
+            sum += p.dot(normal).abs() / p.length().powi(3);
+        }
+        sum / f64::from(n * n)
+    }
+
+    const CASES: [(Vec3, Vec3, Vec3); 5] = [
+        (Vec3::new(-0.5, -0.5, -1.0), Vec3::X, Vec3::Y),
+        (Vec3::new(2.0, 1.0, 0.5), Vec3::new(0.0, 0.0, 1.5), Vec3::new(0.0, 2.0, 0.0)),
+        (Vec3::new(-3.0, 0.2, 1.0), Vec3::new(6.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 2.0)),
+        (Vec3::new(40.0, -30.0, 25.0), Vec3::new(0.6, 0.8, 0.0), Vec3::new(-0.8, 0.6, 0.0)),
+        (Vec3::new(1000.0, 900.0, 800.0), Vec3::X, Vec3::Z),
+    ];
+
+    #[test]
+    fn solid_angle_matches_the_sum_of_small_pieces() {
+        for (corner, u, v) in CASES {
+            let quad = SphericalQuad::new(corner, u.normalize(), u.length(), v.normalize(), v.length());
+            let expected = solid_angle_by_parts(corner, u, v);
+            let relative = (f64::from(quad.solid_angle()) - expected) / expected;
+            assert!(relative.abs() < 2e-4, "{corner}: {} for {expected}", quad.solid_angle());
+        }
+    }
+
+    #[test]
+    fn points_follow_the_solid_angle() {
+        for (corner, u, v) in &CASES[..4] {
+            let quad = SphericalQuad::new(*corner, u.normalize(), u.length(), v.normalize(), v.length());
+            // Stratified samples; their share in each cell against the cell's solid angle.
+            let (n, cells) = (512, 4);
+            let mut counts = [0.0f64; 16];
+            for i in 0..n * n {
+                let p = quad.sample(Vec2::new(((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32));
+                let cell = (p * cells as f32).as_uvec2().min(glam::UVec2::splat(cells - 1));
+                counts[(cell.y * cells + cell.x) as usize] += 1.0 / f64::from(n * n);
+            }
+            let total = solid_angle_by_parts(*corner, *u, *v);
+            for (i, count) in counts.iter().enumerate() {
+                let (x, y) = ((i as u32 % cells) as f32, (i as u32 / cells) as f32);
+                let s = 1.0 / cells as f32;
+                let part = solid_angle_by_parts(*corner + x * s * *u + y * s * *v, s * *u, s * *v) / total;
+                assert!((count - part).abs() < 2e-3, "{corner}, cell {i}: {count} for {part}");
+            }
+        }
+    }
+
+    /// The mean direction over the solid angle in f64: half the sum of edge angle times edge normal, over the angle.
+    fn mean_direction(corner: Vec3, u: Vec3, v: Vec3, solid_angle: f64) -> glam::DVec3 {
+        let (corner, u, v) = (corner.as_dvec3(), u.as_dvec3(), v.as_dvec3());
+        let corners = [corner, corner + u, corner + u + v, corner + v];
+        let facing = corner.dot(u.cross(v)).signum();
+        (0..4)
+            .map(|i| {
+                let (p, q) = (corners[i], corners[(i + 1) % 4]);
+                let cross = p.cross(q);
+                0.5 * cross.length().atan2(p.dot(q)) * cross.normalize()
+            })
+            .sum::<glam::DVec3>()
+            * facing
+            / solid_angle
+    }
+
+    #[test]
+    fn directions_are_right_even_close_to_the_plane_of_the_rectangle() {
+        for z in [1.0_f32, 0.1, 0.01, 1e-3, 1e-4, 1e-5] {
+            // In front of it, beside it, beyond its corner.
+            for corner in [Vec3::new(-0.7, -1.2, -z), Vec3::new(0.2, -0.4, -z), Vec3::new(z, 0.1, -z)] {
+                let quad = SphericalQuad::new(corner, Vec3::X, 2.0, Vec3::Y, 2.0);
+                if quad.solid_angle() < 1e-3 {
+                    continue;
+                }
+                let n = 512;
+                let mut sum = glam::DVec3::ZERO;
+                for i in 0..n * n {
+                    let p = quad.sample(Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32);
+                    sum += (corner + 2.0 * p.extend(0.0)).as_dvec3().normalize() / f64::from(n * n);
+                }
+                let expected = mean_direction(corner, Vec3::X * 2.0, Vec3::Y * 2.0, f64::from(quad.solid_angle()));
+                let error = (sum - expected).length();
+                assert!(error < 1e-3, "{corner}: {sum} for {expected}");
+            }
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! What the entities of a scene are made of.
+//!
+//! | entity | components |
+//! |---|---|
+//! | object | [`Shape`], [`Placement`], [`MaterialSlots`] |
+//! | material | [`Material`] |
+//! | point light | [`PointLight`], [`Placement`] |
+//! | camera | [`View`](super::View), [`Projection`](super::Projection), [`Lens`](super::Lens) |
+//!
+//! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the picture follows.
+
+use super::placement::Placement;
+use crate::mesh::Mesh;
+use crate::render::{self, Display, Fresnel, RenderSettings};
+use bevy_ecs::prelude::{Component, Entity, Resource};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// The surface of an object, in its own space; its [`Placement`] says where that is.
+#[derive(Component, Clone, Debug)]
+#[require(Placement, MaterialSlots)]
+pub enum Shape {
+    /// About the origin; metres. Its placement must scale evenly.
+    Sphere {
+        radius: f64,
+    },
+    /// Infinite, through the origin.
+    Plane {
+        normal: DVec3,
+    },
+    /// A parallelogram with a corner at the origin; its front looks along `edge_u` × `edge_v`.
+    Quad {
+        edge_u: DVec3,
+        edge_v: DVec3,
+    },
+    Triangle {
+        vertices: [DVec3; 3],
+    },
+    /// Shared by all objects that use it, together with its tree.
+    Mesh(Arc<Mesh>),
+    /// Many balls of one material. Its placement must scale evenly.
+    Spheres(Arc<Balls>),
+}
+
+impl PartialEq for Shape {
+    /// Meshes and clouds are equal when they are the same one in memory.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Sphere { radius: a }, Self::Sphere { radius: b }) => a == b,
+            (Self::Plane { normal: a }, Self::Plane { normal: b }) => a == b,
+            (Self::Quad { edge_u: a, edge_v: b }, Self::Quad { edge_u: c, edge_v: d }) => a == c && b == d,
+            (Self::Triangle { vertices: a }, Self::Triangle { vertices: b }) => a == b,
+            (Self::Mesh(a), Self::Mesh(b)) => Arc::ptr_eq(a, b),
+            (Self::Spheres(a), Self::Spheres(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
+/// Many balls, stored about their centre so that `f32` suffices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Balls {
+    /// Metres, relative to `center`.
+    pub centers: Vec<Vec3>,
+    /// Metres, one a ball.
+    pub radii: Vec<f32>,
+    pub center: DVec3,
+}
+
+impl Balls {
+    /// One radius a centre.
+    pub fn new(centers: &[DVec3], radii: impl IntoIterator<Item = f64>) -> Self {
+        let (min, max) = centers
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), &point| (min.min(point), max.max(point)));
+        let center = if centers.is_empty() { DVec3::ZERO } else { 0.5 * min + 0.5 * max };
+        Self {
+            centers: centers.iter().map(|&point| (point - center).as_vec3()).collect(),
+            radii: radii.into_iter().map(|radius| radius as f32).collect(),
+            center,
+        }
+    }
+}
+
+/// The material entities of an object, one a slot of its mesh; every other shape has one slot.
+///
+/// A triangle whose slot is not listed uses the last one; with none at all it is plain grey.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+pub struct MaterialSlots(pub Vec<Entity>);
+
+/// What a surface does to light; see [`render::Material`] for the meaning of each number.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub enum Material {
+    Diffuse {
+        albedo: Paint,
+    },
+    Mirror {
+        reflectance: Paint,
+    },
+    Metal {
+        alpha: Amount,
+        reflectance: Paint,
+        fresnel: Fresnel,
+        compensate: bool,
+    },
+    Glass {
+        ior: f32,
+        absorption: Vec3,
+    },
+    /// Of material entities; at most one part is emissive, and then `weight` is a number.
+    Blend {
+        weight: Amount,
+        a: Entity,
+        b: Entity,
+    },
+    Emissive {
+        radiance: Paint,
+    },
+}
+
+/// Plain materials that a blend may come to, however it is nested.
+pub const MAX_LOBES: usize = 8;
+
+impl Material {
+    /// The one of surfaces that have none.
+    pub const GREY: Self = Self::Diffuse { albedo: Paint::Rgb(Vec3::splat(0.5)) };
+}
+
+/// A colour, linear Rec. 709, or a texture.
+#[derive(Clone, Debug)]
+pub enum Paint {
+    Rgb(Vec3),
+    Texture(Arc<SurfaceTexture>),
+}
+
+impl PartialEq for Paint {
+    /// Textures are equal when they are the same one in memory.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Rgb(a), Self::Rgb(b)) => a == b,
+            (Self::Texture(a), Self::Texture(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
+/// A number, or the red channel of a texture.
+#[derive(Clone, Debug)]
+pub enum Amount {
+    Number(f32),
+    Texture(Arc<SurfaceTexture>),
+}
+
+impl PartialEq for Amount {
+    /// Textures are equal when they are the same one in memory.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Number(a), Self::Number(b)) => a == b,
+            (Self::Texture(a), Self::Texture(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
+/// A texture with the name and the description that a scene file has for it.
+#[derive(Clone, Debug)]
+pub struct SurfaceTexture {
+    pub name: String,
+    pub part: super::file::TexturePart,
+    pub texture: render::Texture,
+}
+
+/// Shines evenly into all directions; to the path tracer it is a small glowing ball.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[require(Placement)]
+pub struct PointLight {
+    /// Radiant intensity, W·sr⁻¹.
+    pub intensity: Vec3,
+    /// Metres.
+    pub radius: f64,
+}
+
+/// Where the mesh of an object came from, for saving and reloading it.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct MeshOrigin {
+    pub source: super::file::MeshSourcePart,
+    pub shading: super::file::MeshShadingPart,
+    /// Share of the faces that were kept, 0..1.
+    pub simplify: Option<f64>,
+    /// Materials come from the mesh's own file.
+    pub own_materials: bool,
+}
+
+/// The place of an entity in its scene file. What has none comes after, in the order of its entity.
+///
+/// The picture's bits depend on the order of objects; this keeps them the same in every process.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ordinal(pub u32);
+
+/// Light from infinitely far away.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct SceneEnvironment {
+    pub light: render::Environment,
+    /// What the scene file says, for saving.
+    pub part: super::file::EnvironmentPart,
+}
+
+impl PartialEq for SceneEnvironment {
+    /// Pictures are equal when they are the same one in memory.
+    fn eq(&self, other: &Self) -> bool {
+        use render::Environment::{Black, Constant, Gradient, Image};
+        match (&self.light, &other.light) {
+            (Black, Black) => true,
+            (Constant(a), Constant(b)) => a == b,
+            (Gradient { zenith: a, horizon: b, ground: c }, Gradient { zenith: d, horizon: e, ground: f }) => {
+                a == d && b == e && c == f
+            }
+            (Image { image: a, scale: b, rotation: c }, Image { image: d, scale: e, rotation: f }) => {
+                Arc::ptr_eq(a, d) && b == e && c == f
+            }
+            _ => false,
+        }
+    }
+}
+
+/// The size that the scene asks for, pixels. A window has a size of its own.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FilmSize {
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Default for FilmSize {
+    fn default() -> Self {
+        Self { width: 1280, height: 720 }
+    }
+}
+
+/// Light model, depth and seed.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rendering(pub RenderSettings);
+
+/// Exposure and tone curve; no sample depends on them.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Developing(pub Display);

@@ -1,0 +1,100 @@
+//! How large a scene is: what "frame all" frames, and what the speed of flying is measured by.
+
+use super::components::{Material, Shape};
+use super::inputs::{ObjectInput, SceneInputs};
+use glam::DVec3;
+use std::collections::{HashMap, HashSet};
+
+/// A sphere around the finite things of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Extent {
+    pub center: DVec3,
+    /// Metres; 0 when there is nothing finite.
+    pub radius: f64,
+}
+
+/// Boxes of meshes and clouds in their own space, found once and kept.
+#[derive(Clone, Debug, Default)]
+pub struct ExtentCache(HashMap<usize, (Shape, (DVec3, DVec3))>);
+
+impl ExtentCache {
+    /// The extent of what can be seen; lamps count only when there is nothing else, since nobody goes to look at one.
+    pub fn extent(&mut self, inputs: &SceneInputs) -> Extent {
+        let used: HashSet<usize> = inputs.objects.iter().filter_map(|object| key(&object.shape)).collect();
+        self.0.retain(|key, _| used.contains(key));
+        let glowing: HashSet<_> = (inputs.materials.iter())
+            .filter(|material| matches!(material.material, Material::Emissive { .. }))
+            .map(|material| material.entity)
+            .collect();
+        let is_lamp =
+            |object: &&ObjectInput| !object.slots.is_empty() && object.slots.iter().all(|slot| glowing.contains(slot));
+        let (lamps, things): (Vec<_>, Vec<_>) = inputs.objects.iter().partition(is_lamp);
+        let around = |objects: Vec<&ObjectInput>, cache: &mut Self| {
+            objects
+                .into_iter()
+                .filter_map(|object| cache.world_box(object))
+                .reduce(|(min, max), (other_min, other_max)| (min.min(other_min), max.max(other_max)))
+        };
+        match around(things, self).or_else(|| around(lamps, self)) {
+            Some((min, max)) => Extent { center: 0.5 * min + 0.5 * max, radius: 0.5 * (max - min).length() },
+            None => Extent::default(),
+        }
+    }
+
+    /// The box of an object in the world; `None` for infinite and broken ones.
+    fn world_box(&mut self, object: &ObjectInput) -> Option<(DVec3, DVec3)> {
+        let (min, max) = match &object.shape {
+            Shape::Plane { .. } => return None,
+            Shape::Sphere { radius } => (DVec3::splat(-radius), DVec3::splat(*radius)),
+            Shape::Quad { edge_u, edge_v } => box_of([DVec3::ZERO, *edge_u, *edge_v, edge_u + edge_v])?,
+            Shape::Triangle { vertices } => box_of(*vertices)?,
+            shape @ (Shape::Mesh(_) | Shape::Spheres(_)) => {
+                let key = key(shape)?;
+                match self.0.get(&key) {
+                    Some((_, known)) => *known,
+                    None => {
+                        let own = own_box(shape)?;
+                        self.0.insert(key, (shape.clone(), own));
+                        own
+                    }
+                }
+            }
+        };
+        let world = object.placement.affine();
+        let corners = (0..8).map(|i| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
+            world.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+        });
+        box_of(corners).filter(|(min, max)| min.is_finite() && max.is_finite())
+    }
+}
+
+fn key(shape: &Shape) -> Option<usize> {
+    match shape {
+        Shape::Mesh(mesh) => Some(std::sync::Arc::as_ptr(mesh) as usize),
+        Shape::Spheres(balls) => Some(std::sync::Arc::as_ptr(balls) as usize),
+        _ => None,
+    }
+}
+
+fn own_box(shape: &Shape) -> Option<(DVec3, DVec3)> {
+    let (center, (min, max)) = match shape {
+        Shape::Mesh(mesh) => {
+            let used = mesh.triangles.iter().flatten().filter_map(|&v| mesh.positions.get(v as usize));
+            (mesh.center, box_of(used.map(|position| position.as_dvec3()))?)
+        }
+        Shape::Spheres(balls) => {
+            let ends = balls.centers.iter().zip(&balls.radii).flat_map(|(center, &radius)| {
+                let (center, radius) = (center.as_dvec3(), DVec3::splat(radius.into()));
+                [center - radius, center + radius]
+            });
+            (balls.center, box_of(ends)?)
+        }
+        _ => return None,
+    };
+    Some((min + center, max + center))
+}
+
+fn box_of(points: impl IntoIterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
+    points.into_iter().map(|point| (point, point)).reduce(|(min, max), (point, _)| (min.min(point), max.max(point)))
+}

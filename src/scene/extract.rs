@@ -1,0 +1,472 @@
+//! From the world to the flat snapshot that the workers read.
+//!
+//! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
+//! rebuilt on its own ([`Part`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
+
+use super::components::{Amount, Balls, MAX_LOBES, Material, Paint, Shape, SurfaceTexture};
+use super::inputs::{CameraInput, ObjectInput, SceneInputs};
+use super::placement::Placement;
+use super::view::{Lens, Projection, View};
+use crate::kdtree::{self, BuildPreset, MeshTree, SphereTree};
+use crate::mesh::Mesh;
+use crate::render::{
+    self, Camera, ColorInput, Geometry, MaterialId, Object, ScalarInput, Shading, Snapshot, TextureId,
+};
+use bevy_ecs::prelude::Entity;
+use glam::{Affine3A, DAffine3, DVec3, Vec3};
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// What of a snapshot is to be made anew; each includes the ones before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    Camera,
+    /// Materials, textures, light table.
+    Shading,
+    /// The tree over the objects.
+    Geometry,
+}
+
+/// Trees of meshes and clouds, by the address of what they were built from.
+#[derive(Clone, Debug, Default)]
+pub struct Trees {
+    meshes: HashMap<usize, (Arc<Mesh>, Arc<MeshTree>)>,
+    balls: HashMap<usize, (Arc<Balls>, Arc<SphereTree>)>,
+    /// What no tree can be built of, and why.
+    unfit: HashMap<usize, (Shape, String)>,
+}
+
+impl Trees {
+    /// Whether there is nothing to build for this shape.
+    pub fn has(&self, shape: &Shape) -> bool {
+        if shared(shape).is_some_and(|key| self.unfit.contains_key(&key)) {
+            return true;
+        }
+        match shape {
+            Shape::Mesh(mesh) => self.meshes.contains_key(&address(mesh)),
+            Shape::Spheres(balls) => self.balls.contains_key(&address(balls)),
+            _ => true,
+        }
+    }
+
+    /// Builds the tree of a mesh or a cloud, if it has none yet.
+    ///
+    /// # Errors
+    /// When the mesh has no triangles, an index out of range or a number that is not finite.
+    pub fn add(&mut self, shape: &Shape) -> Result<(), String> {
+        if self.has(shape) {
+            return Ok(());
+        }
+        match shape {
+            Shape::Mesh(mesh) => {
+                check_mesh(mesh)?;
+                let tree = MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best);
+                self.meshes.insert(address(mesh), (mesh.clone(), Arc::new(tree)));
+            }
+            Shape::Spheres(balls) => {
+                check_balls(balls)?;
+                let tree = SphereTree::build(&balls.centers, &balls.radii);
+                self.balls.insert(address(balls), (balls.clone(), Arc::new(tree)));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Remembers that no tree can be built, so that nobody tries again.
+    pub fn mark_unfit(&mut self, shape: &Shape, reason: String) {
+        if let Some(key) = shared(shape) {
+            self.unfit.insert(key, (shape.clone(), reason));
+        }
+    }
+
+    /// Why no tree could be built of this shape, if so.
+    fn reason(&self, shape: &Shape) -> String {
+        let reason = shared(shape).and_then(|key| self.unfit.get(&key));
+        reason.map_or("its tree is not built yet".to_owned(), |(_, reason)| reason.clone())
+    }
+
+    /// Memory of all trees; of clouds, that of the balls in them.
+    pub fn bytes(&self) -> usize {
+        self.meshes.values().map(|(_, tree)| tree.stats().bytes).sum::<usize>()
+            + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
+    }
+
+    /// Takes over all trees of `other`.
+    pub fn extend(&mut self, other: Self) {
+        self.unfit.extend(other.unfit);
+        self.meshes.extend(other.meshes);
+        self.balls.extend(other.balls);
+    }
+
+    /// Forgets the trees that no object uses any more.
+    pub fn keep_used(&mut self, inputs: &SceneInputs) {
+        let used: std::collections::HashSet<usize> = inputs.objects.iter().filter_map(|o| shared(&o.shape)).collect();
+        self.meshes.retain(|key, _| used.contains(key));
+        self.balls.retain(|key, _| used.contains(key));
+        self.unfit.retain(|key, _| used.contains(key));
+    }
+}
+
+fn address<T>(shared: &Arc<T>) -> usize {
+    Arc::as_ptr(shared) as usize
+}
+
+fn shared(shape: &Shape) -> Option<usize> {
+    match shape {
+        Shape::Mesh(mesh) => Some(address(mesh)),
+        Shape::Spheres(balls) => Some(address(balls)),
+        _ => None,
+    }
+}
+
+fn check_mesh(mesh: &Mesh) -> Result<(), String> {
+    let n = mesh.positions.len();
+    if mesh.triangles.is_empty() {
+        return Err("the mesh has no triangles".to_owned());
+    }
+    if let Some(i) = mesh.triangles.iter().position(|corners| corners.iter().any(|&v| v as usize >= n)) {
+        return Err(format!("triangle {i} uses vertex {:?}, but the mesh has {n}", mesh.triangles[i].iter().max()));
+    }
+    if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return Err(format!("vertex {i} of the mesh is not finite"));
+    }
+    let per_vertex = |len: usize| len == 0 || len == n;
+    if !per_vertex(mesh.normals.len()) || !per_vertex(mesh.uvs.len()) {
+        return Err("the mesh needs one normal and one texture coordinate a vertex, or none at all".to_owned());
+    }
+    if !mesh.slots.is_empty() && mesh.slots.len() != mesh.triangles.len() {
+        return Err("the mesh needs one slot a triangle, or none at all".to_owned());
+    }
+    Ok(())
+}
+
+fn check_balls(balls: &Balls) -> Result<(), String> {
+    if balls.centers.is_empty() || balls.centers.len() != balls.radii.len() {
+        return Err(format!("there are {} centres and {} radii", balls.centers.len(), balls.radii.len()));
+    }
+    match balls.centers.iter().zip(&balls.radii).position(|(c, r)| !(c.is_finite() && r.is_finite() && *r > 0.0)) {
+        Some(i) => Err(format!("ball {i} needs a finite centre and a positive radius")),
+        None => Ok(()),
+    }
+}
+
+/// A snapshot and what is needed to renew it in parts.
+pub struct Extraction {
+    /// Metres: the world point that is (0, 0, 0) of the snapshot.
+    pub origin: DVec3,
+    pub snapshot: Snapshot,
+    /// Objects that were left out, and why.
+    pub problems: Vec<String>,
+    /// The entity of each object of the snapshot.
+    pub entities: Vec<Entity>,
+    ids: HashMap<MaterialKey, MaterialId>,
+    order: Vec<MaterialKey>,
+}
+
+/// Whose material it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum MaterialKey {
+    /// What has none.
+    Grey,
+    Material(Entity),
+    /// The glow of a point light.
+    Light(Entity),
+}
+
+impl Extraction {
+    /// Everything anew. Objects whose tree is missing in `trees` are left out.
+    pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
+        let origin = origin_for(&camera_of(inputs).view);
+        let mut materials = MaterialTable::default();
+        let mut problems = Vec::new();
+        let mut geometry = (Vec::new(), Vec::new());
+        let mut entities = Vec::new();
+        for object in &inputs.objects {
+            match shape_of(object, trees, origin) {
+                Ok((shape, mesh)) => {
+                    let mut keys: Vec<_> = object.slots.iter().map(|&slot| MaterialKey::Material(slot)).collect();
+                    if keys.is_empty() {
+                        keys.push(MaterialKey::Grey);
+                    }
+                    let n_slots =
+                        mesh.as_ref().and_then(|mesh| mesh.slots.iter().max()).map_or(1, |&last| usize::from(last) + 1);
+                    let last = keys[keys.len() - 1];
+                    keys.resize(keys.len().max(n_slots), last);
+                    geometry.0.push(shape);
+                    geometry
+                        .1
+                        .push(Object { mesh, materials: keys.into_iter().map(|key| materials.id(key)).collect() });
+                    entities.push(object.entity);
+                }
+                Err(reason) => {
+                    let name = object.name.clone().unwrap_or_else(|| object.entity.to_string());
+                    problems.push(format!("object `{name}` is left out: {reason}"));
+                }
+            }
+        }
+        for light in &inputs.lights {
+            let center = (light.placement.translation - origin).as_vec3();
+            let radius = light.light.radius as f32;
+            if !(radius.is_normal() && radius > 0.0 && center.is_finite()) {
+                problems.push(format!("point light {} is left out: its radius is {radius}", light.entity));
+                continue;
+            }
+            geometry.0.push(kdtree::Shape::Sphere { center, radius });
+            geometry.1.push(Object { mesh: None, materials: vec![materials.id(MaterialKey::Light(light.entity))] });
+            entities.push(light.entity);
+        }
+        let geometry = Arc::new(Geometry::build(geometry.0, geometry.1));
+        let shading = Arc::new(shading_of(inputs, &geometry, &mut materials));
+        let camera = camera_in(&camera_of(inputs), origin);
+        Self {
+            origin,
+            snapshot: Snapshot { geometry, shading, camera },
+            problems,
+            entities,
+            ids: materials.ids,
+            order: materials.order,
+        }
+    }
+
+    /// Renews one part and keeps the rest. A camera that has gone far takes the origin along, which renews all;
+    /// returns true then.
+    pub fn update(&mut self, part: Part, inputs: &SceneInputs, trees: &Trees) -> bool {
+        let camera = camera_of(inputs);
+        let moved = origin_for(&camera.view) != self.origin;
+        if moved || part == Part::Geometry {
+            *self = Self::new(inputs, trees);
+            return moved;
+        }
+        if part == Part::Shading {
+            let mut materials =
+                MaterialTable { ids: std::mem::take(&mut self.ids), order: std::mem::take(&mut self.order) };
+            self.snapshot.shading = Arc::new(shading_of(inputs, &self.snapshot.geometry, &mut materials));
+            (self.ids, self.order) = (materials.ids, materials.order);
+        }
+        self.snapshot.camera = camera_in(&camera, self.origin);
+        false
+    }
+}
+
+/// The origin for a camera: a corner of a grid whose cells are 512 to 1024 viewing distances wide.
+///
+/// What lies at the viewing distance is then never further than 887 of them away, where `f32` rounds by
+/// 887 · 2⁻²⁴ of that distance: a fifteenth of a pixel of a picture 1000 pixels high that sees 45 degrees.
+/// The rule looks at the view alone, so that one view always gives the same bits, however it was reached; near the
+/// world's own origin it gives zero, and ordinary moves keep it.
+pub fn origin_for(view: &View) -> DVec3 {
+    let cell = (512.0 * view.pivot_distance.clamp(1e-9, 1e12)).log2().ceil().exp2();
+    let origin = (view.eye / cell).round() * cell;
+    if origin.is_finite() { origin } else { DVec3::ZERO }
+}
+
+fn camera_of(inputs: &SceneInputs) -> CameraInput {
+    inputs.camera.unwrap_or(CameraInput {
+        entity: Entity::PLACEHOLDER,
+        view: View::default(),
+        projection: Projection::default(),
+        lens: Lens::default(),
+    })
+}
+
+fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: DVec3) -> Camera {
+    Camera {
+        eye: (view.eye - origin).as_vec3(),
+        right: view.forward.cross(view.up).as_vec3(),
+        up: view.up.as_vec3(),
+        forward: view.forward.as_vec3(),
+        tan_half_vfov: (0.5 * projection.vfov_deg).to_radians().tan() as f32,
+        lens_radius: if lens.enabled { lens.radius as f32 } else { 0.0 },
+        focus_distance: lens.focus_distance as f32,
+        blades: lens.blades,
+        blade_rotation: lens.blade_rotation_deg.to_radians() as f32,
+    }
+}
+
+/// The shape as the kernel wants it, about `origin`, or why it cannot be had.
+fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtree::Shape, Option<Arc<Mesh>>), String> {
+    let placement = &object.placement;
+    let world = placement.affine();
+    let determinant = world.matrix3.determinant();
+    if !world.is_finite() || !determinant.is_finite() || determinant == 0.0 {
+        return Err("its placement is not finite or squeezes it flat".to_owned());
+    }
+    let point = |p: DVec3| (world.transform_point3(p) - origin).as_vec3();
+    let vector = |v: DVec3| world.transform_vector3(v).as_vec3();
+    let even = |placement: &Placement| placement.even_scale().ok_or("balls must be scaled evenly".to_owned());
+    let shape = match &object.shape {
+        Shape::Sphere { radius } => {
+            let radius = (radius * even(placement)?) as f32;
+            if !(radius.is_normal() && radius > 0.0) {
+                return Err(format!("its radius is {radius}"));
+            }
+            kdtree::Shape::Sphere { center: point(DVec3::ZERO), radius }
+        }
+        Shape::Plane { normal } => {
+            // Normals go by the inverse transpose, and stay in front when the placement mirrors.
+            let normal = (world.matrix3.inverse().transpose() * *normal).normalize_or_zero().as_vec3();
+            if normal == Vec3::ZERO || !normal.is_finite() {
+                return Err("its normal has no length".to_owned());
+            }
+            kdtree::Shape::Plane { point: point(DVec3::ZERO), normal }
+        }
+        Shape::Quad { edge_u, edge_v } => {
+            let (edge_u, edge_v) = (vector(*edge_u), vector(*edge_v));
+            if !has_area(edge_u, edge_v) {
+                return Err("it has no area".to_owned());
+            }
+            kdtree::Shape::Quad { corner: point(DVec3::ZERO), edge_u, edge_v }
+        }
+        Shape::Triangle { vertices } => {
+            let vertices = vertices.map(point);
+            if !has_area(vertices[1] - vertices[0], vertices[2] - vertices[0]) {
+                return Err("it has no area".to_owned());
+            }
+            kdtree::Shape::Triangle { vertices }
+        }
+        Shape::Mesh(mesh) => {
+            let (_, tree) = trees.meshes.get(&address(mesh)).ok_or_else(|| trees.reason(&object.shape))?;
+            let world_from_object = about(world, mesh.center, origin);
+            return Ok((kdtree::Shape::Mesh { tree: tree.clone(), world_from_object }, Some(mesh.clone())));
+        }
+        Shape::Spheres(balls) => {
+            even(placement)?;
+            let (_, tree) = trees.balls.get(&address(balls)).ok_or_else(|| trees.reason(&object.shape))?;
+            kdtree::Shape::Spheres { tree: tree.clone(), world_from_object: about(world, balls.center, origin) }
+        }
+    };
+    Ok((shape, None))
+}
+
+fn has_area(u: Vec3, v: Vec3) -> bool {
+    let area = u.as_dvec3().cross(v.as_dvec3()).length();
+    area.is_finite() && area > 0.0
+}
+
+/// A placement for coordinates that count from `center`, seen from `origin`.
+fn about(world: DAffine3, center: DVec3, origin: DVec3) -> Affine3A {
+    let translation = world.transform_point3(center) - origin;
+    Affine3A::from_mat3_translation(world.matrix3.as_mat3(), translation.as_vec3())
+}
+
+/// Which materials a snapshot needs, numbered in the order in which they are first asked for.
+#[derive(Default)]
+struct MaterialTable {
+    ids: HashMap<MaterialKey, MaterialId>,
+    order: Vec<MaterialKey>,
+}
+
+impl MaterialTable {
+    fn id(&mut self, key: MaterialKey) -> MaterialId {
+        *self.ids.entry(key).or_insert_with(|| {
+            self.order.push(key);
+            (self.order.len() - 1) as MaterialId
+        })
+    }
+}
+
+/// The shading under the materials that `table` lists; what they blend is added to it.
+fn shading_of(inputs: &SceneInputs, geometry: &Geometry, table: &mut MaterialTable) -> Shading {
+    let by_entity: HashMap<Entity, &Material> = inputs.materials.iter().map(|m| (m.entity, &m.material)).collect();
+    let mut textures = TextureTable::default();
+    let mut materials = Vec::new();
+    // Blends add to the table while it is walked, so its length is asked anew each time.
+    while materials.len() < table.order.len() {
+        let key = table.order[materials.len()];
+        materials.push(match key {
+            MaterialKey::Grey => material_of(&Material::GREY, table, &mut textures, &by_entity),
+            MaterialKey::Material(entity) => {
+                let material = by_entity.get(&entity).copied().unwrap_or(&Material::GREY);
+                material_of(material, table, &mut textures, &by_entity)
+            }
+            MaterialKey::Light(entity) => render::Material::Emissive {
+                radiance: ColorInput::Constant(inputs.lights.iter().find(|light| light.entity == entity).map_or(
+                    Vec3::ZERO,
+                    // A ball of radiance L and radius r has the radiant intensity π r² L in every direction.
+                    |light| light.light.intensity * (1.0 / (PI * light.light.radius.powi(2))) as f32,
+                )),
+            },
+        });
+    }
+    Shading::build(geometry, materials, textures.textures, inputs.environment.light.clone())
+}
+
+fn material_of(
+    material: &Material,
+    table: &mut MaterialTable,
+    textures: &mut TextureTable,
+    by_entity: &HashMap<Entity, &Material>,
+) -> render::Material {
+    match material {
+        Material::Diffuse { albedo } => render::Material::Diffuse { albedo: textures.color(albedo) },
+        Material::Mirror { reflectance } => render::Material::Mirror { reflectance: textures.color(reflectance) },
+        Material::Metal { alpha, reflectance, fresnel, compensate } => render::Material::Metal {
+            alpha: textures.scalar(alpha),
+            reflectance: textures.color(reflectance),
+            fresnel: *fresnel,
+            compensate: *compensate,
+        },
+        Material::Glass { ior, absorption } => render::Material::Glass { ior: *ior, absorption: *absorption },
+        // What blends itself, or too much, is grey.
+        Material::Blend { .. } if !is_fit(material, by_entity) => {
+            render::Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) }
+        }
+        Material::Blend { weight, a, b } => render::Material::Blend {
+            weight: textures.scalar(weight),
+            a: table.id(MaterialKey::Material(*a)),
+            b: table.id(MaterialKey::Material(*b)),
+        },
+        Material::Emissive { radiance } => render::Material::Emissive { radiance: textures.color(radiance) },
+    }
+}
+
+/// Whether a blend ends in few enough plain materials, at most one of them emissive and then evenly blended.
+fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
+    let (mut lobes, mut glowing, mut textured) = (0, 0, false);
+    let mut open = vec![Some(blend)];
+    // A tree of so many leaves has fewer than twice as many nodes; more steps than that are a circle.
+    for _ in 0..2 * MAX_LOBES {
+        match open.pop() {
+            Some(Some(Material::Blend { weight, a, b })) => {
+                textured |= matches!(weight, Amount::Texture(_));
+                open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
+            }
+            Some(Some(Material::Emissive { .. })) => (lobes, glowing) = (lobes + 1, glowing + 1),
+            Some(_) => lobes += 1,
+            None => break,
+        }
+    }
+    open.is_empty() && lobes <= MAX_LOBES && (glowing == 0 || glowing == 1 && !textured)
+}
+
+/// Each texture once, however many materials use it.
+#[derive(Default)]
+struct TextureTable {
+    ids: HashMap<usize, TextureId>,
+    textures: Vec<render::Texture>,
+}
+
+impl TextureTable {
+    fn id(&mut self, texture: &Arc<SurfaceTexture>) -> TextureId {
+        *self.ids.entry(address(texture)).or_insert_with(|| {
+            self.textures.push(texture.texture.clone());
+            (self.textures.len() - 1) as TextureId
+        })
+    }
+
+    fn color(&mut self, paint: &Paint) -> ColorInput {
+        match paint {
+            Paint::Rgb(rgb) => ColorInput::Constant(*rgb),
+            Paint::Texture(texture) => ColorInput::Texture(self.id(texture)),
+        }
+    }
+
+    fn scalar(&mut self, amount: &Amount) -> ScalarInput {
+        match amount {
+            Amount::Number(value) => ScalarInput::Constant(*value),
+            Amount::Texture(texture) => ScalarInput::Texture(self.id(texture)),
+        }
+    }
+}

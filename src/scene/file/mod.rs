@@ -1,0 +1,79 @@
+//! The scene file: RON text to [`SceneFile`] and back.
+//!
+//! Reading has three steps, each with errors that name line and column: syntax and field names ([`SceneFile::parse`]),
+//! meaning and limits (`check`), and, in the loader, the files that the scene points at.
+//! Metres, right-handed, Y up, linear Rec. 709 colours, degrees for angles; paths relative to the scene file.
+
+mod check;
+mod locate;
+mod parts;
+mod syntax;
+mod value;
+
+pub use check::check_film_size;
+pub use locate::locate;
+pub use parts::{
+    CameraPart, DisplayPart, EnvironmentPart, FilmPart, FresnelPart, IntegratorPart, LightPart, MaterialPart,
+    MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart, ToneCurvePart,
+    TransformPart, WrapPart,
+};
+pub use value::{Amount, Named, Paint, Rgb};
+
+use super::error::{Problem, SceneError};
+use ron::extensions::Extensions;
+use std::path::Path;
+
+impl SceneFile {
+    /// Pixels along one side of a film at most.
+    pub const MAX_FILM_SIDE: u32 = 65_536;
+    /// Pixels of a film at most: its sums take 24 bytes each, 6 GiB in all.
+    pub const MAX_FILM_PIXELS: u64 = 1 << 28;
+    /// Bytes of scene text at most.
+    pub const MAX_TEXT: u64 = 1 << 30;
+    /// Problems that are told with their places; nobody reads more, and each place is looked for in the whole text.
+    const MAX_TOLD: usize = 20;
+    /// Metres: beyond this, squared distances leave the range of `f32`.
+    pub const MAX_COORDINATE: f64 = 1e12;
+    /// Metres: below this, squared sizes leave the range of `f32`.
+    pub const MIN_SIZE: f64 = 1e-12;
+
+    /// Reads and checks the text of a scene file; `name` is what messages call it.
+    pub fn parse(text: &str, name: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let name = name.as_ref();
+        let file: Self = options().from_str(text).map_err(|error| syntax::explain(&error, text, name))?;
+        let found = check::check(&file);
+        let place = |path: &str| Some(locate(text, path));
+        let mut problems: Vec<Problem> = (found.iter().take(Self::MAX_TOLD))
+            .map(|(path, message)| Problem { file: Some(name.into()), at: place(path), message: message.clone() })
+            .collect();
+        if found.len() > problems.len() {
+            let message = format!("and {} more problems", found.len() - problems.len());
+            problems.push(Problem { file: Some(name.into()), at: None, message });
+        }
+        if problems.is_empty() { Ok(file) } else { Err(SceneError { problems }) }
+    }
+
+    /// The text of this scene; reading it gives an equal value.
+    pub fn to_ron(&self) -> String {
+        let pretty = ron::ser::PrettyConfig::new()
+            .depth_limit(3)
+            .indentor("    ")
+            .extensions(Extensions::IMPLICIT_SOME)
+            .compact_arrays(true);
+        // Plain structs, enums, numbers and strings can always be written.
+        options().to_string_pretty(self, pretty).expect("a scene file is plain data") + "\n"
+    }
+
+    /// Everything that is wrong with the values, without places.
+    pub fn check(&self) -> Result<(), SceneError> {
+        let problems: Vec<Problem> = check::check(self)
+            .into_iter()
+            .map(|(path, message)| Problem { file: None, at: None, message: format!("{path}: {message}") })
+            .collect();
+        if problems.is_empty() { Ok(()) } else { Err(SceneError { problems }) }
+    }
+}
+
+fn options() -> ron::Options {
+    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
+}

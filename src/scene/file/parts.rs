@@ -1,0 +1,497 @@
+//! The parts of a scene file, as written. Meaning and limits are checked in `check`.
+
+use super::value::{Amount, Named, Paint, Rgb};
+use crate::render::{Fresnel, Integrator, ToneCurve, Wrap};
+use glam::{DVec2, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Everything that a scene file says. Only `camera` must be given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    pub camera: CameraPart,
+    #[serde(default)]
+    pub film: FilmPart,
+    #[serde(default)]
+    pub integrator: IntegratorPart,
+    /// Longest path in segments; 1 shows emitters alone; unbounded when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_depth: Option<u32>,
+    #[serde(default)]
+    pub display: DisplayPart,
+    #[serde(default)]
+    pub environment: EnvironmentPart,
+    #[serde(default, skip_serializing_if = "Named::is_empty")]
+    pub textures: Named<TexturePart>,
+    #[serde(default, skip_serializing_if = "Named::is_empty")]
+    pub materials: Named<MaterialPart>,
+    #[serde(default)]
+    pub objects: Vec<ObjectPart>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lights: Vec<LightPart>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraPart {
+    pub eye: DVec3,
+    pub look_at: DVec3,
+    #[serde(default = "default_up")]
+    pub up: DVec3,
+    /// Vertical field of view, degrees.
+    #[serde(default = "default_vfov")]
+    pub vfov: f64,
+    /// Metres; a pinhole when neither this nor `f_stop` is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens_radius: Option<f64>,
+    /// Focal length over aperture diameter, for a film 24 mm high.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_stop: Option<f64>,
+    /// Metres from the eye to the focal plane along the view axis; the distance of `look_at` when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus_distance: Option<f64>,
+    /// Straight edges of the aperture; below 3 it is round.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub blades: u32,
+    /// Degrees.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub blade_rotation: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilmPart {
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Default for FilmPart {
+    fn default() -> Self {
+        Self { width: 1280, height: 720 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IntegratorPart {
+    #[default]
+    Path,
+    Phong,
+}
+
+impl From<IntegratorPart> for Integrator {
+    fn from(part: IntegratorPart) -> Self {
+        match part {
+            IntegratorPart::Path => Self::Path,
+            IntegratorPart::Phong => Self::Phong,
+        }
+    }
+}
+
+/// How the picture is shown; no sample depends on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DisplayPart {
+    /// Factors of two.
+    pub exposure: f32,
+    pub tone_curve: ToneCurvePart,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ToneCurvePart {
+    Linear,
+    #[default]
+    Neutral,
+    Filmic,
+}
+
+impl From<ToneCurvePart> for ToneCurve {
+    fn from(part: ToneCurvePart) -> Self {
+        match part {
+            ToneCurvePart::Linear => Self::Linear,
+            ToneCurvePart::Neutral => Self::Neutral,
+            ToneCurvePart::Filmic => Self::Filmic,
+        }
+    }
+}
+
+/// Radiance from infinitely far away.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum EnvironmentPart {
+    #[default]
+    Black,
+    Constant(Rgb),
+    Gradient {
+        zenith: Rgb,
+        horizon: Rgb,
+        ground: Rgb,
+    },
+    /// Equirectangular, HDR, EXR, PNG or JPEG.
+    Image {
+        file: String,
+        #[serde(default = "white")]
+        scale: Rgb,
+        /// Degrees about +Y.
+        #[serde(default, skip_serializing_if = "is_default")]
+        rotate: f64,
+    },
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum TexturePart {
+    /// `squares` along u and v of the surface (0..1), or a metre on an infinite plane; (0, 0) lies in colour `a`.
+    Checker {
+        a: Rgb,
+        b: Rgb,
+        #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
+        squares: DVec2,
+        #[serde(default, skip_serializing_if = "is_default")]
+        offset: DVec2,
+        /// Degrees.
+        #[serde(default, skip_serializing_if = "is_default")]
+        rotate: f64,
+    },
+    Image {
+        file: String,
+        /// How often the picture fits along u and v.
+        #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
+        repeat: DVec2,
+        #[serde(default, skip_serializing_if = "is_default")]
+        offset: DVec2,
+        /// Degrees.
+        #[serde(default, skip_serializing_if = "is_default")]
+        rotate: f64,
+        #[serde(default, skip_serializing_if = "is_default")]
+        wrap: WrapPart,
+        /// Bilinear between texels, or the nearest texel.
+        #[serde(default = "yes")]
+        smooth: bool,
+    },
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WrapPart {
+    #[default]
+    Repeat,
+    Mirror,
+    Clamp,
+}
+
+impl From<WrapPart> for Wrap {
+    fn from(part: WrapPart) -> Self {
+        match part {
+            WrapPart::Repeat => Self::Repeat,
+            WrapPart::Mirror => Self::Mirror,
+            WrapPart::Clamp => Self::Clamp,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum MaterialPart {
+    Diffuse {
+        albedo: Paint,
+    },
+    Mirror {
+        #[serde(default = "white_paint")]
+        reflectance: Paint,
+    },
+    Metal {
+        /// GGX width: the square of the roughness that other programs ask for.
+        alpha: Amount,
+        reflectance: Paint,
+        #[serde(default, skip_serializing_if = "is_default")]
+        fresnel: FresnelPart,
+        #[serde(default, skip_serializing_if = "is_default")]
+        compensate: bool,
+    },
+    Glass {
+        #[serde(default = "default_ior")]
+        ior: f32,
+        /// Per metre.
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: Rgb,
+    },
+    Blend {
+        weight: Amount,
+        a: String,
+        b: String,
+    },
+    Emissive {
+        radiance: Paint,
+    },
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FresnelPart {
+    #[default]
+    Constant,
+    Schlick,
+}
+
+impl From<FresnelPart> for Fresnel {
+    fn from(part: FresnelPart) -> Self {
+        match part {
+            FresnelPart::Constant => Self::Constant,
+            FresnelPart::Schlick => Self::Schlick,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ObjectPart {
+    Sphere {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        #[serde(default, skip_serializing_if = "is_default")]
+        center: DVec3,
+        radius: f64,
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+    /// Infinite.
+    Plane {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        #[serde(default, skip_serializing_if = "is_default")]
+        point: DVec3,
+        #[serde(default = "default_up")]
+        normal: DVec3,
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+    /// A parallelogram; its front looks along `edge_u` × `edge_v`.
+    Quad {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        #[serde(default, skip_serializing_if = "is_default")]
+        corner: DVec3,
+        edge_u: DVec3,
+        edge_v: DVec3,
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+    Triangle {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        vertices: [DVec3; 3],
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+    Mesh {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        source: MeshSourcePart,
+        /// How normals between vertices are found.
+        #[serde(default, skip_serializing_if = "is_default")]
+        shading: MeshShadingPart,
+        /// Share of the faces to keep, 0..1.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        simplify: Option<f64>,
+        /// For every slot; without it the materials of the file (MTL) are used.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        material: Option<String>,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+    /// Many balls, one material.
+    Spheres {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        centers: Vec<DVec3>,
+        radii: RadiiPart,
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+}
+
+impl ObjectPart {
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Sphere { name, .. }
+            | Self::Plane { name, .. }
+            | Self::Quad { name, .. }
+            | Self::Triangle { name, .. }
+            | Self::Mesh { name, .. }
+            | Self::Spheres { name, .. } => name.as_deref(),
+        }
+    }
+
+    pub fn material(&self) -> Option<&str> {
+        match self {
+            Self::Sphere { material, .. }
+            | Self::Plane { material, .. }
+            | Self::Quad { material, .. }
+            | Self::Triangle { material, .. }
+            | Self::Spheres { material, .. } => Some(material),
+            Self::Mesh { material, .. } => material.as_deref(),
+        }
+    }
+
+    pub fn transform(&self) -> &TransformPart {
+        match self {
+            Self::Sphere { transform, .. }
+            | Self::Plane { transform, .. }
+            | Self::Quad { transform, .. }
+            | Self::Triangle { transform, .. }
+            | Self::Mesh { transform, .. }
+            | Self::Spheres { transform, .. } => transform,
+        }
+    }
+}
+
+/// Where the triangles of a mesh come from.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MeshSourcePart {
+    /// Wavefront OBJ, relative to the scene file.
+    Obj(String),
+    /// A mesh that the program makes.
+    Builtin(String),
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MeshShadingPart {
+    /// Normals of the file where it has them, else smooth.
+    #[default]
+    Auto,
+    /// Area-weighted vertex normals, whatever the file says.
+    Smooth,
+    Flat,
+}
+
+/// One radius for all balls or one for each.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RadiiPart {
+    All(f64),
+    Each(Vec<f64>),
+}
+
+/// From the object's own space to the world: scale, then rotate, then translate; or a matrix.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TransformPart {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub translate: Option<DVec3>,
+    /// Degrees about X, then Y, then Z, the axes standing still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<DVec3>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<ScalePart>,
+    /// Three rows of four: the last column translates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<[[f64; 4]; 3]>,
+}
+
+/// One factor or one an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScalePart(pub DVec3);
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum LightPart {
+    /// A small glowing ball that shines evenly into all directions.
+    Point {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        position: DVec3,
+        /// Radiant intensity, W·sr⁻¹.
+        intensity: Rgb,
+        /// Metres; shadows are as soft as the ball is large.
+        #[serde(default = "default_light_radius")]
+        radius: f64,
+    },
+}
+
+impl<'de> Deserialize<'de> for ScalePart {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NumberOrThree;
+        impl<'de> serde::de::Visitor<'de> for NumberOrThree {
+            type Value = DVec3;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("a factor or (x, y, z)")
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<DVec3, E> {
+                Ok(DVec3::splat(value))
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<DVec3, E> {
+                Ok(DVec3::splat(value as f64))
+            }
+
+            fn visit_u64<E>(self, value: u64) -> Result<DVec3, E> {
+                Ok(DVec3::splat(value as f64))
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<DVec3, A::Error> {
+                let mut next =
+                    |i| seq.next_element::<f64>()?.ok_or_else(|| serde::de::Error::invalid_length(i, &"three factors"));
+                Ok(DVec3::new(next(0)?, next(1)?, next(2)?))
+            }
+        }
+        deserializer.deserialize_any(NumberOrThree).map(Self)
+    }
+}
+
+impl Serialize for ScalePart {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let DVec3 { x, y, z } = self.0;
+        if x == y && y == z { serializer.serialize_f64(x) } else { (x, y, z).serialize(serializer) }
+    }
+}
+
+fn default_up() -> DVec3 {
+    DVec3::Y
+}
+
+fn default_vfov() -> f64 {
+    40.0
+}
+
+fn default_ior() -> f32 {
+    1.5
+}
+
+fn default_light_radius() -> f64 {
+    0.01
+}
+
+fn white() -> Rgb {
+    Rgb(Vec3::ONE)
+}
+
+fn white_paint() -> Paint {
+    Paint::grey(1.0)
+}
+
+fn one_by_one() -> DVec2 {
+    DVec2::ONE
+}
+
+fn is_one_by_one(value: &DVec2) -> bool {
+    *value == DVec2::ONE
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

@@ -1,0 +1,54 @@
+//! Errors of the parser in words for people: what stands there, what was expected, the nearest known name.
+
+use crate::scene::error::{SceneError, suggestion};
+use ron::error::{Error, SpannedError};
+use std::path::Path;
+
+/// Turns a parser's error into a message with line and column.
+pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
+    let at = (error.span.start.line.max(1), error.span.start.col.max(1));
+    let of = |outer: &Option<String>| outer.as_ref().map(|name| format!(" of `{}`", plain(name))).unwrap_or_default();
+    let message = match &error.code {
+        Error::NoSuchStructField { expected, found, outer } => {
+            format!("unknown field `{found}`{}{}", of(outer), suggestion(found, expected.iter().copied()))
+        }
+        Error::NoSuchEnumVariant { expected, found, .. } => {
+            format!("unknown kind `{found}`{}", suggestion(found, expected.iter().copied()))
+        }
+        Error::MissingStructField { field, outer } => format!("field `{field}`{} is missing", of(outer)),
+        Error::DuplicateStructField { field, outer } => {
+            format!("field `{field}`{} is given twice: remove one", of(outer))
+        }
+        Error::ExceededRecursionLimit => "brackets are nested too deeply".to_owned(),
+        Error::Eof => "the text ends too early: a bracket or a quote is not closed".to_owned(),
+        Error::TrailingCharacters => "the scene ends here, but more text follows".to_owned(),
+        other => lower_first(&other.to_string()),
+    };
+    // The parser stands behind the word it complains about.
+    let at = match &error.code {
+        Error::NoSuchStructField { found, .. } | Error::NoSuchEnumVariant { found, .. } => word_before(text, at, found),
+        _ => at,
+    };
+    SceneError::at(file, at, message)
+}
+
+/// The place where `word` starts, if the parser's place lies within or right behind it.
+fn word_before(text: &str, (line, column): (usize, usize), word: &str) -> (usize, usize) {
+    let Some(content) = text.lines().nth(line - 1) else { return (line, column) };
+    let chars: Vec<char> = content.chars().collect();
+    let word: Vec<char> = word.chars().collect();
+    (0..column.min(chars.len()))
+        .rev()
+        .find(|&start| chars[start..].starts_with(&word))
+        .map_or((line, column), |start| (line, start + 1))
+}
+
+/// Our own names for the parts: `CameraPart` is the camera.
+fn plain(name: &str) -> String {
+    name.trim_end_matches("Part").to_lowercase()
+}
+
+fn lower_first(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map(|first| first.to_lowercase().collect::<String>() + chars.as_str()).unwrap_or_default()
+}

@@ -1,0 +1,221 @@
+//! Small values of a scene file that may be written in more than one way.
+
+use glam::Vec3;
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
+use serde::ser::{SerializeMap, SerializeTuple};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+use std::marker::PhantomData;
+
+/// A colour, linear Rec. 709: `0.5` for a grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Paint {
+    Rgb(Vec3),
+    Texture(String),
+}
+
+/// A number, or the name of a texture whose red channel is taken.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Amount {
+    Number(f32),
+    Texture(String),
+}
+
+/// A colour that cannot be a texture: `0.5` or `(0.8, 0.2, 0.1)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rgb(pub Vec3);
+
+impl Paint {
+    pub const fn grey(value: f32) -> Self {
+        Self::Rgb(Vec3::splat(value))
+    }
+
+    pub const fn rgb(r: f32, g: f32, b: f32) -> Self {
+        Self::Rgb(Vec3::new(r, g, b))
+    }
+}
+
+/// Reads whatever stands there and lets the types below take what they know.
+struct AnyValue {
+    textures: bool,
+    colours: bool,
+}
+
+enum Found {
+    Number(f32),
+    Rgb(Vec3),
+    Name(String),
+}
+
+impl<'de> Visitor<'de> for AnyValue {
+    type Value = Found;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match (self.colours, self.textures) {
+            (true, true) => "a colour: a number, (red, green, blue) or the \"name\" of a texture",
+            (true, false) => "a colour: a number or (red, green, blue)",
+            (false, _) => "a number or the \"name\" of a texture",
+        })
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Found, E> {
+        Ok(Found::Number(value as f32))
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Found, E> {
+        Ok(Found::Number(value as f32))
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Found, E> {
+        Ok(Found::Number(value as f32))
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Found, E> {
+        if self.textures {
+            Ok(Found::Name(value.to_owned()))
+        } else {
+            Err(E::invalid_type(serde::de::Unexpected::Str(value), &self))
+        }
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Found, A::Error> {
+        if !self.colours {
+            return Err(A::Error::invalid_type(serde::de::Unexpected::Seq, &self));
+        }
+        let mut rgb = [0.0; 3];
+        for (i, channel) in rgb.iter_mut().enumerate() {
+            *channel = seq.next_element()?.ok_or_else(|| A::Error::invalid_length(i, &self))?;
+        }
+        if seq.next_element::<f32>()?.is_some() {
+            return Err(A::Error::invalid_length(4, &self));
+        }
+        Ok(Found::Rgb(Vec3::from_array(rgb)))
+    }
+}
+
+impl<'de> Deserialize<'de> for Paint {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: true })? {
+            Found::Number(value) => Self::grey(value),
+            Found::Rgb(rgb) => Self::Rgb(rgb),
+            Found::Name(name) => Self::Texture(name),
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Amount {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: false })? {
+            Found::Name(name) => Self::Texture(name),
+            Found::Number(value) | Found::Rgb(Vec3 { x: value, .. }) => Self::Number(value),
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Rgb {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match deserializer.deserialize_any(AnyValue { textures: false, colours: true })? {
+            Found::Number(value) => Ok(Self(Vec3::splat(value))),
+            Found::Rgb(rgb) => Ok(Self(rgb)),
+            Found::Name(name) => {
+                Err(D::Error::invalid_type(serde::de::Unexpected::Str(&name), &"a colour without texture"))
+            }
+        }
+    }
+}
+
+impl Serialize for Rgb {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Vec3 { x, y, z } = self.0;
+        if x == y && y == z {
+            return serializer.serialize_f32(x);
+        }
+        let mut tuple = serializer.serialize_tuple(3)?;
+        for channel in [x, y, z] {
+            tuple.serialize_element(&channel)?;
+        }
+        tuple.end()
+    }
+}
+
+impl Serialize for Paint {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Rgb(rgb) => Rgb(*rgb).serialize(serializer),
+            Self::Texture(name) => serializer.serialize_str(name),
+        }
+    }
+}
+
+impl Serialize for Amount {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Number(value) => serializer.serialize_f32(*value),
+            Self::Texture(name) => serializer.serialize_str(name),
+        }
+    }
+}
+
+/// Things with names, in the order of the file; a name given twice is refused, not silently replaced.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Named<T>(pub Vec<(String, T)>);
+
+impl<T> Named<T> {
+    pub fn get(&self, name: &str) -> Option<&T> {
+        self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
+    }
+
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(|(name, _)| name.as_str())
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &T)> {
+        self.0.iter().map(|(name, value)| (name.as_str(), value))
+    }
+}
+
+impl<T> Default for Named<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Named<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
+            type Value = Named<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("named entries: { \"name\": value, … }")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Named<T>, A::Error> {
+                let mut entries = Vec::new();
+                let mut seen = std::collections::HashSet::new();
+                while let Some(name) = map.next_key::<String>()? {
+                    if !seen.insert(name.clone()) {
+                        return Err(A::Error::custom(format!("`{name}` is defined twice: rename or remove one")));
+                    }
+                    entries.push((name, map.next_value()?));
+                }
+                Ok(Named(entries))
+            }
+        }
+        deserializer.deserialize_map(Entries(PhantomData))
+    }
+}
+
+impl<T: Serialize> Serialize for Named<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, value) in &self.0 {
+            map.serialize_entry(name, value)?;
+        }
+        map.end()
+    }
+}

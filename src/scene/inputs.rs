@@ -1,0 +1,147 @@
+//! What the picture depends on, copied out of the world in a fixed order.
+
+use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape};
+use super::placement::Placement;
+use super::view::{Lens, Projection, View};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, Query, Res, World};
+use bevy_ecs::system::{SystemParam, SystemState};
+use std::collections::HashSet;
+
+/// All that a snapshot is built from. Cheap to copy: meshes, clouds and pictures are shared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneInputs {
+    pub objects: Vec<ObjectInput>,
+    /// Those that the objects use, directly or in a blend.
+    pub materials: Vec<MaterialInput>,
+    pub lights: Vec<LightInput>,
+    /// The first camera.
+    pub camera: Option<CameraInput>,
+    pub environment: SceneEnvironment,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectInput {
+    pub entity: Entity,
+    pub name: Option<String>,
+    pub shape: Shape,
+    pub placement: Placement,
+    pub slots: Vec<Entity>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialInput {
+    pub entity: Entity,
+    pub name: Option<String>,
+    pub material: Material,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightInput {
+    pub entity: Entity,
+    pub name: Option<String>,
+    pub light: PointLight,
+    pub placement: Placement,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraInput {
+    pub entity: Entity,
+    pub view: View,
+    pub projection: Projection,
+    pub lens: Lens,
+}
+
+type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
+
+/// Read access to everything that the picture depends on.
+#[derive(SystemParam)]
+pub struct SceneQueries<'w, 's> {
+    objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
+    materials: Query<'w, 's, Ranked<'static, &'static Material>>,
+    lights: Query<'w, 's, Ranked<'static, (&'static PointLight, &'static Placement)>>,
+    cameras: Query<'w, 's, Ranked<'static, (&'static View, &'static Projection, &'static Lens)>>,
+    environment: Option<Res<'w, SceneEnvironment>>,
+}
+
+impl SceneQueries<'_, '_> {
+    pub fn collect(&self) -> SceneInputs {
+        let text = |name: Option<&Name>| name.map(|name| name.as_str().to_owned());
+        let objects = in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {
+            entity,
+            name: text(name),
+            shape: shape.clone(),
+            placement: *placement,
+            slots: slots.0.clone(),
+        });
+        let used = self.used_materials(&objects);
+        let materials = self.materials.iter().filter(|(entity, ..)| used.contains(entity));
+        SceneInputs {
+            materials: in_order(materials, |entity, name, material| MaterialInput {
+                entity,
+                name: text(name),
+                material: material.clone(),
+            }),
+            objects,
+            lights: in_order(self.lights.iter(), |entity, name, (light, placement)| LightInput {
+                entity,
+                name: text(name),
+                light: *light,
+                placement: *placement,
+            }),
+            camera: self.cameras.iter().min_by_key(|(entity, rank, ..)| order(*rank, *entity)).map(
+                |(entity, _, _, (view, projection, lens))| CameraInput {
+                    entity,
+                    view: *view,
+                    projection: *projection,
+                    lens: *lens,
+                },
+            ),
+            environment: self.environment(),
+        }
+    }
+
+    /// The light around everything; none when the resource is missing.
+    pub fn environment(&self) -> SceneEnvironment {
+        self.environment.as_deref().cloned().unwrap_or_default()
+    }
+
+    /// The materials that objects name, and those that these are blended of.
+    fn used_materials(&self, objects: &[ObjectInput]) -> HashSet<Entity> {
+        let mut used = HashSet::new();
+        let mut open: Vec<Entity> = objects.iter().flat_map(|object| object.slots.iter().copied()).collect();
+        while let Some(entity) = open.pop() {
+            if used.insert(entity)
+                && let Ok((.., Material::Blend { a, b, .. })) = self.materials.get(entity)
+            {
+                open.extend([*a, *b]);
+            }
+        }
+        used
+    }
+}
+
+impl SceneInputs {
+    /// Reads a world outside of a schedule.
+    pub fn of(world: &mut World) -> Self {
+        SystemState::<SceneQueries>::new(world)
+            .get(world)
+            .expect("queries of optional things are always valid")
+            .collect()
+    }
+}
+
+/// The order of the file first, then of entities: the same in every process that does the same.
+fn order(rank: Option<&Ordinal>, entity: Entity) -> (u32, Entity) {
+    (rank.map_or(u32::MAX, |rank| rank.0), entity)
+}
+
+fn in_order<'a, T, U>(
+    items: impl Iterator<Item = Ranked<'a, T>>,
+    make: impl Fn(Entity, Option<&'a Name>, T) -> U,
+) -> Vec<U> {
+    let mut ranked: Vec<_> =
+        items.map(|(entity, rank, name, item)| (order(rank, entity), make(entity, name, item))).collect();
+    ranked.sort_by_key(|(key, _)| *key);
+    ranked.into_iter().map(|(_, item)| item).collect()
+}

@@ -1,0 +1,289 @@
+//! From a name or a path to everything a scene needs: text, meshes, pictures, trees. Runs on any thread.
+
+use super::builtin::{BUILTIN_SCENES, builtin_text};
+use super::components::{Balls, Shape};
+use super::error::{Problem, SceneError, suggestion};
+use super::extract::Trees;
+use super::file::{
+    EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, locate,
+};
+use super::meshes::{LoadedMesh, load_mesh, plain_io};
+use super::picture::read_picture;
+use super::showcase;
+use crate::render::ImageTexture;
+use std::collections::HashMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What to open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SceneSource {
+    /// One of [`BUILTIN_SCENES`].
+    Builtin(String),
+    /// A scene file (RON).
+    Scene(PathBuf),
+    /// A model (OBJ), to be framed.
+    Model(PathBuf),
+}
+
+/// Which axis of a model points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpAxis {
+    Y,
+    Z,
+}
+
+/// How to load.
+#[derive(Clone, Copy, Default)]
+pub struct LoadOptions<'a> {
+    /// For models; guessed from how the model would stand when not given.
+    pub up: Option<UpAxis>,
+    /// Width over height of the picture that a model is framed for; 16:9 when not given.
+    pub aspect: Option<f64>,
+    /// Told what is being done now.
+    pub progress: Option<&'a (dyn Fn(&str) + Sync)>,
+}
+
+impl LoadOptions<'_> {
+    fn say(&self, text: &str) {
+        if let Some(progress) = self.progress {
+            progress(text);
+        }
+    }
+}
+
+/// A scene with everything it needs, ready to be spawned into a world.
+#[derive(Clone, Debug)]
+pub struct LoadedScene {
+    pub source: SceneSource,
+    pub file: SceneFile,
+    /// What the paths in `file` count from.
+    pub folder: PathBuf,
+    /// One an object of `file`, `None` for what is not a mesh.
+    pub(super) meshes: Vec<Option<LoadedMesh>>,
+    /// One an object of `file`, `None` for what is not a cloud.
+    pub(super) balls: Vec<Option<Arc<Balls>>>,
+    /// By the path in `file`.
+    pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
+    pub trees: Trees,
+    pub warnings: Vec<String>,
+    /// Reading and parsing.
+    pub load_seconds: f64,
+    /// Building trees.
+    pub build_seconds: f64,
+}
+
+impl SceneSource {
+    /// What a word on the command line means: a built-in name, unless a file of that name exists.
+    ///
+    /// # Errors
+    /// When it is neither a built-in scene nor a file that can be opened here.
+    pub fn parse(word: &str) -> Result<Self, SceneError> {
+        let path = Path::new(word);
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if !path.is_file() && builtin_text(word).is_some() {
+            return Ok(Self::Builtin(word.to_owned()));
+        }
+        match extension.as_deref() {
+            Some("ron") => Ok(Self::Scene(path.to_path_buf())),
+            Some("obj") => Ok(Self::Model(path.to_path_buf())),
+            _ if path.is_dir() => Err(SceneError::in_file(path, "is a folder: name a scene (.ron) or a model (.obj)")),
+            _ if path.exists() => {
+                Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)"))
+            }
+            _ => {
+                let hint = suggestion(word, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
+                Err(SceneError::in_file(path, format!("neither a file nor a built-in scene{hint}")))
+            }
+        }
+    }
+
+    /// What messages and titles call it.
+    pub fn title(&self) -> String {
+        match self {
+            Self::Builtin(name) => name.clone(),
+            Self::Scene(path) | Self::Model(path) => path.display().to_string(),
+        }
+    }
+}
+
+/// Reads a scene and all it points at, and builds its trees.
+pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
+    options.say(&format!("reading {}", source.title()));
+    let start = Instant::now();
+    let mut scene = match source {
+        SceneSource::Builtin(name) => {
+            let text = builtin_text(name).ok_or_else(|| {
+                let hint = suggestion(name, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
+                SceneError::new(format!("there is no built-in scene `{name}`{hint}"))
+            })?;
+            resolve(source, SceneFile::parse(text, name)?, text, PathBuf::new(), options)?
+        }
+        SceneSource::Scene(path) => {
+            let text = read_text(path)?;
+            let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+            resolve(source, SceneFile::parse(&text, path)?, &text, folder, options)?
+        }
+        SceneSource::Model(path) => {
+            let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+            let mesh_source = MeshSourcePart::Obj(file);
+            let mesh = load_mesh(&mesh_source, MeshShadingPart::Auto, None, &folder)?;
+            let file = showcase::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
+            let mut scene = LoadedScene::empty(source, file, folder);
+            scene.meshes = scene.file.objects.iter().map(|_| None).collect();
+            scene.balls = scene.file.objects.iter().map(|_| None).collect();
+            scene.warnings.extend(mesh.warnings.iter().cloned());
+            let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
+            scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
+            scene.add_mesh_pictures(options);
+            scene
+        }
+    };
+    scene.load_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    scene.build_trees(options)?;
+    scene.build_seconds = start.elapsed().as_secs_f64();
+    Ok(scene)
+}
+
+/// Loads what the objects, textures and environment of a checked file point at.
+fn resolve(
+    source: &SceneSource,
+    file: SceneFile,
+    text: &str,
+    folder: PathBuf,
+    options: &LoadOptions,
+) -> Result<LoadedScene, SceneError> {
+    let mut scene = LoadedScene::empty(source, file, folder);
+    let title = PathBuf::from(source.title());
+    let mut problems = Vec::new();
+    // An error inside a file that the scene points at names that file; the scene's line is told beside it.
+    let mut note = |path: String, error: SceneError| {
+        for problem in error.problems {
+            let at = Some(locate(text, &path));
+            problems.push(Problem { file: Some(title.clone()), at, message: problem.to_string() });
+        }
+    };
+    let mut known: HashMap<(MeshSourcePart, MeshShadingPart, Option<u64>), LoadedMesh> = HashMap::new();
+    for (i, object) in scene.file.objects.iter().enumerate() {
+        let (mut mesh, mut balls) = (None, None);
+        match object {
+            ObjectPart::Mesh { source, shading, simplify, .. } => {
+                let key = (source.clone(), *shading, simplify.map(f64::to_bits));
+                if let Some(loaded) = known.get(&key) {
+                    mesh = Some(loaded.clone());
+                } else {
+                    let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = source;
+                    options.say(&format!("reading {name}"));
+                    match load_mesh(source, *shading, *simplify, &scene.folder) {
+                        Ok(loaded) => {
+                            scene.warnings.extend(loaded.warnings.iter().cloned());
+                            mesh = Some(known.entry(key).or_insert(loaded).clone());
+                        }
+                        Err(error) => note(format!("objects/{i}/source"), error),
+                    }
+                }
+            }
+            ObjectPart::Spheres { centers, radii, .. } => {
+                balls = Some(Arc::new(match radii {
+                    RadiiPart::All(radius) => Balls::new(centers, centers.iter().map(|_| *radius)),
+                    RadiiPart::Each(radii) => Balls::new(centers, radii.iter().copied()),
+                }));
+            }
+            _ => {}
+        }
+        scene.meshes.push(mesh);
+        scene.balls.push(balls);
+    }
+    let mut wanted: Vec<(String, String)> = Vec::new();
+    for (name, texture) in scene.file.textures.iter() {
+        if let TexturePart::Image { file, .. } = texture {
+            wanted.push((format!("textures/{name}/file"), file.clone()));
+        }
+    }
+    if let EnvironmentPart::Image { file, .. } = &scene.file.environment {
+        wanted.push(("environment/file".to_owned(), file.clone()));
+    }
+    for (place, file) in wanted {
+        let path = scene.folder.join(&file);
+        if let Err(error) = scene.add_picture(&file, &path, options) {
+            note(place, error);
+        }
+    }
+    scene.add_mesh_pictures(options);
+    if problems.is_empty() { Ok(scene) } else { Err(SceneError { problems }) }
+}
+
+impl LoadedScene {
+    fn empty(source: &SceneSource, file: SceneFile, folder: PathBuf) -> Self {
+        Self {
+            source: source.clone(),
+            file,
+            folder,
+            meshes: Vec::new(),
+            balls: Vec::new(),
+            pictures: HashMap::new(),
+            trees: Trees::default(),
+            warnings: Vec::new(),
+            load_seconds: 0.0,
+            build_seconds: 0.0,
+        }
+    }
+
+    fn add_picture(&mut self, name: &str, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
+        if self.pictures.contains_key(name) {
+            return Ok(());
+        }
+        options.say(&format!("reading {name}"));
+        let (picture, warning) = read_picture(path).map_err(|reason| SceneError::in_file(path, reason))?;
+        self.warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
+        self.pictures.insert(name.to_owned(), Arc::new(picture));
+        Ok(())
+    }
+
+    /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
+    fn add_mesh_pictures(&mut self, options: &LoadOptions) {
+        let textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
+        let files: Vec<(String, PathBuf)> = textures.map(|(name, _, file)| (name.clone(), file.clone())).collect();
+        for (name, path) in files {
+            if let Err(error) = self.add_picture(&name, &path, options) {
+                self.warnings.push(format!("{error}; the surface is left plain"));
+            }
+        }
+    }
+
+    fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
+        let shapes = (self.meshes.iter().flatten().map(|mesh| Shape::Mesh(mesh.mesh.clone())))
+            .chain(self.balls.iter().flatten().map(|balls| Shape::Spheres(balls.clone())));
+        let shapes: Vec<Shape> = shapes.collect();
+        for shape in shapes {
+            if !self.trees.has(&shape) {
+                options.say(&match &shape {
+                    Shape::Mesh(mesh) => format!("building a tree over {} triangles", mesh.triangles.len()),
+                    Shape::Spheres(balls) => format!("building a tree over {} balls", balls.centers.len()),
+                    _ => String::new(),
+                });
+            }
+            self.trees.add(&shape).map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
+        }
+        Ok(())
+    }
+}
+
+/// The text of a scene file, within its limit.
+fn read_text(path: &Path) -> Result<String, SceneError> {
+    let fail = |error: std::io::Error| SceneError::in_file(path, format!("cannot be read: {}", plain_io(&error)));
+    let file = std::fs::File::open(path).map_err(fail)?;
+    if file.metadata().map_err(fail)?.is_dir() {
+        return Err(SceneError::in_file(path, "cannot be read: it is a folder"));
+    }
+    let mut text = String::new();
+    file.take(SceneFile::MAX_TEXT + 1).read_to_string(&mut text).map_err(fail)?;
+    if text.len() as u64 > SceneFile::MAX_TEXT {
+        return Err(SceneError::in_file(path, format!("is longer than {} bytes", SceneFile::MAX_TEXT)));
+    }
+    Ok(text)
+}

@@ -1,0 +1,196 @@
+//! The meshes that a scene names: from OBJ files or made by the program, shaded as asked, with their own materials.
+
+use super::error::SceneError;
+use super::file::{MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
+use super::obj::{ImportedMaterial, ObjError, ObjNormals, ObjOptions, load_obj_with};
+use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
+use glam::{DVec2, DVec3, Vec3};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What `builtin("…")` may name.
+pub const BUILTIN_NAMES: &[&str] = &[
+    "asteroid",
+    "blob-in-bowl",
+    "bored-block",
+    "cube",
+    "icosphere",
+    "room",
+    "serpent-knot",
+    "slivers",
+    "terrain",
+    "torus",
+];
+
+/// The mesh of that name, and the crease angle, radians, beyond which its edges are hard.
+fn builtin_mesh(name: &str) -> Option<(Mesh, Option<f32>)> {
+    let sharp = Some(40_f32.to_radians());
+    Some(match name {
+        "asteroid" => (procedural::displaced_sphere(&procedural::DisplacedSphere::default()), None),
+        "blob-in-bowl" => (procedural::blob_in_bowl(), sharp),
+        "bored-block" => (procedural::bored_block(64), sharp),
+        "cube" => (procedural::cuboid(DVec3::ONE), sharp),
+        "icosphere" => (procedural::icosphere(32), None),
+        "room" => (procedural::room(), sharp),
+        "serpent-knot" => (procedural::serpent_knot(&procedural::SerpentKnot::default()), None),
+        "slivers" => (procedural::slivers(10_000, 1), sharp),
+        "terrain" => (procedural::terrain(&procedural::Terrain::default()), None),
+        "torus" => (procedural::torus(1.0, 0.35, 192, 64), None),
+        _ => return None,
+    })
+}
+
+/// A mesh and the materials that its own file gives its slots.
+#[derive(Clone, Debug)]
+pub struct LoadedMesh {
+    pub mesh: Arc<Mesh>,
+    /// One a slot; empty when the file has none.
+    pub slots: Vec<(String, MaterialPart)>,
+    /// Textures that `slots` name, and where their pictures lie.
+    pub textures: Vec<(String, TexturePart, PathBuf)>,
+    pub warnings: Vec<String>,
+}
+
+/// Reads or makes a mesh, then simplifies and shades it as asked.
+pub fn load_mesh(
+    source: &MeshSourcePart,
+    shading: MeshShadingPart,
+    simplify: Option<f64>,
+    folder: &Path,
+) -> Result<LoadedMesh, SceneError> {
+    match source {
+        MeshSourcePart::Obj(file) => read_obj(&folder.join(file), shading, simplify),
+        MeshSourcePart::Builtin(name) => {
+            let (mesh, crease) =
+                builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?;
+            let mesh = shaded(simplified(mesh, simplify)?, shading, crease);
+            Ok(LoadedMesh { mesh: Arc::new(mesh), slots: Vec::new(), textures: Vec::new(), warnings: Vec::new() })
+        }
+    }
+}
+
+fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Result<LoadedMesh, SceneError> {
+    let read = |normals| {
+        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
+            // The reader's own words for a missing file speak of an error number.
+            ObjError::Read { path, source } => {
+                SceneError::in_file(path, format!("cannot be read: {}", plain_io(&source)))
+            }
+            other => SceneError::new(other.to_string()),
+        })
+    };
+    let computed = ObjOptions::default().normals;
+    let mut imported = read(if shading == MeshShadingPart::Auto { computed } else { ObjNormals::Ignore })?;
+    if shading == MeshShadingPart::Auto {
+        // Normals that were computed would hold simplification back at every crease; they are computed after it.
+        if simplify.is_some() && !imported.normals_from_file {
+            imported.mesh = read(ObjNormals::Ignore)?.mesh;
+        }
+        imported.mesh = simplified(imported.mesh, simplify)?;
+        if imported.mesh.normals.is_empty()
+            && let ObjNormals::FileOrComputed { crease_angle } = computed
+        {
+            imported.mesh = shaded(imported.mesh, shading, Some(crease_angle));
+        }
+    } else {
+        imported.mesh = shaded(simplified(imported.mesh, simplify)?, shading, None);
+    }
+    let mesh = Arc::new(imported.mesh);
+    let mut loaded = LoadedMesh { mesh, slots: Vec::new(), textures: Vec::new(), warnings: imported.warnings };
+    // A file without any material leaves the choice to whoever uses it.
+    if imported.materials.iter().any(|material| !material.name.is_empty()) {
+        for material in &imported.materials {
+            let part = loaded.material(material);
+            loaded.slots.push((material.name.clone(), part));
+        }
+    }
+    Ok(loaded)
+}
+
+fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
+    match ratio {
+        Some(ratio) if ratio < 1.0 => {
+            simplify::simplify(&mesh, simplify::Method::default(), simplify::Target::Ratio(ratio))
+                .map_err(|error| SceneError::new(format!("the mesh cannot be simplified: {error}")))
+        }
+        _ => Ok(mesh),
+    }
+}
+
+/// `crease`: radians beyond which an edge is hard in automatic shading; `None` smooths every edge.
+fn shaded(mesh: Mesh, shading: MeshShadingPart, crease: Option<f32>) -> Mesh {
+    match shading {
+        MeshShadingPart::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
+        MeshShadingPart::Smooth => mesh.with_vertex_normals(),
+        MeshShadingPart::Flat => mesh.flat(),
+    }
+}
+
+impl LoadedMesh {
+    /// What an MTL material means here. The exponent of its highlight is not modelled; illumination models 3 and 5
+    /// are mirrors, 4, 6, 7 and 9 are glass.
+    fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
+        let share = |color: Vec3| Paint::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
+        let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);
+        if glows || material.emission_texture.is_some() {
+            let radiance = material.emission.unwrap_or(Vec3::ONE).max(Vec3::ZERO);
+            let radiance = self.texture(material.emission_texture.as_ref()).unwrap_or(Paint::Rgb(radiance));
+            return MaterialPart::Emissive { radiance };
+        }
+        match material.illumination_model {
+            Some(3 | 5) => MaterialPart::Mirror { reflectance: share(material.specular.unwrap_or(Vec3::splat(0.9))) },
+            Some(4 | 6 | 7 | 9) => MaterialPart::Glass {
+                ior: material.ior.filter(|ior| *ior > 0.0).unwrap_or(1.5),
+                absorption: Rgb::default(),
+            },
+            _ => {
+                let plain = share(material.diffuse.unwrap_or(Vec3::splat(0.6)));
+                MaterialPart::Diffuse { albedo: self.texture(material.diffuse_texture.as_ref()).unwrap_or(plain) }
+            }
+        }
+    }
+
+    fn texture(&mut self, file: Option<&PathBuf>) -> Option<Paint> {
+        let file = file?;
+        let name = file.display().to_string();
+        if !self.textures.iter().any(|(known, ..)| *known == name) {
+            let part = TexturePart::Image {
+                file: name.clone(),
+                repeat: DVec2::ONE,
+                offset: DVec2::ZERO,
+                rotate: 0.0,
+                wrap: WrapPart::Repeat,
+                smooth: true,
+            };
+            self.textures.push((name.clone(), part, file.clone()));
+        }
+        Some(Paint::Texture(name))
+    }
+}
+
+/// What went wrong with a file, in plain words.
+pub fn plain_io(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        io::ErrorKind::InvalidData => "it is not UTF-8 text".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_builtin_mesh_can_be_had() {
+        for name in BUILTIN_NAMES {
+            let source = MeshSourcePart::Builtin((*name).to_owned());
+            let loaded = load_mesh(&source, MeshShadingPart::Flat, None, Path::new("")).unwrap();
+            loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+        assert!(BUILTIN_NAMES.is_sorted());
+    }
+}

@@ -1,0 +1,43 @@
+use crate::mesh::MeshError;
+use std::path::PathBuf;
+
+/// Why an OBJ file could not be loaded: which file, which line, what was expected.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjError {
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write { path: PathBuf, source: std::io::Error },
+    #[error("{}: is not a regular file", path.display())]
+    NotAFile { path: PathBuf },
+    #[error("{}: has {bytes} bytes, more than the limit of {limit}", path.display())]
+    TooLarge { path: PathBuf, bytes: u64, limit: u64 },
+    #[error("{}: has no faces (lines that start with `f`): is it a Wavefront OBJ file?", path.display())]
+    NoFaces { path: PathBuf },
+    #[error("{}:{line}: {problem}", path.display())]
+    Line { path: PathBuf, line: usize, problem: LineProblem },
+    #[error("{}: uses more than 65536 materials", path.display())]
+    TooManyMaterials { path: PathBuf },
+    #[error("{}: {source}", path.display())]
+    Mesh { path: PathBuf, source: MeshError },
+    /// The parser refused text that had passed every check.
+    #[error("{}: cannot be parsed: {source}", path.display())]
+    Parser { path: PathBuf, source: tobj::LoadError },
+}
+
+/// What is wrong with one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LineProblem {
+    #[error("`{text}` is not a face corner; expected v, v/vt, v//vn or v/vt/vn with whole numbers")]
+    FaceCorner { text: String },
+    #[error("the face has {corners} corners, but needs at least 3")]
+    FewCorners { corners: usize },
+    #[error("the face uses {what} {index}, but the file has {count}")]
+    OutOfRange { what: &'static str, index: i64, count: usize },
+    #[error("the face uses {what} 0, but they count from 1 (or from -1 backwards)")]
+    IndexZero { what: &'static str },
+    #[error("expected {expected} numbers after `{keyword}`")]
+    Numbers { keyword: String, expected: usize },
+    #[error("`{text}` is not a finite number")]
+    NotFinite { text: String },
+}

@@ -1,0 +1,75 @@
+//! Picture files as textures: decoded once, linear, within limits.
+
+use crate::render::ImageTexture;
+use glam::Vec3;
+use image::{DynamicImage, ImageReader, Limits};
+use std::path::Path;
+
+/// Pixels along one side at most.
+const MAX_SIDE: u32 = 32_768;
+/// Bytes that decoding may take: a 16,384 × 8,192 picture in `f32`.
+const MAX_BYTES: u64 = 2 << 30;
+
+/// Reads PNG, JPEG, HDR or EXR; 8- and 16-bit pictures are taken as sRGB. Returns a warning beside the picture when
+/// some of its numbers had to be left out.
+pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), String> {
+    let mut reader = ImageReader::open(path)
+        .and_then(|reader| reader.with_guessed_format())
+        .map_err(|error| format!("cannot be read: {}", super::meshes::plain_io(&error)))?;
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    limits.max_alloc = Some(MAX_BYTES);
+    reader.limits(limits);
+    if reader.format().is_none() {
+        return Err("is no picture that can be read: use PNG, JPEG, HDR or EXR".to_owned());
+    }
+    let picture = reader.decode().map_err(|error| format!("cannot be decoded: {error}"))?;
+    let (width, height) = (picture.width(), picture.height());
+    let is_float = matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
+    let mut texels: Vec<Vec3> = if is_float {
+        picture.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect()
+    } else {
+        let curve: Vec<f32> = (0..=u16::MAX).map(|value| linear_from_srgb(f32::from(value) / 65535.0)).collect();
+        let to_linear = |value: u16| curve[usize::from(value)];
+        picture.into_rgb16().pixels().map(|pixel| Vec3::from_array(pixel.0.map(to_linear))).collect()
+    };
+    let is_good = |texel: &Vec3| texel.is_finite() && texel.cmpge(Vec3::ZERO).all();
+    let bad = texels.iter().filter(|texel| !is_good(texel)).count();
+    texels.iter_mut().filter(|texel| !is_good(texel)).for_each(|texel| *texel = Vec3::ZERO);
+    let warning = (bad > 0).then(|| format!("{bad} pixels are negative or not finite and were made black"));
+    Ok((ImageTexture { width, height, texels }, warning))
+}
+
+/// The sRGB transfer function backwards (IEC 61966-2-1).
+fn linear_from_srgb(encoded: f32) -> f32 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_bit_pictures_are_decoded_to_linear_light() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("two.png");
+        image::RgbImage::from_raw(2, 1, vec![0, 188, 255, 255, 0, 0]).unwrap().save(&path).unwrap();
+        let (picture, warning) = read_picture(&path).unwrap();
+        assert_eq!((picture.width, picture.height, warning), (2, 1, None));
+        // Byte 188 is the usual stand-in for half the light.
+        assert!(picture.texels[0].abs_diff_eq(Vec3::new(0.0, 0.5029, 1.0), 1e-3), "{}", picture.texels[0]);
+        assert_eq!(picture.texels[1], Vec3::X);
+    }
+
+    #[test]
+    fn broken_pictures_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("broken.png");
+        std::fs::write(&path, b"\x89PNG\r\n\x1a\nnothing").unwrap();
+        assert!(read_picture(&path).unwrap_err().contains("decoded"));
+        std::fs::write(&path, b"just text").unwrap();
+        assert!(read_picture(&path).is_err());
+        assert!(read_picture(&dir.path().join("none.png")).unwrap_err().contains("no such file"));
+    }
+}

@@ -1,0 +1,123 @@
+//! A scene around a lone model: ground, sky, key light, and a camera that sees all of it.
+
+use super::file::{
+    CameraPart, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MaterialPart, MeshShadingPart, MeshSourcePart,
+    Named, ObjectPart, Paint, Rgb, SceneFile, TransformPart,
+};
+use super::load::UpAxis;
+use super::meshes::LoadedMesh;
+use super::upright::guess_up;
+use crate::mesh::Mesh;
+use glam::{DVec3, Vec3};
+
+/// Names of the parts, as a saved scene shows them.
+const CLAY: &str = "clay";
+
+/// The scene of a model that is opened by itself.
+///
+/// All sizes follow from the model's box, so that a model of any unit looks the same.
+pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, aspect: f64) -> SceneFile {
+    let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
+    let (min, max) = bounds(&loaded.mesh, up);
+    let center = 0.5 * (min + max);
+    let radius = (0.5 * (max - min).length()).max(SceneFile::MIN_SIZE);
+    let transform = match up {
+        UpAxis::Y => TransformPart::default(),
+        UpAxis::Z => TransformPart { rotate: Some(DVec3::new(-90.0, 0.0, 0.0)), ..TransformPart::default() },
+    };
+    let material = |albedo| MaterialPart::Diffuse { albedo };
+    let mut materials = vec![
+        ("ground".to_owned(), material(Paint::rgb(0.45, 0.45, 0.43))),
+        // As large as the model and five radii away: about three times the light of the sky.
+        ("key light".to_owned(), MaterialPart::Emissive { radiance: Paint::rgb(26.0, 24.0, 21.0) }),
+    ];
+    if loaded.slots.is_empty() {
+        materials.push((CLAY.to_owned(), material(Paint::rgb(0.72, 0.56, 0.45))));
+    }
+    let key = center + 5.0 * radius * DVec3::new(-0.55, 0.75, 0.6).normalize();
+    SceneFile {
+        camera: camera(min, max, aspect),
+        film: FilmPart::default(),
+        integrator: IntegratorPart::default(),
+        max_depth: None,
+        display: DisplayPart::default(),
+        environment: EnvironmentPart::Gradient {
+            zenith: Rgb(Vec3::new(0.35, 0.5, 0.8)),
+            horizon: Rgb(Vec3::new(0.85, 0.9, 0.95)),
+            ground: Rgb(Vec3::splat(0.3)),
+        },
+        textures: Named::default(),
+        materials: Named(materials),
+        objects: vec![
+            ObjectPart::Mesh {
+                name: Some("model".to_owned()),
+                source: source.clone(),
+                shading: MeshShadingPart::Auto,
+                simplify: None,
+                material: loaded.slots.is_empty().then(|| CLAY.to_owned()),
+                transform,
+            },
+            ObjectPart::Plane {
+                name: Some("ground".to_owned()),
+                point: DVec3::new(center.x, min.y, center.z),
+                normal: DVec3::Y,
+                material: "ground".to_owned(),
+                transform: TransformPart::default(),
+            },
+            ObjectPart::Sphere {
+                name: Some("key light".to_owned()),
+                center: key,
+                radius,
+                material: "key light".to_owned(),
+                transform: TransformPart::default(),
+            },
+        ],
+        lights: Vec::new(),
+    }
+}
+
+/// A three-quarter view from slightly above, as near as the box allows.
+fn camera(min: DVec3, max: DVec3, aspect: f64) -> CameraPart {
+    const VFOV_DEG: f64 = 35.0;
+    /// Room around the box.
+    const MARGIN: f64 = 1.12;
+    let center = 0.5 * (min + max);
+    let back = DVec3::new(0.6, 0.38, 1.0).normalize();
+    let right = DVec3::Y.cross(back).normalize();
+    let up = back.cross(right);
+    let tan_v = (0.5 * VFOV_DEG).to_radians().tan() / MARGIN;
+    let tan_h = tan_v * aspect;
+    // Each corner asks for a distance from which it is still inside the picture; the largest one wins.
+    let distance = (0..8)
+        .map(|i| {
+            let corner = DVec3::new(
+                if i & 1 == 0 { min.x } else { max.x },
+                if i & 2 == 0 { min.y } else { max.y },
+                if i & 4 == 0 { min.z } else { max.z },
+            ) - center;
+            corner.dot(back) + (corner.dot(right).abs() / tan_h).max(corner.dot(up).abs() / tan_v)
+        })
+        .fold(SceneFile::MIN_SIZE, f64::max);
+    CameraPart {
+        eye: center + distance * back,
+        look_at: center,
+        up: DVec3::Y,
+        vfov: VFOV_DEG,
+        lens_radius: None,
+        f_stop: None,
+        focus_distance: None,
+        blades: 0,
+        blade_rotation: 0.0,
+    }
+}
+
+/// The box of the model once `up` points along +Y, metres.
+fn bounds(mesh: &Mesh, up: UpAxis) -> (DVec3, DVec3) {
+    let used = mesh.triangles.iter().flatten().map(|&v| mesh.positions[v as usize].as_dvec3() + mesh.center);
+    let (min, max) =
+        used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), point| (min.min(point), max.max(point)));
+    match up {
+        UpAxis::Y => (min, max),
+        UpAxis::Z => (DVec3::new(min.x, min.z, -max.y), DVec3::new(max.x, max.z, -min.y)),
+    }
+}

@@ -1,0 +1,220 @@
+//! From a loaded scene to entities.
+
+use super::components::{
+    Amount, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
+    SceneEnvironment, Shape, SurfaceTexture,
+};
+use super::file::{self, CameraPart, EnvironmentPart, LightPart, MaterialPart, ObjectPart, TexturePart};
+use super::load::LoadedScene;
+use super::placement::Placement;
+use super::view::{Lens, Projection, View};
+use crate::render::{Display, Environment, RenderSettings, Texture, TexturePattern};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, Or, With, World};
+use glam::{DVec2, DVec3, Mat2, Vec2};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+impl LoadedScene {
+    /// Puts this scene in the place of whatever scene `world` holds. The seed of [`Rendering`] stays.
+    pub fn spawn(&self, world: &mut World) {
+        clear(world);
+        let mut ordinals = (0..).map(Ordinal);
+        let mut next = move || ordinals.next().expect("fewer entities than numbers");
+
+        let mut textures: HashMap<&str, Arc<SurfaceTexture>> = HashMap::new();
+        let own_textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
+        for (name, part) in self.file.textures.iter().chain(own_textures.map(|(name, part, _)| (name.as_str(), part))) {
+            if let Some(texture) = self.texture(part) {
+                let texture = SurfaceTexture { name: name.to_owned(), part: part.clone(), texture };
+                textures.entry(name).or_insert_with(|| Arc::new(texture));
+            }
+        }
+
+        // Entities first, so that blends can name materials that come later.
+        let mut materials: HashMap<&str, Entity> = HashMap::new();
+        for (name, _) in self.file.materials.iter() {
+            materials.insert(name, world.spawn((Name::new(name.to_owned()), next())).id());
+        }
+        for (name, part) in self.file.materials.iter() {
+            world.entity_mut(materials[name]).insert(material(part, &textures, &materials));
+        }
+
+        let mut own_materials: HashMap<usize, Vec<Entity>> = HashMap::new();
+        for (i, object) in self.file.objects.iter().enumerate() {
+            let slots = match (object.material(), &self.meshes[i]) {
+                (Some(name), _) => vec![materials[name]],
+                (None, Some(mesh)) => own_materials
+                    .entry(Arc::as_ptr(&mesh.mesh) as usize)
+                    .or_insert_with(|| {
+                        let spawn = |(name, part): &(String, MaterialPart)| {
+                            let material = material(part, &textures, &materials);
+                            world.spawn((Name::new(name.clone()), next(), material)).id()
+                        };
+                        mesh.slots.iter().map(spawn).collect()
+                    })
+                    .clone(),
+                (None, None) => Vec::new(),
+            };
+            let (shape, placement) = self.shape(i, object);
+            let mut entity = world.spawn((shape, placement, MaterialSlots(slots), next()));
+            if let Some(name) = object.name() {
+                entity.insert(Name::new(name.to_owned()));
+            }
+            if let ObjectPart::Mesh { source, shading, simplify, material, .. } = object {
+                entity.insert(MeshOrigin {
+                    source: source.clone(),
+                    shading: *shading,
+                    simplify: *simplify,
+                    own_materials: material.is_none(),
+                });
+            }
+        }
+        for LightPart::Point { name, position, intensity, radius } in &self.file.lights {
+            let light = PointLight { intensity: intensity.0, radius: *radius };
+            let mut entity = world.spawn((light, Placement::at(*position), next()));
+            if let Some(name) = name {
+                entity.insert(Name::new(name.clone()));
+            }
+        }
+        let (view, projection, lens) = camera(&self.file.camera);
+        world.spawn((view, projection, lens, Name::new("camera"), next()));
+        self.insert_resources(world);
+    }
+
+    fn insert_resources(&self, world: &mut World) {
+        let file = &self.file;
+        world.insert_resource(SceneEnvironment { light: self.environment(), part: file.environment.clone() });
+        world.insert_resource(FilmSize { width: file.film.width, height: file.film.height });
+        let seed = world.get_resource::<Rendering>().map_or(0, |rendering| rendering.0.seed);
+        world.insert_resource(Rendering(RenderSettings {
+            integrator: file.integrator.into(),
+            max_depth: file.max_depth.unwrap_or(u32::MAX),
+            seed,
+        }));
+        let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
+        world.insert_resource(Developing(display));
+    }
+
+    fn environment(&self) -> Environment {
+        match &self.file.environment {
+            EnvironmentPart::Black => Environment::Black,
+            EnvironmentPart::Constant(radiance) => Environment::Constant(radiance.0),
+            EnvironmentPart::Gradient { zenith, horizon, ground } => {
+                Environment::Gradient { zenith: zenith.0, horizon: horizon.0, ground: ground.0 }
+            }
+            EnvironmentPart::Image { file, scale, rotate } => match self.pictures.get(file) {
+                Some(image) => {
+                    Environment::Image { image: image.clone(), scale: scale.0, rotation: rotate.to_radians() as f32 }
+                }
+                None => Environment::Black,
+            },
+        }
+    }
+
+    /// `None` when its picture could not be had.
+    fn texture(&self, part: &TexturePart) -> Option<Texture> {
+        let (pattern, scale, offset, rotate) = match part {
+            TexturePart::Checker { a, b, squares, offset, rotate } => {
+                (TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
+            }
+            TexturePart::Image { file, repeat, offset, rotate, wrap, smooth } => {
+                let image = self.pictures.get(file)?.clone();
+                (TexturePattern::Image { image, wrap: (*wrap).into(), smooth: *smooth }, *repeat, *offset, *rotate)
+            }
+        };
+        let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(rotate.to_radians() as f32);
+        Some(Texture { pattern, uv_matrix, uv_offset: as_vec2(offset) })
+    }
+
+    fn shape(&self, i: usize, object: &ObjectPart) -> (Shape, Placement) {
+        let placement = Placement::from_part(object.transform());
+        // A shape that has a point of its own is stored about that point, so that turning it turns it in place.
+        let at = |point: DVec3| Placement { translation: placement.affine().transform_point3(point), ..placement };
+        match object {
+            ObjectPart::Sphere { center, radius, .. } => (Shape::Sphere { radius: *radius }, at(*center)),
+            ObjectPart::Plane { point, normal, .. } => (Shape::Plane { normal: normal.normalize() }, at(*point)),
+            ObjectPart::Quad { corner, edge_u, edge_v, .. } => {
+                (Shape::Quad { edge_u: *edge_u, edge_v: *edge_v }, at(*corner))
+            }
+            ObjectPart::Triangle { vertices, .. } => {
+                let first = vertices[0];
+                (Shape::Triangle { vertices: vertices.map(|vertex| vertex - first) }, at(first))
+            }
+            ObjectPart::Mesh { .. } => {
+                let mesh = self.meshes[i].as_ref().expect("every mesh object has been loaded");
+                (Shape::Mesh(mesh.mesh.clone()), placement)
+            }
+            ObjectPart::Spheres { .. } => {
+                (Shape::Spheres(self.balls[i].clone().expect("every cloud has been made")), placement)
+            }
+        }
+    }
+}
+
+/// Removes whatever belongs to a scene.
+fn clear(world: &mut World) {
+    type OfAScene = Or<(With<Shape>, With<Material>, With<PointLight>, With<View>)>;
+    let old: Vec<Entity> = world.query_filtered::<Entity, OfAScene>().iter(world).collect();
+    for entity in old {
+        world.despawn(entity);
+    }
+}
+
+fn material(
+    part: &MaterialPart,
+    textures: &HashMap<&str, Arc<SurfaceTexture>>,
+    materials: &HashMap<&str, Entity>,
+) -> Material {
+    let paint = |paint: &file::Paint| match paint {
+        file::Paint::Rgb(rgb) => Paint::Rgb(*rgb),
+        // Only a mesh's own picture can be missing, and that was said in a warning.
+        file::Paint::Texture(name) => textures
+            .get(name.as_str())
+            .map_or(Paint::Rgb(glam::Vec3::splat(0.5)), |texture| Paint::Texture(texture.clone())),
+    };
+    let amount = |amount: &file::Amount| match amount {
+        file::Amount::Number(value) => Amount::Number(*value),
+        file::Amount::Texture(name) => {
+            textures.get(name.as_str()).map_or(Amount::Number(0.5), |texture| Amount::Texture(texture.clone()))
+        }
+    };
+    match part {
+        MaterialPart::Diffuse { albedo } => Material::Diffuse { albedo: paint(albedo) },
+        MaterialPart::Mirror { reflectance } => Material::Mirror { reflectance: paint(reflectance) },
+        MaterialPart::Metal { alpha, reflectance, fresnel, compensate } => Material::Metal {
+            alpha: amount(alpha),
+            reflectance: paint(reflectance),
+            fresnel: (*fresnel).into(),
+            compensate: *compensate,
+        },
+        MaterialPart::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: absorption.0 },
+        MaterialPart::Blend { weight, a, b } => {
+            Material::Blend { weight: amount(weight), a: materials[a.as_str()], b: materials[b.as_str()] }
+        }
+        MaterialPart::Emissive { radiance } => Material::Emissive { radiance: paint(radiance) },
+    }
+}
+
+/// The camera that a scene file describes.
+pub fn camera(part: &CameraPart) -> (View, Projection, Lens) {
+    let offset = part.look_at - part.eye;
+    let forward = offset.normalize();
+    let up = part.up.reject_from_normalized(forward).normalize();
+    let view = View { eye: part.eye, forward, up, pivot_distance: offset.length() };
+    // A film 24 mm high sees this angle through a lens of focal length 12 mm / tan(vfov / 2).
+    let focal_length = 0.012 / (0.5 * part.vfov).to_radians().tan();
+    let radius = part.f_stop.map(|stop| 0.5 * focal_length / stop).or(part.lens_radius).unwrap_or(0.0);
+    let lens = Lens {
+        radius,
+        focus_distance: part.focus_distance.unwrap_or(offset.length()),
+        enabled: radius > 0.0,
+        blades: part.blades,
+        blade_rotation_deg: part.blade_rotation,
+    };
+    (view, Projection { vfov_deg: part.vfov }, lens)
+}
+
+fn as_vec2(value: DVec2) -> Vec2 {
+    value.as_vec2()
+}

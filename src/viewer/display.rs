@@ -1,0 +1,58 @@
+//! Is there a display, and which? Decided before the event loop is made, because a process can make only one.
+
+/// What the environment offers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Display {
+    /// Let the window library choose.
+    Default,
+    /// Wayland is announced but nobody listens, and X11 is there too.
+    ForceX11,
+    None,
+}
+
+/// Looks for a display.
+#[cfg(all(unix, not(target_os = "macos")))]
+pub fn find() -> Display {
+    use std::path::PathBuf;
+    let var = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    // An absolute name counts as it is; `join` keeps it so.
+    let wayland = var("WAYLAND_DISPLAY").map(|name| {
+        let socket = PathBuf::from(var("XDG_RUNTIME_DIR").unwrap_or_default()).join(name);
+        std::os::unix::net::UnixStream::connect(socket).is_ok()
+    });
+    // A socket handed over by the parent is open already.
+    let wayland = if var("WAYLAND_SOCKET").is_some() { Some(true) } else { wayland };
+    choose(wayland, var("DISPLAY").is_some())
+}
+
+/// Every other desktop has a display by being one.
+#[cfg(not(all(unix, not(target_os = "macos"))))]
+pub fn find() -> Display {
+    Display::Default
+}
+
+/// `wayland`: announced, and whether somebody listens; `x11`: announced.
+#[cfg_attr(not(all(unix, not(target_os = "macos"))), allow(dead_code))]
+fn choose(wayland: Option<bool>, x11: bool) -> Display {
+    match (wayland, x11) {
+        (Some(true), _) | (None, true) => Display::Default,
+        // The window library would try Wayland alone and give up.
+        (Some(false), true) => Display::ForceX11,
+        (Some(false) | None, false) => Display::None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dead_wayland_socket_leads_to_x11_or_to_none() {
+        assert_eq!(choose(None, false), Display::None);
+        assert_eq!(choose(None, true), Display::Default);
+        assert_eq!(choose(Some(true), false), Display::Default);
+        assert_eq!(choose(Some(true), true), Display::Default);
+        assert_eq!(choose(Some(false), true), Display::ForceX11);
+        assert_eq!(choose(Some(false), false), Display::None);
+    }
+}

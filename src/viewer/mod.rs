@@ -1,0 +1,28 @@
+//! The window: winit for events, pixels for the picture, egui for what is written over it.
+//!
+//! It turns keys and mouse into commands for a [`crate::frame::Session`] and shows the pictures that come back; it
+//! knows nothing of how they are made, and never waits for them. Without this room (feature `viewer` off) the library
+//! and the command line need no display code at all.
+//!
+//! | file | about |
+//! |---|---|
+//! | `app` | the event loop: what happens when |
+//! | `presenter` | picture and overlays onto the window; the only place that knows the graphics device |
+//! | [`keys`] | the one table of keys and gestures |
+//! | `input` | keys and mouse to commands, independent of the frame rate |
+//! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
+//! | `saver` | pictures to disk, on the side |
+//! | [`display`] | is there a display at all |
+
+mod app;
+mod camera_text;
+pub mod display;
+mod input;
+pub mod keys;
+mod overlay;
+mod presenter;
+mod saver;
+mod status;
+mod toasts;
+
+pub use app::{ViewerError, ViewerOptions, run};

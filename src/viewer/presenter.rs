@@ -1,0 +1,172 @@
+//! Puts a picture and the overlays on a window: the only file that knows pixels and wgpu.
+//!
+//! One graphics device serves both. The picture and the window have sizes of their own; the picture is stretched
+//! over the window, so a coarse one shown while moving fills it too. Nothing here waits for rendering.
+
+use crate::frame::Picture;
+use pixels::{Pixels, PixelsBuilder, ScalingMode, SurfaceTexture, wgpu};
+use std::sync::Arc;
+use std::time::Duration;
+use thiserror::Error;
+use winit::event::WindowEvent;
+use winit::window::Window;
+
+/// Why there is nothing to be seen.
+#[derive(Debug, Error)]
+pub enum PresentError {
+    #[error(
+        "no graphics driver can draw in a window ({0}); install one (on Debian or Ubuntu: mesa-vulkan-drivers), or render without a window: firstlight render SCENE -o out.png"
+    )]
+    NoDriver(pixels::Error),
+    #[error("the window cannot be drawn: {0}")]
+    Failed(#[from] pixels::Error),
+    #[error("the window cannot be drawn: {0}")]
+    Texture(#[from] pixels::TextureError),
+}
+
+/// What came of presenting.
+#[derive(Clone, Copy, Debug)]
+pub struct Presented {
+    /// When the overlays want to be drawn again; `Duration::MAX` for never.
+    pub repaint_after: Duration,
+    /// The window was not ready; draw again at the next chance.
+    pub again: bool,
+}
+
+pub struct Presenter {
+    // Dropped in this order: everything on the device before the window.
+    egui_renderer: egui_wgpu::Renderer,
+    egui_state: egui_winit::State,
+    pixels: Pixels<'static>,
+    surface_size: (u32, u32),
+    picture_size: (u32, u32),
+    window: Arc<Window>,
+}
+
+impl Presenter {
+    pub fn new(window: Arc<Window>) -> Result<Self, PresentError> {
+        let size = window.inner_size();
+        let (width, height) = (size.width.max(1), size.height.max(1));
+        let surface = SurfaceTexture::new(width, height, window.clone());
+        let no_driver = |error| match error {
+            pixels::Error::AdapterNotFound | pixels::Error::CreateSurface(_) | pixels::Error::DeviceNotFound(_) => {
+                PresentError::NoDriver(error)
+            }
+            other => PresentError::Failed(other),
+        };
+        let mut pixels = PixelsBuilder::new(width, height, surface).build().map_err(no_driver)?;
+        // The default handler panics; a frame that failed is followed by another.
+        pixels.device().on_uncaptured_error(Arc::new(|error| log::error!("graphics: {error}")));
+        pixels.set_scaling_mode(ScalingMode::Fill);
+        pixels.resize_surface(width, height)?;
+        let egui_state = egui_winit::State::new(
+            egui::Context::default(),
+            egui::ViewportId::ROOT,
+            &window,
+            Some(window.scale_factor() as f32),
+            window.theme(),
+            Some(pixels.device().limits().max_texture_dimension_2d as usize),
+        );
+        let egui_renderer =
+            egui_wgpu::Renderer::new(pixels.device(), pixels.surface_texture_format(), Default::default());
+        Ok(Self {
+            egui_renderer,
+            egui_state,
+            pixels,
+            surface_size: (width, height),
+            picture_size: (width, height),
+            window,
+        })
+    }
+
+    pub fn egui_context(&self) -> &egui::Context {
+        self.egui_state.egui_ctx()
+    }
+
+    /// The largest side of a picture that can be shown.
+    pub fn max_side(&self) -> u32 {
+        self.pixels.device().limits().max_texture_dimension_2d
+    }
+
+    /// Tells the overlays what happened; answers whether they took it, and whether they want to be drawn again.
+    pub fn on_window_event(&mut self, event: &WindowEvent) -> egui_winit::EventResponse {
+        self.egui_state.on_window_event(&self.window, event)
+    }
+
+    /// Takes a picture to show from now on.
+    pub fn set_picture(&mut self, picture: &Picture) -> Result<(), PresentError> {
+        let size = (picture.width, picture.height);
+        if size.0 == 0 || size.1 == 0 || picture.rgba.len() != size.0 as usize * size.1 as usize * 4 {
+            return Ok(());
+        }
+        if size != self.picture_size {
+            self.pixels.resize_buffer(size.0, size.1)?;
+            self.picture_size = size;
+        }
+        self.pixels.frame_mut().copy_from_slice(&picture.rgba);
+        Ok(())
+    }
+
+    /// Draws the picture with `overlays` over it. A window without pixels is left alone.
+    pub fn present(&mut self, overlays: impl FnMut(&egui::Context)) -> Result<Presented, PresentError> {
+        let context = self.egui_state.egui_ctx().clone();
+        let output = context.run(self.egui_state.take_egui_input(&self.window), overlays);
+        self.egui_state.handle_platform_output(&self.window, output.platform_output);
+        let (device, queue) = (self.pixels.device(), self.pixels.queue());
+        // Told once only, so even if this frame is not shown.
+        for (id, delta) in &output.textures_delta.set {
+            self.egui_renderer.update_texture(device, queue, *id, delta);
+        }
+        let jobs = context.tessellate(output.shapes, output.pixels_per_point);
+        let root = output.viewport_output.get(&egui::ViewportId::ROOT);
+        let repaint_after = root.map_or(Duration::MAX, |viewport| viewport.repaint_delay);
+        let shown = self.draw(&jobs, output.pixels_per_point);
+        for id in &output.textures_delta.free {
+            self.egui_renderer.free_texture(id);
+        }
+        Ok(Presented { repaint_after, again: !shown? })
+    }
+
+    /// False when the surface was not ready.
+    fn draw(&mut self, jobs: &[egui::ClippedPrimitive], pixels_per_point: f32) -> Result<bool, PresentError> {
+        let size = self.window.inner_size();
+        if size.width == 0 || size.height == 0 {
+            return Ok(true);
+        }
+        let surface_size = (size.width.min(self.max_side()), size.height.min(self.max_side()));
+        if self.surface_size != surface_size {
+            self.pixels.resize_surface(surface_size.0, surface_size.1)?;
+            self.surface_size = surface_size;
+        }
+        // The surface's own size: the window's may be newer already.
+        let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: [surface_size.0, surface_size.1], pixels_per_point };
+        let (egui_renderer, window) = (&mut self.egui_renderer, &self.window);
+        let result = self.pixels.render_with(|encoder, view, context| {
+            context.scaling_renderer.render(encoder, view);
+            let commands = egui_renderer.update_buffers(&context.device, &context.queue, encoder, jobs, &screen);
+            context.queue.submit(commands);
+            let mut pass = encoder
+                .begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("overlays"),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+                    })],
+                    ..Default::default()
+                })
+                .forget_lifetime();
+            egui_renderer.render(&mut pass, jobs, &screen);
+            window.pre_present_notify();
+            Ok(())
+        });
+        match result {
+            Ok(()) => Ok(true),
+            Err(pixels::Error::Surface(
+                wgpu::SurfaceError::Timeout | wgpu::SurfaceError::Outdated | wgpu::SurfaceError::Lost,
+            )) => Ok(false),
+            Err(error) => Err(error.into()),
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Saves pictures on threads of their own, so that the window goes on.
+
+use crate::frame::{PictureFormat, Waker, write_new_film};
+use crate::render::{Display, Film};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+/// A picture that is now on disk, or why it is not.
+pub type Saved = Result<Kept, String>;
+
+/// A picture on disk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Kept {
+    pub path: PathBuf,
+    /// The view changed before there was a film of full resolution.
+    pub coarse: bool,
+}
+
+pub struct Saver {
+    folder: PathBuf,
+    waker: Waker,
+    sender: Sender<Saved>,
+    receiver: Receiver<Saved>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Saver {
+    /// Saves into `folder`; `waker` is called when a picture is done.
+    pub fn new(folder: &Path, waker: Waker) -> Self {
+        let (sender, receiver) = channel();
+        Self { folder: folder.to_owned(), waker, sender, receiver, threads: Vec::new() }
+    }
+
+    /// Saves the film that will come, under the name of `scene` and the next free number; a PNG with `size` pixels.
+    pub fn save(
+        &mut self,
+        film: Receiver<Film>,
+        display: Display,
+        size: (u32, u32),
+        scene: &str,
+        format: PictureFormat,
+    ) {
+        let (folder, stem) = (self.folder.clone(), file_stem(scene));
+        let (sender, waker) = (self.sender.clone(), self.waker.clone());
+        let work = move || {
+            let saved = match film.recv() {
+                Ok(film) => write_new_film(&film, &display, size, &folder, &stem, format)
+                    .map(|path| Kept { path, coarse: (film.width(), film.height()) != size }),
+                Err(_) => Err("there was no picture to be kept".to_owned()),
+            };
+            // The window may be gone, and then nobody needs the news.
+            let _ = sender.send(saved);
+            waker();
+        };
+        match std::thread::Builder::new().name("save".to_owned()).spawn(work) {
+            Ok(thread) => self.threads.push(thread),
+            Err(error) => {
+                let _ =
+                    self.sender.send(Err(format!("the picture was not saved: no thread could be started: {error}")));
+            }
+        }
+        self.threads.retain(|thread| !thread.is_finished());
+    }
+
+    /// What has been finished since the last call.
+    pub fn finished(&self) -> Vec<Saved> {
+        self.receiver.try_iter().collect()
+    }
+
+    /// Waits for the pictures that are still being written.
+    pub fn finish(&mut self) -> Vec<Saved> {
+        for thread in self.threads.drain(..) {
+            // A panic has been printed by the thread itself.
+            let _ = thread.join();
+        }
+        self.finished()
+    }
+}
+
+/// A file name for pictures of this scene: its own name without folder and extension.
+fn file_stem(scene: &str) -> String {
+    let stem = Path::new(scene).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let plain: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_ .".contains(c) { c } else { '-' }).collect();
+    if plain.trim_matches(['.', ' ']).is_empty() { "picture".to_owned() } else { plain }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    fn ready(film: Film) -> Receiver<Film> {
+        let (sender, receiver) = channel();
+        sender.send(film).unwrap();
+        receiver
+    }
+
+    #[test]
+    fn pictures_of_one_moment_get_names_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let woken = Arc::new(AtomicUsize::new(0));
+        let counter = woken.clone();
+        let mut saver = Saver::new(
+            folder.path(),
+            Arc::new(move || {
+                counter.fetch_add(1, Ordering::SeqCst);
+            }),
+        );
+        for _ in 0..8 {
+            let film = ready(Film::new(3, 2));
+            saver.save(film, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
+        }
+        let saved = saver.finish().into_iter().map(|saved| saved.unwrap());
+        let mut saved: Vec<PathBuf> = saved.inspect(|kept| assert!(!kept.coarse)).map(|kept| kept.path).collect();
+        saved.sort();
+        let expected: Vec<PathBuf> = (1..=8).map(|i| folder.path().join(format!("my room-{i:04}.png"))).collect();
+        assert_eq!(saved, expected);
+        assert_eq!(woken.load(Ordering::SeqCst), 8);
+    }
+
+    #[test]
+    fn a_failure_is_told() {
+        let mut saver = Saver::new(Path::new("/no/such/folder"), Arc::new(|| ()));
+        saver.save(ready(Film::new(1, 1)), Display::default(), (1, 1), "gallery", PictureFormat::Exr);
+        let [Err(error)] = &saver.finish()[..] else { panic!("it cannot have been saved") };
+        assert!(error.contains("/no/such/folder"), "{error}");
+
+        let (_, never) = channel();
+        saver.save(never, Display::default(), (1, 1), "gallery", PictureFormat::Png);
+        assert_eq!(saver.finish(), [Err("there was no picture to be kept".to_owned())]);
+    }
+
+    #[test]
+    fn every_scene_has_a_file_name() {
+        assert_eq!(file_stem("gallery"), "gallery");
+        assert_eq!(file_stem("/a/b.c/bunny.obj"), "bunny");
+        assert_eq!(file_stem(""), "picture");
+        assert_eq!(file_stem(".."), "picture");
+        assert_eq!(file_stem("a:b"), "a-b");
+    }
+}

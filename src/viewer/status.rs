@@ -1,0 +1,138 @@
+//! The status line in words: what the picture is worth so far, and what is seen.
+
+use crate::frame::Status;
+use crate::render::{Integrator, ToneCurve};
+use std::fmt::Write as _;
+
+/// The figures: samples, seconds, speed, resolution, error, and why it last began again.
+pub fn figures(status: &Status) -> String {
+    let mut line = String::new();
+    if let Some(loading) = &status.loading {
+        write!(line, "{loading}…   ").expect("a string takes all");
+    }
+    write!(
+        line,
+        "{} spp   {}   {:.2} Mrays/s   {}×{}",
+        status.spp,
+        seconds(status.seconds),
+        status.mrays(),
+        status.film_width,
+        status.film_height
+    )
+    .expect("a string takes all");
+    if status.divider > 1 {
+        write!(line, " (1/{})", status.divider).expect("a string takes all");
+    }
+    match status.estimated_error {
+        Some(error) => write!(line, "   error {}", percent(error)),
+        None => write!(line, "   error –"),
+    }
+    .expect("a string takes all");
+    if !status.restart_cause.is_empty() {
+        write!(line, "   restarted: {}", status.restart_cause).expect("a string takes all");
+    }
+    line
+}
+
+/// What is not as usual: lens, exposure, tone curve, model, pause; and the key that helps.
+pub fn settings(status: &Status) -> String {
+    let mut parts = Vec::new();
+    if status.paused {
+        parts.push("paused".to_owned());
+    }
+    if status.integrator == Integrator::Phong {
+        parts.push("Phong".to_owned());
+    }
+    let lens = status.rig.lens;
+    if lens.enabled {
+        parts.push(format!("focus {}, aperture {} wide", metres(lens.focus_distance), metres(2.0 * lens.radius)));
+    }
+    if status.display.exposure_stops != 0.0 {
+        parts.push(format!("{:+.1} stops", status.display.exposure_stops));
+    }
+    if status.display.tone_curve != ToneCurve::default() {
+        parts.push(tone_curve(status.display.tone_curve).to_owned());
+    }
+    parts.push("H: keys".to_owned());
+    parts.join("   ")
+}
+
+pub fn tone_curve(curve: ToneCurve) -> &'static str {
+    match curve {
+        ToneCurve::Linear => "linear",
+        ToneCurve::Neutral => "neutral",
+        ToneCurve::Filmic => "filmic",
+    }
+}
+
+fn seconds(s: f64) -> String {
+    if s < 60.0 {
+        format!("{s:.1} s")
+    } else if s < 3600.0 {
+        format!("{}:{:02} min", (s / 60.0) as u64, s as u64 % 60)
+    } else {
+        format!("{}:{:02} h", (s / 3600.0) as u64, s as u64 / 60 % 60)
+    }
+}
+
+/// Two digits that mean something.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    match percent {
+        p if !p.is_finite() => "–".to_owned(),
+        p if p >= 10.0 => format!("{p:.0} %"),
+        p if p >= 1.0 => format!("{p:.1} %"),
+        p => format!("{p:.2} %"),
+    }
+}
+
+/// A length with the unit that suits it.
+fn metres(m: f64) -> String {
+    match m {
+        m if m.is_infinite() => "∞".to_owned(),
+        m if m >= 1e5 => format!("{:.0} km", m / 1e3),
+        m if m >= 1e3 => format!("{:.2} km", m / 1e3),
+        m if m >= 1.0 => format!("{m:.2} m"),
+        m if m >= 1e-2 => format!("{:.1} cm", m * 1e2),
+        m if m >= 1e-4 => format!("{:.2} mm", m * 1e3),
+        m => format!("{:.2} µm", m * 1e6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Lens;
+
+    #[test]
+    fn figures_say_what_matters() {
+        let mut status = Status { spp: 37, seconds: 12.34, bounce_mrays: 4.567, ..Status::default() };
+        (status.film_width, status.film_height, status.divider) = (320, 180, 4);
+        (status.estimated_error, status.restart_cause) = (Some(0.0234), "camera moved".to_owned());
+        assert_eq!(
+            figures(&status),
+            "37 spp   12.3 s   4.57 Mrays/s   320×180 (1/4)   error 2.3 %   restarted: camera moved"
+        );
+        (status.estimated_error, status.divider) = (None, 1);
+        assert!(figures(&status).contains("320×180   error –"));
+    }
+
+    #[test]
+    fn settings_tell_only_what_is_unusual() {
+        let mut status = Status::default();
+        assert_eq!(settings(&status), "H: keys");
+        status.rig.lens = Lens::thin(0.01, 2.5);
+        status.paused = true;
+        status.display.exposure_stops = -1.0 / 3.0;
+        assert_eq!(settings(&status), "paused   focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   H: keys");
+    }
+
+    #[test]
+    fn units_suit_their_numbers() {
+        assert_eq!([seconds(0.04), seconds(61.0), seconds(7325.0)], ["0.0 s", "1:01 min", "2:02 h"]);
+        assert_eq!([percent(0.5), percent(0.012), percent(0.0001)], ["50 %", "1.2 %", "0.01 %"]);
+        assert_eq!(percent(f64::INFINITY), "–");
+        let lengths = [metres(f64::INFINITY), metres(5e6), metres(1234.0), metres(0.5), metres(0.002), metres(2e-6)];
+        assert_eq!(lengths, ["∞", "5000 km", "1.23 km", "50.0 cm", "2.00 mm", "2.00 µm"]);
+    }
+}

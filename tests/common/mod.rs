@@ -1,0 +1,78 @@
+//! Small scenes built by hand, straight from shapes and materials.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use firstlight::kdtree::Shape;
+use firstlight::render::{
+    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PassReport, RenderSettings, Shading, Snapshot,
+    advance,
+};
+use glam::Vec3;
+use std::sync::Arc;
+
+pub fn diffuse(albedo: f32) -> Material {
+    Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(albedo)) }
+}
+
+pub fn emissive(radiance: f32) -> Material {
+    Material::Emissive { radiance: ColorInput::Constant(Vec3::splat(radiance)) }
+}
+
+pub fn sphere(center: Vec3, radius: f32) -> Shape {
+    Shape::Sphere { center, radius }
+}
+
+pub fn plane(point: Vec3, normal: Vec3) -> Shape {
+    Shape::Plane { point, normal }
+}
+
+pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Shape {
+    Shape::Quad { corner, edge_u, edge_v }
+}
+
+/// A pinhole at `eye`; `vfov` in degrees.
+pub fn camera(eye: Vec3, look_at: Vec3, vfov: f32) -> Camera {
+    let forward = (look_at - eye).normalize();
+    let right = forward.cross(if forward.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }).normalize();
+    Camera {
+        eye,
+        right,
+        up: right.cross(forward),
+        forward,
+        tan_half_vfov: (0.5 * vfov.to_radians()).tan(),
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+        blades: 0,
+        blade_rotation: 0.0,
+    }
+}
+
+/// Each shape with the index of its material.
+pub fn scene(
+    shapes: Vec<(Shape, u32)>,
+    materials: Vec<Material>,
+    environment: Environment,
+    camera: Camera,
+) -> Snapshot {
+    let (shapes, objects) =
+        shapes.into_iter().map(|(shape, m)| (shape, Object { mesh: None, materials: vec![m] })).unzip();
+    let geometry = Geometry::build(shapes, objects);
+    let shading = Shading::build(&geometry, materials, Vec::new(), environment);
+    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+}
+
+pub fn render(scene: &Snapshot, settings: &RenderSettings, width: u32, height: u32, spp: u32) -> (Film, PassReport) {
+    let mut film = Film::new(width, height);
+    let report = advance(scene, settings, &mut film, spp, &|| false);
+    assert!(report.completed && film.spp() == spp);
+    assert_eq!(report.n_bad, 0, "samples that are not finite: {:?}", report.bad);
+    (film, report)
+}
+
+/// Mean over the picture, and its standard error from the scatter between pixels.
+pub fn picture_mean(film: &Film) -> (f64, f64) {
+    let values: Vec<f64> = film.means().iter().map(|c| f64::from(c.y)).collect();
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}

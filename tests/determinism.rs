@@ -1,0 +1,73 @@
+//! The same scene, seed and samples give the same bytes, whoever computes them and in whatever portions.
+
+mod common;
+
+use common::*;
+use firstlight::render::{Environment, Film, Material, RenderSettings, Snapshot, advance};
+use glam::Vec3;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+fn busy_scene() -> Snapshot {
+    let mut camera = camera(Vec3::new(0.0, 1.5, 5.0), Vec3::new(0.0, 0.5, 0.0), 40.0);
+    camera.lens_radius = 0.05;
+    camera.focus_distance = 5.0;
+    scene(
+        vec![
+            (plane(Vec3::ZERO, Vec3::Y), 0),
+            (sphere(Vec3::new(-0.8, 0.5, 0.0), 0.5), 2),
+            (sphere(Vec3::new(0.5, 0.5, 0.4), 0.5), 0),
+            (quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0), 1),
+            (sphere(Vec3::new(3.0, 3.0, 2.0), 0.3), 1),
+        ],
+        vec![diffuse(0.7), emissive(6.0), Material::Glass { ior: 1.5, absorption: Vec3::splat(0.3) }],
+        Environment::Constant(Vec3::splat(0.2)),
+        camera,
+    )
+}
+
+fn bits(film: &Film) -> Vec<u32> {
+    film.means().iter().flat_map(|mean| mean.to_array().map(f32::to_bits)).collect()
+}
+
+fn with_threads<T: Send>(n: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(work)
+}
+
+#[test]
+fn any_number_of_threads_and_any_tile_size_give_the_same_bits() {
+    let scene = busy_scene();
+    let settings = RenderSettings { seed: 12, ..RenderSettings::default() };
+    let picture = |threads, tile_size| {
+        with_threads(threads, || {
+            let mut film = Film::with_tile_size(75, 50, tile_size);
+            advance(&scene, &settings, &mut film, 5, &|| false);
+            bits(&film)
+        })
+    };
+    let reference = picture(1, 32);
+    for (threads, tile_size) in [(2, 32), (3, 32), (8, 32), (1, 16), (3, 7), (2, 128), (1, 1)] {
+        assert!(picture(threads, tile_size) == reference, "{threads} threads, tiles of {tile_size}");
+    }
+    let other = RenderSettings { seed: 13, ..settings };
+    let mut film = Film::new(75, 50);
+    advance(&scene, &other, &mut film, 5, &|| false);
+    assert!(bits(&film) != reference, "another seed must give another picture");
+}
+
+#[test]
+fn portions_and_interruptions_change_nothing() {
+    let scene = busy_scene();
+    let settings = RenderSettings::default();
+    let mut whole = Film::new(75, 50);
+    advance(&scene, &settings, &mut whole, 6, &|| false);
+    let mut portions = Film::new(75, 50);
+    for target in [1, 2, 5, 6] {
+        // Stopped after a while, a different while each time, and then finished.
+        let asked = AtomicU32::new(0);
+        let report =
+            advance(&scene, &settings, &mut portions, target, &|| asked.fetch_add(1, Ordering::Relaxed) > 3 * target);
+        assert!(!report.completed || target == 1 || portions.spp() == target);
+        assert!(advance(&scene, &settings, &mut portions, target, &|| false).completed);
+    }
+    assert!(bits(&whole) == bits(&portions));
+}

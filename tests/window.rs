@@ -1,0 +1,267 @@
+//! The real window on a desktop without a screen: opened, flown through, resized, hidden and closed by synthetic keys
+//! and mouse, and looked at.
+#![cfg(all(feature = "viewer", target_os = "linux"))]
+
+mod desktop;
+
+use desktop::{Desktop, Program, until};
+use firstlight::scene::file::{CameraPart, SceneFile};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// The view as the program prints it on V.
+fn camera(program: &Program) -> CameraPart {
+    let before = program.output().matches("camera:").count();
+    program.key("v");
+    let text = until("the camera to be printed", || {
+        let output = program.output();
+        let complete = output.matches("camera:").count() > before && output.ends_with("),\n");
+        complete.then(|| output[output.rfind("camera:").expect("just counted")..].to_owned())
+    });
+    SceneFile::parse(&format!("({text})"), "printed").unwrap_or_else(|error| panic!("{error}\n{text}")).camera
+}
+
+/// Asks for the view until it is as it should be and has come to rest: a movement waits for the picture of the one
+/// before it, so the end of a drag may take effect some frames later.
+fn camera_when(program: &Program, what: &str, is_right: impl Fn(&CameraPart) -> bool) -> CameraPart {
+    until(what, || {
+        let now = camera(program);
+        std::thread::sleep(Duration::from_millis(400));
+        (is_right(&now) && camera(program) == now).then_some(now)
+    })
+}
+
+/// Presses the key and waits for the file.
+fn keep(program: &Program, key: &str, path: &Path) {
+    program.key(key);
+    until(&format!("{} to be saved", path.display()), || path.is_file().then_some(()));
+}
+
+fn open_picture(path: &Path) -> image::RgbImage {
+    image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).to_rgb8()
+}
+
+/// How many colours there are, and how far they spread: a blank picture has one and 0.
+fn content(picture: &image::RgbImage) -> (usize, f64) {
+    let colours: HashSet<[u8; 3]> = picture.pixels().map(|pixel| pixel.0).collect();
+    let values: Vec<f64> = picture.as_raw().iter().map(|&value| f64::from(value)).collect();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    (colours.len(), variance.sqrt())
+}
+
+fn has_content(picture: &image::RgbImage) -> bool {
+    let (colours, spread) = content(picture);
+    colours > 600 && spread > 10.0
+}
+
+/// Mean difference of two pictures of one size, in 8-bit steps.
+fn difference(a: &image::RgbImage, b: &image::RgbImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let sum: f64 = a.as_raw().iter().zip(b.as_raw()).map(|(&a, &b)| f64::from(a.abs_diff(b))).sum();
+    sum / a.as_raw().len() as f64
+}
+
+#[test]
+fn a_person_flies_focuses_keeps_pictures_and_leaves() {
+    let Some(desktop) = Desktop::start() else { return };
+    let mut program = desktop.open(&["gallery", "--size", "640x360"], &[]);
+    let file = |name: &str| -> PathBuf { desktop.folder().join(name) };
+    until("the gallery to be seen", || has_content(&program.pixels()).then_some(()));
+    until("the title", || (program.title() == "firstlight — gallery").then_some(()));
+    keep(&program, "k", &file("gallery-0001.png"));
+    let first = open_picture(&file("gallery-0001.png"));
+    assert_eq!(first.dimensions(), (640, 360));
+    assert!(has_content(&first), "{:?}", content(&first));
+    let home = camera(&program);
+
+    // Fly: the eye goes where it looks, and looks where it looked.
+    program.hold("w", 300);
+    let flown = camera_when(&program, "the eye to move", |now| now.eye != home.eye);
+    let (step, ahead) = (flown.eye - home.eye, (home.look_at - home.eye).normalize());
+    assert!(step.dot(ahead) > 0.1 * (home.look_at - home.eye).length(), "{step}");
+    assert!(step.normalize().dot(ahead) > 1.0 - 1e-9, "{step}");
+    assert!((flown.look_at - flown.eye).normalize().dot(ahead) > 1.0 - 1e-9);
+
+    // Look about: the eye stays.
+    program.drag(1, (300, 200), (60, 0));
+    let looked = camera_when(&program, "the view to turn", |now| now.look_at != flown.look_at);
+    assert_eq!(looked.eye, flown.eye);
+
+    // Orbit by mouse and by key: the pivot and its distance stay.
+    program.key("Home");
+    let home_again = camera_when(&program, "the view home", |now| now.eye == home.eye);
+    assert_eq!(home_again, home, "home is home, bit for bit");
+    let distance = |camera: &CameraPart| (camera.look_at - camera.eye).length();
+    let same_pivot = |now: &CameraPart| {
+        assert!((now.look_at - home.look_at).length() < 1e-9, "the pivot stays: {now:?}");
+        assert!((distance(now) - distance(&home)).abs() < 1e-9, "so does its distance: {now:?}");
+    };
+    program.drag(2, (300, 200), (80, 30));
+    let orbited = camera_when(&program, "the eye to orbit", |now| now.eye != home.eye);
+    same_pivot(&orbited);
+    assert!(orbited.eye.y > home.eye.y, "what is dragged down shows its top");
+    keep(&program, "k", &file("gallery-0002.png"));
+    let second = open_picture(&file("gallery-0002.png"));
+    assert!(has_content(&second), "{:?}", content(&second));
+    assert!(difference(&first, &second) > 5.0, "{}", difference(&first, &second));
+    program.hold("Left", 200);
+    same_pivot(&camera_when(&program, "the eye to orbit on", |now| now.eye != orbited.eye));
+    program.key("Home");
+    camera_when(&program, "the view home again", |now| *now == home);
+
+    // Focus and aperture, by steps and by a click.
+    let focus = home.focus_distance.expect("it is always printed");
+    program.key("bracketright bracketright bracketright");
+    camera_when(&program, "the focal plane to move", |now| {
+        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(3)).abs() < 1e-9)
+    });
+    program.key("bracketleft");
+    camera_when(&program, "the focal plane to come back", |now| {
+        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(2)).abs() < 1e-9)
+    });
+    let radius = home.lens_radius.expect("the gallery has a lens");
+    program.key("braceright braceright");
+    camera_when(&program, "the aperture to open", |now| {
+        now.lens_radius.is_some_and(|wide| (wide / radius - 1.05f64.powi(2)).abs() < 1e-9)
+    });
+    program.key("o");
+    camera_when(&program, "the depth of field to go", |now| now.lens_radius.is_none());
+    program.key("o");
+    camera_when(&program, "the depth of field to come", |now| now.lens_radius.is_some());
+    let stepped = camera(&program).focus_distance;
+    program.xdotool("keydown shift");
+    program.drag(1, (320, 300), (0, 0));
+    program.xdotool("keyup shift");
+    let clicked = camera_when(&program, "the focus to go to the click", |now| now.focus_distance != stepped);
+    let near = clicked.focus_distance.expect("it is always printed");
+    assert!(near > 0.0 && near < 2.0 * distance(&home), "the floor in front is near: {near}");
+    assert_eq!(clicked.eye, home.eye, "a click moves nothing");
+
+    // Linear light; and nothing that is there is ever written over.
+    keep(&program, "shift+k", &file("gallery-0001.exr"));
+    let linear = image::open(file("gallery-0001.exr")).expect("an EXR file").to_rgb32f();
+    assert_eq!(linear.dimensions(), (640, 360));
+    assert!(linear.as_raw().iter().all(|value| value.is_finite() && *value >= 0.0));
+    assert!(linear.as_raw().iter().any(|value| *value > 1.0), "linear light knows no white");
+    std::fs::write(file("gallery-0003.png"), "somebody else's").expect("a file in the way");
+    keep(&program, "F12", &file("gallery-0004.png"));
+    assert_eq!(std::fs::read(file("gallery-0003.png")).expect("still there"), b"somebody else's");
+
+    // The list of keys, shown and hidden, over a picture that stands still.
+    program.key("p");
+    let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 160, 90, 320, 180).to_image();
+    until("the picture to stand still", || {
+        let before = middle(&program);
+        std::thread::sleep(Duration::from_millis(400));
+        (difference(&before, &middle(&program)) == 0.0).then_some(())
+    });
+    let bare = middle(&program);
+    program.key("h");
+    until("the list of keys", || (difference(&bare, &middle(&program)) > 10.0).then_some(()));
+    program.key("Escape");
+    until("the list to close", || (difference(&bare, &middle(&program)) == 0.0).then_some(()));
+    let foot = |program: &Program| image::imageops::crop_imm(&program.pixels(), 0, 340, 640, 20).to_image();
+    let written = foot(&program);
+    program.key("Tab");
+    until("the status line to go", || (difference(&written, &foot(&program)) > 10.0).then_some(()));
+    program.key("Tab p");
+
+    // Resizing is where windows hang.
+    let mut state = 1u32;
+    for _ in 0..60 {
+        state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+        program.resize(80 + (state >> 8) % 900, 60 + (state >> 20) % 700);
+    }
+    program.must_live();
+    program.resize(500, 300);
+    until("a picture of the new size", || (program.pixels().dimensions() == (500, 300)).then_some(()));
+    until("the gallery to be seen again", || has_content(&program.pixels()).then_some(()));
+    keep(&program, "k", &file("gallery-0005.png"));
+    assert_eq!(open_picture(&file("gallery-0005.png")).dimensions(), (500, 300));
+
+    // Away and back.
+    program.minimise();
+    std::thread::sleep(Duration::from_millis(500));
+    program.must_live();
+    program.focus();
+    until("the gallery to come back", || has_content(&program.pixels()).then_some(()));
+
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+    assert_eq!(std::fs::read(file("gallery-0003.png")).expect("still there"), b"somebody else's");
+}
+
+#[test]
+fn a_dense_screen_gets_fine_pictures_and_one_asked_for_on_the_way_out_is_kept() {
+    let Some(desktop) = Desktop::start() else { return };
+    let program = desktop.open(
+        &["cornell", "--size", "240x180"],
+        &[("WINIT_X11_SCALE_FACTOR", "2"), ("WAYLAND_DISPLAY", "nobody-listens")],
+    );
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    program.key("k");
+    program.close();
+    assert!(program.ended().success(), "closing the window is no failure");
+    assert_eq!(open_picture(&desktop.folder().join("cornell-0001.png")).dimensions(), (480, 360));
+}
+
+#[test]
+fn a_paused_window_sleeps() {
+    let Some(desktop) = Desktop::start() else { return };
+    let program = desktop.open(&["cornell", "--size", "160x120"], &[]);
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    program.key("p");
+    std::thread::sleep(Duration::from_secs(3));
+    let before = program.cpu_seconds();
+    std::thread::sleep(Duration::from_secs(2));
+    let used = program.cpu_seconds() - before;
+    assert!(used <= 0.1, "{used} CPU seconds in 2 s of doing nothing");
+    program.key("Escape");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn a_scene_that_is_not_there_is_told_in_the_terminal() {
+    let Some(desktop) = Desktop::start() else { return };
+    let folder = desktop.folder();
+    std::fs::write(folder.join("broken.ron"), "(camera: (eye: (0, 0, 0), look_at: (0, 0, 0)))").expect("a file");
+    for (scene, expected) in
+        [("broken.ron", "broken.ron:1"), ("galery", "did you mean `gallery`"), ("no.obj", "no.obj")]
+    {
+        let (status, errors) = desktop.fails(&[scene], &[]);
+        assert_eq!(status.code(), Some(1), "{scene}: {errors}");
+        assert!(errors.contains(expected) && !errors.contains("panicked"), "{scene}: {errors}");
+    }
+}
+
+#[test]
+fn without_a_graphics_driver_the_way_out_is_told() {
+    let Some(desktop) = Desktop::start() else { return };
+    let nowhere = [("VK_ICD_FILENAMES", "/nowhere"), ("VK_DRIVER_FILES", "/nowhere"), ("WGPU_BACKEND", "vulkan")];
+    let (status, errors) = desktop.fails(&["cornell"], &nowhere);
+    assert_eq!(status.code(), Some(1), "{errors}");
+    assert!(errors.contains("install one") && errors.contains("firstlight render"), "{errors}");
+    assert!(!errors.contains("panicked"), "{errors}");
+}
+
+#[test]
+fn without_a_display_the_scene_is_rendered_to_a_picture() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let output = Command::new(env!("CARGO_BIN_EXE_firstlight"))
+        .args(["cornell", "--size", "48x32"])
+        .current_dir(folder.path())
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .expect("firstlight starts");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    assert!(errors.contains("no display"), "{errors}");
+    let picture = open_picture(&folder.path().join("firstlight-cornell.png"));
+    assert_eq!(picture.dimensions(), (48, 32));
+    assert!(content(&picture).1 > 10.0, "{:?}", content(&picture));
+}
