@@ -110,7 +110,7 @@ impl Embree {
             };
             macro_rules! function {
                 ($name:literal) => {
-                    std::mem::transmute::<*mut c_void, _>(symbol($name)?)
+                    std::mem::transmute_copy(&symbol($name)?)
                 };
             }
             let new_device: unsafe extern "C" fn(*const c_char) -> Handle = function!("rtcNewDevice");

@@ -28,8 +28,9 @@ const _: () = assert!(size_of::<WideNode>() == 128);
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Entries that a walk may have on its stack, and room for one full store beyond.
-pub(super) const STACK: usize = 128;
+/// Entries that a walk may have on its stack, and room for one full store beyond. An odd number of cache lines, so
+/// that the stacks of many rays do not compete for the same few sets of the cache.
+pub(super) const STACK: usize = 144;
 
 /// What waits to be visited, nearest on top.
 #[repr(C, align(64))]
