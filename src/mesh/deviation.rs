@@ -103,7 +103,7 @@ fn spread_points(mesh: &Mesh, offset: DVec3, samples: usize) -> Vec<DVec3> {
             up_to
         })
         .collect();
-    if !(up_to > 0.0) {
+    if up_to.is_nan() || up_to <= 0.0 {
         return Vec::new();
     }
     let mut t = 0;
