@@ -67,7 +67,7 @@ impl Quadric {
         let r = -(self.times(guess) + self.b);
         let (c0, c1, c2) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
         let determinant = xx * c0 + xy * c1 + xz * c2;
-        if !(determinant > 0.0) {
+        if determinant.is_nan() || determinant <= 0.0 {
             return guess;
         }
         let (c3, c4, c5) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
