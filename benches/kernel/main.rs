@@ -6,6 +6,7 @@
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
 //! - `FIRSTLIGHT_EMBREE`: a libembree4 shared object to compare with (see `scripts/compare_embree.sh`).
+//! - `FIRSTLIGHT_EMBREE_ROBUST`: if set, Embree builds its scenes with the robust flag.
 //!
 //! Times are CPU time of one thread, engines take turns in every round, and the figure is the median over the rounds
 //! of the ratio in the same round: the machine may be busy and its clock may wander. Before anything is timed,
