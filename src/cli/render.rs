@@ -126,6 +126,7 @@ fn settings(args: &RenderArgs, of_scene: RenderSettings) -> RenderSettings {
         integrator: args.integrator.map_or(of_scene.integrator, Into::into),
         max_depth: args.max_depth.unwrap_or(of_scene.max_depth),
         seed: args.seed,
+        ..of_scene
     }
 }
 
