@@ -4,6 +4,7 @@ mod info;
 mod render;
 mod report;
 mod show;
+mod simplify;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use firstlight::render::Integrator;
@@ -28,6 +29,8 @@ enum Command {
     Report(report::ReportArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
+    /// Write a model with fewer triangles, and measure how far it is from the original.
+    Simplify(simplify::SimplifyArgs),
 }
 
 /// What to open, and how.
@@ -100,6 +103,7 @@ pub fn main() -> ExitCode {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),
     };
     let (message, code) = match result {
