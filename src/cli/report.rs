@@ -7,9 +7,7 @@ use firstlight::report::{
     Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv, page,
     summary_text,
 };
-use firstlight::scene::{
-    BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs,
-};
+use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -85,18 +83,15 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-fn measure_all(
-    args: &ReportArgs,
-    names: &[String],
-    given: Option<&Reference>,
-) -> Result<Vec<SceneOutcome>, Failure> {
+fn measure_all(args: &ReportArgs, names: &[String], given: Option<&Reference>) -> Result<Vec<SceneOutcome>, Failure> {
     // Every scene is read first: a mistake in the last name should not cost the wait for the others.
     let mut scenes = Vec::new();
     for name in names {
         let scene = SceneArgs { scene: name.clone(), up: None };
         scenes.push(Prepared::new(args, &scene.load(None, &|_| ())?, given)?);
     }
-    let limits = Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
+    let limits =
+        Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
     let mut progress = Progress::new(&scenes, !args.no_ablation, given.is_some());
     let outcomes = scenes.iter().map(|scene| scene.measure(args, limits, given, &mut progress)).collect();
     progress.bar.finish_and_clear();
@@ -259,7 +254,8 @@ fn command_line() -> String {
 
 /// Whole or not at all.
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let fail = |error: &dyn std::fmt::Display| Failure::Failed(format!("{}: cannot be written: {error}", path.display()));
+    let fail =
+        |error: &dyn std::fmt::Display| Failure::Failed(format!("{}: cannot be written: {error}", path.display()));
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".firstlight-").suffix(".part");

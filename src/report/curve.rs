@@ -59,7 +59,10 @@ mod tests {
         assert!(matches!(inside, Some(Seconds::Interpolated(s)) if (s - 0.08 / 0.03).abs() < 1e-9), "{inside:?}");
         for target in [1e-4, 5.0] {
             let outside = seconds_to(&points, fitted, target);
-            assert!(matches!(outside, Some(Seconds::Extrapolated(s)) if (s * target - 0.08).abs() < 1e-9), "{outside:?}");
+            assert!(
+                matches!(outside, Some(Seconds::Extrapolated(s)) if (s * target - 0.08).abs() < 1e-9),
+                "{outside:?}"
+            );
         }
     }
 

@@ -121,13 +121,7 @@ fn section(outcome: &SceneOutcome) -> String {
         plots.push(ablation_plot(outcome));
     }
     for plot in plots {
-        let _ = write!(
-            html,
-            "<figure><h3>{}</h3>\n{}{}</figure>\n",
-            escape(&plot.title),
-            plot.svg(),
-            plot.legend()
-        );
+        let _ = write!(html, "<figure><h3>{}</h3>\n{}{}</figure>\n", escape(&plot.title), plot.svg(), plot.legend());
     }
     html.push_str("</div>\n");
     html.push_str(&steps_table(&outcome.ladder));
@@ -145,7 +139,8 @@ fn about_reference(outcome: &SceneOutcome) -> String {
     let own = made.relative_error.map_or(String::new(), |error| format!(", its own error {}", percent(error)));
     let mut text = format!("<p>Reference: own render with another seed, {} samples per pixel{own}.", made.spp);
     if let Some(share) = outcome.share_of_reference().filter(|share| *share > 0.1) {
-        let _ = write!(text, " Up to {:.0} % of the last step’s relMSE is the reference’s own.", 100.0 * share.min(1.0));
+        let _ =
+            write!(text, " Up to {:.0} % of the last step’s relMSE is the reference’s own.", 100.0 * share.min(1.0));
     }
     text + "</p>\n"
 }
@@ -189,8 +184,7 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
 }
 
 fn ablation_plot(outcome: &SceneOutcome) -> Plot {
-    let all =
-        Series { label: "all".to_owned(), color: 0, style: Style::Measured, points: outcome.ladder.curve() };
+    let all = Series { label: "all".to_owned(), color: 0, style: Style::Measured, points: outcome.ladder.curve() };
     let used = outcome.ablations.iter().enumerate().filter(|(_, ablation)| !ablation.is_unused);
     let without = used.map(|(i, Ablation { technique, ladder, .. })| Series {
         label: format!("without {technique}"),

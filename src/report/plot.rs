@@ -54,10 +54,8 @@ impl Plot {
         let x = Axis::over(self.points().map(|p| p.0), LEFT, WIDTH - RIGHT);
         let heights = self.points().map(|p| p.1).chain(self.levels.iter().map(|level| level.0));
         let y = Axis::over(heights, HEIGHT - BOTTOM, TOP);
-        let mut svg = format!(
-            "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n",
-            escape(&self.title)
-        );
+        let mut svg =
+            format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n", escape(&self.title));
         self.write_axes(&mut svg, &x, &y);
         if let Some(band) = &self.band {
             let upper = band.points.iter().map(|p| (p.0, p.2));
@@ -111,7 +109,8 @@ impl Plot {
             if label {
                 let text = number(value);
                 let y = HEIGHT - BOTTOM + 16.0;
-                let _ = writeln!(svg, "<text x=\"{at:.1}\" y=\"{y}\" class=\"tick\" text-anchor=\"middle\">{text}</text>");
+                let _ =
+                    writeln!(svg, "<text x=\"{at:.1}\" y=\"{y}\" class=\"tick\" text-anchor=\"middle\">{text}</text>");
             }
         }
         for (value, label) in y.ticks() {

@@ -92,8 +92,8 @@ impl ReferenceStore {
         let mut film = Film::new(key.size.0, key.size.1);
         let mut slice = 4;
         while film.spp() < spp {
-            let start = Instant::now();
-            advance(snapshot, &settings, &mut film, film.spp().saturating_add(slice).min(spp), &|| false);
+            let (start, goal) = (Instant::now(), film.spp().saturating_add(slice).min(spp));
+            advance(snapshot, &settings, &mut film, goal, &|| false);
             progress(f64::from(film.spp()) / f64::from(spp));
             slice = (f64::from(slice) * 0.25 / start.elapsed().as_secs_f64().max(1e-6)).clamp(4.0, 1024.0) as u32;
         }
