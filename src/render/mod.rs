@@ -17,6 +17,7 @@ mod path;
 mod renderer;
 mod snapshot;
 mod surface;
+mod techniques;
 mod texture;
 
 pub use camera::Camera;
@@ -28,4 +29,5 @@ pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
 pub use renderer::{BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, replay_sample};
 pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};
+pub use techniques::Techniques;
 pub use texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};

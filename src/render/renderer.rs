@@ -1,8 +1,8 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
-use super::Snapshot;
 use super::film::{Film, FilmTile};
 use super::path::{CameraPath, PathWave};
+use super::{Snapshot, Techniques};
 use crate::geometry::Ray;
 use crate::sampling::Sampler;
 use glam::{UVec2, Vec2, Vec3};
@@ -27,11 +27,12 @@ pub struct RenderSettings {
     /// Longest path in segments; 1 shows emitters alone. `u32::MAX` is unbounded.
     pub max_depth: u32,
     pub seed: u32,
+    pub techniques: Techniques,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0 }
+        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0, techniques: Techniques::default() }
     }
 }
 
@@ -136,7 +137,7 @@ fn advance_tile(
                 CameraPath { ray, sampler, slot: s as u32 * n_pixels as u32 + local }
             })
         });
-        let Some(rays) = wave.trace(snapshot, settings.max_depth, camera_paths, &mut radiance, stop) else {
+        let Some(rays) = wave.trace(snapshot, settings, camera_paths, &mut radiance, stop) else {
             report.completed = false;
             break;
         };
@@ -161,7 +162,7 @@ pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: 
     let (ray, sampler) = camera_ray(snapshot, settings, film_size, UVec2::new(at.x, at.y), at.sample);
     let mut radiance = [Vec3::ZERO];
     let path = CameraPath { ray, sampler, slot: 0 };
-    PathWave::default().trace(snapshot, settings.max_depth, std::iter::once(path), &mut radiance, &|| false);
+    PathWave::default().trace(snapshot, settings, std::iter::once(path), &mut radiance, &|| false);
     radiance[0]
 }
 
@@ -174,7 +175,9 @@ fn camera_ray(
     pixel: UVec2,
     sample: u32,
 ) -> (Ray, Sampler) {
-    let sampler = Sampler::new(settings.seed, pixel.x, pixel.y, sample);
+    let Techniques { even_samples, .. } = settings.techniques;
+    let new_sampler = if even_samples { Sampler::new } else { Sampler::independent };
+    let sampler = new_sampler(settings.seed, pixel.x, pixel.y, sample);
     let film = pixel.as_vec2() + sampler.pair(0);
     let lens = if snapshot.camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
     (snapshot.camera.ray(film, film_size.as_vec2(), lens), sampler)

@@ -91,6 +91,7 @@ impl LoadedScene {
             integrator: file.integrator.into(),
             max_depth: file.max_depth.unwrap_or(u32::MAX),
             seed,
+            ..RenderSettings::default()
         }));
         let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
         world.insert_resource(Developing(display));

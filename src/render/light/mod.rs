@@ -6,7 +6,7 @@
 mod selection;
 mod shape;
 
-use super::{ColorInput, Emission, Geometry, Texture};
+use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;
 use glam::{Vec2, Vec3};
 use selection::Selection;
@@ -153,14 +153,15 @@ impl LightTable {
     pub(super) fn sample(
         &self,
         textures: &[Texture],
+        techniques: &Techniques,
         position: Vec3,
         normal: Vec3,
         u_select: impl FnOnce() -> f32,
         u: Vec2,
     ) -> Option<LightSample> {
-        let (id, pmf) = self.selection.sample(&self.lights, position, normal, u_select)?;
+        let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select)?;
         let light = &self.lights[id as usize];
-        let point = light.shape.sample(position, u)?;
+        let point = light.shape.sample(position, techniques.solid_angle, u)?;
         let radiance = light.emission.scale
             * match light.emission.radiance {
                 ColorInput::Constant(radiance) => radiance,
@@ -172,9 +173,17 @@ impl LightTable {
     /// The density with which [`Self::sample`] at `position` finds the point of light `id` in direction `wi`,
     /// `distance` metres away; per steradian.
     #[inline]
-    pub(super) fn pdf(&self, id: u32, position: Vec3, normal: Vec3, wi: Vec3, distance: f32) -> f32 {
-        let pmf = self.selection.pmf(&self.lights, id, position, normal);
-        pmf * self.lights[id as usize].shape.pdf(position, wi, distance)
+    pub(super) fn pdf(
+        &self,
+        techniques: &Techniques,
+        id: u32,
+        position: Vec3,
+        normal: Vec3,
+        wi: Vec3,
+        distance: f32,
+    ) -> f32 {
+        let pmf = self.selection.pmf(&self.lights, techniques, id, position, normal);
+        pmf * self.lights[id as usize].shape.pdf(position, techniques.solid_angle, wi, distance)
     }
 }
 
