@@ -1,7 +1,7 @@
 //! The parts of a scene file, as written. Meaning and limits are checked in `check`.
 
 use super::value::{Amount, Named, Paint, Rgb};
-use crate::render::{Fresnel, Integrator, ToneCurve, Wrap};
+use crate::render::{Fresnel, Integrator, PixelFilter, ToneCurve, Wrap};
 use glam::{DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +21,9 @@ pub struct SceneFile {
     pub display: DisplayPart,
     #[serde(default)]
     pub environment: EnvironmentPart,
+    /// What the air absorbs, per metre. Light from the environment has passed it already.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub air: Rgb,
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub textures: Named<TexturePart>,
     #[serde(default, skip_serializing_if = "Named::is_empty")]
@@ -63,11 +66,37 @@ pub struct CameraPart {
 pub struct FilmPart {
     pub width: u32,
     pub height: u32,
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub filter: FilterPart,
 }
 
 impl Default for FilmPart {
     fn default() -> Self {
-        Self { width: 1280, height: 720 }
+        Self { width: 1280, height: 720, filter: FilterPart::default() }
+    }
+}
+
+/// How the light around a pixel is weighted; see [`PixelFilter`] for their widths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterPart {
+    #[default]
+    Box,
+    Tent,
+    Gaussian,
+    BlackmanHarris,
+    Mitchell,
+}
+
+impl From<FilterPart> for PixelFilter {
+    fn from(part: FilterPart) -> Self {
+        match part {
+            FilterPart::Box => Self::Box,
+            FilterPart::Tent => Self::Tent,
+            FilterPart::Gaussian => Self::Gaussian,
+            FilterPart::BlackmanHarris => Self::BlackmanHarris,
+            FilterPart::Mitchell => Self::Mitchell,
+        }
     }
 }
 
@@ -211,6 +240,27 @@ pub enum MaterialPart {
         compensate: bool,
     },
     Glass {
+        #[serde(default = "default_ior")]
+        ior: f32,
+        /// Per metre.
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: Rgb,
+    },
+    /// The classic local model. Path tracing takes it for shares of matte, mirror and glass.
+    Phong {
+        diffuse: Paint,
+        /// Of the ambient light, the share of `diffuse` that comes back.
+        #[serde(default = "one")]
+        ambient: f32,
+        /// Share that is mirrored; lights appear in it as highlights.
+        #[serde(default = "no_amount", skip_serializing_if = "is_no_amount")]
+        specular: Amount,
+        /// Exponent of the highlights.
+        #[serde(default = "default_shininess")]
+        shininess: f32,
+        /// Share that is glass.
+        #[serde(default, skip_serializing_if = "is_default")]
+        transparency: f32,
         #[serde(default = "default_ior")]
         ior: f32,
         /// Per metre.
@@ -462,6 +512,22 @@ fn default_up() -> DVec3 {
 
 fn default_vfov() -> f64 {
     40.0
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn default_shininess() -> f32 {
+    20.0
+}
+
+fn no_amount() -> Amount {
+    Amount::Number(0.0)
+}
+
+fn is_no_amount(value: &Amount) -> bool {
+    *value == no_amount()
 }
 
 fn default_ior() -> f32 {
