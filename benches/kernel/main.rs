@@ -90,7 +90,7 @@ fn main() {
             scene
         });
         println!();
-        let scene = SceneTree::build(vec![Shape::Mesh { tree, world_from_object: Affine3A::IDENTITY }]);
+        let scene = SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::IDENTITY }]);
         for set in rays::classes(&scene, &mesh) {
             check(&scene, &set);
             let mut hits = HitBatch::default();
@@ -121,7 +121,16 @@ fn main() {
             let ratio = median(&mut theirs.iter().zip(&own).map(|(theirs, own)| theirs / own).collect::<Vec<_>>());
             let packet_ratio =
                 median(&mut theirs.iter().zip(&packets).map(|(theirs, own)| theirs / own).collect::<Vec<_>>());
-            print!("    {:9} closest {:6.1}  any {:6.1}", set.name, median(&mut own), median(&mut any));
+            let visits = mean_visits(&tree, &set);
+            print!(
+                "    {:9} [{:4.1} {:4.2} {:4.2}] closest {:6.1}  any {:6.1}",
+                set.name,
+                visits[0],
+                visits[1],
+                visits[2],
+                median(&mut own),
+                median(&mut any)
+            );
             if !theirs.is_empty() {
                 print!(
                     "   x{ratio:.2}   embree {:6.1}, packet 16 {:6.1} (x{packet_ratio:.2})",
@@ -143,6 +152,22 @@ fn main() {
     for (name, sum, count) in totals {
         println!("geometric mean over {count} meshes, {name}: x{:.2}", (sum / count as f64).exp());
     }
+}
+
+/// Inner nodes of the binary tree, leaves and blocks a ray.
+fn mean_visits(tree: &MeshTree, set: &RaySet) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    let mut n = 0.0;
+    for wave in &set.waves {
+        for i in (0..wave.len()).step_by(7) {
+            let visits = tree.count_visits(&wave.get(i));
+            for (sum, count) in sum.iter_mut().zip([visits.inner, visits.leaves, visits.blocks]) {
+                *sum += count as f64;
+            }
+            n += 1.0;
+        }
+    }
+    sum.map(|sum| sum / f64::max(n, 1.0))
 }
 
 /// Every hit of every ray against the plain traversal, and some against no tree at all.

@@ -3,6 +3,7 @@
 mod info;
 mod render;
 mod show;
+mod simplify;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use firstlight::render::{Integrator, PixelFilter};
@@ -25,6 +26,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
+    /// Write a model with fewer triangles, and measure how far it is from the original.
+    Simplify(simplify::SimplifyArgs),
 }
 
 /// What to open, and how.
@@ -117,6 +120,7 @@ pub fn main() -> ExitCode {
     let result = match line.command {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),
     };
     let (message, code) = match result {

@@ -147,7 +147,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (film, display) = (Film::new(5, 3), Display::default());
         std::fs::write(folder.path().join("gallery-0002.png"), "not ours").unwrap();
-        let mut save = |format| write_new_film(&film, &display, (10, 6), folder.path(), "gallery", format).unwrap();
+        let save = |format| write_new_film(&film, &display, (10, 6), folder.path(), "gallery", format).unwrap();
         let first = save(PictureFormat::Png);
         assert_eq!(first, folder.path().join("gallery-0001.png"));
         assert_eq!(save(PictureFormat::Png), folder.path().join("gallery-0003.png"));

@@ -68,9 +68,16 @@ impl Changes {
     }
 }
 
+/// The cause that says it all.
+pub const SCENE_OPENED: &str = "scene opened";
+
 impl fmt::Display for Changes {
     /// The causes of the restart, the weightiest first, no more than three.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Of a new scene everything is new.
+        if self.0.iter().any(|change| change.cause == SCENE_OPENED) {
+            return f.write_str(SCENE_OPENED);
+        }
         let mut causes: Vec<&Change> = self.0.iter().filter(|change| change.level >= Level::Restart).collect();
         causes.sort_by_key(|change| std::cmp::Reverse(change.level));
         let shown: Vec<&str> = causes.iter().take(3).map(|change| change.cause.as_str()).collect();

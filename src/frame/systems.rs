@@ -2,7 +2,7 @@
 
 use super::beside::{Beside, Finished};
 use super::navigation::Surroundings;
-use super::reset::{Changes, Level, compare, compare_displays, compare_settings};
+use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
 use super::status::{MessageKind, Picture, Status};
 use super::worker::{Job, Worker};
 use super::{Target, navigation};
@@ -179,7 +179,7 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<Around>().home = home;
     let mut shown = world.resource_mut::<Shown>();
     shown.trees.extend(scene.trees.clone());
-    shown.restart = Some("scene opened");
+    shown.restart = Some(SCENE_OPENED);
     let mut status = world.resource_mut::<Status>();
     status.scene = scene.source.title();
     for warning in &scene.warnings {

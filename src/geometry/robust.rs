@@ -37,13 +37,10 @@ pub fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
 pub fn offset_ray_origin(point: Vec3, error: Vec3, geometric_normal: Vec3, dir: Vec3) -> Vec3 {
     let distance = geometric_normal.abs().dot(error);
     let offset = distance * if dir.dot(geometric_normal) < 0.0 { -geometric_normal } else { geometric_normal };
-    // The addition rounds too: one more step away from the surface makes up for it.
-    let away = |p: f32, o: f32| match p + o {
-        sum if o > 0.0 => sum.next_up(),
-        sum if o < 0.0 => sum.next_down(),
-        sum => sum,
-    };
-    Vec3::new(away(point.x, offset.x), away(point.y, offset.y), away(point.z, offset.z))
+    let sum = point + offset;
+    // The addition rounds by half a unit in the last place at most: a whole one, away from the surface, makes up for it.
+    let away = sum + (2.0 * UNIT_ROUNDOFF * sum.abs()).copysign(offset);
+    Vec3::select(offset.cmpeq(Vec3::ZERO), sum, away)
 }
 
 /// Property tests that draw the same cases on every run.

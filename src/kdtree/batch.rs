@@ -44,7 +44,7 @@ impl RayBatch {
         self.t_max.push(ray.t_max);
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn get(&self, i: usize) -> Ray {
         Ray {
             origin: Vec3::new(self.origin_x[i], self.origin_y[i], self.origin_z[i]),

@@ -3,6 +3,7 @@
 use super::build::{BuildConfig, Primitives, build, clip_triangle};
 use super::nodes::KdNodes;
 use super::ray::{Nearest, TreeRay};
+use super::stats::Visits;
 use super::wide::{WideNode, widen};
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
 use glam::Vec3;
@@ -179,22 +180,42 @@ impl MeshTree {
 
     /// Whether the tree outgrows the caches, so that asking for memory in advance pays.
     pub(super) fn is_large(&self) -> bool {
-        self.blocks.len() * size_of::<TriangleBlock>() > 16 << 20
+        self.blocks.len() * size_of::<TriangleBlock>() > 1 << 20
     }
 
     /// Offers the triangles along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
         let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.extent);
         self.nodes.walk(&tree_ray, nearest.t, |first, count| {
-            for block in &self.blocks[first as usize..][..count as usize] {
-                for lane in 0..BLOCK {
-                    if let Some(hit) = intersect_triangle(ray.origin, shear, &block.triangle(lane)) {
-                        nearest.offer(hit.t, hit.u, hit.v, block.prim(lane));
-                    }
-                }
-            }
+            self.offer_leaf(ray, shear, nearest, first, count);
             if any && nearest.found { f32::NEG_INFINITY } else { nearest.t }
         });
+    }
+
+    /// What the nearest hit of a ray costs, whatever traversal finds it.
+    pub fn count_visits(&self, ray: &Ray) -> Visits {
+        let shear = Shear::new(ray.dir);
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, self.extent);
+        let mut nearest = Nearest::before(ray.t_max);
+        let (mut leaves, mut blocks, mut inner) = (0, 0, 0);
+        let visit = |first, count| {
+            (leaves, blocks) = (leaves + 1, blocks + count as usize);
+            self.offer_leaf(ray, &shear, &mut nearest, first, count);
+            nearest.t
+        };
+        self.nodes.walk_counting(&tree_ray, ray.t_max, visit, || inner += 1);
+        Visits { inner, leaves, blocks }
+    }
+
+    #[inline]
+    fn offer_leaf(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, first: u32, count: u32) {
+        for block in &self.blocks[first as usize..][..count as usize] {
+            for lane in 0..BLOCK {
+                if let Some(hit) = intersect_triangle(ray.origin, shear, &block.triangle(lane)) {
+                    nearest.offer(hit.t, hit.u, hit.v, block.prim(lane));
+                }
+            }
+        }
     }
 
     /// The same by trying every triangle: the reference for all trees.

@@ -27,5 +27,5 @@ pub use mesh_tree::{BuildPreset, MeshTree};
 pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
 pub use simd::InstructionSet;
 pub use sphere_tree::SphereTree;
-pub use stats::KdTreeStats;
+pub use stats::{KdTreeStats, Visits};
 pub use surface::SurfacePoint;

@@ -70,7 +70,19 @@ impl KdNodes {
     /// Calls `visit(first, count)` for the leaves along the ray, front to back, as long as they start no later than
     /// the limit that `visit` returns; the first limit is `t_max`.
     #[inline]
-    pub fn walk(&self, ray: &TreeRay, t_max: f32, mut visit: impl FnMut(u32, u32) -> f32) {
+    pub fn walk(&self, ray: &TreeRay, t_max: f32, visit: impl FnMut(u32, u32) -> f32) {
+        self.walk_counting(ray, t_max, visit, || ());
+    }
+
+    /// The same, and calls `at_inner` at every inner node.
+    #[inline]
+    pub fn walk_counting(
+        &self,
+        ray: &TreeRay,
+        t_max: f32,
+        mut visit: impl FnMut(u32, u32) -> f32,
+        mut at_inner: impl FnMut(),
+    ) {
         let (mut t0, mut t1) = ray.clip(&self.bounds, t_max);
         if t0 > t1 {
             return;
@@ -82,6 +94,7 @@ impl KdNodes {
         loop {
             match self.nodes[index as usize].unpack() {
                 Node::Inner { axis, split, first_child } => {
+                    at_inner();
                     let (lo, hi) = ray.crossing(axis, split);
                     let near = first_child + ray.down[axis] as u32;
                     let far = first_child + 1 - ray.down[axis] as u32;

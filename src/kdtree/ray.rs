@@ -34,7 +34,7 @@ pub(super) struct TreeRay {
 
 impl TreeRay {
     /// - `extent`: the largest side of the tree's bounds.
-    #[inline]
+    #[inline(always)]
     pub fn new(origin: Vec3, dir: Vec3, shear: &Shear, extent: f32) -> Self {
         let inv = dir.to_array().map(|d| 1.0 / d);
         Self {
@@ -50,21 +50,23 @@ impl TreeRay {
     ///
     /// NaN for a ray that runs inside the plane. A crossing behind the origin comes out shifted towards the
     /// origin or away from it, but never changes sides by more than the slack.
-    #[inline]
+    #[inline(always)]
     pub fn crossing(&self, axis: usize, split: f32) -> (f32, f32) {
         let distance = split - self.origin[axis];
         (distance * self.inv_lo[axis] - self.slack, distance * self.inv_hi[axis] + self.slack)
     }
 
     /// The part of `0..=t_max` inside the box, widened; empty when it starts after its end.
-    #[inline]
+    #[inline(always)]
     pub fn clip(&self, bounds: &Aabb, t_max: f32) -> (f32, f32) {
         let faces = [bounds.min, bounds.max];
         let (mut t0, mut t1) = (0.0, t_max);
         for (axis, &down) in self.down.iter().enumerate() {
             // NaN (a ray inside a face) loses against either number.
-            t0 = f32::max(t0, self.crossing(axis, faces[down][axis]).0);
-            t1 = f32::min(t1, self.crossing(axis, faces[1 - down][axis]).1);
+            let (entry, exit) =
+                (self.crossing(axis, faces[down][axis]).0, self.crossing(axis, faces[1 - down][axis]).1);
+            t0 = if entry > t0 { entry } else { t0 };
+            t1 = if exit < t1 { exit } else { t1 };
         }
         (t0, t1)
     }
@@ -87,7 +89,7 @@ impl Nearest {
         Self { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn offer(&mut self, t: f32, u: f32, v: f32, prim: u32) {
         if t > 0.0 && (t < self.t || (t == self.t && prim < self.prim)) {
             *self = Self { t, u, v, prim, found: true };

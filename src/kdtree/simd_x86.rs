@@ -96,40 +96,40 @@ impl Simd for Avx512 {
             // The stores below write eight entries each.
             assert!(height <= STACK - 8);
             let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
+            let shifts = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(shifts), shifts);
+            // The lower half is about entries and holds times, the upper half about exits and holds their negatives:
+            // then both only ever grow.
+            let upper_half = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
             // Lane 7 holds the axes: a plane that no child asks for.
-            let splits = _mm256_loadu_ps(std::ptr::from_ref(node).cast());
-            let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), shifts);
-            let inv_lo = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv_lo.as_ptr()), axes);
-            let inv_hi = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv_hi.as_ptr()), axes);
-            let origin = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.origin.as_ptr()), axes);
-            let slack = _mm256_set1_ps(ray.slack);
-            let distance = _mm256_sub_ps(splits, origin);
-            let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), slack);
-            let hi = _mm256_add_ps(_mm256_mul_ps(distance, inv_hi), slack);
-            let (never, always) = (_mm256_set1_ps(f32::NEG_INFINITY), _mm256_set1_ps(f32::INFINITY));
-            // Where the direction points down, the upper side comes first.
-            let down = _mm256_movepi32_mask(_mm256_castps_si256(inv_lo));
-            let lower_t0 = _mm256_mask_blend_ps(down, never, lo);
-            let upper_t0 = _mm256_mask_blend_ps(down, lo, never);
-            let lower_t1 = _mm256_mask_blend_ps(down, hi, always);
-            let upper_t1 = _mm256_mask_blend_ps(down, always, hi);
-            // For each child the plane of each level, on its side: 0 to 7 lower, 8 to 15 upper.
-            let root = _mm256_setr_epi32(0, 0, 0, 0, 8, 8, 8, 8);
-            let middle = _mm256_setr_epi32(1, 1, 9, 9, 2, 2, 10, 10);
-            let bottom = _mm256_setr_epi32(3, 11, 4, 12, 5, 13, 6, 14);
+            let splits = _mm256_load_ps(std::ptr::from_ref(node).cast());
+            let splits = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(splits), splits);
+            let axes = _mm512_srlv_epi32(_mm512_set1_epi32(node.axes as i32), shifts);
+            // Only three bits of the axes are their own.
+            let axes = _mm512_ternarylogic_epi32::<0xF8>(upper_half, axes, _mm512_set1_epi32(7));
+            let origin = _mm512_permutexvar_ps(axes, _mm512_load_ps(ray.origin.as_ptr().cast()));
+            let inv = _mm512_permutexvar_ps(axes, _mm512_load_ps(ray.inv.as_ptr().cast()));
+            let times = _mm512_mul_ps(_mm512_sub_ps(splits, origin), inv);
+            let times = _mm512_sub_ps(times, _mm512_set1_ps(ray.slack));
+            let root = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
+            let middle = _mm512_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2, 9, 9, 9, 9, 10, 10, 10, 10);
+            let bottom = _mm512_setr_epi32(3, 3, 4, 4, 5, 5, 6, 6, 11, 11, 12, 12, 13, 13, 14, 14);
+            // The far side has a new entry, the near side a new exit.
+            let octant = node.octants[ray.octant & 7];
+            let bounds = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(t0), _mm512_set1_ps(-t1));
             // NaN as the first argument loses against the second.
-            let mut first = _mm256_set1_ps(t0);
-            first = _mm256_max_ps(_mm256_permutex2var_ps(lower_t0, root, upper_t0), first);
-            first = _mm256_max_ps(_mm256_permutex2var_ps(lower_t0, middle, upper_t0), first);
-            first = _mm256_max_ps(_mm256_permutex2var_ps(lower_t0, bottom, upper_t0), first);
-            let mut last = _mm256_set1_ps(t1);
-            last = _mm256_min_ps(_mm256_permutex2var_ps(lower_t1, root, upper_t1), last);
-            last = _mm256_min_ps(_mm256_permutex2var_ps(lower_t1, middle, upper_t1), last);
-            last = _mm256_min_ps(_mm256_permutex2var_ps(lower_t1, bottom, upper_t1), last);
-            let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.order[ray.octant & 7] as i32), shifts);
-            let first = _mm256_permutexvar_ps(order, first);
-            let last = _mm256_permutexvar_ps(order, last);
-            let children = _mm256_permutexvar_epi32(order, _mm256_load_si256(node.children.as_ptr().cast()));
+            let mask = both_halves(octant >> 24);
+            let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(root, times), bounds);
+            let mask = both_halves(octant >> 32);
+            let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(middle, times), bounds);
+            let mask = both_halves(octant >> 40);
+            let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(bottom, times), bounds);
+            let order = _mm512_srlv_epi32(_mm512_set1_epi32(octant as i32), shifts);
+            let order_twice = _mm512_ternarylogic_epi32::<0xF8>(upper_half, order, _mm512_set1_epi32(7));
+            let bounds = _mm512_permutexvar_ps(order_twice, bounds);
+            let first = _mm512_castps512_ps256(bounds);
+            let last = _mm256_xor_ps(_mm512_extractf32x8_ps::<1>(bounds), _mm256_set1_ps(-0.0));
+            let children = _mm256_load_si256(node.children.as_ptr().cast());
+            let children = _mm256_permutexvar_epi32(_mm512_castsi512_si256(order), children);
             let some = _mm256_cmpneq_epi32_mask(children, _mm256_set1_epi32(EMPTY as i32));
             let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(some, first, last);
             _mm256_storeu_si256(stack.child.as_mut_ptr().add(height).cast(), _mm256_maskz_compress_epi32(met, children));
@@ -139,6 +139,13 @@ impl Simd for Avx512 {
         }
         fn prefetch(at: *const u8) { _mm_prefetch::<_MM_HINT_T0>(at.cast()) }
     }
+}
+
+/// The low byte, and its complement above it.
+#[inline(always)]
+fn both_halves(far: u64) -> Mask {
+    let far = far as Mask & 0xFF;
+    far | (far ^ 0xFF) << 8
 }
 
 /// A mask of 8 bits as a register of lanes that are all ones or all zeros.
@@ -279,13 +286,13 @@ impl Simd for Avx2 {
             // Lane 7 holds the axes: a plane that no child asks for.
             let splits = _mm256_loadu_ps(std::ptr::from_ref(node).cast());
             let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), shifts);
-            let inv_lo = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv_lo.as_ptr()), axes);
-            let inv_hi = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv_hi.as_ptr()), axes);
-            let origin = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.origin.as_ptr()), axes);
+            let inv_lo = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv[0].as_ptr()), axes);
+            let minus_inv_hi = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv[1].as_ptr()), axes);
+            let origin = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.origin[0].as_ptr()), axes);
             let slack = _mm256_set1_ps(ray.slack);
             let distance = _mm256_sub_ps(splits, origin);
             let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), slack);
-            let hi = _mm256_add_ps(_mm256_mul_ps(distance, inv_hi), slack);
+            let hi = _mm256_sub_ps(slack, _mm256_mul_ps(distance, minus_inv_hi));
             let (never, always) = (_mm256_set1_ps(f32::NEG_INFINITY), _mm256_set1_ps(f32::INFINITY));
             // Where the direction points down, the upper side comes first.
             let down = _mm256_castps_si256(inv_lo);
@@ -307,7 +314,7 @@ impl Simd for Avx2 {
             last = _mm256_min_ps(sides::<0b1111_0000>(lower_t1, root, upper_t1), last);
             last = _mm256_min_ps(sides::<0b1100_1100>(lower_t1, middle, upper_t1), last);
             last = _mm256_min_ps(sides::<0b1010_1010>(lower_t1, bottom, upper_t1), last);
-            let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.order[ray.octant & 7] as i32), shifts);
+            let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.octants[ray.octant & 7] as i32), shifts);
             let first = _mm256_permutevar8x32_ps(first, order);
             let last = _mm256_permutevar8x32_ps(last, order);
             let children = _mm256_permutevar8x32_epi32(_mm256_load_si256(node.children.as_ptr().cast()), order);

@@ -27,6 +27,15 @@ pub struct KdTreeStats {
     pub expected_block_tests: f64,
 }
 
+/// What one ray looked at in one tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Visits {
+    pub inner: usize,
+    /// Leaves with something in them.
+    pub leaves: usize,
+    pub blocks: usize,
+}
+
 impl KdTreeStats {
     pub fn references_per_primitive(&self) -> f64 {
         self.references as f64 / self.primitives.max(1) as f64

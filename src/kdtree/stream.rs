@@ -8,13 +8,13 @@
 
 use super::lanes::{may_hit, resolve, shear};
 use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
-use super::ray::{Nearest, WIDEN};
+use super::ray::{Nearest, TreeRay};
 use super::simd::Simd;
-use super::wide::{DescentRay, LEAF, STACK, Stack};
+use super::wide::{DescentRay, LEAF, STACK, Stack, WideNode};
 use crate::geometry::{Ray, Shear};
 
 /// Rays in flight.
-const SLOTS: usize = 16;
+const SLOTS: usize = 32;
 
 /// Where the stream gets its rays, in the mesh's own space, and leaves what they hit.
 pub(super) trait Source {
@@ -24,11 +24,13 @@ pub(super) trait Source {
     fn finish(&mut self, ray: u32, nearest: &Nearest);
 }
 
+#[derive(Clone, Copy)]
 struct Slot {
     descent: DescentRay,
     leaf: LeafRay,
     nearest: Nearest,
     id: u32,
+    is_busy: bool,
     height: usize,
     /// The entry that is visited next.
     child: u32,
@@ -37,6 +39,7 @@ struct Slot {
 }
 
 /// A ray as the test of a leaf block wants it.
+#[derive(Clone, Copy)]
 pub(super) struct LeafRay {
     /// Axes across, across and along.
     pub axes: [usize; 3],
@@ -57,7 +60,7 @@ impl LeafRay {
 /// Tests one ray against a block.
 #[inline(always)]
 pub(super) fn test_block<S: Simd>(s: S, block: &TriangleBlock, ray: &LeafRay, nearest: &mut Nearest) {
-    let [kx, ky, kz] = ray.axes.map(|axis| axis % 3);
+    let [kx, ky, kz] = ray.axes;
     let origin = [s.splat(ray.origin[0]), s.splat(ray.origin[1]), s.splat(ray.origin[2])];
     let (sx, sy) = (s.splat(ray.sx), s.splat(ray.sy));
     let [a, b, c] = &block.vertices;
@@ -82,160 +85,160 @@ pub(super) fn test_block<S: Simd>(s: S, block: &TriangleBlock, ray: &LeafRay, ne
     nearest.offer(t, u[lane % BLOCK], v[lane % BLOCK], block.prim(lane % BLOCK));
 }
 
+/// The entry below all others: the ray is through.
+const DONE: u32 = LEAF - 1;
+
+/// The slots in one state. A slot is written to every list and kept in the one that it belongs to, which takes
+/// no branch; hence the spare place.
+struct List {
+    slots: [u8; SLOTS + 1],
+    len: usize,
+}
+
+impl List {
+    const NEW: Self = Self { slots: [0; SLOTS + 1], len: 0 };
+
+    #[inline(always)]
+    fn push_if(&mut self, belongs: bool, slot: u8) {
+        self.slots[self.len] = slot;
+        self.len += usize::from(belongs);
+    }
+
+    /// Empties the list and returns what was in it.
+    #[inline(always)]
+    fn take(&mut self) -> ([u8; SLOTS + 1], usize) {
+        (self.slots, std::mem::take(&mut self.len))
+    }
+}
+
 /// Traces all rays of the source; with `ANY` a ray ends at its first hit.
 #[inline(always)]
 pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut impl Source) {
-    let mut stream = Stream { s, tree, prefetch: tree.is_large(), stacks: Box::new([Stack::NEW; SLOTS]) };
-    let mut slots: [Slot; SLOTS] = std::array::from_fn(|_| Slot::IDLE);
-    // Slots whose next entry is a wide node, and those whose next entry is a leaf.
-    // Both have room for one entry that is written and not kept.
-    let (mut inner, mut n_inner) = ([0u8; SLOTS + 1], 0);
-    let (mut leaf, mut n_leaf) = ([0u8; SLOTS + 1], 0);
-    for i in 0..SLOTS {
-        if stream.refill(&mut slots[i], source) {
-            inner[n_inner] = i as u8;
-            n_inner += 1;
-        }
+    let (wide, blocks) = (&tree.wide[..], &tree.blocks[..]);
+    let prefetch = tree.is_large();
+    let mut stacks: [Stack; SLOTS] = [Stack::NEW; SLOTS];
+    let mut slots: [Slot; SLOTS] = [Slot::IDLE; SLOTS];
+    let (mut inner, mut leaf, mut idle) = (List::NEW, List::NEW, List::NEW);
+    for (i, stack) in (0..SLOTS as u8).zip(&mut stacks) {
+        (stack.child[0], stack.t0[0]) = (DONE, f32::NEG_INFINITY);
+        idle.push_if(true, i);
     }
-    while n_inner + n_leaf > 0 {
-        let mut kept = 0;
-        for k in 0..n_inner {
-            let i = inner[k] as usize % SLOTS;
-            let slot = &mut slots[i];
-            let stack = &mut stream.stacks[i];
-            let t1 = slot.t1.min(slot.nearest.t);
-            let node = &tree.wide[slot.child as usize];
-            slot.height = s.descend(node, &slot.descent, slot.t0, t1, stack, slot.height);
-            if !stream.pop(i, slot) {
+    loop {
+        let (list, len) = idle.take();
+        for &i in &list[..len] {
+            let slot = &mut slots[i as usize % SLOTS];
+            if slot.is_busy {
                 source.finish(slot.id, &slot.nearest);
-                if !stream.refill(slot, source) {
-                    continue;
+            }
+            slot.is_busy = refill(tree, slot, source);
+            inner.push_if(slot.is_busy, i);
+        }
+        if inner.len + leaf.len == 0 {
+            return;
+        }
+        let (list, len) = inner.take();
+        for &i in &list[..len] {
+            let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
+            let t1 = if slot.nearest.t < slot.t1 { slot.nearest.t } else { slot.t1 };
+            slot.height = s.descend(&wide[slot.child as usize], &slot.descent, slot.t0, t1, stack, slot.height);
+            slot.pop(stack);
+            if prefetch {
+                fetch(s, wide, blocks, slot.child);
+            }
+            inner.push_if(slot.child < DONE, i);
+            leaf.push_if(slot.child > DONE, i);
+            idle.push_if(slot.child == DONE, i);
+        }
+        let (list, len) = leaf.take();
+        if prefetch {
+            for &i in &list[..len] {
+                let at = blocks.as_ptr().wrapping_add((slots[i as usize % SLOTS].child & !LEAF) as usize);
+                for line in 2..size_of::<TriangleBlock>() / 64 {
+                    s.prefetch(at.cast::<u8>().wrapping_add(64 * line));
                 }
             }
-            let is_leaf = slot.child & LEAF != 0;
-            (inner[kept], leaf[n_leaf]) = (i as u8, i as u8);
-            kept += usize::from(!is_leaf);
-            n_leaf += usize::from(is_leaf);
         }
-        n_inner = kept;
-        let mut kept = 0;
-        for k in 0..n_leaf {
-            let i = leaf[k] as usize % SLOTS;
-            let slot = &mut slots[i];
+        for &i in &list[..len] {
+            let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
             let mut block = (slot.child & !LEAF) as usize;
             loop {
-                test_block(s, &tree.blocks[block], &slot.leaf, &mut slot.nearest);
-                if !tree.blocks[block].is_followed() {
+                test_block(s, &blocks[block], &slot.leaf, &mut slot.nearest);
+                if !blocks[block].is_followed() {
                     break;
                 }
                 block += 1;
             }
-            let done = ANY && slot.nearest.found;
-            if done || !stream.pop(i, slot) {
-                source.finish(slot.id, &slot.nearest);
-                if !stream.refill(slot, source) {
-                    continue;
-                }
+            slot.pop(stack);
+            if ANY && slot.nearest.found {
+                slot.child = DONE;
             }
-            let is_leaf = slot.child & LEAF != 0;
-            (leaf[kept], inner[n_inner]) = (i as u8, i as u8);
-            kept += usize::from(is_leaf);
-            n_inner += usize::from(!is_leaf);
+            if prefetch {
+                fetch(s, wide, blocks, slot.child);
+            }
+            inner.push_if(slot.child < DONE, i);
+            leaf.push_if(slot.child > DONE, i);
+            idle.push_if(slot.child == DONE, i);
         }
-        n_leaf = kept;
     }
 }
 
-struct Stream<'a, S> {
-    s: S,
-    tree: &'a MeshTree,
-    prefetch: bool,
-    stacks: Box<[Stack; SLOTS]>,
+/// Asks for the first lines of what will be visited next, whatever it is.
+#[inline(always)]
+fn fetch<S: Simd>(s: S, wide: &[WideNode], blocks: &[TriangleBlock], child: u32) {
+    let node = wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
+    let block = blocks.as_ptr().wrapping_add((child & !LEAF) as usize).cast::<u8>();
+    let at = if child & LEAF != 0 { block } else { node };
+    s.prefetch(at);
+    s.prefetch(at.wrapping_add(64));
 }
 
-impl<S: Simd> Stream<'_, S> {
-    /// Takes the nearest entry that can still matter; false if there is none.
-    #[inline(always)]
-    fn pop(&self, i: usize, slot: &mut Slot) -> bool {
-        let stack = &self.stacks[i];
-        while slot.height > 0 {
-            slot.height -= 1;
-            let top = slot.height % STACK;
-            if stack.t0[top] <= slot.nearest.t {
-                (slot.child, slot.t0, slot.t1) = (stack.child[top], stack.t0[top], stack.t1[top]);
-                if self.prefetch {
-                    self.fetch(slot.child);
-                }
-                return true;
-            }
+/// Starts the next ray that meets the bounds; false if there are no more.
+#[inline(always)]
+fn refill(tree: &MeshTree, slot: &mut Slot, source: &mut impl Source) -> bool {
+    while let Some((ray, nearest, id)) = source.next() {
+        let shear = Shear::new(ray.dir);
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, tree.extent);
+        let (t0, t1) = tree_ray.clip(&tree.nodes.bounds, nearest.t);
+        if t0 <= t1 && !tree.wide.is_empty() {
+            *slot = Slot {
+                descent: DescentRay::new(tree_ray.origin, tree_ray.inv_lo, tree_ray.inv_hi, tree_ray.slack),
+                leaf: LeafRay::new(&ray, &shear),
+                nearest,
+                id,
+                is_busy: true,
+                height: 1,
+                child: 0,
+                t0,
+                t1,
+            };
+            return true;
         }
-        false
+        source.finish(id, &nearest);
     }
-
-    #[inline(always)]
-    fn fetch(&self, child: u32) {
-        if child & LEAF != 0 {
-            let at = self.tree.blocks.as_ptr().wrapping_add((child & !LEAF) as usize).cast::<u8>();
-            for line in 0..size_of::<TriangleBlock>() / 64 {
-                self.s.prefetch(at.wrapping_add(64 * line));
-            }
-        } else {
-            let at = self.tree.wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
-            self.s.prefetch(at);
-            self.s.prefetch(at.wrapping_add(64));
-        }
-    }
-
-    /// Starts the next ray that meets the bounds; false if there are no more.
-    #[inline(always)]
-    fn refill(&mut self, slot: &mut Slot, source: &mut impl Source) -> bool {
-        while let Some((ray, nearest, id)) = source.next() {
-            let shear = Shear::new(ray.dir);
-            let (mut origin, mut inv_lo, mut inv_hi) = ([0.0; 8], [0.0; 8], [0.0; 8]);
-            let mut octant = 0;
-            for axis in 0..3 {
-                let inv = 1.0 / ray.dir[axis];
-                origin[axis] = ray.origin[axis];
-                inv_lo[axis] = inv * (1.0 - WIDEN);
-                inv_hi[axis] = inv * (1.0 + WIDEN);
-                octant |= usize::from(ray.dir[axis].is_sign_negative()) << axis;
-            }
-            let slack = (WIDEN * self.tree.extent) * shear.sz.abs();
-            let bounds = [self.tree.nodes.bounds.min, self.tree.nodes.bounds.max];
-            let (mut t0, mut t1) = (0.0, nearest.t);
-            for axis in 0..3 {
-                let down = octant >> axis & 1;
-                t0 = f32::max(t0, (bounds[down][axis] - origin[axis]) * inv_lo[axis] - slack);
-                t1 = f32::min(t1, (bounds[1 - down][axis] - origin[axis]) * inv_hi[axis] + slack);
-            }
-            if t0 <= t1 && !self.tree.wide.is_empty() {
-                *slot = Slot {
-                    descent: DescentRay { origin, inv_lo, inv_hi, slack, octant },
-                    leaf: LeafRay::new(&ray, &shear),
-                    nearest,
-                    id,
-                    height: 0,
-                    child: 0,
-                    t0,
-                    t1,
-                };
-                return true;
-            }
-            source.finish(id, &nearest);
-        }
-        false
-    }
+    false
 }
 
 impl Slot {
     const IDLE: Self = Self {
-        descent: DescentRay { origin: [0.0; 8], inv_lo: [0.0; 8], inv_hi: [0.0; 8], slack: 0.0, octant: 0 },
+        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0 },
         leaf: LeafRay { axes: [0, 1, 2], origin: [0.0; 3], sx: 0.0, sy: 0.0, sz: 0.0 },
         nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
         id: 0,
-        height: 0,
+        is_busy: false,
+        height: 1,
         child: 0,
         t0: 0.0,
         t1: 0.0,
     };
+
+    /// Takes the nearest entry that can still matter; the last of all is [`DONE`].
+    #[inline(always)]
+    fn pop(&mut self, stack: &Stack) {
+        let mut top = self.height - 1;
+        while stack.t0[top % STACK] > self.nearest.t {
+            top -= 1;
+        }
+        self.height = top;
+        (self.child, self.t0, self.t1) = (stack.child[top % STACK], stack.t0[top % STACK], stack.t1[top % STACK]);
+    }
 }

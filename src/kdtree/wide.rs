@@ -11,17 +11,19 @@ use super::nodes::{KdNodes, Node};
 /// highest first, 1 for the upper side. Where the binary tree ends early, the missing planes lie at infinity and
 /// only the lowest of the lanes below has a child.
 #[derive(Clone, Debug, PartialEq)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct WideNode {
     pub splits: [f32; 7],
     /// Three bits a plane.
     pub axes: u32,
     /// [`EMPTY`], a wide node, or with [`LEAF`] set the first block of a leaf.
     pub children: [u32; 8],
-    /// For each octant of directions (bit `a` set: down axis `a`) the children from far to near, three bits each.
-    pub order: [u32; 8],
+    /// For each octant of directions (bit `a` set: down axis `a`) the children from far to near, three bits each,
+    /// and above these 24 bits, for each level from the root one byte: which children lie on the far side of their plane.
+    pub octants: [u64; 8],
 }
-const _: () = assert!(size_of::<WideNode>() == 96);
+// Two cache lines.
+const _: () = assert!(size_of::<WideNode>() == 128);
 
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
@@ -41,23 +43,38 @@ impl Stack {
     pub const NEW: Self = Self { child: [0; STACK], t0: [0.0; STACK], t1: [0.0; STACK] };
 }
 
-/// A ray as [`super::simd::Simd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it.
+/// A ray as [`super::simd::Simd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it, twice.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct DescentRay {
-    pub origin: [f32; 8],
-    pub inv_lo: [f32; 8],
-    pub inv_hi: [f32; 8],
+    pub origin: [[f32; 8]; 2],
+    /// Shortened reciprocals of the direction, and lengthened ones with their sign turned: times a distance they are the
+    /// earliest crossing, and the negative of the latest.
+    pub inv: [[f32; 8]; 2],
     pub slack: f32,
     pub octant: usize,
+}
+
+impl DescentRay {
+    #[inline(always)]
+    pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], slack: f32) -> Self {
+        let [x, y, z] = origin;
+        let origin = [[x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]; 2];
+        let down = |axis: usize| usize::from(inv_lo[axis].is_sign_negative()) << axis;
+        let inv = [
+            [inv_lo[0], inv_lo[1], inv_lo[2], 0.0, 0.0, 0.0, 0.0, 0.0],
+            [-inv_hi[0], -inv_hi[1], -inv_hi[2], 0.0, 0.0, 0.0, 0.0, 0.0],
+        ];
+        Self { origin, inv, slack, octant: down(0) | down(1) | down(2) }
+    }
 }
 
 /// All wide nodes over a binary tree, root first.
 pub(super) fn widen(tree: &KdNodes) -> Vec<WideNode> {
     let mut nodes = Vec::new();
     if !tree.bounds.is_empty() {
-        // Each wide node consumes three levels and leaves at most seven entries behind.
-        assert!(tree.depth().div_ceil(3) * 7 + 8 < STACK, "a tree too deep for the stack");
+        // Each wide node consumes three levels and leaves at most seven entries behind; one lies at the bottom.
+        assert!(tree.depth().div_ceil(3) * 7 + 9 < STACK, "a tree too deep for the stack");
         let mut roots = vec![(0, 0)];
         nodes.push(None);
         while let Some((binary, slot)) = roots.pop() {
@@ -73,7 +90,7 @@ pub(super) fn widen(tree: &KdNodes) -> Vec<WideNode> {
 }
 
 fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> WideNode {
-    let mut node = WideNode { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], order: [0; 8] };
+    let mut node = WideNode { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], octants: [0; 8] };
     // The subtree at each place of a level; `None` below a leaf.
     let mut level = vec![Some(binary)];
     let mut plane = 0;
@@ -106,24 +123,28 @@ fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32
             Node::Inner { .. } => make_child(index),
         };
     }
-    for octant in 0..8 {
-        let mut near_to_far = Vec::new();
-        visit_order(&node, octant, 0, 0, 0, &mut near_to_far);
-        node.order[octant] = near_to_far.iter().fold(0, |word, lane| word << 3 | lane);
-    }
+    node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
     node
 }
 
-fn visit_order(node: &WideNode, octant: usize, depth: usize, place: usize, plane: usize, order: &mut Vec<u32>) {
-    if depth == 3 {
-        order.push(place as u32);
-        return;
+/// Order and far sides for one octant.
+///
+/// A child's rank from the near end has a bit for each level, 1 where it is on the far side.
+fn octant_word(axes: u32, octant: usize) -> u64 {
+    let mut word = 0;
+    for child in 0..8u64 {
+        let (mut rank, mut plane) = (0, 0);
+        for depth in 0..3 {
+            let side = child >> (2 - depth) & 1;
+            let down = (octant >> (axes >> (3 * plane) & 7) & 1) as u64;
+            let far = side ^ down;
+            word |= far << (24 + 8 * depth + child);
+            rank = rank << 1 | far;
+            plane = 2 * plane + 1 + side;
+        }
+        word |= child << (3 * (7 - rank));
     }
-    let axis = node.axes >> (3 * plane) & 7;
-    let near = octant >> axis & 1;
-    for side in [near, 1 - near] {
-        visit_order(node, octant, depth + 1, 2 * place + side, 2 * plane + 1 + side, order);
-    }
+    word
 }
 
 /// The plain version of [`super::simd::Simd::descend`].
@@ -138,7 +159,7 @@ pub(super) fn descend_plain(
     stack: &mut Stack,
     mut height: usize,
 ) -> usize {
-    let mut order = node.order[ray.octant];
+    let mut order = node.octants[ray.octant];
     for _ in 0..8 {
         let lane = (order & 7) as usize;
         order >>= 3;
@@ -146,13 +167,13 @@ pub(super) fn descend_plain(
         let mut plane = 0;
         for depth in 0..3 {
             let axis = (node.axes >> (3 * plane) & 7) as usize;
-            let distance = node.splits[plane] - ray.origin[axis];
+            let distance = node.splits[plane] - ray.origin[0][axis];
             let side = lane >> (2 - depth) & 1;
             // NaN, a ray inside the plane, bounds neither side.
             if (side == 1) == (ray.octant >> axis & 1 == 1) {
-                t1 = f32::min(t1, distance * ray.inv_hi[axis] + ray.slack);
+                t1 = f32::min(t1, ray.slack - distance * ray.inv[1][axis]);
             } else {
-                t0 = f32::max(t0, distance * ray.inv_lo[axis] - ray.slack);
+                t0 = f32::max(t0, distance * ray.inv[0][axis] - ray.slack);
             }
             plane = 2 * plane + 1 + side;
         }
@@ -174,7 +195,9 @@ mod tests {
             let height = s.descend(node, ray, *t0, *t1, &mut stack, 3);
             out.push(height as u64);
             for i in 3..height {
-                out.extend([stack.child[i], stack.t0[i].to_bits(), stack.t1[i].to_bits()].map(u64::from));
+                // Adding 0 makes the zeros alike.
+                let bits = |t: f32| (t + 0.0).to_bits();
+                out.extend([stack.child[i], bits(stack.t0[i]), bits(stack.t1[i])].map(u64::from));
             }
         }
     }
@@ -190,22 +213,16 @@ mod tests {
             .map(|_| {
                 let mut number = || [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
                 let mut node =
-                    WideNode { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], order: [0; 8] };
-                let origin = [number(), number(), number(), 0.0, 0.0, 0.0, 0.0, 0.0];
+                    WideNode { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
+                let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
                 (0..7).for_each(|plane| node.axes |= next() % 3 << (3 * plane));
                 if next() % 4 == 0 {
                     node.splits[2] = f32::INFINITY;
                 }
                 node.children = std::array::from_fn(|c| if next() % 5 == 0 { EMPTY } else { c as u32 * 7 });
-                for octant in 0..8 {
-                    let mut order = Vec::new();
-                    visit_order(&node, octant, 0, 0, 0, &mut order);
-                    node.order[octant] = order.iter().fold(0, |word, lane| word << 3 | lane);
-                }
-                let inverse = |widen: f32| std::array::from_fn(|i| if i < 3 { widen / dir[i] } else { 0.0 });
-                let octant = (0..3).map(|i| usize::from(dir[i].is_sign_negative()) << i).sum();
-                let ray = DescentRay { origin, inv_lo: inverse(0.999), inv_hi: inverse(1.001), slack: 1e-6, octant };
+                node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
+                let ray = DescentRay::new(origin, dir.map(|d| 0.999 / d), dir.map(|d| 1.001 / d), 1e-6);
                 (node, ray, 0.0, if next() % 2 == 0 { f32::INFINITY } else { 1.5 })
             })
             .collect();

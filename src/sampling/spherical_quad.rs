@@ -37,33 +37,55 @@ impl SphericalQuad {
     }
 
     fn compute_solid_angle(&self, area: f32) -> f32 {
-        let corner = |x, y| Vec3::new(x, y, self.z0);
+        // In units of the distance to the first corner, so that products of six lengths stay in range.
+        let unit = Vec3::new(self.x0, self.y0, self.z0).length().max(f32::MIN_POSITIVE).recip();
+        let corner = |x, y| Vec3::new(x, y, self.z0) * unit;
         let [a, b, c, d] =
             [corner(self.x0, self.y0), corner(self.x1, self.y0), corner(self.x1, self.y1), corner(self.x0, self.y1)];
         let [la, lb, lc, ld] = [a, b, c, d].map(Vec3::length);
         // The triple product of both halves: exact up to rounding, however small the rectangle looks.
-        let triple = area * -self.z0;
+        let triple = area * unit * unit * (-self.z0 * unit);
         let half = |p: Vec3, lp: f32, q: Vec3, lq: f32, r: Vec3, lr: f32| {
-            triple.atan2(lp * lq * lr + p.dot(q) * lr + q.dot(r) * lp + r.dot(p) * lq)
+            lp * lq * lr + p.dot(q) * lr + q.dot(r) * lp + r.dot(p) * lq
         };
-        2.0 * (half(a, la, b, lb, c, lc) + half(a, la, c, lc, d, ld))
+        let (first, second) = (half(a, la, b, lb, c, lc), half(a, la, c, lc, d, ld));
+        // Each half is twice the angle of (denominator, triple); the product of the two as complex numbers adds them.
+        2.0 * (triple * (first + second)).atan2(first * second - triple * triple)
     }
 
     /// Where on the rectangle, `[0, 1]²` along its sides, a direction uniform in solid angle meets it.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Vec2 {
         let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
-        // Heights of the four edge planes' normals; the angles between them are those of the spherical rectangle.
-        let height = |y: f32| y / (z0 * z0 + y * y).sqrt();
-        let (n0z, n2z, n3z) = (-height(y0), height(y1), -height(x0));
-        let angle = |p: f32, q: f32| (-p * q).clamp(-1.0, 1.0).acos();
-        let (b0, b1) = (n0z, n2z);
-        let k = std::f32::consts::TAU - angle(n2z, n3z) - angle(n3z, n0z);
-        let au = u.x * solid_angle + k;
-        let (sin_au, cos_au) = au.sin_cos();
-        let fu = (cos_au * b0 - b1) / sin_au;
-        let cu = ((fu * fu + b0 * b0).sqrt().recip().copysign(fu)).clamp(-1.0, 1.0);
-        let xu = (-(cu * z0) / (1.0 - cu * cu).max(f32::MIN_POSITIVE).sqrt()).clamp(x0, x1);
+        // Heights of the four edge planes' normals; the angles between them are those of the spherical rectangle. Of
+        // each, the square of what it lacks to 1 is known without cancellation.
+        let z2 = z0 * z0;
+        let height = |y: f32| {
+            let h2 = z2 + y * y;
+            (y / h2.sqrt(), z2 / h2)
+        };
+        let ((h0, r0), (b1, r1), (h3, r3)) = (height(y0), height(y1), height(x0));
+        let (b0, n3) = (-h0, -h3);
+        // Cosine and sine of the two angles at the far side of x0, and of their sum.
+        let (cos_2, sin_2) = (-b1 * n3, (r1 + b1 * b1 * r3).sqrt());
+        let (cos_3, sin_3) = (-n3 * b0, (r0 + b0 * b0 * r3).sqrt());
+        let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
+        // The slice of the wanted area ends at the plane with angle u · area − sum (mod 2π).
+        let (sin_part, cos_part) = (u.x * solid_angle).sin_cos();
+        let cos_au = cos_part * cos_sum + sin_part * sin_sum;
+        let sin_au = sin_part * cos_sum - cos_part * sin_sum;
+        // cos · b0 − b1: all three may be near 1, and then only what each lacks to 1 tells them apart.
+        let (product, lack_0, lack_1) = (cos_au * b0, r0 / (1.0 + b0.abs()), r1 / (1.0 + b1.abs()));
+        let lack_au = sin_au * sin_au / (1.0 + cos_au.abs());
+        let difference = if product * b1 > 0.0 {
+            (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * b1.signum()
+        } else {
+            product - b1
+        };
+        let fu = difference / sin_au;
+        // Where that plane meets the rectangle: cu = ±1 / √(fu² + b0²), written so that 1 − cu² does not cancel.
+        let xu = (-z0).copysign(fu) / (fu * fu - r0).max(f32::MIN_POSITIVE).sqrt();
+        let xu = if xu.is_nan() { x0 } else { xu.clamp(x0, x1) };
         let d2 = xu * xu + z0 * z0;
         let h0 = y0 / (d2 + y0 * y0).sqrt();
         let h1 = y1 / (d2 + y1 * y1).sqrt();
@@ -165,7 +187,7 @@ mod tests {
                 }
                 let expected = mean_direction(corner, Vec3::X * 2.0, Vec3::Y * 2.0, f64::from(quad.solid_angle()));
                 let error = (sum - expected).length();
-                assert!(error < 2e-3, "{corner}: {sum} for {expected}");
+                assert!(error < 1e-3, "{corner}: {sum} for {expected}");
             }
         }
     }

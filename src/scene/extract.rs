@@ -87,6 +87,12 @@ impl Trees {
         reason.map_or("its tree is not built yet".to_owned(), |(_, reason)| reason.clone())
     }
 
+    /// Memory of all trees; of clouds, that of the balls in them.
+    pub fn bytes(&self) -> usize {
+        self.meshes.values().map(|(_, tree)| tree.stats().bytes).sum::<usize>()
+            + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
+    }
+
     /// Takes over all trees of `other`.
     pub fn extend(&mut self, other: Self) {
         self.unfit.extend(other.unfit);

@@ -3,7 +3,7 @@
 use super::error::SceneError;
 use super::file::{MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
 use super::obj::{ImportedMaterial, ObjError, ObjNormals, ObjOptions, load_obj_with};
-use crate::mesh::{Mesh, NormalWeight, procedural};
+use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use glam::{DVec2, DVec3, Vec3};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -59,41 +59,45 @@ pub fn load_mesh(
     simplify: Option<f64>,
     folder: &Path,
 ) -> Result<LoadedMesh, SceneError> {
-    if simplify.is_some_and(|ratio| ratio < 1.0) {
-        return Err(SceneError::new("meshes cannot be simplified while loading: simplify the file beforehand"));
-    }
     match source {
-        MeshSourcePart::Obj(file) => read_obj(&folder.join(file), shading),
+        MeshSourcePart::Obj(file) => read_obj(&folder.join(file), shading, simplify),
         MeshSourcePart::Builtin(name) => {
             let (mesh, crease) =
                 builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?;
-            let mesh = match shading {
-                MeshShadingPart::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
-                MeshShadingPart::Smooth => mesh.with_vertex_normals(),
-                MeshShadingPart::Flat => mesh.flat(),
-            };
+            let mesh = shaded(simplified(mesh, simplify)?, shading, crease);
             Ok(LoadedMesh { mesh: Arc::new(mesh), slots: Vec::new(), textures: Vec::new(), warnings: Vec::new() })
         }
     }
 }
 
-fn read_obj(path: &Path, shading: MeshShadingPart) -> Result<LoadedMesh, SceneError> {
-    let mut options = ObjOptions::default();
-    if shading != MeshShadingPart::Auto {
-        options.normals = ObjNormals::Ignore;
-    }
-    let imported = load_obj_with(path, &options).map_err(|error| match error {
-        // The reader's own words for a missing file speak of an error number.
-        ObjError::Read { path, source } => SceneError::in_file(path, format!("cannot be read: {}", plain_io(&source))),
-        other => SceneError::new(other.to_string()),
-    })?;
-    let mesh = match shading {
-        MeshShadingPart::Auto => imported.mesh,
-        MeshShadingPart::Smooth => imported.mesh.with_vertex_normals(),
-        MeshShadingPart::Flat => imported.mesh.flat(),
+fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Result<LoadedMesh, SceneError> {
+    let read = |normals| {
+        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
+            // The reader's own words for a missing file speak of an error number.
+            ObjError::Read { path, source } => {
+                SceneError::in_file(path, format!("cannot be read: {}", plain_io(&source)))
+            }
+            other => SceneError::new(other.to_string()),
+        })
     };
-    let mut loaded =
-        LoadedMesh { mesh: Arc::new(mesh), slots: Vec::new(), textures: Vec::new(), warnings: imported.warnings };
+    let computed = ObjOptions::default().normals;
+    let mut imported = read(if shading == MeshShadingPart::Auto { computed } else { ObjNormals::Ignore })?;
+    if shading == MeshShadingPart::Auto {
+        // Normals that were computed would hold simplification back at every crease; they are computed after it.
+        if simplify.is_some() && !imported.normals_from_file {
+            imported.mesh = read(ObjNormals::Ignore)?.mesh;
+        }
+        imported.mesh = simplified(imported.mesh, simplify)?;
+        if imported.mesh.normals.is_empty()
+            && let ObjNormals::FileOrComputed { crease_angle } = computed
+        {
+            imported.mesh = shaded(imported.mesh, shading, Some(crease_angle));
+        }
+    } else {
+        imported.mesh = shaded(simplified(imported.mesh, simplify)?, shading, None);
+    }
+    let mesh = Arc::new(imported.mesh);
+    let mut loaded = LoadedMesh { mesh, slots: Vec::new(), textures: Vec::new(), warnings: imported.warnings };
     // A file without any material leaves the choice to whoever uses it.
     if imported.materials.iter().any(|material| !material.name.is_empty()) {
         for material in &imported.materials {
@@ -102,6 +106,25 @@ fn read_obj(path: &Path, shading: MeshShadingPart) -> Result<LoadedMesh, SceneEr
         }
     }
     Ok(loaded)
+}
+
+fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
+    match ratio {
+        Some(ratio) if ratio < 1.0 => {
+            simplify::simplify(&mesh, simplify::Method::default(), simplify::Target::Ratio(ratio))
+                .map_err(|error| SceneError::new(format!("the mesh cannot be simplified: {error}")))
+        }
+        _ => Ok(mesh),
+    }
+}
+
+/// `crease`: radians beyond which an edge is hard in automatic shading; `None` smooths every edge.
+fn shaded(mesh: Mesh, shading: MeshShadingPart, crease: Option<f32>) -> Mesh {
+    match shading {
+        MeshShadingPart::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
+        MeshShadingPart::Smooth => mesh.with_vertex_normals(),
+        MeshShadingPart::Flat => mesh.flat(),
+    }
 }
 
 impl LoadedMesh {

@@ -18,6 +18,7 @@ mod picture;
 mod placement;
 mod showcase;
 mod spawn;
+mod upright;
 mod view;
 
 pub use builtin::{BUILTIN_SCENES, builtin_text};

@@ -6,6 +6,7 @@ use super::file::{
 };
 use super::load::UpAxis;
 use super::meshes::LoadedMesh;
+use super::upright::guess_up;
 use crate::mesh::Mesh;
 use glam::{DVec3, Vec3};
 
@@ -120,25 +121,4 @@ fn bounds(mesh: &Mesh, up: UpAxis) -> (DVec3, DVec3) {
         UpAxis::Y => (min, max),
         UpAxis::Z => (DVec3::new(min.x, min.z, -max.y), DVec3::new(max.x, max.z, -min.y)),
     }
-}
-
-/// Y, as most OBJ files have it, unless the model stands much better on its lower Z side.
-///
-/// Things that stand have faces that look down at their lowest level: feet, a base, a floor. The measure of standing
-/// along an axis is the area of such faces within the lowest 2 % of the height, over the area of the box's floor.
-pub fn guess_up(mesh: &Mesh) -> UpAxis {
-    let stands = |axis: usize| {
-        let (min, max) = bounds(mesh, UpAxis::Y);
-        let level = min[axis] + 0.02 * (max[axis] - min[axis]) - mesh.center[axis];
-        let size = max - min;
-        let floor = size[(axis + 1) % 3] * size[(axis + 2) % 3];
-        let area: f64 = (mesh.triangles.iter())
-            .map(|corners| corners.map(|v| mesh.positions[v as usize].as_dvec3()))
-            .filter(|corners| corners.iter().all(|corner| corner[axis] <= level))
-            .map(|[a, b, c]| (-0.5 * (b - a).cross(c - a)[axis]).max(0.0))
-            .sum();
-        if floor > 0.0 { area / floor } else { 0.0 }
-    };
-    let (along_y, along_z) = (stands(1), stands(2));
-    if along_z > 4.0 * along_y && along_z > 0.005 { UpAxis::Z } else { UpAxis::Y }
 }

@@ -69,6 +69,8 @@ struct Wake;
 
 /// Ticks and frames come no faster: more would only cost the workers their processors.
 const FRAME: Duration = Duration::from_micros(8_000);
+/// So long a movement waits for the picture of the one before it.
+const LATEST: Duration = Duration::from_millis(250);
 /// Figures that change by themselves are shown again so often.
 const FIGURES: Duration = Duration::from_millis(250);
 /// Pixels of a touchpad that count as a notch of a wheel.
@@ -129,6 +131,8 @@ struct App {
     shown_picture: Option<u64>,
     shown_figures: String,
     last_tick: Option<Instant>,
+    /// When a movement was last handed over.
+    steered_at: Instant,
     last_draw: Option<Instant>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
@@ -150,8 +154,10 @@ impl App {
         })
         .map_err(ViewerError::Session)?;
         session.open(options.source.clone());
+        let start = Instant::now();
         Ok(Self {
-            start: Instant::now(),
+            start,
+            steered_at: start,
             pending,
             session,
             saver: Saver::new(&options.folder, waker),
@@ -203,11 +209,13 @@ impl App {
     fn tick(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
         self.stirred = false;
         self.last_tick = Some(now);
-        for command in self.input.take(now) {
-            self.session.send(command);
-        }
         let clock = now - self.start;
         self.session.update(clock);
+        // A movement that came before the last one was seen would only take its place: it waits, and adds up.
+        let answered = self.is_answered(now);
+        if answered {
+            self.steer(now, clock);
+        }
         let status = self.session.status();
         for message in status.messages.iter().filter(|message| message.at == clock) {
             let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
@@ -229,7 +237,8 @@ impl App {
         let n_toasts = self.toasts.len();
         self.toasts.at(now);
         let Some(window) = &self.window else { return };
-        if title != self.title {
+        // Until the first scene is there, the window is called after what it will show.
+        if title != self.title && !self.session.status().scene.is_empty() {
             window.set_title(&title);
             self.title = title;
         }
@@ -240,11 +249,33 @@ impl App {
         if !self.occluded && (new_picture || repaint || (new_figures && figures_due)) {
             window.request_redraw();
         }
-        let moving = self.input.is_moving().then(|| now + FRAME);
+        let moving = match answered {
+            true => self.input.is_moving().then(|| now + FRAME),
+            false => Some(self.steered_at + LATEST),
+        };
         let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
         let session = self.session.next_wake(clock).map(|at| self.start + at);
         self.wake_at = [session, self.toasts.next_change(), moving, figures, repaint_at].into_iter().flatten().min();
+    }
+
+    /// The last change of the view has been rendered, or that takes too long to wait for.
+    fn is_answered(&self, now: Instant) -> bool {
+        let rendered = self.session.picture().generation >= self.session.status().restarts;
+        rendered || now >= self.steered_at + LATEST
+    }
+
+    /// Hands over how keys and mouse moved.
+    fn steer(&mut self, now: Instant, clock: Duration) {
+        let commands = self.input.take(now);
+        if commands.is_empty() {
+            return;
+        }
+        for command in commands {
+            self.session.send(command);
+        }
+        self.session.update(clock);
+        self.steered_at = now;
     }
 
     fn figures(&self) -> String {
@@ -258,6 +289,7 @@ impl App {
         let picture = self.session.picture();
         if self.shown_picture != Some(picture.number) {
             presenter.set_picture(picture)?;
+            tracing::debug!("picture {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
         let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
@@ -271,6 +303,7 @@ impl App {
                 overlay::help(context, help);
             }
         })?;
+        tracing::trace!("drawn in {:.1} ms", now.elapsed().as_secs_f64() * 1e3);
         if presented.again {
             window.request_redraw();
         }
@@ -355,9 +388,11 @@ impl App {
     fn tell_saved(&mut self, saved: Saved) {
         let now = Instant::now();
         match saved {
-            Ok(path) => {
-                eprintln!("saved {}", path.display());
-                self.toasts.add(Tone::News, format!("saved {}", path.display()), now);
+            Ok(kept) => {
+                let coarse = if kept.coarse { ", coarse because the view changed at once" } else { "" };
+                let news = format!("saved {}{coarse}", kept.path.display());
+                eprintln!("{news}");
+                self.toasts.add(Tone::News, news, now);
             }
             Err(error) => {
                 eprintln!("error: {error}");
@@ -406,11 +441,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::Focused(false) => self.input.release_all(now),
             WindowEvent::DroppedFile(path) => self.session.send(Command::Open { path }),
             WindowEvent::ModifiersChanged(modifiers) => {
-                // What was held so far was held with the old ones.
-                for command in self.input.take(now) {
-                    self.session.send(command);
-                }
-                self.input.set_modifiers(modifiers.state());
+                self.input.set_modifiers(modifiers.state(), now);
             }
             WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
                 let pressed = event.state.is_pressed();
@@ -432,7 +463,7 @@ impl ApplicationHandler<Wake> for App {
                     MouseScrollDelta::LineDelta(x, y) => f64::from(x + y),
                     MouseScrollDelta::PixelDelta(by) => (by.x + by.y) / PIXELS_A_NOTCH,
                 };
-                if self.input.wheel(notches) {
+                if self.input.wheel(notches, now) {
                     self.toasts.add(Tone::News, format!("speed ×{:.2}", self.input.speed()), now);
                 }
             }

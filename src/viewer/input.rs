@@ -105,7 +105,9 @@ impl Input {
         self.size = [f64::from(width), f64::from(height)];
     }
 
-    pub fn set_modifiers(&mut self, modifiers: ModifiersState) {
+    pub fn set_modifiers(&mut self, modifiers: ModifiersState, now: Instant) {
+        // What was held so far was held with the old ones.
+        self.count(now);
         self.modifiers = modifiers;
     }
 
@@ -224,13 +226,14 @@ impl Input {
     }
 
     /// The wheel turned by so many notches, away from the person positive; true when the flying speed changed.
-    pub fn wheel(&mut self, notches: f64) -> bool {
+    pub fn wheel(&mut self, notches: f64, now: Instant) -> bool {
         if self.modifiers.control_key() {
             self.sum.dolly -= notches * ZOOM_NOTCH.ln();
         } else if self.modifiers.shift_key() {
             self.sum.zoom -= notches * ZOOM_NOTCH.ln();
         } else {
-            // What was flown so far was flown at the old speed; `take` has counted all but the last few milliseconds.
+            // What was flown so far was flown at the old speed.
+            self.count(now);
             self.speed = (self.speed * SPEED_NOTCH.powf(notches)).clamp(SPEED_RANGE.0, SPEED_RANGE.1);
             return true;
         }
@@ -239,6 +242,12 @@ impl Input {
 
     /// Everything asked for since the last call, one command of a kind.
     pub fn take(&mut self, now: Instant) -> Vec<Command> {
+        self.count(now);
+        std::mem::take(&mut self.sum).into_commands()
+    }
+
+    /// Adds up what the held keys have moved by now.
+    fn count(&mut self, now: Instant) {
         for i in 0..self.held.len() {
             let held = &mut self.held[i];
             let seconds = now.saturating_duration_since(held.since).as_secs_f64();
@@ -246,7 +255,6 @@ impl Input {
             let motion = held.motion;
             self.advance(motion, seconds);
         }
-        std::mem::take(&mut self.sum).into_commands()
     }
 
     fn release(&mut self, motion: Motion, now: Instant) {
@@ -369,6 +377,16 @@ mod tests {
     }
 
     #[test]
+    fn speed_and_shift_count_from_when_they_change() {
+        let (mut input, start) = input();
+        press(&mut input, KeyCode::KeyW, "w", true, start);
+        input.wheel(1.0, after(start, 1000));
+        input.set_modifiers(ModifiersState::SHIFT, after(start, 2000));
+        let [Command::Fly { forward, .. }] = input.take(after(start, 3000))[..] else { panic!() };
+        assert!((forward - (1.0 + SPEED_NOTCH + FAST * SPEED_NOTCH)).abs() < 1e-9, "{forward}");
+    }
+
+    #[test]
     fn a_tap_moves_and_opposite_keys_stand_still() {
         let (mut input, start) = input();
         press(&mut input, KeyCode::KeyD, "d", true, start);
@@ -382,7 +400,7 @@ mod tests {
     #[test]
     fn shift_flies_faster_and_turns_orbiting_into_panning() {
         let (mut input, start) = input();
-        input.set_modifiers(ModifiersState::SHIFT);
+        input.set_modifiers(ModifiersState::SHIFT, start);
         press(&mut input, KeyCode::KeyE, "E", true, start);
         press(&mut input, KeyCode::ArrowLeft, "", true, start);
         let commands = input.take(after(start, 1000));
@@ -395,7 +413,7 @@ mod tests {
     #[test]
     fn ctrl_letters_do_not_fly() {
         let (mut input, start) = input();
-        input.set_modifiers(ModifiersState::CONTROL);
+        input.set_modifiers(ModifiersState::CONTROL, start);
         assert_eq!(press(&mut input, KeyCode::KeyQ, "q", true, start), Some(Action::Quit));
         assert_eq!(press(&mut input, KeyCode::KeyW, "w", true, start), None);
         assert!(!input.is_moving());
@@ -449,7 +467,7 @@ mod tests {
         input.button(MouseButton::Left, false, after(start, 310));
         assert_eq!(input.take(start), [], "a third click is not a second double click");
 
-        input.set_modifiers(ModifiersState::SHIFT);
+        input.set_modifiers(ModifiersState::SHIFT, start);
         input.button(MouseButton::Left, true, after(start, 2000));
         assert_eq!(input.take(start), [Command::FocusAt { x: 0.25, y: 0.25 }]);
         input.cursor(900.0, 300.0);
@@ -459,19 +477,19 @@ mod tests {
     #[test]
     fn the_wheel_does_three_things() {
         let (mut input, start) = input();
-        assert!(input.wheel(2.0));
+        assert!(input.wheel(2.0, start));
         assert_eq!(input.speed(), SPEED_NOTCH * SPEED_NOTCH);
-        input.set_modifiers(ModifiersState::CONTROL);
-        assert!(!input.wheel(1.0));
-        input.set_modifiers(ModifiersState::SHIFT);
-        assert!(!input.wheel(-1.0));
+        input.set_modifiers(ModifiersState::CONTROL, start);
+        assert!(!input.wheel(1.0, start));
+        input.set_modifiers(ModifiersState::SHIFT, start);
+        assert!(!input.wheel(-1.0, start));
         let [Command::Dolly { factor: dolly }, Command::Zoom { factor: zoom }] = input.take(start)[..] else {
             panic!()
         };
         assert!((dolly * ZOOM_NOTCH - 1.0).abs() < 1e-12 && (zoom / ZOOM_NOTCH - 1.0).abs() < 1e-12);
-        input.set_modifiers(NONE);
+        input.set_modifiers(NONE, start);
         for _ in 0..1000 {
-            input.wheel(1.0);
+            input.wheel(1.0, start);
         }
         assert_eq!(input.speed(), SPEED_RANGE.1);
     }

@@ -25,7 +25,7 @@ pub enum Trigger {
     Hold(KeyCode, Motion),
     /// Happens once a press, and again as the keyboard repeats.
     Press(Chord, Action),
-    /// A gesture, told in words; [`super::input`] knows how.
+    /// A gesture, told in words; `input` knows how.
     Mouse(&'static str),
 }
 

@@ -6,12 +6,12 @@
 //!
 //! | file | about |
 //! |---|---|
-//! | [`app`] | the event loop: what happens when |
-//! | [`presenter`] | picture and overlays onto the window; the only place that knows the graphics device |
+//! | `app` | the event loop: what happens when |
+//! | `presenter` | picture and overlays onto the window; the only place that knows the graphics device |
 //! | [`keys`] | the one table of keys and gestures |
-//! | [`input`] | keys and mouse to commands, independent of the frame rate |
-//! | [`overlay`], [`status`], [`toasts`] | what is written over the picture |
-//! | [`saver`] | pictures to disk, on the side |
+//! | `input` | keys and mouse to commands, independent of the frame rate |
+//! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
+//! | `saver` | pictures to disk, on the side |
 //! | [`display`] | is there a display at all |
 
 mod app;

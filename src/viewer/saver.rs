@@ -7,7 +7,15 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 /// A picture that is now on disk, or why it is not.
-pub type Saved = Result<PathBuf, String>;
+pub type Saved = Result<Kept, String>;
+
+/// A picture on disk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Kept {
+    pub path: PathBuf,
+    /// The view changed before there was a film of full resolution.
+    pub coarse: bool,
+}
 
 pub struct Saver {
     folder: PathBuf,
@@ -37,7 +45,8 @@ impl Saver {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
             let saved = match film.recv() {
-                Ok(film) => write_new_film(&film, &display, size, &folder, &stem, format),
+                Ok(film) => write_new_film(&film, &display, size, &folder, &stem, format)
+                    .map(|path| Kept { path, coarse: (film.width(), film.height()) != size }),
                 Err(_) => Err("there was no picture to be kept".to_owned()),
             };
             // The window may be gone, and then nobody needs the news.
@@ -103,7 +112,8 @@ mod tests {
             let film = ready(Film::new(3, 2));
             saver.save(film, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
         }
-        let mut saved: Vec<PathBuf> = saver.finish().into_iter().map(|saved| saved.unwrap()).collect();
+        let saved = saver.finish().into_iter().map(|saved| saved.unwrap());
+        let mut saved: Vec<PathBuf> = saved.inspect(|kept| assert!(!kept.coarse)).map(|kept| kept.path).collect();
         saved.sort();
         let expected: Vec<PathBuf> = (1..=8).map(|i| folder.path().join(format!("my room-{i:04}.png"))).collect();
         assert_eq!(saved, expected);

@@ -100,10 +100,11 @@ impl Desktop {
     }
 
     /// Runs the program, which is to leave by itself without a window; how, and what it said.
-    pub fn fails(&self, arguments: &[&str]) -> (ExitStatus, String) {
+    pub fn fails(&self, arguments: &[&str], environment: &[(&str, &str)]) -> (ExitStatus, String) {
         let errors = self.folder().join("stderr");
         let mut command = Command::new(env!("CARGO_BIN_EXE_firstlight"));
         quiet(&mut command, &self.display, &self.folder).args(arguments).current_dir(self.folder());
+        command.envs(environment.iter().copied());
         command.stderr(File::create(&errors).expect("a file for what it says"));
         let mut child = command.spawn().map(Ended).expect("firstlight starts");
         let status = wait(&mut child.0, PATIENCE).expect("it leaves by itself");

@@ -34,15 +34,15 @@ struct Edge {
     ends: [u32; 2],
     /// Sum of the ends' versions when the cost was computed.
     version: u32,
-    key: f32,
     /// See the flags below.
-    state: u8,
+    state: u32,
 }
+const _: () = assert!(size_of::<Edge>() == 16);
 
 /// Not in the queue: it was refused, and waits for its ends to change.
-const ASLEEP: u8 = 1;
+const ASLEEP: u32 = 1;
 /// The edge is in the waiting list of its first, second end.
-const LISTED: [u8; 2] = [2, 4];
+const LISTED: [u32; 2] = [2, 4];
 
 #[derive(Debug)]
 pub(super) struct Greedy {
@@ -57,6 +57,8 @@ pub(super) struct Greedy {
     sleepers: Vec<u32>,
     next_sleeper: Vec<u32>,
     last_key: f32,
+    /// By a hash of its ends, the edge that was last put back: see [`Self::is_twin`].
+    seen: Vec<u32>,
     pub log: Log,
 }
 
@@ -72,24 +74,9 @@ pub(super) struct Limits {
 }
 
 impl Greedy {
-    pub fn new(mut surface: Surface, quadrics: Vec<Quadric>) -> Self {
+    pub fn new(surface: Surface, quadrics: Vec<Quadric>) -> Self {
         let count = surface.positions.len();
-        let mut edges = Vec::with_capacity(surface.face_count * 3 / 2 + 16);
-        for vertex in 0..count as u32 {
-            if surface.kinds[vertex as usize] == Kind::Frozen {
-                continue;
-            }
-            surface.for_each_neighbor(vertex, |other| {
-                if vertex < other {
-                    edges.push(Edge { ends: [vertex, other], version: 0, key: 0.0, state: 0 });
-                }
-            });
-        }
-        let kinds = &surface.kinds;
-        edges.retain(|edge: &Edge| {
-            let [p, q] = edge.ends.map(|end| kinds[end as usize]);
-            p.max(q) != Kind::Frozen && p.min(q) != Kind::Fixed
-        });
+        let edges = edges_of(&surface);
         let mut greedy = Self {
             surface,
             quadrics,
@@ -98,13 +85,13 @@ impl Greedy {
             versions: vec![0; count],
             sleepers: vec![NONE; count],
             next_sleeper: vec![NONE; 2 * edges.len()],
+            seen: vec![NONE; edges.len().next_power_of_two()],
             edges,
             last_key: 0.0,
             log: Log::default(),
         };
         for e in 0..greedy.edges.len() {
             let (_, _, _, cost) = greedy.plan(greedy.edges[e].ends);
-            greedy.edges[e].key = cost;
             greedy.queue.push(cost, e as u32);
         }
         greedy
@@ -125,10 +112,13 @@ impl Greedy {
                 continue;
             }
             let version = self.versions[ends[0] as usize].wrapping_add(self.versions[ends[1] as usize]);
+            if version != edge.version && self.is_twin(e, ends, version) {
+                continue;
+            }
             let (from, to, position, cost) = self.plan(ends);
             if version != edge.version {
                 let edge = &mut self.edges[e as usize];
-                (edge.version, edge.key) = (version, cost);
+                (edge.version, edge.ends) = (version, ends);
                 if cost > key {
                     self.queue.push(cost, e);
                     continue;
@@ -154,6 +144,28 @@ impl Greedy {
     /// A lower bound on the cost of the next collapse, if any edge is left.
     pub fn next_cost(&self) -> Option<f32> {
         self.queue.least_key()
+    }
+
+    /// Whether another edge between the same ends is up to date already. A collapse makes two such pairs; to search
+    /// for them there would cost more than to meet them here. A missed twin costs time and nothing else.
+    fn is_twin(&mut self, e: u32, [p, q]: [u32; 2], version: u32) -> bool {
+        let (low, high) = (p.min(q), p.max(q));
+        let hash = (low.wrapping_mul(0x9e37_79b1) ^ high).wrapping_mul(0x85eb_ca77);
+        let cell = (u64::from(hash) * self.seen.len() as u64 >> 32) as usize;
+        let other = std::mem::replace(&mut self.seen[cell], e);
+        let twin = other != NONE && other != e && {
+            let other = &self.edges[other as usize];
+            other.version == version && (other.ends == [p, q] || other.ends == [q, p])
+        };
+        if twin {
+            self.seen[cell] = other;
+        }
+        twin
+    }
+
+    /// The cost that half of the edges do not exceed before any collapse; 0 without edges.
+    pub fn median_cost(&self) -> f32 {
+        self.queue.median_key().unwrap_or(0.0)
     }
 
     /// Which end goes, which stays, where the survivor will be, and the cost.
@@ -215,7 +227,8 @@ impl Greedy {
             edge.state &= !LISTED[entry as usize % 2];
             if edge.state & ASLEEP != 0 {
                 edge.state &= !ASLEEP;
-                self.queue.push(edge.key.max(self.last_key), entry / 2);
+                // Its cost has changed; the last key bounds it, and the queue finds out.
+                self.queue.push(self.last_key, entry / 2);
             }
             entry = self.next_sleeper[entry as usize];
         }
@@ -229,4 +242,20 @@ impl Greedy {
         }
         vertex
     }
+}
+
+/// Every edge that can ever collapse, those on lines perhaps twice.
+fn edges_of(surface: &Surface) -> Vec<Edge> {
+    let mut edges = Vec::with_capacity(surface.face_count * 3 / 2 + 16);
+    for (_, [a, b, c], _) in surface.live_triangles() {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            let (kind, other) = (surface.kinds[p as usize], surface.kinds[q as usize]);
+            // Inside the surface the neighbour runs along the edge the other way; on a line there may be none.
+            let once = p < q || kind.min(other) >= Kind::Curve;
+            if once && kind.max(other) != Kind::Frozen && kind.min(other) != Kind::Fixed {
+                edges.push(Edge { ends: [p, q], version: 0, state: 0 });
+            }
+        }
+    }
+    edges
 }

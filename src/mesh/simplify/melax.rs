@@ -82,7 +82,8 @@ impl Melax {
     /// Neighbours that a vertex's kind lets it go into, cheapest first.
     fn candidates(&mut self, from: u32) -> Vec<(f32, u32)> {
         let kind = self.surface.kinds[from as usize];
-        if kind >= Kind::Fixed {
+        // A hub may not collapse anyway, and to weigh all its edges against each other takes quadratic time.
+        if kind >= Kind::Fixed || self.surface.is_hub(from) {
             return Vec::new();
         }
         let mut neighbors = std::mem::take(&mut self.neighbors);
@@ -125,9 +126,9 @@ impl Melax {
 
 /// Largest over the triangles around a vertex of the least turn against a triangle at the edge to `to`, 0 to 1.
 fn bend(normals: &[(DVec3, u32, u32)], to: u32) -> f64 {
-    let sides = || normals.iter().filter(|(_, b, c)| *b == to || *c == to);
+    let sides: Vec<DVec3> = normals.iter().filter(|(_, b, c)| *b == to || *c == to).map(|side| side.0).collect();
     normals
         .iter()
-        .map(|(normal, ..)| sides().map(|(side, ..)| 0.5 * (1.0 - normal.dot(*side))).fold(1.0, f64::min))
+        .map(|(normal, ..)| sides.iter().map(|side| 0.5 * (1.0 - normal.dot(*side))).fold(1.0, f64::min))
         .fold(0.0, f64::max)
 }

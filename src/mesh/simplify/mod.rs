@@ -85,7 +85,7 @@ pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, Sim
         Target::Error(error) => return within_error(mesh, method, error),
     };
     let mut prepared = prepare(mesh, method)?;
-    run(&mut prepared, method, faces, f64::INFINITY);
+    run(&mut prepared, method, faces, f64::INFINITY, false);
     Ok(finish(mesh, prepared))
 }
 
@@ -93,7 +93,7 @@ pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, Sim
 pub fn collapse_order(mesh: &Mesh, method: Method, faces: usize) -> Result<CollapseOrder, SimplifyError> {
     let start = prepare(mesh, method)?;
     let mut work = start.clone();
-    let log = run(&mut work, method, faces, f64::INFINITY);
+    let log = run(&mut work, method, faces, f64::INFINITY, true);
     Ok(CollapseOrder::new(mesh, start, log))
 }
 
@@ -104,10 +104,12 @@ fn prepare(mesh: &Mesh, method: Method) -> Result<Prepared, SimplifyError> {
 
 /// - `error`: metres; what it limits is an estimate, the root of an edge's mean squared distance (quadric) or its
 ///   cost (Melax).
-fn run(prepared: &mut Prepared, method: Method, faces: usize, error: f64) -> Log {
+fn run(prepared: &mut Prepared, method: Method, faces: usize, error: f64, keep_log: bool) -> Log {
     let error = error * f64::from(prepared.scale);
     match method {
-        Method::Quadric => parts::simplify(prepared, Limits { faces, cost: f32::INFINITY, mean_square: error * error }),
+        Method::Quadric => {
+            parts::simplify(prepared, Limits { faces, cost: f32::INFINITY, mean_square: error * error }, keep_log)
+        }
         Method::Melax => melax::simplify(prepared, faces, error as f32),
     }
 }
@@ -131,7 +133,7 @@ fn within_error(mesh: &Mesh, method: Method, error: f64) -> Result<Mesh, Simplif
     let (mut works, mut fails) = (0.0, f64::INFINITY);
     for _ in 0..8 {
         let mut work = start.clone();
-        run(&mut work, method, 1, limit);
+        run(&mut work, method, 1, limit, false);
         let candidate = finish(mesh, work);
         let measured = Deviation::between(mesh, &candidate, ERROR_SAMPLES).max();
         if measured <= error {

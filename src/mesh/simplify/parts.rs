@@ -13,19 +13,19 @@ use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// About this many triangles a part: what one core's second-level cache holds.
-const PART_TRIANGLES: usize = 12_288;
+/// About this many triangles a part: small enough that a core works on it within its second-level cache.
+const PART_TRIANGLES: usize = 4_096;
 /// The last sixteenth is left to the queue over the whole mesh, which puts the parts on a level.
 const LEFT_TO_WHOLE: usize = 16;
 
 /// Simplifies in place: afterwards `prepared` holds what is left, and vertices keep their numbers.
-pub(super) fn simplify(prepared: &mut Prepared, limits: Limits) -> Log {
+pub(super) fn simplify(prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
     let count = prepared.triangles.len().div_ceil(PART_TRIANGLES);
     let mut log = Log::default();
     if count > 1 && prepared.triangles.len() > limits.faces {
         let mut parts = split(prepared, count);
         run_together(&mut parts, limits, prepared.triangles.len());
-        log = join(prepared, parts);
+        log = join(prepared, parts, keep_log);
     }
     let whole: Vec<u32> = (0..prepared.triangles.len() as u32).collect();
     let mut owners = vec![0; prepared.positions.len()];
@@ -35,7 +35,7 @@ pub(super) fn simplify(prepared: &mut Prepared, limits: Limits) -> Log {
     vertices.iter().zip(0..).for_each(|(&v, i)| local[v as usize] = i);
     let mut part = Part::new(prepared, whole, vertices, &local, &[]);
     part.greedy.run(limits);
-    let finish = join(prepared, vec![part]);
+    let finish = join(prepared, vec![part], keep_log);
     log.collapses.extend(finish.collapses);
     log.joins.extend(finish.joins);
     log
@@ -143,23 +143,41 @@ fn split(prepared: &Prepared, count: usize) -> Vec<Part> {
 
 /// Raises the threshold, and lets every part follow it, until the whole is near the wanted count.
 fn run_together(parts: &mut [Part], limits: Limits, triangles: usize) {
-    let done_at = limits.faces + (triangles - limits.faces) / LEFT_TO_WHOLE;
+    // Triangles at rims stay whole for now; the others must not pay for them.
+    let at_rims: usize = parts.iter().map(|part| part.greedy.surface.faces_at(Kind::Frozen)).sum();
+    let excess = triangles - limits.faces;
+    let done_at =
+        limits.faces + excess / LEFT_TO_WHOLE + (at_rims as u128 * excess as u128 / triangles as u128) as usize;
     let mut total = triangles;
-    let mut threshold = 0.0_f32;
+    let mut medians: Vec<f32> = parts.par_iter().with_max_len(1).map(|part| part.greedy.median_cost()).collect();
+    medians.sort_unstable_by(f32::total_cmp);
+    let mut threshold = medians[medians.len() / 2].min(limits.cost);
     while total > done_at && threshold < limits.cost {
         let excess = total - limits.faces;
-        parts.par_iter_mut().with_max_len(1).for_each(|part| {
-            let faces = part.greedy.surface.face_count;
-            // Its share of what is too much: however cheap one part is, the whole cannot fall below the limit.
-            let share = (excess as u128 * faces as u128 / total as u128) as usize;
-            part.greedy.run(Limits { faces: faces - share, cost: threshold, ..limits });
-        });
+        // How many parts were stopped by their share, not by the threshold.
+        let stopped: usize = parts
+            .par_iter_mut()
+            .with_max_len(1)
+            .map(|part| {
+                let faces = part.greedy.surface.face_count;
+                // Its share of what is too much: however cheap one part is, the whole cannot fall below the limit.
+                let share = (excess as u128 * faces as u128 / total as u128) as usize;
+                part.greedy.run(Limits { faces: faces - share, cost: threshold, ..limits });
+                usize::from(part.greedy.surface.face_count <= faces - share)
+            })
+            .sum();
         let now: usize = parts.iter().map(|part| part.greedy.surface.face_count).sum();
-        // Parts that cost little come first: only when they have nothing left does the threshold rise.
-        if (total - now) * 4 < excess {
+        if now == total && stopped * 2 > parts.len() {
+            // Shares too small to be worth a round.
+            break;
+        }
+        // Parts that cost little come first: only when most have nothing left below it does the threshold rise.
+        if stopped * 2 <= parts.len() {
             let next = parts.iter().filter_map(|part| part.greedy.next_cost()).min_by(f32::total_cmp);
+            // In a desert of costs larger strides: each round fetches every part's memory anew.
+            let stride = if (total - now) * 16 < excess { 8.0 } else { 2.0 };
             match next {
-                Some(next) => threshold = (2.0 * threshold).max(next).min(limits.cost),
+                Some(next) => threshold = (stride * threshold).max(next).min(limits.cost),
                 None => break,
             }
         }
@@ -168,7 +186,7 @@ fn run_together(parts: &mut [Part], limits: Limits, triangles: usize) {
 }
 
 /// Brings the parts' results back into the whole, and their steps into one order.
-fn join(prepared: &mut Prepared, parts: Vec<Part>) -> Log {
+fn join(prepared: &mut Prepared, parts: Vec<Part>, keep_log: bool) -> Log {
     let mut triangles = Vec::new();
     let mut sources = Vec::new();
     let mut corner_wedges = Vec::new();
@@ -189,7 +207,7 @@ fn join(prepared: &mut Prepared, parts: Vec<Part>) -> Log {
         }
     }
     (prepared.triangles, prepared.sources, prepared.corner_wedges) = (triangles, sources, corner_wedges);
-    merge_logs(parts)
+    if keep_log { merge_logs(parts) } else { Log::default() }
 }
 
 /// Steps by cost; each part's own are in order of cost already, and parts do not touch each other.

@@ -104,6 +104,9 @@ impl Prepared {
 
     /// - `spokes`: working memory.
     fn kind_of(&self, corners: &[u32], spokes: &mut Vec<Spoke>) -> (Kind, bool) {
+        if self.is_inside(corners) {
+            return (Kind::Free, false);
+        }
         spokes.clear();
         for &corner in corners {
             let [next, after] = ring(corner);
@@ -133,6 +136,34 @@ impl Prepared {
             _ => Kind::Fixed,
         };
         (kind, faulty)
+    }
+
+    /// Whether the corners are one or more closed fans without a seam; by far the most common case, done fast.
+    fn is_inside(&self, corners: &[u32]) -> bool {
+        const MAX: usize = 16;
+        let count = corners.len();
+        if count > MAX {
+            return false;
+        }
+        let (mut next, mut after) = ([0; MAX], [0; MAX]);
+        for (i, &corner) in corners.iter().enumerate() {
+            let triangle = &self.triangles[corner as usize / 3];
+            let k = corner as usize % 3;
+            (next[i], after[i]) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+        }
+        let times = |list: &[u32; MAX], vertex: u32| list[..count].iter().filter(|&&v| v == vertex).count();
+        (0..count).all(|i| times(&next, next[i]) == 1 && times(&after, next[i]) == 1)
+            && (self.corner_wedges.is_empty() || self.has_one_wedge_an_edge(corners, &next, &after))
+    }
+
+    /// For corners of a closed fan: whether at each edge both triangles have the same wedges.
+    fn has_one_wedge_an_edge(&self, corners: &[u32], next: &[u32], after: &[u32]) -> bool {
+        let here = self.corner_wedges[corners[0] as usize];
+        corners.iter().enumerate().all(|(i, &corner)| {
+            let partner = after.iter().position(|&v| v == next[i]).unwrap_or(i);
+            let ends = [ring(corner)[0], ring(corners[partner])[1]].map(|c| self.corner_wedges[c as usize]);
+            self.corner_wedges[corner as usize] == here && ends[0] == ends[1]
+        })
     }
 
     /// Whether any triangle on the same three vertices as an earlier one was found; they are gone then.
@@ -169,18 +200,23 @@ impl Prepared {
 
     /// The planes of the triangles around each vertex, and at borders and seams planes that stand on the edge.
     fn find_quadrics(&self, around: &Around) -> Vec<Quadric> {
-        let normals: Vec<DVec3> = self.triangles.par_iter().map(|t| self.doubled_area_normal(t)).collect();
+        let normals: Vec<(DVec3, f64)> = self
+            .triangles
+            .par_iter()
+            .map(|triangle| {
+                let normal = self.doubled_area_normal(triangle);
+                let length = normal.length();
+                (normal / length.max(f64::MIN_POSITIVE), length)
+            })
+            .collect();
         (0..self.positions.len())
             .into_par_iter()
             .map(|vertex| {
                 let here = self.positions[vertex].as_dvec3();
                 let mut sum = Quadric::default();
                 for &corner in around.corners(vertex) {
-                    let normal = normals[corner as usize / 3];
-                    let length = normal.length();
-                    if length > 0.0 {
-                        sum += Quadric::of_plane(here, normal / length, length / 6.0);
-                    }
+                    let (normal, doubled_area) = normals[corner as usize / 3];
+                    sum += Quadric::of_plane(here, normal, doubled_area / 6.0);
                 }
                 if self.kinds[vertex] != Kind::Free {
                     self.add_edge_planes(around, vertex, &normals, &mut sum);
@@ -192,7 +228,7 @@ impl Prepared {
 
     /// For each triangle side at `vertex` that ends at another vertex on a line, and is itself border or seam, the
     /// plane through it that stands on the triangle.
-    fn add_edge_planes(&self, around: &Around, vertex: usize, normals: &[DVec3], sum: &mut Quadric) {
+    fn add_edge_planes(&self, around: &Around, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
         let here = self.positions[vertex].as_dvec3();
         for &corner in around.corners(vertex) {
             for other in ring(corner) {
@@ -201,7 +237,7 @@ impl Prepared {
                     continue;
                 }
                 let along = self.positions[end as usize].as_dvec3() - here;
-                if let Some(normal) = along.cross(normals[corner as usize / 3]).try_normalize() {
+                if let Some(normal) = along.cross(normals[corner as usize / 3].0).try_normalize() {
                     // As heavy as a square on the edge: a border moves as reluctantly as the surface does.
                     *sum += Quadric::of_plane(here, normal, along.length_squared());
                 }

@@ -29,6 +29,13 @@ impl MonotoneQueue {
         filled.iter().map(|entry| f32::from_bits(entry.0)).min_by(f32::total_cmp)
     }
 
+    /// The key in the middle of all entries.
+    pub fn median_key(&self) -> Option<f32> {
+        let mut keys: Vec<u32> = self.buckets.iter().flatten().map(|entry| entry.0).collect();
+        let middle = keys.len() / 2;
+        if keys.is_empty() { None } else { Some(f32::from_bits(*keys.select_nth_unstable(middle).1)) }
+    }
+
     /// The entry with the least key.
     pub fn pop(&mut self) -> Option<(f32, u32)> {
         if self.buckets[0].is_empty() {

@@ -34,7 +34,7 @@ impl Wedge {
 
 /// More triangles than this around a new vertex are not allowed: it bounds the work on meshes with a hub.
 const MAX_VALENCE: u32 = 256;
-/// Cosine of the largest turn of a triangle, 75°.
+/// Cosine of the largest turn of a triangle, about 75°.
 const MIN_TURN: f64 = 0.25;
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -116,8 +116,14 @@ impl Surface {
         live.map(|(t, &vertices)| (t, vertices, wedges.get(t).copied()))
     }
 
-    pub fn is_alive(&self, vertex: u32) -> bool {
-        self.valence[vertex as usize] > 0
+    /// Whether a vertex has too many triangles to collapse.
+    pub fn is_hub(&self, vertex: u32) -> bool {
+        self.valence[vertex as usize] > MAX_VALENCE
+    }
+
+    /// How many live triangles have a vertex of this kind.
+    pub fn faces_at(&self, kind: Kind) -> usize {
+        self.live_triangles().filter(|(_, t, _)| t.iter().any(|&v| self.kinds[v as usize] == kind)).count()
     }
 
     /// The live triangles around a vertex, as (vertex's corner, next vertex, one after).

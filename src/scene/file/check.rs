@@ -195,7 +195,7 @@ impl Check<'_> {
         }
     }
 
-    /// Whether the blend `from` leads to material `to`.
+    /// Whether the blend `from` leads to material `to`, within as many steps as a blend that is not refused has.
     fn reaches(&self, from: &str, to: &str) -> bool {
         let (mut seen, mut open) = (HashSet::new(), vec![from]);
         while let Some(name) = open.pop() {
@@ -203,6 +203,7 @@ impl Check<'_> {
                 return true;
             }
             if let Some(MaterialPart::Blend { a, b, .. }) = self.materials.get(name)
+                && seen.len() < 2 * MAX_LOBES
                 && seen.insert(name)
             {
                 open.extend([a.as_str(), b.as_str()]);

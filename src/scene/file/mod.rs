@@ -30,6 +30,8 @@ impl SceneFile {
     pub const MAX_FILM_PIXELS: u64 = 1 << 28;
     /// Bytes of scene text at most.
     pub const MAX_TEXT: u64 = 1 << 30;
+    /// Problems that are told with their places; nobody reads more, and each place is looked for in the whole text.
+    const MAX_TOLD: usize = 20;
     /// Metres: beyond this, squared distances leave the range of `f32`.
     pub const MAX_COORDINATE: f64 = 1e12;
     /// Metres: below this, squared sizes leave the range of `f32`.
@@ -39,10 +41,15 @@ impl SceneFile {
     pub fn parse(text: &str, name: impl AsRef<Path>) -> Result<Self, SceneError> {
         let name = name.as_ref();
         let file: Self = options().from_str(text).map_err(|error| syntax::explain(&error, text, name))?;
-        let problems: Vec<Problem> = check::check(&file)
-            .into_iter()
-            .map(|(path, message)| Problem { file: Some(name.to_path_buf()), at: Some(locate(text, &path)), message })
+        let found = check::check(&file);
+        let place = |path: &str| Some(locate(text, path));
+        let mut problems: Vec<Problem> = (found.iter().take(Self::MAX_TOLD))
+            .map(|(path, message)| Problem { file: Some(name.into()), at: place(path), message: message.clone() })
             .collect();
+        if found.len() > problems.len() {
+            let message = format!("and {} more problems", found.len() - problems.len());
+            problems.push(Problem { file: Some(name.into()), at: None, message });
+        }
         if problems.is_empty() { Ok(file) } else { Err(SceneError { problems }) }
     }
 

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 pub enum ObjError {
     #[error("{}: cannot be read: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write { path: PathBuf, source: std::io::Error },
     #[error("{}: is not a regular file", path.display())]
     NotAFile { path: PathBuf },
     #[error("{}: has {bytes} bytes, more than the limit of {limit}", path.display())]

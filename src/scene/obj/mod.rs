@@ -2,23 +2,26 @@
 //!
 //! The file is screened ([`screen`]), parsed by tobj in `f64`, and assembled: polygons are cut into triangles,
 //! corners that share position, texture coordinate and normal share a vertex (across groups too), and normals that
-//! the file lacks are computed. Start reading at [`load_obj`].
+//! the file lacks are computed. Start reading at [`load_obj`]; [`save_obj`] is
+//! the way back.
 
 mod error;
 mod mtl;
 mod polygon;
 mod screen;
 mod warnings;
+mod write;
 
 pub use error::{LineProblem, ObjError};
 pub use mtl::ImportedMaterial;
+pub use write::{ObjExtras, save_obj};
 
 use self::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::io::{Cursor, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A model as its file has it.
 #[derive(Clone, Debug)]
@@ -27,6 +30,8 @@ pub struct ImportedObj {
     pub mesh: Mesh,
     /// Only materials that faces use. One whose name the libraries lack has its name and nothing else.
     pub materials: Vec<ImportedMaterial>,
+    /// The material libraries that were found.
+    pub libraries: Vec<PathBuf>,
     /// Whether every corner had a usable normal in the file; otherwise they were computed.
     pub normals_from_file: bool,
     /// What was left out or replaced, one sentence each.
@@ -122,8 +127,8 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
         ObjNormals::Ignore => (mesh, false),
     };
     mesh.validate().map_err(mesh_error)?;
-    let materials = find_materials(path, screened, options.max_library_bytes, &mut warnings);
-    Ok(ImportedObj { mesh, materials, normals_from_file, warnings: warnings.into_list() })
+    let (materials, libraries) = find_materials(path, screened, options.max_library_bytes, &mut warnings);
+    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, warnings: warnings.into_list() })
 }
 
 fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
@@ -246,7 +251,7 @@ fn find_materials(
     screened: screen::Screened,
     max_bytes: u64,
     warnings: &mut Warnings,
-) -> Vec<ImportedMaterial> {
+) -> (Vec<ImportedMaterial>, Vec<PathBuf>) {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut known: HashMap<String, ImportedMaterial> = HashMap::new();
     let mut seen = Vec::new();
@@ -284,5 +289,6 @@ fn find_materials(
             missing[..missing.len().min(3)].join(", ")
         ));
     }
-    materials
+    seen.retain(|library| library.is_file());
+    (materials, seen)
 }

@@ -1,0 +1,121 @@
+//! `firstlight simplify IN.obj -o OUT.obj`: fewer triangles, with the error measured.
+
+use super::Failure;
+use clap::{Args, ValueEnum};
+use firstlight::mesh::simplify::{Method, Target, simplify};
+use firstlight::mesh::{Deviation, Distances, Topology};
+use firstlight::scene::obj::{ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
+use std::path::PathBuf;
+use std::time::Instant;
+
+#[derive(Args, Clone, Debug)]
+#[command(group = clap::ArgGroup::new("target").required(true))]
+pub struct SimplifyArgs {
+    /// The model, a Wavefront OBJ file.
+    #[arg(value_name = "IN.obj")]
+    input: PathBuf,
+    /// Where to write the result; a file that is there is replaced once the new one is complete.
+    #[arg(short, long, value_name = "OUT.obj")]
+    output: PathBuf,
+    /// Keep this share of the triangles, above 0 and at most 1.
+    #[arg(long, value_name = "R", group = "target")]
+    ratio: Option<f64>,
+    /// Keep at most this many triangles.
+    #[arg(long, value_name = "N", group = "target")]
+    faces: Option<usize>,
+    /// Keep as few triangles as this largest distance between the surfaces allows, in the file's unit.
+    #[arg(long, value_name = "E", group = "target")]
+    error: Option<f64>,
+    #[arg(long, value_enum, default_value = "quadric")]
+    method: MethodArg,
+    /// Print one JSON object as the last line.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MethodArg {
+    /// Quadric error metric: the most accurate, on all threads.
+    Quadric,
+    /// Edge length times bend (Melax 1998): keeps vertices where they are.
+    Melax,
+}
+
+/// Points for each direction of the measured error.
+const SAMPLES: usize = 200_000;
+
+pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
+    let target = match (args.ratio, args.faces, args.error) {
+        (Some(ratio), ..) => Target::Ratio(ratio),
+        (_, Some(faces), _) => Target::Faces(faces),
+        (.., error) => Target::Error(error.unwrap_or(0.0)),
+    };
+    let method = match args.method {
+        MethodArg::Quadric => Method::Quadric,
+        MethodArg::Melax => Method::Melax,
+    };
+    let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
+    // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
+    let mut model = load_obj_with(&args.input, &ObjOptions::default()).map_err(|error| failed(&error))?;
+    if !model.normals_from_file {
+        let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
+        model = load_obj_with(&args.input, &options).map_err(|error| failed(&error))?;
+    }
+    for warning in &model.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let start = Instant::now();
+    let result = simplify(&model.mesh, method, target).map_err(|error| Failure::Usage(error.to_string()))?;
+    let seconds = start.elapsed().as_secs_f64();
+    let before = model.mesh.triangles.len();
+    let after = result.triangles.len();
+    let missed = match target {
+        Target::Ratio(ratio) => after > ((before as f64 * ratio) as usize).max(1),
+        Target::Faces(faces) => after > faces,
+        Target::Error(_) => false,
+    };
+    if missed {
+        eprintln!("warning: borders, seams and joints allow no fewer than {after} triangles");
+    }
+    let names: Vec<String> = model.materials.iter().map(|material| material.name.clone()).collect();
+    let comment = format!("{after} of {before} triangles, simplified by firstlight");
+    let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
+    save_obj(&args.output, &result, &extras).map_err(|error| failed(&error))?;
+    let deviation = Deviation::between(&model.mesh, &result, SAMPLES);
+    let diagonal = model.mesh.bounds().size().as_dvec3().length();
+    let topology = Topology::of(&result);
+    if args.json {
+        let way = |d: Distances| serde_json::json!({ "mean": d.mean, "rms": d.rms, "max": d.max });
+        let report = serde_json::json!({
+            "input": args.input.to_string_lossy(),
+            "output": args.output.to_string_lossy(),
+            "method": format!("{method:?}").to_lowercase(),
+            "faces_before": before,
+            "faces_after": after,
+            "vertices_after": result.positions.len(),
+            "simplify_seconds": seconds,
+            "diagonal": diagonal,
+            "error_forward": way(deviation.forward),
+            "error_backward": way(deviation.backward),
+            "hausdorff": deviation.max(),
+            "closed": topology.is_closed(),
+            "manifold": topology.is_manifold(),
+        });
+        println!("{report}");
+        return Ok(());
+    }
+    println!("{before} -> {after} triangles in {seconds:.3} s");
+    for (name, d) in [("original to result", deviation.forward), ("result to original", deviation.backward)] {
+        let percent = |length: f64| 100.0 * length / diagonal;
+        println!(
+            "{name}: mean {:.3e}, RMS {:.3e}, largest {:.3e} ({:.4} %, {:.4} %, {:.4} % of the diagonal)",
+            d.mean,
+            d.rms,
+            d.max,
+            percent(d.mean),
+            percent(d.rms),
+            percent(d.max)
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! Which way is up in a model whose file does not say? The way in which it would stand.
+
+use super::load::UpAxis;
+use crate::mesh::Mesh;
+use glam::{DVec2, DVec3};
+
+/// Y, as most OBJ files have it, unless the model would fall over that way and stands on its lower Z side.
+///
+/// A thing stands when the centre of its surface lies above the convex hull of its lowest 2 %. To be believed, the
+/// hull must also be more than twice as large on the Z side as on the Y side.
+pub fn guess_up(mesh: &Mesh) -> UpAxis {
+    let corners: Vec<DVec3> =
+        mesh.triangles.iter().flatten().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()).collect();
+    let Some(center) = surface_center(&corners) else { return UpAxis::Y };
+    let (min, max) = corners.iter().fold((center, center), |(min, max), &corner| (min.min(corner), max.max(corner)));
+    let stand = |axis: usize| {
+        let seen_from_below = |point: DVec3| DVec2::new(point[(axis + 1) % 3], point[(axis + 2) % 3]);
+        let level = min[axis] + 0.02 * (max[axis] - min[axis]);
+        let lowest = corners.iter().filter(|corner| corner[axis] <= level);
+        let hull = convex_hull(lowest.map(|&corner| seen_from_below(corner)).collect());
+        let size = seen_from_below(max - min);
+        Stand { stable: contains(&hull, seen_from_below(center)), support: area(&hull) / (size.x * size.y) }
+    };
+    let (on_y, on_z) = (stand(1), stand(2));
+    if !on_y.stable && on_z.stable && on_z.support > 2.0 * on_y.support { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// How a thing stands on one of its sides.
+struct Stand {
+    stable: bool,
+    /// Area of the hull of what touches the ground, over that of the box's floor.
+    support: f64,
+}
+
+/// The centre of a skin of even thickness.
+fn surface_center(corners: &[DVec3]) -> Option<DVec3> {
+    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+    for triangle in corners.chunks_exact(3) {
+        let (a, b, c) = (triangle[0], triangle[1], triangle[2]);
+        let area = (b - a).cross(c - a).length();
+        sum += area * (a + b + c) / 3.0;
+        total += area;
+    }
+    (total > 0.0).then(|| sum / total)
+}
+
+/// Counter-clockwise, by Andrew's monotone chain.
+fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    let chain = |points: &mut dyn Iterator<Item = DVec2>| {
+        let mut chain: Vec<DVec2> = Vec::new();
+        for point in points {
+            while let [.., a, b] = chain[..]
+                && (b - a).perp_dot(point - a) <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        // The last point begins the other chain.
+        chain.pop();
+        chain
+    };
+    let mut hull = chain(&mut points.iter().copied());
+    hull.extend(chain(&mut points.iter().rev().copied()));
+    hull
+}
+
+fn edges(hull: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> {
+    hull.iter().zip(hull.iter().cycle().skip(1)).map(|(&a, &b)| (a, b))
+}
+
+fn area(hull: &[DVec2]) -> f64 {
+    0.5 * edges(hull).map(|(a, b)| a.perp_dot(b)).sum::<f64>()
+}
+
+fn contains(hull: &[DVec2], point: DVec2) -> bool {
+    hull.len() > 2 && edges(hull).all(|(a, b)| (b - a).perp_dot(point - a) >= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A table: a top and four legs, standing along +Z or +Y.
+    fn table(up: UpAxis) -> Mesh {
+        let mut positions = Vec::new();
+        let mut triangles = Vec::new();
+        let mut block = |center: DVec3, size: DVec3| {
+            let cube = crate::mesh::procedural::cuboid(size);
+            let first = positions.len() as u32;
+            positions.extend(cube.positions.iter().map(|position| position.as_dvec3() + cube.center + center));
+            triangles.extend(cube.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+        };
+        block(DVec3::new(0.0, 1.0, 0.1), DVec3::new(2.0, 0.1, 1.2));
+        for (x, z) in [(-0.9, -0.4), (0.9, -0.4), (-0.9, 0.6), (0.9, 0.6)] {
+            block(DVec3::new(x, 0.5, z), DVec3::new(0.1, 1.0, 0.1));
+        }
+        if up == UpAxis::Z {
+            positions.iter_mut().for_each(|p| *p = DVec3::new(p.x, -p.z, p.y));
+        }
+        Mesh::from_f64(&positions, triangles).unwrap()
+    }
+
+    #[test]
+    fn a_table_stands_on_its_legs() {
+        assert_eq!(guess_up(&table(UpAxis::Y)), UpAxis::Y);
+        assert_eq!(guess_up(&table(UpAxis::Z)), UpAxis::Z);
+    }
+
+    #[test]
+    fn what_stands_either_way_is_y_up() {
+        assert_eq!(guess_up(&crate::mesh::procedural::cuboid(DVec3::ONE)), UpAxis::Y);
+        assert_eq!(guess_up(&crate::mesh::procedural::icosphere(8)), UpAxis::Y);
+    }
+
+    #[test]
+    fn a_hull_holds_its_points() {
+        let points: Vec<DVec2> = (0..50).map(|i| DVec2::from_angle(f64::from(i) * 2.4) * f64::from(i % 7)).collect();
+        let hull = convex_hull(points.clone());
+        assert!(area(&hull) > 0.0);
+        assert!(points.iter().all(|&point| contains(&hull, point)));
+        assert!(!contains(&hull, DVec2::new(6.5, 0.0)));
+        assert_eq!(area(&convex_hull(vec![DVec2::ZERO, DVec2::ONE])), 0.0);
+    }
+}

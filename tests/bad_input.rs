@@ -1,0 +1,212 @@
+//! Bad input: a clear error with place and advice, the right exit status, and nothing half-written.
+
+use assert_cmd::Command;
+use firstlight::scene::file::SceneFile;
+use firstlight::scene::{LoadOptions, SceneSource, load};
+use std::path::Path;
+
+const CAMERA: &str = "camera: (eye: (0, 0, 5), look_at: (0, 0, 0))";
+
+/// The message for a scene file with this text.
+fn message(text: &str) -> String {
+    match SceneFile::parse(text, "scene.ron") {
+        Ok(_) => panic!("no error for: {text}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// The message for a scene with a good camera, and these fields beside it, each on a line of its own.
+fn with(fields: &[&str]) -> String {
+    message(&format!("(\n    {CAMERA},\n    {},\n)", fields.join(",\n    ")))
+}
+
+#[track_caller]
+fn assert_says(found: &str, expected: &[&str]) {
+    for part in expected {
+        assert!(found.contains(part), "expected {part:?} in: {found}");
+    }
+}
+
+#[test]
+fn wrong_words_are_named_with_line_column_and_the_nearest_known() {
+    let red = r#"materials: { "red": diffuse(albedo: (0.6, 0.1, 0.1)) }"#;
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["film: (width: 3, hieght: 4)"], &["scene.ron:3:22:", "unknown field `hieght`", "did you mean `height`?"]),
+        (&["objets: []"], &["scene.ron:3:5:", "`objets`", "did you mean `objects`?"]),
+        (&["objects: [\n        spere(radius: 1, material: \"red\")]"], &["scene.ron:4:9:", "did you mean `sphere`?"]),
+        (
+            &[red, r#"objects: [sphere(radius: 1, material: "read")]"#],
+            &["scene.ron:4:", "material `read` is not defined (did you mean `red`?)"],
+        ),
+        (
+            &[r#"materials: { "a": diffuse(albedo: "tiels") }"#, r#"textures: { "tiles": checker(a: 0, b: 1) }"#],
+            &["texture `tiels`", "did you mean `tiles`?"],
+        ),
+        (&[r#"objects: [mesh(source: builtin("serpent-not"))]"#], &["did you mean `serpent-knot`?"]),
+        (&["objects: [sphere(radius: 1)]"], &["scene.ron:3:", "`material`", "missing"]),
+        (&["integrator: pathh"], &["scene.ron:3:", "did you mean `path`?"]),
+        (&["film: (width: 3, width: 4, height: 2)"], &["`width`", "twice"]),
+        (&[r#"materials: { "a": mirror(), "a": mirror() }"#], &["scene.ron:3:", "`a` is defined twice"]),
+        (&["film: (width: -3, height: 4)"], &["scene.ron:3:"]),
+        (&["film: (width: 3.5, height: 4)"], &["scene.ron:3:"]),
+        (&[r#"environment: constant("blue")"#], &["scene.ron:3:", "colour"]),
+        (&["environment: constant((1, 2))"], &["scene.ron:3:"]),
+    ];
+    for (fields, expected) in cases {
+        assert_says(&with(fields), expected);
+    }
+    assert_says(&message("(camera: (eye: (0, 0, 5)"), &["scene.ron:1:"]);
+    assert_says(&message(""), &["scene.ron:1:"]);
+    assert_says(&message("()"), &["`camera`", "missing"]);
+    assert_says(&message(&"(camera: ".repeat(5000)), &["scene.ron:1:"]);
+}
+
+#[test]
+fn values_out_of_range_are_named_with_what_is_expected() {
+    let red = r#"materials: { "red": diffuse(albedo: (0.6, 0.1, 0.1)) }"#;
+    let object = |text: &str| with(&[red, &format!("objects: [\n        {text}]")]);
+    let material = |text: &str| with(&[&format!("materials: {{\n        \"m\": {text} }}")]);
+    for (found, expected) in [
+        (object(r#"sphere(radius: 0, material: "red")"#), "the radius is 0, but must lie between"),
+        (object(r#"sphere(radius: -1, material: "red")"#), "the radius is -1"),
+        (object(r#"sphere(radius: NaN, material: "red")"#), "the radius is NaN"),
+        (object(r#"sphere(center: (inf, 0, 0), radius: 1, material: "red")"#), "must be finite"),
+        (object(r#"sphere(center: (1e300, 0, 0), radius: 1, material: "red")"#), "must be finite and within"),
+        (object(r#"sphere(radius: 1, material: "red", transform: (scale: (1, 2, 1)))"#), "balls stay round"),
+        (object(r#"sphere(radius: 1, material: "red", transform: (scale: 0))"#), "squeezes the object flat"),
+        (object(r#"plane(normal: (0, 0, 0), material: "red")"#), "the normal is (0, 0, 0)"),
+        (object(r#"quad(edge_u: (1, 0, 0), edge_v: (2, 0, 0), material: "red")"#), "the quad has no area"),
+        (object(r#"triangle(vertices: ((0, 0, 0), (1, 0, 0), (2, 0, 0)), material: "red")"#), "triangle has no area"),
+        (object(r#"spheres(centers: [], radii: all(1), material: "red")"#), "there are no balls"),
+        (object(r#"spheres(centers: [(0, 0, 0)], radii: each([1, 2]), material: "red")"#), "2 radii for 1 centres"),
+        (object(r#"mesh(source: builtin("cube"), material: "red", simplify: 0)"#), "`simplify` is 0"),
+        (
+            object(r#"mesh(source: builtin("cube"), transform: (matrix: ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 0))))"#),
+            "flat",
+        ),
+        (material("diffuse(albedo: 1.5)"), "is a share of light: between 0 and 1"),
+        (material("diffuse(albedo: (0.5, NaN, 0.5))"), "between 0 and 1"),
+        (material("metal(alpha: 2, reflectance: 1)"), "`alpha` is 2"),
+        (material("glass(ior: 0)"), "`ior` is 0, but must be positive"),
+        (material("emissive(radiance: (1, -1, 0))"), "nowhere negative"),
+        (material("blend(weight: 0.5, a: \"m\", b: \"m\")"), "blends itself"),
+        (with(&["film: (width: 0, height: 4)"]), "has no pixels"),
+        (with(&["film: (width: 60000, height: 60000)"]), "GiB"),
+        (with(&["film: (width: 4000000000, height: 4000000000)"]), "GiB"),
+        (with(&["max_depth: 0"]), "use at least 1"),
+        (with(&["environment: gradient(zenith: 1, horizon: inf, ground: 0)"]), "must be finite"),
+        (with(&["lights: [point(position: (0, 0, 0), intensity: 1, radius: 0)]"]), "the radius is 0"),
+    ] {
+        assert_says(&found, &["scene.ron:", expected]);
+    }
+    let camera = |fields: &str| message(&format!("(\n    camera: ({fields}),\n)"));
+    for (fields, expected) in [
+        ("eye: (1, 2, 3), look_at: (1, 2, 3)", "`eye` and `look_at` are the same point"),
+        ("eye: (0, 5, 0), look_at: (0, 0, 0)", "`up` is parallel to the view direction"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), up: (0, 0, 0)", "`up` is (0, 0, 0)"),
+        ("eye: (0, NaN, 5), look_at: (0, 0, 0)", "must be finite"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), vfov: 180", "between 0 and 180"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), lens_radius: -1", "must be 0 or positive"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), f_stop: 0", "`f_stop` is 0"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), f_stop: 2, lens_radius: 1", "say the same thing"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), focus_distance: 0", "`focus_distance` is 0"),
+    ] {
+        assert_says(&camera(fields), &["scene.ron:2:", expected]);
+    }
+}
+
+#[test]
+fn all_mistakes_of_a_file_are_told_at_once() {
+    let found =
+        with(&["film: (width: 0, height: 0)", "max_depth: 0", r#"objects: [sphere(radius: 0, material: "none")]"#]);
+    assert_eq!(found.lines().count(), 4, "{found}");
+}
+
+#[test]
+fn hostile_text_is_refused_quickly() {
+    // Blends that double at every level, and a long chain of them.
+    let doubling: String =
+        (0..40).map(|i| format!("\"m{i}\": blend(weight: 0.5, a: \"m{0}\", b: \"m{0}\"),", i + 1)).collect();
+    let found = with(&[&format!("materials: {{ {doubling} \"m40\": mirror() }}")]);
+    assert_says(&found, &["more than 8 plain materials"]);
+    let chain: String =
+        (0..20_000).map(|i| format!("\"m{i}\": blend(weight: 0.5, a: \"m{}\", b: \"w\"),", i + 1)).collect();
+    let found = with(&[&format!("materials: {{ {chain} \"m20000\": mirror(), \"w\": mirror() }}")]);
+    assert_says(&found, &["more than 8 plain materials"]);
+}
+
+#[test]
+fn files_that_a_scene_points_at_are_named_together_with_the_line_that_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let open = |fields: &str| {
+        write("scene.ron", &format!("(\n{CAMERA},\n{fields})"));
+        load(&SceneSource::Scene(folder.path().join("scene.ron")), &LoadOptions::default()).unwrap_err().to_string()
+    };
+    assert_says(&open(r#"objects: [mesh(source: obj("none.obj"))]"#), &["scene.ron:3:", "none.obj", "no such file"]);
+    write("empty.obj", "v 0 0 0\n");
+    assert_says(&open(r#"objects: [mesh(source: obj("empty.obj"))]"#), &["scene.ron:3:", "empty.obj", "no faces"]);
+    write("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
+    assert_says(&open(r#"objects: [mesh(source: obj("range.obj"))]"#), &["range.obj:4", "vertex 4"]);
+    write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert_says(&open(r#"objects: [mesh(source: obj("nan.obj"))]"#), &["nan.obj:2", "finite"]);
+    assert_says(&open(r#"environment: image(file: "sky.hdr")"#), &["scene.ron:3:", "sky.hdr", "no such file"]);
+    write("sky.hdr", "#?RADIANCE\nnonsense");
+    assert_says(&open(r#"environment: image(file: "sky.hdr")"#), &["scene.ron:3:", "sky.hdr"]);
+    std::fs::write(folder.path().join("bytes.ron"), b"(\xff\xfe)").unwrap();
+    let bytes = load(&SceneSource::Scene(folder.path().join("bytes.ron")), &LoadOptions::default());
+    assert_says(&bytes.unwrap_err().to_string(), &["bytes.ron", "UTF-8"]);
+}
+
+fn firstlight() -> Command {
+    Command::cargo_bin("firstlight").unwrap()
+}
+
+/// Runs a command that must fail, and gives back what it says.
+#[track_caller]
+fn fails(folder: &Path, args: &[&str], status: i32) -> String {
+    let output = firstlight().args(args).current_dir(folder).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(status), "{args:?}: {said}");
+    said
+}
+
+#[test]
+fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir(path.join("folder.png")).unwrap();
+    std::fs::write(path.join("notes.txt"), "hello").unwrap();
+    let entries = || std::fs::read_dir(path).unwrap().count();
+    let before = entries();
+    // Usage.
+    for args in [
+        &["render", "cornell"][..],
+        &["render", "cornell", "-o", "a.png", "--spp", "0"],
+        &["render", "cornell", "-o", "a.png", "--spp", "many"],
+        &["render", "cornell", "-o", "a.png", "--size", "0x10"],
+        &["render", "cornell", "-o", "a.png", "--size", "640"],
+        &["render", "cornell", "-o", "a.png", "--time", "-1"],
+        &["render", "cornell", "-o", "a.png", "--threads", "0"],
+        &["render", "cornell", "-o", "a.png", "--integrator", "magic"],
+        &["rendr", "cornell", "--nothing"],
+    ] {
+        fails(path, args, 2);
+    }
+    // Failure, each before any ray is traced.
+    for (args, expected) in [
+        (&["render", "cornel", "-o", "a.png"][..], "did you mean `cornell`?"),
+        (&["render", "none.ron", "-o", "a.png"], "no such file"),
+        (&["render", "none.obj", "-o", "a.png"], "no such file"),
+        (&["render", "notes.txt", "-o", "a.png"], "use a scene (.ron) or a model (.obj)"),
+        (&["render", "cornell", "-o", "a.jpg"], "use .png or .exr"),
+        (&["render", "cornell", "-o", "a"], "end it in .png or .exr"),
+        (&["render", "cornell", "-o", "nowhere/a.png"], "there is no folder nowhere"),
+        (&["render", "cornell", "-o", "folder.png"], "is a folder"),
+        (&["info", "none.ron"], "no such file"),
+    ] {
+        let said = fails(path, args, 1);
+        assert!(said.starts_with("error: ") && said.contains(expected), "{args:?}: {said}");
+    }
+    assert_eq!(entries(), before, "nothing was written");
+}

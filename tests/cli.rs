@@ -1,0 +1,123 @@
+//! The program from outside: pictures, figures, and the same bytes for any number of threads.
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn firstlight(folder: &Path, args: &[&str]) -> String {
+    let mut command = Command::cargo_bin("firstlight").unwrap();
+    command.current_dir(folder).args(args).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn a_png_and_an_exr_show_the_same_light() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(
+        path.join("grey.ron"),
+        "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), environment: constant(0.5), display: (tone_curve: linear))",
+    )
+    .unwrap();
+    firstlight(path, &["render", "grey.ron", "-o", "grey.png", "--size", "20x10", "--spp", "2"]);
+    firstlight(path, &["render", "grey.ron", "-o", "grey.exr", "--size", "20x10", "--spp", "2", "--exposure", "3"]);
+    let png = image::open(path.join("grey.png")).unwrap().into_rgb8();
+    assert_eq!(png.dimensions(), (20, 10));
+    assert!(png.pixels().all(|pixel| pixel.0 == [188; 3]), "half the light is byte 188 in sRGB");
+    let exr = image::open(path.join("grey.exr")).unwrap().into_rgb32f();
+    assert!(exr.pixels().all(|pixel| pixel.0 == [0.5; 3]), "linear, and exposure left out");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = |name: &str| std::fs::metadata(path.join(name)).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode("grey.png"), mode("grey.ron"), "readable by whom the user's mask lets");
+    }
+}
+
+#[test]
+fn the_last_line_is_one_json_object() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["render", "cornell", "-o", "c.png", "--size", "24x16", "--spp", "8", "--threads", "2", "--json"];
+    let out = firstlight(folder.path(), &args);
+    let json: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
+    assert_eq!((json["width"].as_u64(), json["height"].as_u64()), (Some(24), Some(16)));
+    assert_eq!((json["spp"].as_u64(), json["threads"].as_u64()), (Some(8), Some(2)));
+    assert_eq!(json["rays"]["camera"].as_u64(), Some(24 * 16 * 8));
+    assert_eq!(json["bad_samples"].as_u64(), Some(0));
+    for key in ["load_s", "build_s", "render_s", "cpu_s", "mrays_per_s", "estimated_error"] {
+        assert!(json[key].as_f64().is_some_and(|value| value >= 0.0), "{key}: {json}");
+    }
+}
+
+#[test]
+fn the_picture_does_not_depend_on_threads_but_on_the_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let render = |name: &str, threads: &str, seed: &str| {
+        let args = ["render", "cornell-balls", "-o", name, "--size", "40x40", "--spp", "4"];
+        firstlight(path, &[&args[..], &["--threads", threads, "--seed", seed]].concat());
+        std::fs::read(path.join(name)).unwrap()
+    };
+    let one = render("one.exr", "1", "7");
+    assert_eq!(one, render("three.exr", "3", "7"));
+    assert_ne!(one, render("other.exr", "3", "8"));
+}
+
+#[test]
+fn time_and_error_end_a_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let spp = |limit: [&str; 2]| {
+        let args = ["render", "dof-balls", "-o", "d.png", "--size", "32x24", "--json"];
+        let out = firstlight(folder.path(), &[&args[..], &limit].concat());
+        let json: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
+        (json["spp"].as_u64().unwrap(), json["render_s"].as_f64().unwrap(), json["estimated_error"].as_f64())
+    };
+    let (samples, seconds, _) = spp(["--time", "0.2"]);
+    assert!(samples >= 1 && (0.2..5.0).contains(&seconds), "{samples} samples in {seconds} s");
+    let (samples, _, error) = spp(["--error", "0.05"]);
+    assert!(samples >= 4 && error.is_some_and(|error| error <= 0.05), "{error:?} after {samples}");
+}
+
+#[test]
+fn without_a_display_the_scene_becomes_a_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), film: (width: 8, height: 8))";
+    std::fs::write(folder.path().join("dark.ron"), scene).unwrap();
+    for name in ["firstlight-dark.png", "firstlight-dark-2.png"] {
+        firstlight(folder.path(), &["dark.ron"]);
+        assert_eq!(image::image_dimensions(folder.path().join(name)).unwrap(), (8, 8));
+    }
+}
+
+#[test]
+fn info_tells_what_is_in_a_scene_and_what_it_uses() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = firstlight(folder.path(), &["info", "cornell-balls"]);
+    for expected in ["2 × sphere", "6 × quad", "1 × glass", "pinhole", "512 x 512", "1 emissive objects"] {
+        assert!(out.contains(expected), "expected {expected:?} in:\n{out}");
+    }
+    let uses = out.lines().find(|line| line.trim_start().starts_with("uses")).unwrap();
+    assert!(uses.contains("glass") && !uses.contains("textures"), "{uses}");
+}
+
+#[test]
+fn a_model_alone_is_framed_and_lit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    // A small tetrahedron far from the origin, as surveyors have them.
+    let at = |x: f64, y: f64, z: f64| format!("v {} {} {}\n", 5e5 + x, 4.5e6 + y, 120.0 + z);
+    let obj = at(0.0, 0.0, 0.0) + &at(1.0, 0.0, 0.0) + &at(0.0, 0.0, -1.0) + &at(0.3, 1.0, -0.3);
+    std::fs::write(path.join("tent.obj"), obj + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n").unwrap();
+    firstlight(path, &["render", "tent.obj", "-o", "tent.png", "--size", "64x48", "--spp", "16", "--up", "y"]);
+    let picture = image::open(path.join("tent.png")).unwrap().into_rgb8();
+    let [mut warm, mut all] = [0_u32, 0];
+    for pixel in
+        picture.enumerate_pixels().filter(|(x, y, _)| (16..48).contains(x) && (12..36).contains(y)).map(|p| p.2)
+    {
+        all += 1;
+        // Clay is redder than ground and sky.
+        warm += u32::from(i32::from(pixel.0[0]) > i32::from(pixel.0[2]) + 15);
+    }
+    assert!(warm * 4 > all, "the model fills the middle: {warm} of {all} pixels");
+}
