@@ -233,3 +233,112 @@ pub(super) fn lobe_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: 
         Material::Emissive { .. } | Material::Phong { .. } | Material::Blend { .. } => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kdtree::{BuildPreset, MeshTree};
+    use crate::mesh::{Mesh, procedural};
+    use crate::render::{Camera, Environment, Geometry, Object, Shading};
+    use glam::Affine3A;
+    use std::sync::Arc;
+
+    fn scene_of(mesh: Mesh, world_from_object: Affine3A) -> Snapshot {
+        let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
+        let object = Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) };
+        let geometry = Geometry::build(vec![Shape::Mesh { tree, world_from_object }], vec![object]);
+        let grey = Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) };
+        let shading = Shading::build(&geometry, vec![grey], Vec::new(), Environment::Black);
+        let camera = Camera {
+            eye: Vec3::ZERO,
+            right: Vec3::X,
+            up: Vec3::Y,
+            forward: Vec3::NEG_Z,
+            tan_half_vfov: 1.0,
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+            blades: 0,
+            blade_rotation: 0.0,
+        };
+        Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+    }
+
+    /// Rays from outside towards a unit ball, side by side.
+    fn rays() -> impl Iterator<Item = Ray> {
+        let n = 160;
+        (0..n * n).map(move |i| {
+            let (x, y) = (2.0 * (i % n) as f32 / n as f32 - 1.0, 2.0 * (i / n) as f32 / n as f32 - 1.0);
+            Ray::new(Vec3::new(0.97 * x + 1e-3, 0.97 * y + 2e-3, 4.0), Vec3::NEG_Z)
+        })
+    }
+
+    /// Root mean square error of the light that a coarse ball of radius `size` gets from one side, against the true
+    /// ball: by the lifted origin, and by the plain one.
+    fn light_errors(frequency: u32, map: Affine3A) -> (f64, f64) {
+        let light = Vec3::new(0.96, 0.28, 0.0);
+        let scene = scene_of(procedural::icosphere(frequency).with_vertex_normals(), map);
+        let tree = &scene.geometry.tree;
+        let (mut n, mut lifted, mut plain) = (0, 0.0, 0.0);
+        let to_world = |ray: Ray| Ray::new(map.transform_point3(ray.origin), map.transform_vector3(ray.dir).normalize());
+        for ray in rays() {
+            let (d, b) = (ray.dir, ray.origin.dot(ray.dir));
+            let disc = b * b - ray.origin.length_squared() + 1.0;
+            let ray = to_world(ray);
+            let Some(hit) = tree.closest_hit(&ray) else { continue };
+            if disc <= 0.0 {
+                continue;
+            }
+            let (outwards, vertex) = (ray_point(&ray, &map, d, b, disc), Vertex::new(&scene, &ray, &hit));
+            let wi = map.transform_vector3(light).normalize();
+            let truth = outwards.dot(light).max(0.0);
+            let arriving = |vertex: &Vertex| {
+                let cos = vertex.normal.dot(wi).max(0.0);
+                let open = cos > 0.0
+                    && vertex.is_reached_from(wi)
+                    && tree.closest_hit(&Ray::new(vertex.leaving(wi), wi)).is_none();
+                if open { cos } else { 0.0 }
+            };
+            let flat = Vertex { lift: Vec3::ZERO, ..vertex };
+            n += 1;
+            lifted += f64::from(arriving(&vertex) - truth).powi(2);
+            plain += f64::from(arriving(&flat) - truth).powi(2);
+        }
+        ((lifted / f64::from(n)).sqrt(), (plain / f64::from(n)).sqrt())
+    }
+
+    /// The true normal, in the ball's own space, where the ray meets it.
+    fn ray_point(ray: &Ray, map: &Affine3A, dir: Vec3, b: f32, disc: f32) -> Vec3 {
+        let origin = map.inverse().transform_point3(ray.origin);
+        (origin + (-b - disc.sqrt()) * dir).normalize()
+    }
+
+    #[test]
+    fn a_coarse_ball_is_lit_like_the_true_one() {
+        for frequency in [2, 4, 8] {
+            let (lifted, plain) = light_errors(frequency, Affine3A::IDENTITY);
+            println!("icosphere {}: rms {lifted:.4}, without {plain:.4}", 20 * frequency * frequency);
+            assert!(lifted < 0.7 * plain, "{frequency}: {lifted} against {plain}");
+        }
+        // Neither size nor mirroring makes a difference.
+        let (plain, _) = light_errors(4, Affine3A::IDENTITY);
+        for scale in [Vec3::splat(1e-3), Vec3::splat(500.0), Vec3::new(-1.0, 1.0, 1.0)] {
+            let (scaled, _) = light_errors(4, Affine3A::from_scale(scale));
+            assert!((scaled - plain).abs() < 0.05 * plain, "{scale}: {scaled} for {plain}");
+        }
+    }
+
+    #[test]
+    fn surfaces_that_are_flat_or_bend_inwards_are_not_lifted() {
+        let flat = scene_of(procedural::icosphere(3).flat(), Affine3A::IDENTITY);
+        let smooth = scene_of(procedural::icosphere(3).with_vertex_normals(), Affine3A::IDENTITY);
+        for ray in rays() {
+            let within = Ray::new(Vec3::new(0.1, 0.2, 0.05), (ray.origin - Vec3::Z * 3.5).normalize());
+            for (scene, ray, size) in [(&flat, &ray, 1e-6), (&smooth, &within, 1e-6), (&smooth, &ray, 0.1)] {
+                if let Some(hit) = scene.geometry.tree.closest_hit(ray) {
+                    let lift = Vertex::new(scene, ray, &hit).lift.length();
+                    assert!(lift <= size, "{lift}");
+                }
+            }
+        }
+    }
+}

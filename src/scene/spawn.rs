@@ -150,7 +150,7 @@ impl LoadedScene {
                 let mesh = self.meshes[i].as_ref().expect("every mesh object has been loaded");
                 (Shape::Mesh(mesh.mesh.clone()), placement)
             }
-            ObjectPart::Spheres { .. } => {
+            ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. } => {
                 (Shape::Spheres(self.balls[i].clone().expect("every cloud has been made")), placement)
             }
         }

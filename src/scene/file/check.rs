@@ -236,7 +236,8 @@ impl Check<'_> {
             self.material_name(&format!("{path}/material"), name);
         }
         let placement = self.transform(&format!("{path}/transform"), object.transform());
-        let must_scale_evenly = matches!(object, ObjectPart::Sphere { .. } | ObjectPart::Spheres { .. });
+        let must_scale_evenly =
+            matches!(object, ObjectPart::Sphere { .. } | ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. });
         if must_scale_evenly && placement.is_some_and(|placement| placement.even_scale().is_none()) {
             self.wrong(
                 &format!("{path}/transform"),
@@ -280,7 +281,24 @@ impl Check<'_> {
                     );
                 }
             }
+            ObjectPart::BallGrid { first, steps, radius, .. } => {
+                self.size(&format!("{path}/radius"), "the radius", *radius);
+                self.steps(path, *first, steps);
+            }
             ObjectPart::Spheres { centers, radii, .. } => self.balls(path, centers, radii),
+        }
+    }
+
+    fn steps(&mut self, path: &str, first: DVec3, steps: &[(u32, DVec3)]) {
+        let n: u64 = steps.iter().map(|(count, _)| u64::from(*count)).fold(1, u64::saturating_mul);
+        let reach = steps.iter().map(|(count, step)| f64::from(*count) * step.abs()).fold(first.abs(), |a, b| a + b);
+        if n == 0 || n > SceneFile::MAX_GRID_BALLS || steps.len() > 3 {
+            let message =
+                format!("a grid has one to three rows and up to {} balls, not {n}", SceneFile::MAX_GRID_BALLS);
+            self.wrong(&format!("{path}/steps"), message);
+        } else {
+            self.point(&format!("{path}/first"), first);
+            self.point(&format!("{path}/steps"), reach);
         }
     }
 

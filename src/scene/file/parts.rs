@@ -355,6 +355,19 @@ pub enum ObjectPart {
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
+    /// Balls of one material in rows, layers or blocks: one at `first`, then by each step in turn that many times.
+    BallGrid {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        #[serde(default, skip_serializing_if = "is_default")]
+        first: DVec3,
+        /// Up to three pairs: how many balls in a row, and the way from each to the next.
+        steps: Vec<(u32, DVec3)>,
+        radius: f64,
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
     /// Many balls, one material.
     Spheres {
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -375,6 +388,7 @@ impl ObjectPart {
             | Self::Quad { name, .. }
             | Self::Triangle { name, .. }
             | Self::Mesh { name, .. }
+            | Self::BallGrid { name, .. }
             | Self::Spheres { name, .. } => name.as_deref(),
         }
     }
@@ -385,6 +399,7 @@ impl ObjectPart {
             | Self::Plane { material, .. }
             | Self::Quad { material, .. }
             | Self::Triangle { material, .. }
+            | Self::BallGrid { material, .. }
             | Self::Spheres { material, .. } => Some(material),
             Self::Mesh { material, .. } => material.as_deref(),
         }
@@ -397,9 +412,18 @@ impl ObjectPart {
             | Self::Quad { transform, .. }
             | Self::Triangle { transform, .. }
             | Self::Mesh { transform, .. }
+            | Self::BallGrid { transform, .. }
             | Self::Spheres { transform, .. } => transform,
         }
     }
+}
+
+/// The centres of a [`ObjectPart::BallGrid`].
+pub fn ball_grid(first: DVec3, steps: &[(u32, DVec3)]) -> Vec<DVec3> {
+    steps.iter().fold(vec![first], |centers, &(count, step)| {
+        let row = |center: DVec3| (0..count).map(move |i| center + f64::from(i) * step);
+        centers.into_iter().flat_map(row).collect()
+    })
 }
 
 /// Where the triangles of a mesh come from.
