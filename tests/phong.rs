@@ -153,7 +153,7 @@ fn a_white_furnace_stays_white() {
         // What is left to chance is what counts for less than a sixty-fourth.
         ("glass", glass, 2e-3),
         ("matte", diffuse(1.0), 1e-3),
-        ("clear phong", phong(1.0, 0.3, 0.6), 0.25),
+        ("clear phong", phong(1.0, 0.3, 0.6), 0.5),
     ];
     for (name, material, bound) in materials {
         let scene = scene(vec![(sphere(Vec3::ZERO, 0.9), 0)], vec![material], even.clone(), view);

