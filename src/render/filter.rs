@@ -165,7 +165,8 @@ mod tests {
             let sampler = FilterSampler::new(filter);
             let n = 1 << 16;
             // Moments tell the width; the last one, steps between pixels, where the weight goes.
-            let tests: [(&str, fn(f64) -> f64); 4] =
+            type Moment = fn(f64) -> f64;
+            let tests: [(&str, Moment); 4] =
                 [("whole", |_| 1.0), ("x²", |x| x * x), ("x⁴", |x| x.powi(4)), ("neighbour", |x| f64::from(x > 0.5))];
             for (name, g) in tests {
                 let sum: f64 = (0..n)
