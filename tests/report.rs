@@ -9,7 +9,9 @@ use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, RenderSettings, ScalarInput, Snapshot, Techniques,
 };
 use firstlight::report::{Key, Ladder, Limits, LinearPicture, ReferenceStore, climb};
-use firstlight::scene::Fingerprint;
+use firstlight::scene::{
+    BUILTIN_SCENES, Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load,
+};
 use glam::Vec3;
 
 /// A room with lights of every shape, one much brighter than the others, matte, glossy and mirroring things.
@@ -42,11 +44,11 @@ fn room() -> Snapshot {
 
 /// Mean of the picture over independent renders, and its standard error.
 fn mean_of_renders(snapshot: &Snapshot, techniques: Techniques) -> (f64, f64) {
-    let n = 12;
+    let n = 8;
     let means: Vec<f64> = (0..n)
         .map(|seed| {
             let settings = RenderSettings { seed: 100 + seed, techniques, ..RenderSettings::default() };
-            picture_mean(&render(snapshot, &settings, 24, 16, 128).0).0
+            picture_mean(&render(snapshot, &settings, 24, 16, 64).0).0
         })
         .collect();
     let mean = means.iter().sum::<f64>() / f64::from(n);
@@ -58,13 +60,13 @@ fn mean_of_renders(snapshot: &Snapshot, techniques: Techniques) -> (f64, f64) {
 fn every_technique_switched_off_leaves_the_mean_alone() {
     let room = room();
     let (expected, error) = mean_of_renders(&room, Techniques::default());
-    assert!(error < 2e-3 * expected, "{expected} ± {error}");
+    assert!(error < 5e-3 * expected, "{expected} ± {error}");
     for (technique, techniques) in Techniques::ablations() {
         let (found, other) = mean_of_renders(&room, techniques);
         assert_ne!(found, expected, "without {technique} nothing changed: the switch is not connected");
-        // Student's t with about 20 degrees of freedom: 4.5 is one in 4,000 for each of six.
+        // Student's t with about 14 degrees of freedom: 5 is one in 5,000 for each of six.
         let t = (found - expected) / error.hypot(other);
-        assert!(t.abs() < 4.5, "without {technique}: {found} ± {other} for {expected} ± {error}");
+        assert!(t.abs() < 5.0, "without {technique}: {found} ± {other} for {expected} ± {error}");
         assert!(other < 0.05 * expected, "without {technique} the test can see nothing: ± {other}");
     }
 }
@@ -82,8 +84,9 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
     let ladder = Ladder::measure(&rungs, &truth, &Display::default());
     // A rung is what a render of so many samples gives, to the bit.
     assert_eq!(rungs[3].picture, LinearPicture::of(&render(&room, &settings, size.0, size.1, 8).0));
+    let slope = ladder.slope().expect("four steps make a line");
+    assert!((-1.6..-0.6).contains(&slope), "{slope}");
     for pair in ladder.steps.windows(2) {
-        assert!(pair[1].distance.relative_mse < pair[0].distance.relative_mse, "{pair:?}");
         assert!(pair[1].spent.wall_seconds >= pair[0].spent.wall_seconds);
         assert_eq!(pair[1].spent.camera_paths, 2 * pair[0].spent.camera_paths);
     }
@@ -150,4 +153,38 @@ fn the_command_writes_a_page_and_a_table() {
     assert!(fail(&["cornell", "--reference", "none.exr"]).contains("none.exr"));
     assert!(fail(&["--reference", "none.exr"]).contains("name the scene"));
     assert!(fail(&["cornel"]).contains("cornell"));
+}
+
+/// On every built-in scene, from 16 samples a pixel on, the estimate agrees with the true error within ×1.25: as root
+/// of the mean of squares over several renders, because where rare bright samples rule (gallery), one render of so few
+/// pixels may lie beside it by chance.
+#[test]
+fn estimated_error_is_the_true_error_on_every_builtin_scene() {
+    let size = (48, 36);
+    for (name, _, _) in BUILTIN_SCENES {
+        let source = SceneSource::Builtin((*name).to_owned());
+        let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
+        let settings = world.resource::<Rendering>().0;
+        let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 8192).0;
+        let truth = LinearPicture::of(&truth);
+        // Sums of squares, estimated and true, a step.
+        let mut sums = vec![(0.0, 0.0); 8];
+        for seed in 0..6 {
+            let settings = RenderSettings { seed, ..settings };
+            let rungs = climb(&snapshot, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| ());
+            let ladder = Ladder::measure(&rungs, &truth, &Display::default());
+            for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
+                sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));
+                sum.1 += step.distance.relative_mse;
+            }
+        }
+        let ratios: Vec<f64> = sums.iter().map(|(estimated, found)| (estimated / found).sqrt()).collect();
+        println!("{name}: estimated / true at 1, 2, 4 … samples: {ratios:.2?}");
+        for (k, ratio) in ratios.iter().enumerate().skip(4) {
+            assert!((0.8..=1.25).contains(ratio), "{name} at {} samples: {ratio:.3} ({ratios:.2?})", 1 << k);
+        }
+    }
 }

@@ -5,6 +5,9 @@
 //! I₂ₙ is the mean of both, so cov(Iₙ, I₂ₙ) = var I₂ₙ. Summed over the picture these differences of consecutive
 //! doublings are large sums and tell both the error and how fast it falls: where it falls as n^−a, they do too, and
 //! var I₂ₙ is the difference over 2ᵃ − 1. Independent batches would tell the same, and cost the evenness between them.
+//!
+//! What a difference is relative to must not come from the pixel alone: one bright sample that few pixels have drawn
+//! yet (a caustic) would raise the very value that its own error is divided by, and hide itself: see [`level`].
 
 use glam::DVec3;
 
@@ -82,22 +85,42 @@ const MAX_EXPONENT: f64 = 3.0;
 pub(super) struct TileConvergence {
     /// Means at the last power of two.
     checkpoint: Vec<DVec3>,
-    /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (I₂ₙ² + 0.01), n = 2ᵏ.
+    /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (level² + 0.01), n = 2ᵏ.
     steps: Vec<f64>,
     /// Pixels times channels.
     n_values: f64,
 }
 
 impl TileConvergence {
-    /// Takes the means after `spp` samples, a power of two.
-    pub fn record(&mut self, spp: u32, means: impl Iterator<Item = DVec3>) {
+    /// Takes the means after `spp` samples, a power of two, of a tile `width` pixels wide.
+    pub fn record(&mut self, spp: u32, width: usize, means: impl Iterator<Item = DVec3>) {
         let before = std::mem::replace(&mut self.checkpoint, means.collect());
         self.n_values = 3.0 * self.checkpoint.len() as f64;
         if spp > 1 {
-            let pairs = before.iter().zip(&self.checkpoint);
-            self.steps.push(pairs.map(|(a, b)| ((*a - *b).powf(2.0) / (*b * *b + 0.01)).element_sum()).sum());
+            let pairs = before.iter().zip(&self.checkpoint).enumerate();
+            let relative = pairs.map(|(i, (a, b))| {
+                let (difference, level) = (*a - *b, level(&self.checkpoint, *a, width, i));
+                (difference * difference / (level * level + 0.01)).element_sum()
+            });
+            let sum = relative.sum();
+            self.steps.push(sum);
         }
     }
+}
+
+/// What the error of pixel `i` is relative to: its own mean, but no more than its neighbours' mean and its own darker
+/// half.
+///
+/// A bright sample that came once raises one half alone, and few of the neighbours. A lamp of a single pixel, which
+/// its neighbours know nothing of, is bright in both halves.
+fn level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
+    let (x, y, height) = (i % width, i / width, means.len() / width);
+    // At the border pixels repeat.
+    let around = |k: usize, n: usize| [k.saturating_sub(1), k, (k + 1).min(n - 1)];
+    let rows = around(y, height).map(|y| around(x, width).map(|x| means[y * width + x]).iter().sum::<DVec3>());
+    let neighbours = (rows.iter().sum::<DVec3>() - means[i]) / 8.0;
+    let darker_half = before.min(2.0 * means[i] - before);
+    means[i].min(neighbours.max(darker_half))
 }
 
 #[cfg(test)]
@@ -117,7 +140,7 @@ mod tests {
                     *sum += DVec3::splat(integrand(Sampler::new(2, t as u32, p as u32, s).pair(0)));
                 }
                 if (s + 1).is_power_of_two() {
-                    tile.record(s + 1, sums.iter().map(|sum| *sum / f64::from(s + 1)));
+                    tile.record(s + 1, 8, sums.iter().map(|sum| *sum / f64::from(s + 1)));
                 }
             }
             for sum in sums {
@@ -140,6 +163,35 @@ mod tests {
                 assert!((0.8..1.25).contains(&ratio), "{name} at {spp} spp: {estimate:?} for {truth}");
             }
         }
+    }
+
+    /// One sample in 2,000 is bright and brings a twentieth of the light: most pixels have not met it yet.
+    #[test]
+    fn rare_bright_samples_do_not_hide_their_own_error() {
+        let rare = |u: glam::Vec2| if u.x < 0.0005 { 100.95 } else { 0.95 };
+        for spp in [16, 32, 64, 128] {
+            let (estimate, truth) = run(spp, rare, 1.0);
+            let ratio = estimate.relative / truth;
+            assert!((0.8..1.25).contains(&ratio), "at {spp} spp: {estimate:?} for {truth}");
+        }
+    }
+
+    #[test]
+    fn lamps_keep_their_level_and_fireflies_lose_it() {
+        let (dark, width) = (DVec3::splat(0.1), 3);
+        let around = |middle: f64| {
+            let mut means = vec![dark; 9];
+            means[4] = DVec3::splat(middle);
+            means
+        };
+        // A lamp of one pixel: 19 in the first half, 21 in the second.
+        assert_eq!(level(&around(20.0), DVec3::splat(19.0), width, 4), DVec3::splat(19.0));
+        // A firefly in the second half, or in the first.
+        assert!((level(&around(10.05), dark, width, 4) - dark).length() < 1e-12);
+        assert!((level(&around(10.05), DVec3::splat(20.0), width, 4) - dark).length() < 1e-12);
+        // Its neighbours count a ninth of it at most, and a tile of one pixel has itself alone.
+        assert_eq!(level(&around(10.05), dark, width, 0), dark);
+        assert_eq!(level(&[dark], dark, 1, 0), dark);
     }
 
     #[test]

@@ -137,7 +137,7 @@ impl FilmTile {
         self.spp += 1;
         if self.spp.is_power_of_two() {
             let mut convergence = std::mem::take(&mut self.convergence);
-            convergence.record(self.spp, (0..self.n_pixels()).map(|local| self.mean(local)));
+            convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(|local| self.mean(local)));
             self.convergence = convergence;
         }
     }
