@@ -171,7 +171,7 @@ fn estimated_error_is_the_true_error_on_every_builtin_scene() {
         let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 8192).0;
         let truth = LinearPicture::of(&truth);
         // Sums of squares, estimated and true, a step.
-        let mut sums = vec![(0.0, 0.0); 8];
+        let mut sums = [(0.0, 0.0); 8];
         for seed in 0..6 {
             let settings = RenderSettings { seed, ..settings };
             let rungs = climb(&snapshot, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| ());
