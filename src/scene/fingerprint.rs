@@ -26,7 +26,7 @@ impl Fingerprint {
     /// FNV-1a (Fowler, Noll and Vo 1991), 128 bits. The length is mixed in, so that parts cannot run into each other.
     #[must_use]
     pub fn with(mut self, bytes: impl IntoIterator<Item = u8>) -> Self {
-        const PRIME: u128 = 0x0100_0000_0000_0000_013b;
+        const PRIME: u128 = (1 << 88) + 0x13b;
         let mut length = 0u64;
         for byte in bytes {
             self.0 = (self.0 ^ u128::from(byte)).wrapping_mul(PRIME);
