@@ -9,6 +9,7 @@
 //! | 2 | [`render`] | snapshot, camera, film, integrators, lights, materials, textures |
 //! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
 //! | 4 | [`frame`] | the ECS schedule in the order in which a frame runs |
+//! | 5 | [`report`] | speed against error: ladders, metrics, tables and plots |
 //! | 5 | `viewer` (feature) | the window: input, overlays, presenting |
 
 pub mod frame;
@@ -16,6 +17,7 @@ pub mod geometry;
 pub mod kdtree;
 pub mod mesh;
 pub mod render;
+pub mod report;
 pub mod sampling;
 pub mod scene;
 #[cfg(feature = "viewer")]

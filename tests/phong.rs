@@ -5,15 +5,16 @@ mod common;
 use common::{camera, diffuse, emissive, picture_mean, plane, quad, render, scene, sphere};
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, PixelFilter,
-    RenderSettings, ScalarInput, Shading, Snapshot, advance,
+    ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, RenderSettings,
+    ScalarInput, Shading, Snapshot, advance,
 };
 use glam::Vec3;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-const PHONG: RenderSettings =
-    RenderSettings { integrator: Integrator::Phong, max_depth: u32::MAX, seed: 0, filter: PixelFilter::Box };
+fn classic() -> RenderSettings {
+    RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() }
+}
 
 /// Without ambient light, to compare with what can be worked out.
 fn matte(albedo: f32) -> Material {
@@ -68,7 +69,7 @@ fn a_point_light_shines_by_the_inverse_square_and_the_cosine() {
             target + Vec3::new(1.0, 2.0, 0.5),
             target,
         );
-        let (film, report) = render(&scene, &PHONG, 1, 1, 1);
+        let (film, report) = render(&scene, &classic(), 1, 1, 1);
         let distance2 = x * x + height * height;
         let expected = 0.5 / PI * height / distance2.sqrt() / distance2;
         let found = film.mean(0, 0).x;
@@ -91,7 +92,7 @@ fn point_lights_within_the_scene_cast_hard_shadows() {
         let target = Vec3::new(x, 0.0, 0.0);
         let scene =
             point_lit(shapes.clone(), vec![matte(0.5), unit_point()], target + Vec3::new(2.0, 0.6, 1.0), target);
-        let (film, _) = render(&scene, &PHONG, 1, 1, 1);
+        let (film, _) = render(&scene, &classic(), 1, 1, 1);
         assert_eq!(film.mean(0, 0).x > 0.0, lit, "at {x}");
     }
 }
@@ -104,7 +105,7 @@ fn floor_under_a_ball_light_is_as_bright_as_the_formula_says() {
         let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::Y * 12.0, 4.0), 1)];
         let view = camera(target + Vec3::new(0.0, 1.0, 0.1), target, 1e-3);
         let scene = scene(shapes, vec![matte(0.5), emissive(8.0)], Environment::Black, view);
-        let (film, _) = render(&scene, &PHONG, 4, 4, 64);
+        let (film, _) = render(&scene, &classic(), 4, 4, 64);
         let distance = (144.0 + x * x).sqrt();
         let expected = f64::from(0.5 * 8.0 * 16.0 / distance.powi(2) * 12.0 / distance);
         let (found, _) = picture_mean(&film);
@@ -124,7 +125,7 @@ fn direct_light_and_soft_shadows_agree_with_the_path_tracer() {
     };
     let view = camera(Vec3::new(0.0, 3.0, 6.0), Vec3::new(0.0, 0.5, 0.0), 45.0);
     let build = |material| scene(shapes(), vec![material, emissive(5.0)], Environment::Black, view);
-    let (classic, _) = render(&build(matte(0.6)), &PHONG, 24, 16, 256);
+    let (classic, _) = render(&build(matte(0.6)), &classic(), 24, 16, 256);
     let path = RenderSettings { max_depth: 2, seed: 1, ..RenderSettings::default() };
     let (truth, _) = render(&build(diffuse(0.6)), &path, 24, 16, 512);
     let difference: f32 = classic.means().iter().zip(truth.means()).map(|(a, b)| (a.x - b.x).powi(2)).sum();
@@ -157,7 +158,7 @@ fn a_white_furnace_stays_white() {
     ];
     for (name, material, bound) in materials {
         let scene = scene(vec![(sphere(Vec3::ZERO, 0.9), 0)], vec![material], even.clone(), view);
-        let (film, _) = render(&scene, &PHONG, 16, 16, 64);
+        let (film, _) = render(&scene, &classic(), 16, 16, 64);
         let (mean, _) = picture_mean(&film);
         // The matte part of the last one gives back no ambient light: it may only lose.
         assert!(mean < 1.0 + 2e-3 && mean > 1.0 - bound, "{name}: {mean}");
@@ -168,7 +169,7 @@ fn a_white_furnace_stays_white() {
     let picture = Environment::Image { image: Arc::new(image), scale: Vec3::ONE, rotation: 0.0 };
     let ahead = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 2.0);
     let scene = scene(vec![(sphere(Vec3::ZERO, 0.9), 0)], vec![metal], picture, ahead);
-    let (film, _) = render(&scene, &PHONG, 16, 16, 256);
+    let (film, _) = render(&scene, &classic(), 16, 16, 256);
     let (mean, error) = picture_mean(&film);
     assert!((mean - 1.0).abs() < 0.01 + 4.0 * error, "highlight: {mean} ± {error}");
 }
@@ -180,7 +181,7 @@ fn air_absorbs_by_distance_in_both_models() {
     let plain = Arc::try_unwrap(scene.shading).unwrap();
     scene.shading = Arc::new(plain.with_air(Vec3::new(0.0, 0.03, 0.3)));
     for integrator in [Integrator::Path, Integrator::Phong] {
-        let (film, _) = render(&scene, &RenderSettings { integrator, ..PHONG }, 1, 1, 1);
+        let (film, _) = render(&scene, &RenderSettings { integrator, ..classic() }, 1, 1, 1);
         let expected = 2.0 * Vec3::new(1.0, (-0.15_f32).exp(), (-1.5_f32).exp());
         assert!((film.mean(0, 0) - expected).abs().max_element() < 1e-4, "{integrator:?}: {}", film.mean(0, 0));
     }
@@ -196,7 +197,7 @@ fn air_dims_lights_alike_in_both_models() {
         scene.shading = Arc::new(plain.with_air(Vec3::splat(0.1)));
         scene
     };
-    let (classic, _) = render(&build(matte(0.5)), &PHONG, 4, 4, 256);
+    let (classic, _) = render(&build(matte(0.5)), &classic(), 4, 4, 256);
     let (truth, _) =
         render(&build(diffuse(0.5)), &RenderSettings { max_depth: 2, ..RenderSettings::default() }, 4, 4, 1024);
     let (a, b) = (picture_mean(&classic).0, picture_mean(&truth).0);
@@ -213,7 +214,7 @@ fn glass_dims_shadows_and_does_not_blacken_them() {
             shapes.push((sphere(Vec3::Y * 2.0, 0.5), 2));
         }
         let scene = point_lit(shapes, vec![matte(0.5), unit_point(), glass], Vec3::new(2.0, 0.5, 0.0), Vec3::ZERO);
-        render(&scene, &PHONG, 1, 1, 1).0.mean(0, 0).x
+        render(&scene, &classic(), 1, 1, 1).0.mean(0, 0).x
     };
     let open = at(0.0, false);
     // Straight down the axis: two surfaces that reflect 4 % each, and one metre of glass.
@@ -253,7 +254,7 @@ fn the_same_bits_with_any_threads_and_tiles() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut film = Film::with_tile_size(50, 30, tile);
         for spp in (step..=8).step_by(step as usize) {
-            assert!(pool.install(|| advance(&scene, &PHONG, &mut film, spp, &|| false)).completed);
+            assert!(pool.install(|| advance(&scene, &classic(), &mut film, spp, &|| false)).completed);
         }
         film.means()
     };

@@ -2,6 +2,7 @@
 
 mod info;
 mod render;
+mod report;
 mod show;
 mod simplify;
 
@@ -24,6 +25,8 @@ struct CommandLine {
 enum Command {
     /// Render a scene to a picture, without a window.
     Render(render::RenderArgs),
+    /// Measure speed against error: how fast scenes get right, and what each technique is worth.
+    Report(report::ReportArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
     /// Write a model with fewer triangles, and measure how far it is from the original.
@@ -119,6 +122,7 @@ pub fn main() -> ExitCode {
     let line = CommandLine::parse();
     let result = match line.command {
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),

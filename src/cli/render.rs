@@ -4,6 +4,7 @@ use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_
 use clap::Args;
 use firstlight::frame::{OfflineReport, Target, check_writable, render_offline, write_film};
 use firstlight::render::{Film, RenderSettings};
+use firstlight::report::cpu_seconds;
 use firstlight::scene::{Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -130,6 +131,7 @@ fn settings(args: &RenderArgs, of_scene: RenderSettings) -> RenderSettings {
         max_depth: args.max_depth.unwrap_or(of_scene.max_depth),
         seed: args.seed,
         filter: args.filter.map_or(of_scene.filter, Into::into),
+        ..of_scene
     }
 }
 
@@ -173,15 +175,4 @@ fn progress_bar() -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
         .expect("the template is well formed");
     ProgressBar::with_draw_target(Some(1000), target).with_style(style)
-}
-
-/// CPU seconds that this process has used so far, all threads together.
-fn cpu_seconds() -> Option<f64> {
-    #[cfg(unix)]
-    {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        Some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
-    }
-    #[cfg(not(unix))]
-    None
 }

@@ -20,6 +20,7 @@ mod phong;
 mod renderer;
 mod snapshot;
 mod surface;
+mod techniques;
 mod texture;
 
 pub use camera::Camera;
@@ -32,4 +33,5 @@ pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
 pub use renderer::{BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, replay_sample};
 pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};
+pub use techniques::Techniques;
 pub use texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};

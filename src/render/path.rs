@@ -9,9 +9,9 @@
 use super::bsdf::Scatter;
 use super::light::LightSample;
 use super::medium::MediumStack;
-use super::renderer::RayCounts;
+use super::renderer::{RayCounts, RenderSettings};
 use super::surface::{Vertex, blend_at, lobe_at, material_of};
-use super::{Material, MaterialId, Snapshot};
+use super::{Material, MaterialId, Snapshot, Techniques};
 use crate::geometry::Ray;
 use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use crate::sampling::Sampler;
@@ -81,14 +81,14 @@ impl PathWave {
     pub fn trace(
         &mut self,
         scene: &Snapshot,
-        max_depth: u32,
+        settings: &RenderSettings,
         camera_paths: impl Iterator<Item = CameraPath>,
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
         self.start(camera_paths);
         let mut counts = RayCounts { camera: self.rays.len() as u64, ..RayCounts::default() };
-        for depth in 1..=max_depth {
+        for depth in 1..=settings.max_depth {
             if self.rays.is_empty() {
                 break;
             }
@@ -98,7 +98,7 @@ impl PathWave {
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
-            self.shade(scene, depth, max_depth, radiance);
+            self.shade(scene, depth, settings, radiance);
             scene.geometry.tree.any_hits(&self.shadow_rays, class, &mut self.occluded);
             for (&(slot, light), &occluded) in self.shadow_light.iter().zip(&self.occluded) {
                 if !occluded {
@@ -130,7 +130,8 @@ impl PathWave {
         }
     }
 
-    fn shade(&mut self, scene: &Snapshot, depth: u32, max_depth: u32, radiance: &mut [Vec3]) {
+    fn shade(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
+        let techniques = &settings.techniques;
         self.next_rays.clear();
         self.next_paths.clear();
         self.shadow_rays.clear();
@@ -141,24 +142,24 @@ impl PathWave {
             let mut path = self.paths[i];
             let ray = self.rays.get(i);
             let Some(hit) = self.hits.get(i) else {
-                radiance[path.slot as usize] += path.throughput * environment_light(scene, &path, ray.dir);
+                radiance[path.slot as usize] += path.throughput * environment_light(scene, techniques, &path, ray.dir);
                 continue;
             };
             if scene.shading.features.media {
                 path.throughput *= path.media.transmittance(scene, hit.t);
             }
             let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &ray, &hit);
+            let vertex = Vertex::new(scene, &ray, &hit, material);
             if let Some(emission) = scene.shading.emission[material as usize]
                 && vertex.front
             {
-                let weight = emission.scale * emitter_weight(scene, &path, &hit, ray.dir);
+                let weight = emission.scale * emitter_weight(scene, techniques, &path, &hit, ray.dir);
                 radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
             }
-            if depth == max_depth {
+            if depth == settings.max_depth {
                 continue;
             }
-            let step = Step { scene, path: &path, vertex: &vertex, material, depth };
+            let step = Step { scene, techniques, path: &path, vertex: &vertex, material, depth };
             if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
                 if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
                     self.scatter(step, &blend);
@@ -171,7 +172,7 @@ impl PathWave {
 
     #[inline]
     fn scatter(&mut self, step: Step, bsdf: &impl Scatter) {
-        if step.scene.shading.features.light_sampling && bsdf.is_smooth() {
+        if step.scene.shading.features.light_sampling && step.techniques.light_sampling && bsdf.is_smooth() {
             self.sample_light(&step, bsdf);
         }
         self.bounce(&step, bsdf);
@@ -207,7 +208,7 @@ impl PathWave {
     /// Next-event estimation: one point on one light, and a shadow ray to it.
     #[inline]
     fn sample_light(&mut self, step: &Step, bsdf: &impl Scatter) {
-        let &Step { scene, path, vertex, .. } = step;
+        let &Step { scene, techniques, path, vertex, .. } = step;
         let (sampler, dimension) = (&path.sampler, step.dimension());
         let u = sampler.pair(dimension + DIM_LIGHT_POINT);
         let shading = &*scene.shading;
@@ -221,7 +222,8 @@ impl PathWave {
             (None, LightSample { target: wi, wi, pdf: pdf * share, radiance })
         } else {
             let u_light = || ((select() - share) / (1.0 - share)).clamp(0.0, 1.0f32.next_down());
-            let found = shading.lights.sample(&shading.textures, vertex.position, vertex.normal, u_light, u);
+            let found =
+                shading.lights.sample(&shading.textures, techniques, vertex.position, vertex.normal, u_light, u);
             let Some(mut sample) = found else { return };
             sample.pdf *= 1.0 - share;
             (Some(sample.target), sample)
@@ -230,7 +232,7 @@ impl PathWave {
         if pdf <= 0.0 || !vertex.is_reached_from(sample.wi) {
             return;
         }
-        let weight = power_heuristic(sample.pdf, pdf) / sample.pdf;
+        let weight = light_weight(techniques, sample.pdf, pdf) / sample.pdf;
         let mut light = path.throughput * value * sample.radiance * weight;
         if light == Vec3::ZERO {
             return;
@@ -253,7 +255,7 @@ impl PathWave {
     /// Chooses how the path goes on, and whether.
     #[inline]
     fn bounce(&mut self, step: &Step, bsdf: &impl Scatter) {
-        let &Step { scene, vertex, material, depth, .. } = step;
+        let &Step { scene, techniques, vertex, material, depth, .. } = step;
         let mut path = *step.path;
         let (sampler, dimension) = (path.sampler, step.dimension());
         let u = sampler.pair(dimension + DIM_DIRECTION);
@@ -268,7 +270,7 @@ impl PathWave {
         if sample.transmitted {
             path.media = path.media.crossed(material, vertex.front);
         }
-        if depth >= ROULETTE_DEPTH {
+        if depth >= if techniques.roulette { ROULETTE_DEPTH } else { ENDLESS_DEPTH } {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
             let most = path.throughput.abs().max_element() * ior * ior;
@@ -283,7 +285,7 @@ impl PathWave {
         if path.throughput == Vec3::ZERO {
             return;
         }
-        path.pdf = sample.pdf;
+        path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
         path.position = vertex.position;
         path.normal = vertex.normal;
         let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
@@ -295,6 +297,7 @@ impl PathWave {
 /// One vertex of one path.
 struct Step<'a> {
     scene: &'a Snapshot,
+    techniques: &'a Techniques,
     path: &'a Path,
     vertex: &'a Vertex,
     material: MaterialId,
@@ -321,14 +324,14 @@ fn environment_share(scene: &Snapshot) -> f32 {
 
 /// Light from outside that a path runs into, weighted against light sampling having found it.
 #[inline]
-fn environment_light(scene: &Snapshot, path: &Path, dir: Vec3) -> Vec3 {
+fn environment_light(scene: &Snapshot, techniques: &Techniques, path: &Path, dir: Vec3) -> Vec3 {
     if !scene.shading.features.environment {
         return Vec3::ZERO;
     }
     let radiance = scene.shading.environment.radiance(dir);
     match &scene.shading.environment_sampler {
         Some(sampler) if path.pdf.is_finite() => {
-            radiance * power_heuristic(path.pdf, environment_share(scene) * sampler.pdf(dir))
+            radiance * bounce_weight(techniques, path.pdf, environment_share(scene) * sampler.pdf(dir))
         }
         _ => radiance,
     }
@@ -336,17 +339,32 @@ fn environment_light(scene: &Snapshot, path: &Path, dir: Vec3) -> Vec3 {
 
 /// The same for an emitter that a path hits.
 #[inline]
-fn emitter_weight(scene: &Snapshot, path: &Path, hit: &Hit, dir: Vec3) -> f32 {
+fn emitter_weight(scene: &Snapshot, techniques: &Techniques, path: &Path, hit: &Hit, dir: Vec3) -> f32 {
     let lights = &scene.shading.lights;
     if path.pdf.is_infinite() {
         return 1.0;
     }
     match lights.light_of(hit.object, hit.prim) {
         Some(id) => {
-            let pdf = lights.pdf(id, path.position, path.normal, dir, hit.t);
-            power_heuristic(path.pdf, (1.0 - environment_share(scene)) * pdf)
+            let pdf = lights.pdf(techniques, id, path.position, path.normal, dir, hit.t);
+            bounce_weight(techniques, path.pdf, (1.0 - environment_share(scene)) * pdf)
         }
         None => 1.0,
+    }
+}
+
+/// Weight of light that light sampling found with density `own`, and a bounce would have found with `other`.
+#[inline]
+fn light_weight(techniques: &Techniques, own: f32, other: f32) -> f32 {
+    if techniques.mis { power_heuristic(own, other) } else { 1.0 }
+}
+
+/// Weight of light that a bounce found with density `own`, and light sampling would have found with `other`.
+#[inline]
+fn bounce_weight(techniques: &Techniques, own: f32, other: f32) -> f32 {
+    match (techniques.mis, other > 0.0) {
+        (true, _) => power_heuristic(own, other),
+        (false, can_be_sampled) => f32::from(!can_be_sampled),
     }
 }
 

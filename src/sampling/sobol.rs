@@ -24,6 +24,12 @@ impl Sampler {
         Self { stream: hash_combine(hash_combine(hash_u32(seed), x), y), reversed_index: sample.reverse_bits() }
     }
 
+    /// Numbers that owe nothing to the other samples of the pixel: plain random sampling, to compare with.
+    pub fn independent(seed: u32, x: u32, y: u32, sample: u32) -> Self {
+        let Self { stream, .. } = Self::new(seed, x, y, 0);
+        Self { stream: hash_combine(stream, sample), reversed_index: 0 }
+    }
+
     /// Two numbers in `[0, 1)`, well spread together over the samples of a pixel.
     #[inline]
     pub fn pair(&self, dimension: u32) -> Vec2 {
@@ -116,6 +122,25 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn independent_samples_fill_the_square_evenly_and_know_nothing_of_each_other() {
+        // χ² of pairs of one sample, and of one coordinate in two samples that follow each other, in 16 × 16 cells:
+        // 255 degrees of freedom, so 255 ± 22.6; bound at 4.5 σ.
+        let n = 1 << 16;
+        let (mut within, mut between) = ([0u32; 256], [0u32; 256]);
+        let cell = |x: f32, y: f32| (16.0 * x) as usize + 16 * (16.0 * y) as usize;
+        for i in 0..n {
+            let at = |s| Sampler::independent(3, i % 256, i / 256, s).pair(4);
+            within[cell(at(0).x, at(0).y)] += 1;
+            between[cell(at(6).x, at(7).x)] += 1;
+        }
+        let expected = f64::from(n) / 256.0;
+        for counts in [within, between] {
+            let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
+            assert!((255.0 - 4.5 * 22.6..255.0 + 4.5 * 22.6).contains(&chi2), "{chi2}");
         }
     }
 

@@ -10,6 +10,7 @@ mod error;
 mod extent;
 mod extract;
 pub mod file;
+mod fingerprint;
 mod inputs;
 mod load;
 mod meshes;
@@ -29,6 +30,7 @@ pub use components::{
 pub use error::{Problem, SceneError, suggestion};
 pub use extent::{Extent, ExtentCache};
 pub use extract::{Extraction, Part, Trees, origin_for};
+pub use fingerprint::Fingerprint;
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 pub use placement::{Linear, Placement};

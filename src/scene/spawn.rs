@@ -96,6 +96,7 @@ impl LoadedScene {
             max_depth: file.max_depth.unwrap_or(u32::MAX),
             seed,
             filter: file.film.filter.into(),
+            ..RenderSettings::default()
         }));
         let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
         world.insert_resource(Developing(display));

@@ -6,7 +6,7 @@
 mod selection;
 mod shape;
 
-use super::{ColorInput, Emission, Geometry, Texture};
+use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;
 use crate::sampling::Sampler;
 use glam::{Mat3, Vec2, Vec3};
@@ -162,13 +162,14 @@ impl LightTable {
     pub(super) fn sample(
         &self,
         textures: &[Texture],
+        techniques: &Techniques,
         position: Vec3,
         normal: Vec3,
         u_select: impl FnOnce() -> f32,
         u: Vec2,
     ) -> Option<LightSample> {
-        let (id, pmf) = self.selection.sample(&self.lights, position, normal, u_select)?;
-        self.lights[id as usize].sample(textures, position, u, pmf)
+        let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select)?;
+        self.lights[id as usize].sample(textures, techniques.solid_angle, position, u, pmf)
     }
 
     /// Tells `found` of one point on every light, or on one of them where there are many.
@@ -189,7 +190,7 @@ impl LightTable {
                 LightShape::Sphere { center, radius } if light.is_point => {
                     shape::sphere_as_point(center, radius, position).map(|point| light.shining(textures, &point, pmf))
                 }
-                _ => light.sample(textures, position, sampler.pair(dimension), pmf),
+                _ => light.sample(textures, true, position, sampler.pair(dimension), pmf),
             };
             if let Some(sample) = sample {
                 found(sample);
@@ -212,16 +213,31 @@ impl LightTable {
     /// The density with which [`Self::sample`] at `position` finds the point of light `id` in direction `wi`,
     /// `distance` metres away; per steradian.
     #[inline]
-    pub(super) fn pdf(&self, id: u32, position: Vec3, normal: Vec3, wi: Vec3, distance: f32) -> f32 {
-        let pmf = self.selection.pmf(&self.lights, id, position, normal);
-        pmf * self.lights[id as usize].shape.pdf(position, wi, distance)
+    pub(super) fn pdf(
+        &self,
+        techniques: &Techniques,
+        id: u32,
+        position: Vec3,
+        normal: Vec3,
+        wi: Vec3,
+        distance: f32,
+    ) -> f32 {
+        let pmf = self.selection.pmf(&self.lights, techniques, id, position, normal);
+        pmf * self.lights[id as usize].shape.pdf(position, techniques.solid_angle, wi, distance)
     }
 }
 
 impl Light {
     #[inline]
-    fn sample(&self, textures: &[Texture], position: Vec3, u: Vec2, pmf: f32) -> Option<LightSample> {
-        self.shape.sample(position, u).map(|point| self.shining(textures, &point, pmf))
+    fn sample(
+        &self,
+        textures: &[Texture],
+        solid_angle: bool,
+        position: Vec3,
+        u: Vec2,
+        pmf: f32,
+    ) -> Option<LightSample> {
+        self.shape.sample(position, solid_angle, u).map(|point| self.shining(textures, &point, pmf))
     }
 
     #[inline]
@@ -230,9 +246,8 @@ impl Light {
             ColorInput::Constant(radiance) => radiance,
             ColorInput::Texture(texture) => {
                 let uv = match (&self.shape, &self.turned) {
-                    (LightShape::Sphere { center, .. }, Some(object_from_world)) => {
-                        sphere_uv((*object_from_world * (point.target - *center)).normalize())
-                    }
+                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * point.normal),
+                    (LightShape::Sphere { .. }, None) => sphere_uv(point.normal),
                     _ => point.uv,
                 };
                 textures[texture as usize].eval(uv)

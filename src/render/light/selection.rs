@@ -1,6 +1,6 @@
 //! Which light to ask: a few lights by what each could send to the point, many by their power.
 
-use super::{Light, LightShape};
+use super::{Light, LightShape, Techniques};
 use crate::sampling::AliasTable;
 use glam::Vec3;
 
@@ -40,6 +40,7 @@ impl Selection {
     pub fn sample(
         &self,
         lights: &[Light],
+        techniques: &Techniques,
         position: Vec3,
         normal: Vec3,
         u: impl FnOnce() -> f32,
@@ -47,6 +48,7 @@ impl Selection {
         match lights.len() {
             0 => None,
             1 => Some((0, 1.0)),
+            n if !techniques.light_selection => Some(((u() * n as f32) as u32, 1.0 / n as f32)),
             n if n <= MAX_ESTIMATED => {
                 let (estimates, sum) = self.estimates(position, normal);
                 let mut rest = u() * sum;
@@ -74,10 +76,11 @@ impl Selection {
 
     /// The probability that [`Self::sample`] picks light `id`.
     #[inline]
-    pub fn pmf(&self, lights: &[Light], id: u32, position: Vec3, normal: Vec3) -> f32 {
+    pub fn pmf(&self, lights: &[Light], techniques: &Techniques, id: u32, position: Vec3, normal: Vec3) -> f32 {
         match lights.len() {
             0 => 0.0,
             1 => 1.0,
+            n if !techniques.light_selection => 1.0 / n as f32,
             n if n <= MAX_ESTIMATED => {
                 let (estimates, sum) = self.estimates(position, normal);
                 if sum > 0.0 { estimates[id as usize] / sum } else { 0.0 }

@@ -43,7 +43,9 @@ pub(super) struct LightPoint {
     pub wi: Vec3,
     /// Per steradian.
     pub pdf: f32,
-    /// Surface coordinates for textured emission.
+    /// Unit, at the point.
+    pub normal: Vec3,
+    /// Surface coordinates of flat lights, for textured emission; those of a sphere follow from its normal.
     pub uv: Vec2,
 }
 
@@ -81,16 +83,21 @@ impl LightShape {
     }
 
     /// A point of the front seen from `position`, or `None` when there is none.
+    ///
+    /// - `by_angle`: evenly over the solid angle where that is stable, otherwise over the area.
+    /// - `u`: two independent uniform numbers in `[0, 1)`.
     #[inline]
-    pub(super) fn sample(&self, position: Vec3, u: Vec2) -> Option<LightPoint> {
+    pub(super) fn sample(&self, position: Vec3, by_angle: bool, u: Vec2) -> Option<LightPoint> {
         match *self {
-            Self::Sphere { center, radius } => sample_sphere(center, radius, position, u),
+            Self::Sphere { center, radius } if by_angle => sample_sphere(center, radius, position, u),
+            Self::Sphere { center, radius } => sample_sphere_area(center, radius, position, u),
             Self::Quad { corner, edge_u, edge_v, normal, area, rectangle } => {
                 let relative = corner - position;
                 if relative.dot(normal) >= 0.0 {
                     return None;
                 }
                 let by_angle = rectangle
+                    .filter(|_| by_angle)
                     .map(|r| SphericalQuad::new(relative, r.unit_u, r.length_u, r.unit_v, r.length_v))
                     .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
                 let uv = by_angle.map_or(u, |quad| quad.sample(u));
@@ -101,7 +108,7 @@ impl LightShape {
                     None => area_pdf(distance, wi, normal, area)?,
                 };
                 let error = robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs());
-                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, uv })
+                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv })
             }
             Self::Triangle { vertices, normal, area } => {
                 let [a, b, c] = vertices;
@@ -109,7 +116,7 @@ impl LightShape {
                 if relative[0].dot(normal) >= 0.0 {
                     return None;
                 }
-                let by_angle = spherical_triangle(relative);
+                let by_angle = by_angle.then(|| spherical_triangle(relative)).flatten();
                 let weights = match by_angle {
                     Some(triangle) => {
                         let (e1, e2) = (b - a, c - a);
@@ -132,22 +139,30 @@ impl LightShape {
                     None => area_pdf(distance, wi, normal, area)?,
                 };
                 let error = robust::gamma(7) * (a.abs() + b.abs() + c.abs());
-                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, uv: weights })
+                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: weights })
             }
         }
     }
 
     /// Density of [`Self::sample`] at the point that lies `distance` metres along `wi`; per steradian.
     #[inline]
-    pub(super) fn pdf(&self, position: Vec3, wi: Vec3, distance: f32) -> f32 {
+    pub(super) fn pdf(&self, position: Vec3, by_angle: bool, wi: Vec3, distance: f32) -> f32 {
         match *self {
             Self::Sphere { center, radius } => {
                 let distance2 = (center - position).length_squared();
                 let r2 = radius * radius;
-                if distance2 <= r2 { 0.0 } else { cone_pdf(one_minus_cos_from_sin2(r2 / distance2)) }
+                if distance2 <= r2 {
+                    0.0
+                } else if by_angle {
+                    cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
+                } else {
+                    let normal = (position + distance * wi - center) / radius;
+                    area_pdf(distance, wi, normal, self.area()).unwrap_or(0.0)
+                }
             }
             Self::Quad { corner, normal, area, rectangle, .. } => {
                 let by_angle = rectangle
+                    .filter(|_| by_angle)
                     .map(|r| SphericalQuad::new(corner - position, r.unit_u, r.length_u, r.unit_v, r.length_v))
                     .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
                 match by_angle {
@@ -155,10 +170,13 @@ impl LightShape {
                     None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
                 }
             }
-            Self::Triangle { vertices, normal, area } => match spherical_triangle(vertices.map(|v| v - position)) {
-                Some(triangle) => 1.0 / triangle.solid_angle(),
-                None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
-            },
+            Self::Triangle { vertices, normal, area } => {
+                let by_angle = by_angle.then(|| spherical_triangle(vertices.map(|v| v - position))).flatten();
+                match by_angle {
+                    Some(triangle) => 1.0 / triangle.solid_angle(),
+                    None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
+                }
+            }
         }
     }
 }
@@ -190,7 +208,8 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
         target: lifted(point, error, normal, distance),
         wi,
         pdf: cone_pdf(one_minus_cos_max),
-        uv: sphere_uv(normal),
+        normal,
+        uv: Vec2::ZERO,
     })
 }
 
@@ -208,8 +227,22 @@ pub(super) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Opti
         target: lifted(center - radius * wi, error, -wi, distance),
         wi,
         pdf: (distance / radius).powi(2) / std::f32::consts::PI,
-        uv: sphere_uv(-wi),
+        normal: -wi,
+        uv: Vec2::ZERO,
     })
+}
+
+/// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
+fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
+    let z = 1.0 - 2.0 * u.x;
+    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    let normal = Vec3::new(r * cos_phi, r * sin_phi, z);
+    let point = center + radius * normal;
+    let (wi, distance) = direction(position, point)?;
+    let pdf = area_pdf(distance, wi, normal, 4.0 * std::f32::consts::PI * radius * radius)?;
+    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
+    Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: Vec2::ZERO })
 }
 
 /// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.
@@ -267,6 +300,13 @@ mod tests {
         ]
     }
 
+    /// Every light, sampled in both ways.
+    fn cases(lights: &[LightShape]) -> impl Iterator<Item = (bool, usize, &LightShape)> {
+        [true, false]
+            .into_iter()
+            .flat_map(move |by_angle| lights.iter().enumerate().map(move |(case, shape)| (by_angle, case, shape)))
+    }
+
     /// Irradiance on a floor point from radiance 1 by plain area sampling in f64.
     fn irradiance_by_area(shape: &LightShape) -> f64 {
         let n = 1500;
@@ -299,11 +339,11 @@ mod tests {
 
     #[test]
     fn sampled_irradiance_matches_plain_area_sampling() {
-        for (case, shape) in lights().iter().enumerate() {
+        for (by_angle, case, shape) in cases(&lights()) {
             let n = 1 << 14;
             let mut sum = 0.0;
             for i in 0..n {
-                if let Some(point) = shape.sample(Vec3::ZERO, Sampler::new(1, case as u32, 0, i).pair(0)) {
+                if let Some(point) = shape.sample(Vec3::ZERO, by_angle, Sampler::new(1, case as u32, 0, i).pair(0)) {
                     assert!((point.wi.length() - 1.0).abs() < 1e-5);
                     sum += f64::from(point.wi.y.max(0.0) / point.pdf) / f64::from(n);
                 }
@@ -315,11 +355,11 @@ mod tests {
 
     #[test]
     fn pdf_agrees_with_sampling() {
-        for (case, shape) in lights().iter().enumerate() {
+        for (by_angle, case, shape) in cases(&lights()) {
             for i in 0..256 {
                 let position = Vec3::new(0.1 * (i % 16) as f32 - 0.8, 0.0, 0.1 * (i / 16) as f32 - 0.8);
-                let Some(point) = shape.sample(position, Sampler::new(1, 0, 0, i).pair(0)) else { continue };
-                let pdf = shape.pdf(position, point.wi, (point.target - position).length());
+                let Some(point) = shape.sample(position, by_angle, Sampler::new(1, 0, 0, i).pair(0)) else { continue };
+                let pdf = shape.pdf(position, by_angle, point.wi, (point.target - position).length());
                 assert!((pdf / point.pdf - 1.0).abs() < 1e-3, "light {case}: {pdf} for {}", point.pdf);
             }
         }
@@ -328,9 +368,9 @@ mod tests {
     #[test]
     fn nothing_shines_backwards() {
         let behind = Vec3::new(0.0, 5.0, 0.0);
-        assert!(lights()[2].sample(behind, Vec2::splat(0.3)).is_none());
-        assert!(lights()[0].sample(Vec3::new(0.5, 3.2, 0.2), Vec2::splat(0.3)).is_none());
-        assert_eq!(lights()[0].pdf(Vec3::new(0.5, 3.2, 0.2), Vec3::Y, 0.8), 0.0);
+        assert!(lights()[2].sample(behind, true, Vec2::splat(0.3)).is_none());
+        assert!(lights()[0].sample(Vec3::new(0.5, 3.2, 0.2), true, Vec2::splat(0.3)).is_none());
+        assert_eq!(lights()[0].pdf(Vec3::new(0.5, 3.2, 0.2), true, Vec3::Y, 0.8), 0.0);
         assert!((lights()[0].area() - 4.0 * PI).abs() < 1e-5);
     }
 }

@@ -1,0 +1,272 @@
+//! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
+
+use super::{Failure, SceneArgs, parse_positive, parse_size};
+use clap::Args;
+use firstlight::render::{RenderSettings, Snapshot, Techniques};
+use firstlight::report::{
+    Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv, page,
+    summary_text,
+};
+use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+/// Samples per pixel of the last step, unless given.
+const DEFAULT_SPP: u32 = 256;
+
+/// How many times the samples of the last step an own reference has.
+const REFERENCE_FACTOR: u32 = 16;
+
+/// Pixels of a picture, about, unless a size is given: enough to tell, few enough to wait for.
+const DEFAULT_PIXELS: f64 = 50_000.0;
+
+#[derive(Args, Clone, Debug)]
+pub struct ReportArgs {
+    /// Built-in scenes, scene files (.ron) or models (.obj); all built-in scenes when not given.
+    #[arg(value_name = "SCENES")]
+    scenes: Vec<String>,
+    /// A converged linear picture (.exr) of the one scene; a long render of its own, kept for next time, when not given.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Folder for the page, the table and the plots; made when it is not there.
+    #[arg(long, value_name = "DIR", default_value = "report")]
+    out: PathBuf,
+    /// Most samples per pixel; 256 unless a time is given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    spp: Option<u32>,
+    /// Most seconds of rendering for a scene; the same again for each technique that is switched off.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
+    time: Option<f64>,
+    /// Width and height in pixels; that of the reference, or the scene's own shape with about 50,000 pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Worker threads; all cores when not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Another seed gives other noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u32,
+    /// Leave out what each technique is worth.
+    #[arg(long)]
+    no_ablation: bool,
+}
+
+pub fn run(args: &ReportArgs) -> Result<(), Failure> {
+    let names: Vec<String> = if args.scenes.is_empty() {
+        BUILTIN_SCENES.iter().map(|(name, _, _)| (*name).to_owned()).collect()
+    } else {
+        args.scenes.clone()
+    };
+    if args.reference.is_some() && names.len() != 1 {
+        return Err(Failure::Usage(format!(
+            "--reference is a picture of one scene, but there are {}: name the scene it shows",
+            names.len()
+        )));
+    }
+    let given = args.reference.as_deref().map(Reference::read).transpose().map_err(Failure::Failed)?;
+    // A page that cannot be written is not worth the wait.
+    std::fs::create_dir_all(&args.out)
+        .and_then(|()| tempfile::tempfile_in(&args.out))
+        .map_err(|error| Failure::Failed(format!("{}: cannot be written to: {error}", args.out.display())))?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.map_or(0, usize::from))
+        .build()
+        .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
+    let outcomes = pool.install(|| measure_all(args, &names, given.as_ref()))?;
+
+    let (html, table) = (args.out.join("index.html"), args.out.join("steps.csv"));
+    write(&html, &page(&outcomes, &command_line()))?;
+    write(&table, &csv(&outcomes))?;
+    print!("{}", summary_text(&outcomes));
+    println!("{}\n{}", html.display(), table.display());
+    Ok(())
+}
+
+fn measure_all(args: &ReportArgs, names: &[String], given: Option<&Reference>) -> Result<Vec<SceneOutcome>, Failure> {
+    // Every scene is read first: a mistake in the last name should not cost the wait for the others.
+    let mut scenes = Vec::new();
+    for name in names {
+        let scene = SceneArgs { scene: name.clone(), up: None };
+        scenes.push(Prepared::new(args, &scene.load(None, &|_| ())?, given)?);
+    }
+    let limits =
+        Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
+    let mut progress = Progress::new(&scenes, !args.no_ablation, given.is_some());
+    let outcomes = scenes.iter().map(|scene| scene.measure(args, limits, given, &mut progress)).collect();
+    progress.bar.finish_and_clear();
+    Ok(outcomes)
+}
+
+/// A scene, ready to be rendered.
+struct Prepared {
+    title: String,
+    snapshot: Snapshot,
+    settings: RenderSettings,
+    developing: Developing,
+    size: (u32, u32),
+    key: Key,
+}
+
+impl Prepared {
+    fn new(args: &ReportArgs, scene: &LoadedScene, given: Option<&Reference>) -> Result<Self, Failure> {
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
+        for problem in &extraction.problems {
+            eprintln!("warning: {problem}");
+        }
+        let FilmSize { width, height } = *world.resource();
+        let of_reference = given.map(|given| (given.picture.width, given.picture.height));
+        let size = match (args.size, of_reference) {
+            (Some(size), Some(other)) if size != other => {
+                return Err(Failure::Usage(format!(
+                    "--size is {}x{}, but the reference has {}x{} pixels: leave --size out",
+                    size.0, size.1, other.0, other.1
+                )));
+            }
+            (_, Some(size)) | (Some(size), None) => size,
+            (None, None) => modest(width, height),
+        };
+        let settings = RenderSettings { seed: args.seed, ..world.resource::<Rendering>().0 };
+        Ok(Self {
+            title: scene.source.title(),
+            snapshot: extraction.snapshot,
+            settings,
+            developing: *world.resource(),
+            size,
+            key: Key::new(&scene.source.title(), scene.fingerprint(), &settings, size),
+        })
+    }
+
+    fn measure(
+        &self,
+        args: &ReportArgs,
+        limits: Limits,
+        given: Option<&Reference>,
+        progress: &mut Progress,
+    ) -> SceneOutcome {
+        let rungs = self.climb(limits, Techniques::default(), "all techniques", progress);
+        let last_spp = rungs.last().map_or(1, |rung| rung.spp);
+        let reference = match given {
+            Some(given) => given.clone(),
+            None => self.reference(last_spp.saturating_mul(REFERENCE_FACTOR), progress),
+        };
+        let display = self.developing.0;
+        let measure = |rungs: &[Rung]| Ladder::measure(rungs, &reference.picture, &display);
+        let picture = |rung: Option<&Rung>| rung.map(|rung| rung.picture.clone());
+        let last: LinearPicture = picture(rungs.last()).expect("a ladder has at least one step");
+        let ablations = if args.no_ablation {
+            Vec::new()
+        } else {
+            Techniques::ablations()
+                .into_iter()
+                .map(|(technique, techniques)| {
+                    let others = self.climb(limits, techniques, &format!("without {technique}"), progress);
+                    // Only a step that both have can tell.
+                    let is_unused = rungs.iter().zip(&others).all(|(a, b)| a.picture == b.picture);
+                    Ablation { technique, ladder: measure(&others), is_unused }
+                })
+                .collect()
+        };
+        SceneOutcome {
+            title: self.title.clone(),
+            width: self.size.0,
+            height: self.size.1,
+            display,
+            ladder: measure(&rungs),
+            ablations,
+            early: picture(rungs.iter().rfind(|rung| rung.spp <= 4)).unwrap_or_else(|| last.clone()),
+            last,
+            reference: reference.picture,
+            reference_made: reference.made,
+            reference_path: reference.path,
+        }
+    }
+
+    fn climb(&self, limits: Limits, techniques: Techniques, what: &str, progress: &mut Progress) -> Vec<Rung> {
+        let settings = RenderSettings { techniques, ..self.settings };
+        let mut tell = progress.task(format!("{}, {what}", self.title), Progress::LADDER, self.size);
+        climb(&self.snapshot, &settings, self.size, limits, &mut tell)
+    }
+
+    fn reference(&self, spp: u32, progress: &mut Progress) -> Reference {
+        let store = ReferenceStore::of_platform();
+        let title = format!("{}, reference with {spp} samples per pixel", self.title);
+        let mut tell = progress.task(title, Progress::REFERENCE, self.size);
+        if let Some(kept) = store.find(&self.key, spp) {
+            tell(1.0);
+            return kept;
+        }
+        let (reference, trouble) = store.make(&self.key, &self.snapshot, &self.settings, spp, &mut tell);
+        if let Some(trouble) = trouble {
+            eprintln!("warning: {trouble}");
+        }
+        reference
+    }
+}
+
+/// About [`DEFAULT_PIXELS`] in the shape of `width` × `height`, or that itself if it is smaller.
+fn modest(width: u32, height: u32) -> (u32, u32) {
+    let scale = (DEFAULT_PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+    let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+    (scaled(width), scaled(height))
+}
+
+/// How far all of it is; a ladder's share is its pixels, and a reference is as long as many ladders.
+struct Progress {
+    bar: ProgressBar,
+    done: f64,
+}
+
+impl Progress {
+    const LADDER: f64 = 1.0;
+    const REFERENCE: f64 = REFERENCE_FACTOR as f64;
+
+    fn new(scenes: &[Prepared], ablation: bool, given: bool) -> Self {
+        let ladders = 1 + if ablation { Techniques::ablations().len() } else { 0 };
+        let weight = Self::LADDER * ladders as f64 + if given { 0.0 } else { Self::REFERENCE };
+        let pixels: f64 = scenes.iter().map(|scene| f64::from(scene.size.0) * f64::from(scene.size.1)).sum();
+        let target =
+            if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
+            .expect("the template is well formed");
+        let bar = ProgressBar::with_draw_target(Some((weight * pixels) as u64), target).with_style(style);
+        Self { bar, done: 0.0 }
+    }
+
+    /// Begins a part of the work, and counts it as done when the next one begins.
+    fn task(&mut self, message: String, weight: f64, (width, height): (u32, u32)) -> impl FnMut(f64) {
+        let (bar, before) = (self.bar.clone(), self.done);
+        let share = weight * f64::from(width) * f64::from(height);
+        self.done += share;
+        bar.set_message(message);
+        move |done| bar.set_position((before + share * done) as u64)
+    }
+}
+
+/// What was typed, for the page; the program by its plain name.
+fn command_line() -> String {
+    let quoted = |word: String| if word.contains(char::is_whitespace) { format!("'{word}'") } else { word };
+    let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
+    std::iter::once("firstlight".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// Whole or not at all.
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let fail =
+        |error: &dyn std::fmt::Display| Failure::Failed(format!("{}: cannot be written: {error}", path.display()));
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".firstlight-").suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any new file: the user's mask decides.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let file = builder.tempfile_in(folder).map_err(|error| fail(&error))?;
+    std::fs::write(file.path(), text).map_err(|error| fail(&error))?;
+    file.persist(path).map_err(|error| fail(&error.error))?;
+    Ok(())
+}

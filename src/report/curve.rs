@@ -1,0 +1,83 @@
+//! Error against time, where both are straight lines on logarithmic axes.
+
+/// A time that was measured, or one that the fitted line promises.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Seconds {
+    /// Between two measured steps.
+    Interpolated(f64),
+    /// Beyond the first or the last one.
+    Extrapolated(f64),
+}
+
+impl Seconds {
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Interpolated(seconds) | Self::Extrapolated(seconds) => seconds,
+        }
+    }
+}
+
+/// Slope of the least-squares line through (log x, log y); `None` with fewer than two usable points.
+pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> =
+        points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();
+    let n = logs.len() as f64;
+    let (mean_x, mean_y) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+    let spread: f64 = logs.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
+    let common: f64 = logs.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
+    (logs.len() >= 2 && spread > 0.0).then(|| common / spread)
+}
+
+/// When `points` (seconds, error), rising in seconds, come down to `target`, and stay there.
+///
+/// Between two points along the line that joins them, beyond them along `slope`; `None` where that never gets there.
+pub fn seconds_to(points: &[(f64, f64)], slope: Option<f64>, target: f64) -> Option<Seconds> {
+    let along = |(seconds, error): (f64, f64), slope: f64| seconds * (target / error).powf(1.0 / slope);
+    let falling = slope.filter(|slope| *slope < 0.0);
+    match points.iter().rposition(|&(_, error)| error > target) {
+        None => Some(Seconds::Extrapolated(along(*points.first()?, falling?))),
+        Some(last) if last + 1 == points.len() => Some(Seconds::Extrapolated(along(points[last], falling?))),
+        Some(before) => {
+            let (a, b) = (points[before], points[before + 1]);
+            let share = (a.1 / target).ln() / (a.1 / b.1).ln();
+            Some(Seconds::Interpolated(a.0 * (b.0 / a.0).powf(share)))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_law_gives_its_exponent_and_its_times() {
+        let points: Vec<(f64, f64)> = (0..6).map(|k| (0.1 * f64::from(1 << k), 0.8 / f64::from(1 << k))).collect();
+        let fitted = slope(&points);
+        assert!((fitted.unwrap() + 1.0).abs() < 1e-12);
+        // error = 0.08 / seconds.
+        let inside = seconds_to(&points, fitted, 0.03);
+        assert!(matches!(inside, Some(Seconds::Interpolated(s)) if (s - 0.08 / 0.03).abs() < 1e-9), "{inside:?}");
+        for target in [1e-4, 5.0] {
+            let outside = seconds_to(&points, fitted, target);
+            assert!(
+                matches!(outside, Some(Seconds::Extrapolated(s)) if (s * target - 0.08).abs() < 1e-9),
+                "{outside:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_does_not_fall_never_gets_there() {
+        let flat = [(1.0, 0.5), (2.0, 0.5), (4.0, 0.5)];
+        assert_eq!(seconds_to(&flat, slope(&flat), 0.1), None);
+        assert_eq!(slope(&flat[..1]), None);
+        assert_eq!(seconds_to(&[], None, 0.1), None);
+    }
+
+    #[test]
+    fn a_curve_that_rises_again_counts_from_its_last_crossing() {
+        let points = [(1.0, 0.2), (2.0, 0.05), (4.0, 0.2), (8.0, 0.05)];
+        let found = seconds_to(&points, Some(-1.0), 0.1).unwrap();
+        assert!((found.value() - 4.0 * 2.0_f64.sqrt()).abs() < 1e-9, "{found:?}");
+    }
+}

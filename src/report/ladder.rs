@@ -1,0 +1,193 @@
+//! One scene at 1, 2, 4 … samples per pixel: what each step took, and how far from the truth it was.
+
+use super::curve::{Seconds, seconds_to, slope};
+use super::{Distance, LinearPicture};
+use crate::render::{Display, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
+use std::time::{Duration, Instant};
+
+/// Where a ladder ends: at the last power of two that both allow, but never before the first step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Wall time; a step that would go past it is not begun.
+    pub seconds: Option<f64>,
+}
+
+/// What was rendered up to a number of samples.
+#[derive(Clone, Debug)]
+pub struct Rung {
+    pub spp: u32,
+    pub spent: Spent,
+    pub estimate: Option<ErrorEstimate>,
+    pub picture: LinearPicture,
+}
+
+/// What the samples so far have cost; rendering alone, without loading, building or comparing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spent {
+    pub wall_seconds: f64,
+    /// All threads together; `None` where the system does not tell.
+    pub cpu_seconds: Option<f64>,
+    pub threads: usize,
+    pub camera_paths: u64,
+    pub rays: u64,
+}
+
+impl Spent {
+    /// CPU seconds a thread: what the wall clock would show on a quiet machine. Wall time where there is no CPU time.
+    pub fn seconds(&self) -> f64 {
+        self.cpu_seconds.map_or(self.wall_seconds, |cpu| cpu / self.threads as f64)
+    }
+
+    pub fn rays_per_second(&self) -> f64 {
+        self.rays as f64 / self.seconds().max(1e-9)
+    }
+
+    pub fn paths_per_second(&self) -> f64 {
+        self.camera_paths as f64 / self.seconds().max(1e-9)
+    }
+}
+
+/// Renders `snapshot` on the current rayon pool until `limits`. `progress` is told the share that is done, 0..1.
+pub fn climb(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    (width, height): (u32, u32),
+    limits: Limits,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Rung> {
+    let mut film = Film::new(width, height);
+    let mut rungs: Vec<Rung> = Vec::new();
+    let mut rays = RayCounts::default();
+    let mut pace = Pace::default();
+    let (mut wall, mut cpu) = (Duration::ZERO, cpu_seconds().map(|_| 0.0));
+    let mut spp = 1;
+    loop {
+        while film.spp() < spp {
+            let goal = film.spp().saturating_add(pace.spp()).min(spp);
+            let (start, cpu_start) = (Instant::now(), cpu_seconds());
+            let before = film.spp();
+            rays += advance(snapshot, settings, &mut film, goal, &|| false).rays;
+            let elapsed = start.elapsed();
+            wall += elapsed;
+            cpu = cpu.zip(cpu_start.zip(cpu_seconds())).map(|(sum, (from, to))| sum + to - from);
+            pace.took(goal - before, elapsed);
+            let by_time = limits.seconds.map_or(0.0, |seconds| wall.as_secs_f64() / seconds);
+            progress((f64::from(film.spp()) / f64::from(limits.spp)).max(by_time).min(1.0));
+        }
+        let spent = Spent {
+            wall_seconds: wall.as_secs_f64(),
+            cpu_seconds: cpu,
+            threads: rayon::current_num_threads(),
+            camera_paths: rays.camera,
+            rays: rays.total(),
+        };
+        rungs.push(Rung { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
+        // The next step takes as long as all before it.
+        let too_long = limits.seconds.is_some_and(|seconds| 2.0 * spent.wall_seconds > seconds);
+        match spp.checked_mul(2) {
+            Some(next) if next <= limits.spp && !too_long => spp = next,
+            _ => break,
+        }
+    }
+    progress(1.0);
+    rungs
+}
+
+/// How many samples to ask for at once, so that progress is told a few times a second.
+#[derive(Default)]
+struct Pace {
+    seconds_per_sample: f64,
+}
+
+impl Pace {
+    fn spp(&self) -> u32 {
+        const SLICE: f64 = 0.25;
+        // Whole waves hold several samples: few of them at once would leave the kernel half empty.
+        if self.seconds_per_sample > 0.0 { (SLICE / self.seconds_per_sample).clamp(4.0, 4096.0) as u32 } else { 4 }
+    }
+
+    fn took(&mut self, spp: u32, elapsed: Duration) {
+        self.seconds_per_sample = elapsed.as_secs_f64() / f64::from(spp);
+    }
+}
+
+/// One step, measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    pub spp: u32,
+    pub spent: Spent,
+    pub distance: Distance,
+    /// What the renderer itself believed.
+    pub estimate: Option<ErrorEstimate>,
+}
+
+impl Step {
+    /// Root of relMSE: the relative error of the picture.
+    pub fn error(&self) -> f64 {
+        self.distance.relative_mse.sqrt()
+    }
+
+    /// What the renderer believed over what is true; 1 is perfect.
+    pub fn calibration(&self) -> Option<f64> {
+        self.estimate.map(|estimate| estimate.relative / self.error())
+    }
+
+    /// relMSE times seconds: with independent samples the same at every step; smaller is better.
+    pub fn inefficiency(&self) -> f64 {
+        self.distance.relative_mse * self.spent.seconds()
+    }
+}
+
+/// All steps of one scene with one choice of techniques.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ladder {
+    pub steps: Vec<Step>,
+}
+
+impl Ladder {
+    /// At least one rung, all of the size of `reference`.
+    pub fn measure(rungs: &[Rung], reference: &LinearPicture, display: &Display) -> Self {
+        assert!(!rungs.is_empty(), "a ladder has at least one rung");
+        let step = |rung: &Rung| Step {
+            spp: rung.spp,
+            spent: rung.spent,
+            distance: Distance::between(&rung.picture, reference, display),
+            estimate: rung.estimate,
+        };
+        Self { steps: rungs.iter().map(step).collect() }
+    }
+
+    pub fn last(&self) -> &Step {
+        self.steps.last().expect("a ladder has at least one step")
+    }
+
+    /// Seconds and relMSE of each step.
+    pub fn curve(&self) -> Vec<(f64, f64)> {
+        self.steps.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect()
+    }
+
+    /// Fitted slope of log relMSE on log seconds from 4 samples a pixel on; −1 is that of independent samples.
+    pub fn slope(&self) -> Option<f64> {
+        // The first steps are over before the processor and its caches have warmed up.
+        let warm = self.steps.iter().filter(|step| step.spp >= 4);
+        slope(&warm.map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect::<Vec<_>>())
+    }
+
+    /// Seconds until the relative error is down to `error`; `None` where the curve does not lead there.
+    pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
+        seconds_to(&self.curve(), self.slope(), error * error)
+    }
+}
+
+/// CPU seconds that this process has used so far, all threads together; `None` where the system does not tell.
+pub fn cpu_seconds() -> Option<f64> {
+    #[cfg(unix)]
+    {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
+    }
+    #[cfg(not(unix))]
+    None
+}

@@ -1,0 +1,26 @@
+//! Speed against error: how fast a picture gets right, what each technique is worth, and whether the renderer's own
+//! estimate of its error can be believed.
+//!
+//! [`climb`] renders one scene at 1, 2, 4 … samples per pixel; a [`ReferenceStore`] has the picture to measure
+//! against; [`Ladder::measure`] brings the two together; [`page()`] and [`csv`] say what came of it.
+
+mod curve;
+mod flip;
+mod ladder;
+mod metrics;
+mod outcome;
+mod page;
+mod picture;
+mod plot;
+mod reference;
+mod table;
+
+pub use curve::{Seconds, seconds_to, slope};
+pub use flip::flip;
+pub use ladder::{Ladder, Limits, Rung, Spent, Step, climb, cpu_seconds};
+pub use metrics::{Distance, RELATIVE_FLOOR};
+pub use outcome::{Ablation, SceneOutcome};
+pub use page::{page, summary_text};
+pub use picture::LinearPicture;
+pub use reference::{Key, Made, Reference, ReferenceStore};
+pub use table::csv;

@@ -1,0 +1,292 @@
+//! The report as one HTML page that needs nothing else: plots, tables and pictures are inside it.
+
+use super::curve::Seconds;
+use super::outcome::{Ablation, SceneOutcome};
+use super::plot::{Band, Plot, Series, Style, escape, number};
+use super::{Ladder, LinearPicture};
+use crate::render::{Display, develop_pixel};
+use base64::Engine;
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use std::fmt::Write;
+
+/// The errors whose times are told.
+const TARGETS: [f64; 3] = [0.10, 0.03, 0.01];
+
+/// How far an estimate may be off before the page says so.
+const CALIBRATION: f64 = 1.25;
+
+/// The page; `command` is what was asked for, so that it can be asked for again.
+pub fn page(outcomes: &[SceneOutcome], command: &str) -> String {
+    let threads = outcomes.first().map_or(0, |outcome| outcome.ladder.last().spent.threads);
+    let mut html = format!(
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>Speed against error</title>\n\
+         <style>\n{}</style>\n<h1>Speed against error</h1>\n\
+         <p class=\"soft\">firstlight {} · {threads} threads · <code>{}</code></p>\n\
+         <p>The error is √relMSE, the root of the mean of (x − ref)² / (ref² + 0.01) over pixels and channels of linear \
+         light. Seconds are CPU seconds a thread (wall time on a quiet machine) spent on rendering alone. Times in \
+         brackets lie beyond the measured steps and follow the fitted slope. A slope of −1 means: twice the time, half \
+         the squared error.</p>\n",
+        include_str!("page.css"),
+        env!("CARGO_PKG_VERSION"),
+        escape(command),
+    );
+    html.push_str(&summary(outcomes));
+    for outcome in outcomes {
+        html.push_str(&section(outcome));
+    }
+    html.push_str("</html>\n");
+    html
+}
+
+/// The most important figures of each scene, as plain text.
+pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
+    let width = outcomes.iter().map(|outcome| outcome.title.chars().count()).max().unwrap_or(0).max(5);
+    let mut text = format!("{:width$}  {:>9}", "scene", "size");
+    for target in TARGETS {
+        let _ = write!(text, "  {:>9}", format!("s to {}%", 100.0 * target));
+    }
+    let _ = writeln!(text, "  {:>6}  {:>8}  {:>7}  est./true", "slope", "Mrays/s", "error %");
+    for outcome in outcomes {
+        let ladder = &outcome.ladder;
+        let _ = write!(text, "{:width$}  {:>9}", outcome.title, format!("{}x{}", outcome.width, outcome.height));
+        for target in TARGETS {
+            let _ = write!(text, "  {:>9}", seconds(ladder.seconds_to(target)));
+        }
+        let last = ladder.last();
+        let _ = writeln!(
+            text,
+            "  {:>6}  {:>8}  {:>7}  {}",
+            ladder.slope().map_or("-".to_owned(), |slope| format!("{slope:.2}")),
+            number(last.spent.rays_per_second() * 1e-6),
+            number(100.0 * last.error()),
+            last.calibration().map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
+        );
+    }
+    text
+}
+
+fn summary(outcomes: &[SceneOutcome]) -> String {
+    let mut rows = String::new();
+    for outcome in outcomes {
+        let (ladder, last) = (&outcome.ladder, outcome.ladder.last());
+        let times: String =
+            TARGETS.iter().map(|&target| format!("<td>{}</td>", seconds(ladder.seconds_to(target)))).collect();
+        let _ = writeln!(
+            rows,
+            "<tr><td><a href=\"#{id}\">{}</a></td><td>{} × {}</td>{times}<td>{}</td><td>{}</td><td>{}</td>\
+             <td>{}</td><td>{}</td></tr>",
+            escape(&outcome.title),
+            outcome.width,
+            outcome.height,
+            ladder.slope().map_or("–".to_owned(), |slope| format!("{slope:.2}")),
+            number(last.spent.rays_per_second() * 1e-6),
+            number(last.spent.paths_per_second() * 1e-6),
+            last.spp,
+            percent(last.error()),
+            id = anchor(&outcome.title),
+        );
+    }
+    format!(
+        "<div class=\"wide\"><table>\n<tr><th>scene</th><th>pixels</th><th>s to 10 %</th><th>s to 3 %</th>\
+         <th>s to 1 %</th><th>slope</th><th>M rays/s</th><th>M camera paths/s</th><th>last spp</th>\
+         <th>its error</th></tr>\n{rows}</table></div>\n"
+    )
+}
+
+fn section(outcome: &SceneOutcome) -> String {
+    let title = escape(&outcome.title);
+    let mut html = format!("<h2 id=\"{}\">{title}</h2>\n", anchor(&outcome.title));
+    html.push_str(&about_reference(outcome));
+    let spp = |wanted: u32| outcome.ladder.steps.iter().map(|step| step.spp).filter(|&spp| spp <= wanted).max();
+    let last = outcome.ladder.last();
+    html.push_str("<div class=\"pictures\">\n");
+    for (picture, caption) in [
+        (&outcome.early, format!("{} samples per pixel", spp(4).unwrap_or(1))),
+        (&outcome.last, format!("{} samples per pixel, error {}", last.spp, percent(last.error()))),
+        (&outcome.reference, "reference".to_owned()),
+    ] {
+        let _ = writeln!(
+            html,
+            "<figure><img width=\"{}\" height=\"{}\" alt=\"{title}, {caption}\" src=\"{}\">\
+             <figcaption>{caption}</figcaption></figure>",
+            picture.width,
+            picture.height,
+            png_url(picture, &outcome.display)
+        );
+    }
+    html.push_str("</div>\n<div class=\"pair\">\n");
+    let mut plots = vec![error_plot(outcome)];
+    if !outcome.ablations.is_empty() {
+        plots.push(ablation_plot(outcome));
+    }
+    for plot in plots {
+        let _ = write!(html, "<figure><h3>{}</h3>\n{}{}</figure>\n", escape(&plot.title), plot.svg(), plot.legend());
+    }
+    html.push_str("</div>\n");
+    html.push_str(&steps_table(&outcome.ladder));
+    if !outcome.ablations.is_empty() {
+        html.push_str(&ablation_table(outcome));
+    }
+    html
+}
+
+fn about_reference(outcome: &SceneOutcome) -> String {
+    let Some(made) = outcome.reference_made else {
+        let path = outcome.reference_path.as_ref().map_or(String::new(), |path| path.display().to_string());
+        return format!("<p>Reference: <code>{}</code>.</p>\n", escape(&path));
+    };
+    let own = made.relative_error.map_or(String::new(), |error| format!(", its own error {}", percent(error)));
+    let mut text = format!("<p>Reference: own render with another seed, {} samples per pixel{own}.", made.spp);
+    if let Some(share) = outcome.share_of_reference().filter(|share| *share > 0.1) {
+        let _ =
+            write!(text, " Up to {:.0} % of the last step’s relMSE is the reference’s own.", 100.0 * share.min(1.0));
+    }
+    text + "</p>\n"
+}
+
+fn error_plot(outcome: &SceneOutcome) -> Plot {
+    let ladder = &outcome.ladder;
+    let estimates = || ladder.steps.iter().filter_map(|step| step.estimate.map(|e| (step.spent.seconds(), e)));
+    let first = ladder.steps.iter().find(|step| step.spp >= 4).unwrap_or(ladder.last());
+    let ideal = |seconds: f64| (seconds, first.distance.relative_mse * first.spent.seconds() / seconds);
+    let series = |label: &str, color, style, points| Series { label: label.to_owned(), color, style, points };
+    Plot {
+        title: "relMSE against time".to_owned(),
+        x_label: "seconds".to_owned(),
+        y_label: "relMSE".to_owned(),
+        series: vec![
+            series("true error", 0, Style::Measured, ladder.curve()),
+            series(
+                "the renderer’s own estimate, with its 95 % interval",
+                1,
+                Style::Dashed,
+                estimates().map(|(seconds, e)| (seconds, e.relative.powi(2))).collect(),
+            ),
+            series(
+                "slope −1",
+                7,
+                Style::Thin,
+                vec![ideal(first.spent.seconds()), ideal(ladder.last().spent.seconds())],
+            ),
+        ],
+        band: Some(Band {
+            color: 1,
+            points: estimates().map(|(seconds, e)| (seconds, e.low.powi(2), e.high.powi(2))).collect(),
+        }),
+        levels: outcome
+            .reference_made
+            .and_then(|made| made.relative_error)
+            .map(|error| (error * error, "the reference’s own error".to_owned()))
+            .into_iter()
+            .collect(),
+    }
+}
+
+fn ablation_plot(outcome: &SceneOutcome) -> Plot {
+    let all = Series { label: "all".to_owned(), color: 0, style: Style::Measured, points: outcome.ladder.curve() };
+    let used = outcome.ablations.iter().enumerate().filter(|(_, ablation)| !ablation.is_unused);
+    let without = used.map(|(i, Ablation { technique, ladder, .. })| Series {
+        label: format!("without {technique}"),
+        color: 1 + i % 7,
+        style: Style::Thin,
+        points: ladder.curve(),
+    });
+    Plot {
+        title: "Each technique switched off alone".to_owned(),
+        x_label: "seconds".to_owned(),
+        y_label: "relMSE".to_owned(),
+        series: std::iter::once(all).chain(without).collect(),
+        band: None,
+        levels: vec![],
+    }
+}
+
+fn steps_table(ladder: &Ladder) -> String {
+    let mut rows = String::new();
+    for step in &ladder.steps {
+        let estimate = step.estimate.map_or("<td>–</td><td>–</td>".to_owned(), |e| {
+            let ratio = e.relative / step.error();
+            // Below 16 samples nothing is promised.
+            let class = match (step.spp >= 16, (1.0 / CALIBRATION..=CALIBRATION).contains(&ratio)) {
+                (false, _) => "soft",
+                (true, true) => "good",
+                (true, false) => "bad",
+            };
+            let interval = format!("{} ({} – {})", percent(e.relative), percent(e.low), percent(e.high));
+            format!("<td>{interval}</td><td class=\"{class}\">{ratio:.2}</td>")
+        });
+        let _ = writeln!(
+            rows,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
+             <td>{}</td>{estimate}</tr>",
+            step.spp,
+            number(step.spent.wall_seconds),
+            step.spent.cpu_seconds.map_or("–".to_owned(), number),
+            number(step.spent.rays_per_second() * 1e-6),
+            number(step.spent.paths_per_second() * 1e-6),
+            number(step.distance.relative_mse),
+            percent(step.error()),
+            number(step.distance.rmse),
+            number(step.distance.flip),
+        );
+    }
+    format!(
+        "<div class=\"wide\"><table>\n<tr><th>spp</th><th>wall s</th><th>CPU s</th><th>M rays/s</th>\
+         <th>M paths/s</th><th>relMSE</th><th>error</th><th>RMSE</th><th>FLIP</th><th>estimated error (95 %)</th>\
+         <th>estimated / true</th></tr>\n{rows}</table></div>\n"
+    )
+}
+
+fn ablation_table(outcome: &SceneOutcome) -> String {
+    let mut rows = String::new();
+    let all = outcome.ladder.last();
+    let row = |name: &str, step: &super::Step, cost: String| {
+        format!(
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{cost}</td></tr>\n",
+            escape(name),
+            step.spp,
+            number(step.spent.seconds()),
+            number(step.distance.relative_mse),
+        )
+    };
+    rows.push_str(&row("all techniques", all, "1".to_owned()));
+    for ablation in &outcome.ablations {
+        let cost = if ablation.is_unused {
+            "<span class=\"soft\">not used here</span>".to_owned()
+        } else {
+            format!("{:.2}", ablation.cost(&outcome.ladder))
+        };
+        rows.push_str(&row(&format!("without {}", ablation.technique), ablation.ladder.last(), cost));
+    }
+    format!(
+        "<div class=\"wide\"><table>\n<tr><th></th><th>spp</th><th>seconds</th><th>relMSE</th>\
+         <th>times as long for the same error</th></tr>\n{rows}</table></div>\n"
+    )
+}
+
+fn seconds(time: Option<Seconds>) -> String {
+    match time {
+        None => "–".to_owned(),
+        Some(Seconds::Interpolated(seconds)) => number(seconds),
+        Some(Seconds::Extrapolated(seconds)) => format!("({})", number(seconds)),
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", number(100.0 * share))
+}
+
+fn anchor(title: &str) -> String {
+    title.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
+}
+
+/// A developed picture as a PNG inside a URL.
+fn png_url(picture: &LinearPicture, display: &Display) -> String {
+    let rgb: Vec<u8> = picture.pixels.iter().flat_map(|&light| develop_pixel(light, display)).collect();
+    let mut png = Vec::new();
+    PngEncoder::new(&mut png)
+        .write_image(&rgb, picture.width, picture.height, ExtendedColorType::Rgb8)
+        .expect("a picture in memory can be written to memory");
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
+}

@@ -1,0 +1,61 @@
+//! All steps of all scenes as one CSV file (RFC 4180), for those who draw their own conclusions.
+
+use super::{Ladder, SceneOutcome};
+use std::fmt::Write;
+
+const HEADER: &str = "scene,width,height,without,spp,wall_s,cpu_s,threads,camera_paths,rays,relmse,rmse,flip,\
+    estimated_error,estimated_low,estimated_high\n";
+
+/// One row a step; `without` names the technique that is switched off. Empty fields are not known.
+pub fn csv(outcomes: &[SceneOutcome]) -> String {
+    let mut text = HEADER.to_owned();
+    for outcome in outcomes {
+        write_ladder(&mut text, outcome, "", &outcome.ladder);
+        for ablation in &outcome.ablations {
+            write_ladder(&mut text, outcome, ablation.technique, &ablation.ladder);
+        }
+    }
+    text
+}
+
+fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, ladder: &Ladder) {
+    let optional = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value}"));
+    for step in &ladder.steps {
+        let (spent, distance, estimate) = (step.spent, step.distance, step.estimate);
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            field(&outcome.title),
+            outcome.width,
+            outcome.height,
+            field(without),
+            step.spp,
+            spent.wall_seconds,
+            optional(spent.cpu_seconds),
+            spent.threads,
+            spent.camera_paths,
+            spent.rays,
+            distance.relative_mse,
+            distance.rmse,
+            distance.flip,
+            optional(estimate.map(|e| e.relative)),
+            optional(estimate.map(|e| e.low)),
+            optional(estimate.map(|e| e.high)),
+        );
+    }
+}
+
+fn field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_with_commas_and_quotes_stay_one_field() {
+        assert_eq!(field("plain"), "plain");
+        assert_eq!(field("a, \"b\".ron"), "\"a, \"\"b\"\".ron\"");
+    }
+}

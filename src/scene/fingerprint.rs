@@ -1,0 +1,108 @@
+//! A number that tells whether two loaded scenes show the same thing.
+
+use super::LoadedScene;
+use crate::mesh::Mesh;
+use std::fmt;
+
+/// 128 bits over everything that a scene's picture depends on: the scene itself, its meshes and its pictures.
+///
+/// Stays the same from run to run and from machine to machine; made to notice changes, not to withstand malice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Fingerprint(pub u128);
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{:032x}", self.0)
+    }
+}
+
+impl Default for Fingerprint {
+    fn default() -> Self {
+        Self(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
+    }
+}
+
+impl Fingerprint {
+    /// FNV-1a (Fowler, Noll and Vo 1991), 128 bits. The length is mixed in, so that parts cannot run into each other.
+    #[must_use]
+    pub fn with(mut self, bytes: impl IntoIterator<Item = u8>) -> Self {
+        const PRIME: u128 = 0x0100_0000_0000_0000_013b;
+        let mut length = 0u64;
+        for byte in bytes {
+            self.0 = (self.0 ^ u128::from(byte)).wrapping_mul(PRIME);
+            length += 1;
+        }
+        for byte in length.to_le_bytes() {
+            self.0 = (self.0 ^ u128::from(byte)).wrapping_mul(PRIME);
+        }
+        self
+    }
+
+    fn with_floats(self, numbers: impl IntoIterator<Item = f32>) -> Self {
+        self.with(numbers.into_iter().flat_map(|x| x.to_bits().to_le_bytes()))
+    }
+
+    fn with_mesh(self, mesh: &Mesh) -> Self {
+        self.with_floats(mesh.positions.iter().flat_map(|p| p.to_array()))
+            .with(mesh.center.to_array().into_iter().flat_map(|x| x.to_bits().to_le_bytes()))
+            .with(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()))
+            .with_floats(mesh.normals.iter().flat_map(|n| n.to_array()))
+            .with_floats(mesh.uvs.iter().flat_map(|uv| uv.to_array()))
+            .with(mesh.slots.iter().flat_map(|slot| slot.to_le_bytes()))
+    }
+}
+
+impl LoadedScene {
+    /// The same for scenes that show the same thing, wherever their files lie.
+    pub fn fingerprint(&self) -> Fingerprint {
+        let mut print = Fingerprint::default().with(self.file.to_ron().bytes());
+        for mesh in self.meshes.iter().flatten() {
+            print = print.with_mesh(&mesh.mesh).with(format!("{:?}", mesh.slots).bytes());
+        }
+        let mut pictures: Vec<_> = self.pictures.iter().collect();
+        pictures.sort_by_key(|(name, _)| *name);
+        for (name, picture) in pictures {
+            print = print
+                .with(name.bytes())
+                .with([picture.width, picture.height].into_iter().flat_map(u32::to_le_bytes))
+                .with_floats(picture.texels.iter().flat_map(|texel| texel.to_array()));
+        }
+        print
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LoadOptions, SceneSource, load};
+    use super::*;
+
+    #[test]
+    fn bytes_hash_to_the_published_value() {
+        // FNV-1a of "a" is d228cb696f1a8caf78912b704e4a8964; the eight bytes of its length follow.
+        let mut expected = Fingerprint(0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);
+        for byte in 1u64.to_le_bytes() {
+            expected.0 = (expected.0 ^ u128::from(byte)).wrapping_mul((1 << 88) + 0x13b);
+        }
+        assert_eq!(Fingerprint::default().with(*b"a"), expected);
+    }
+
+    #[test]
+    fn any_change_of_a_scene_or_its_mesh_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (model, scene) = (folder.path().join("m.obj"), folder.path().join("s.ron"));
+        let print = |corner: &str, eye: &str| {
+            std::fs::write(&model, format!("v 0 0 0\nv 1 0 0\nv 0 {corner} 0\nf 1 2 3\n")).unwrap();
+            let text = format!(
+                "(camera: (eye: (0, 0, {eye}), look_at: (0, 0, 0)), materials: {{\"m\": diffuse(albedo: 0.5)}}, \
+                 objects: [mesh(source: obj(\"m.obj\"), material: \"m\")])"
+            );
+            std::fs::write(&scene, text).unwrap();
+            let loaded = load(&SceneSource::Scene(scene.clone()), &LoadOptions::default());
+            loaded.unwrap_or_else(|error| panic!("{error}")).fingerprint()
+        };
+        let first = print("1", "3");
+        assert_eq!(first, print("1", "3"));
+        assert_ne!(first, print("1.0000001", "3"));
+        assert_ne!(first, print("1", "3.5"));
+    }
+}

@@ -1,0 +1,153 @@
+//! The report as a user meets it, and the promises that it checks: every technique leaves the mean alone, and the
+//! error that the renderer tells is the error that it has.
+
+mod common;
+
+use common::*;
+use firstlight::kdtree::Shape;
+use firstlight::render::{
+    ColorInput, Display, Environment, Fresnel, Material, RenderSettings, ScalarInput, Snapshot, Techniques,
+};
+use firstlight::report::{Key, Ladder, Limits, LinearPicture, ReferenceStore, climb};
+use firstlight::scene::Fingerprint;
+use glam::Vec3;
+
+/// A room with lights of every shape, one much brighter than the others, matte, glossy and mirroring things.
+fn room() -> Snapshot {
+    let metal = Material::Metal {
+        alpha: ScalarInput::Constant(0.2),
+        reflectance: ColorInput::Constant(Vec3::splat(0.8)),
+        fresnel: Fresnel::Constant,
+        compensate: false,
+    };
+    let mirror = Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(0.9)) };
+    let triangle = |a: Vec3, b: Vec3, c: Vec3| Shape::Triangle { vertices: [a, b, c] };
+    scene(
+        vec![
+            (plane(Vec3::ZERO, Vec3::Y), 0),
+            (plane(Vec3::Z * -3.0, Vec3::Z), 0),
+            (plane(Vec3::X * -3.0, Vec3::X), 1),
+            (plane(Vec3::Y * 4.0, Vec3::NEG_Y), 0),
+            (sphere(Vec3::new(-0.8, 0.7, -0.5), 0.7), 2),
+            (sphere(Vec3::new(0.9, 0.5, 0.3), 0.5), 1),
+            (quad(Vec3::new(-0.5, 3.5, -1.0), Vec3::X * 1.5, Vec3::Z * 1.5), 3),
+            (sphere(Vec3::new(2.0, 1.5, -1.0), 0.6), 4),
+            (triangle(Vec3::new(-2.0, 2.0, -2.9), Vec3::new(-1.0, 2.0, -2.9), Vec3::new(-1.5, 3.0, -2.9)), 4),
+        ],
+        vec![diffuse(0.6), metal, mirror, emissive(6.0), emissive(1.0)],
+        Environment::Constant(Vec3::splat(0.2)),
+        camera(Vec3::new(0.5, 1.5, 5.0), Vec3::new(0.0, 1.0, 0.0), 45.0),
+    )
+}
+
+/// Mean of the picture over independent renders, and its standard error.
+fn mean_of_renders(snapshot: &Snapshot, techniques: Techniques) -> (f64, f64) {
+    let n = 12;
+    let means: Vec<f64> = (0..n)
+        .map(|seed| {
+            let settings = RenderSettings { seed: 100 + seed, techniques, ..RenderSettings::default() };
+            picture_mean(&render(snapshot, &settings, 24, 16, 128).0).0
+        })
+        .collect();
+    let mean = means.iter().sum::<f64>() / f64::from(n);
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / f64::from(n - 1);
+    (mean, (variance / f64::from(n)).sqrt())
+}
+
+#[test]
+fn every_technique_switched_off_leaves_the_mean_alone() {
+    let room = room();
+    let (expected, error) = mean_of_renders(&room, Techniques::default());
+    assert!(error < 2e-3 * expected, "{expected} ± {error}");
+    for (technique, techniques) in Techniques::ablations() {
+        let (found, other) = mean_of_renders(&room, techniques);
+        assert_ne!(found, expected, "without {technique} nothing changed: the switch is not connected");
+        // Student's t with about 20 degrees of freedom: 4.5 is one in 4,000 for each of six.
+        let t = (found - expected) / error.hypot(other);
+        assert!(t.abs() < 4.5, "without {technique}: {found} ± {other} for {expected} ± {error}");
+        assert!(other < 0.05 * expected, "without {technique} the test can see nothing: ± {other}");
+    }
+}
+
+#[test]
+fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
+    let room = room();
+    let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
+    let size = (32, 24);
+    let mut told = Vec::new();
+    let rungs = climb(&room, &settings, size, Limits { spp: 48, seconds: None }, &mut |share| told.push(share));
+    assert_eq!(rungs.iter().map(|rung| rung.spp).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
+    assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
+    let truth = LinearPicture::of(&render(&room, &RenderSettings { seed: 2, ..settings }, size.0, size.1, 2048).0);
+    let ladder = Ladder::measure(&rungs, &truth, &Display::default());
+    // A rung is what a render of so many samples gives, to the bit.
+    assert_eq!(rungs[3].picture, LinearPicture::of(&render(&room, &settings, size.0, size.1, 8).0));
+    for pair in ladder.steps.windows(2) {
+        assert!(pair[1].distance.relative_mse < pair[0].distance.relative_mse, "{pair:?}");
+        assert!(pair[1].spent.wall_seconds >= pair[0].spent.wall_seconds);
+        assert_eq!(pair[1].spent.camera_paths, 2 * pair[0].spent.camera_paths);
+    }
+    assert!(ladder.last().distance.flip < ladder.steps[0].distance.flip);
+    let short = climb(&room, &settings, size, Limits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| ());
+    assert_eq!(short.len(), 1, "the first step is always taken, and no other fits");
+}
+
+#[test]
+fn references_are_kept_and_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = ReferenceStore::in_folder(&folder.path().join("deep"));
+    let (room, settings) = (room(), RenderSettings { seed: 1, ..RenderSettings::default() });
+    let key = Key::new("scenes/my room.ron", Fingerprint(7), &settings, (16, 8));
+    assert!(store.find(&key, 1).is_none());
+    let (made, trouble) = store.make(&key, &room, &settings, 16, &mut |_| ());
+    assert_eq!(trouble, None);
+    assert_ne!(made.picture, LinearPicture::of(&render(&room, &settings, 16, 8, 16).0), "its seed is another");
+    let found = store.find(&key, 8).expect("more samples than asked for are fine");
+    assert_eq!((&found.picture, found.made), (&made.picture, made.made));
+    assert!(store.find(&key, 32).is_none(), "too few samples");
+    let longer = RenderSettings { max_depth: 3, ..settings };
+    for other in [
+        Key::new("scenes/my room.ron", Fingerprint(8), &settings, (16, 8)),
+        Key::new("scenes/my room.ron", Fingerprint(7), &longer, (16, 8)),
+        Key::new("scenes/my room.ron", Fingerprint(7), &settings, (8, 16)),
+    ] {
+        assert!(store.find(&other, 1).is_none());
+    }
+    // Half a file counts as none.
+    let path = made.path.unwrap();
+    std::fs::write(&path, b"half").unwrap();
+    assert!(store.find(&key, 1).is_none());
+    // Where nothing can be kept, the picture is there all the same.
+    let (unkept, trouble) = ReferenceStore::in_folder(&path).make(&key, &room, &settings, 16, &mut |_| ());
+    assert_eq!(unkept.picture, made.picture);
+    assert!(trouble.is_some_and(|text| text.contains("could not be kept")));
+}
+
+#[test]
+fn the_command_writes_a_page_and_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let command = || {
+        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+        command.current_dir(&folder).env("XDG_CACHE_HOME", folder.path().join("cache"));
+        command
+    };
+    let text = ["report", "cornell", "--size", "20x20", "--spp", "4", "--out", "deep/page"];
+    let output = command().args(text).assert().success();
+    let said = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+    assert!(said.contains("cornell") && said.contains("20x20"), "{said}");
+    let page = std::fs::read_to_string(folder.path().join("deep/page/index.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("firstlight report cornell --size 20x20"));
+    assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("NaN"), "the page needs the net");
+    let table = std::fs::read_to_string(folder.path().join("deep/page/steps.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 1 + 7 * 3, "{table}");
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
+
+    let fail = |args: &[&str]| {
+        let output = command().arg("report").args(args).assert().failure();
+        String::from_utf8_lossy(&output.get_output().stderr).into_owned()
+    };
+    assert!(fail(&["cornell", "--reference", "none.exr"]).contains("none.exr"));
+    assert!(fail(&["--reference", "none.exr"]).contains("name the scene"));
+    assert!(fail(&["cornel"]).contains("cornell"));
+}
