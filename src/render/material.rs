@@ -76,6 +76,24 @@ impl Material {
         }
     }
 
+    /// Whether it, or a part of it, looks up a texture.
+    pub(super) fn is_textured(&self, materials: &[Self]) -> bool {
+        let color = |input: &ColorInput| matches!(input, ColorInput::Texture(_));
+        let scalar = |input: &ScalarInput| matches!(input, ScalarInput::Texture(_));
+        match self {
+            Self::Diffuse { albedo } => color(albedo),
+            Self::Mirror { reflectance } => color(reflectance),
+            Self::Metal { alpha, reflectance, .. } => scalar(alpha) || color(reflectance),
+            Self::Glass { .. } => false,
+            Self::Phong { diffuse, specular, .. } => color(diffuse) || scalar(specular),
+            Self::Blend { weight, a, b } => {
+                let part = |id: MaterialId| materials[id as usize].is_textured(materials);
+                scalar(weight) || part(*a) || part(*b)
+            }
+            Self::Emissive { radiance } => color(radiance),
+        }
+    }
+
     pub(super) const KINDS: usize = 7;
 
     /// A number below [`Self::KINDS`] for each kind, to sort by.

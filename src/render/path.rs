@@ -149,7 +149,7 @@ impl PathWave {
                 path.throughput *= path.media.transmittance(scene, hit.t);
             }
             let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &ray, &hit);
+            let vertex = Vertex::new(scene, &ray, &hit, material);
             if let Some(emission) = scene.shading.emission[material as usize]
                 && vertex.front
             {

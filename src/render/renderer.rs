@@ -206,7 +206,8 @@ impl Pass<'_> {
     /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
     #[inline]
     fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
-        let new_sampler = if self.settings.techniques.even_samples { Sampler::new } else { Sampler::independent };
+        let Techniques { even_samples, .. } = self.settings.techniques;
+        let new_sampler = if even_samples { Sampler::new } else { Sampler::independent };
         let sampler = new_sampler(self.settings.seed, pixel.x, pixel.y, sample);
         let (offset, weight) = self.filter.sample(sampler.pair(0));
         let film = pixel.as_vec2() + offset;
@@ -218,10 +219,14 @@ impl Pass<'_> {
 
 /// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.
 fn pixels_in_blocks(size: UVec2) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..size.x * size.y).collect();
-    order.sort_by_key(|i| {
-        let (x, y) = (i % size.x, i / size.x);
-        (y / 4, x / 4, y, x)
-    });
+    const SIDE: u32 = 4;
+    let mut order = Vec::with_capacity((size.x * size.y) as usize);
+    for top in (0..size.y).step_by(SIDE as usize) {
+        for left in (0..size.x).step_by(SIDE as usize) {
+            for y in top..size.y.min(top + SIDE) {
+                order.extend((left..size.x.min(left + SIDE)).map(|x| y * size.x + x));
+            }
+        }
+    }
     order
 }

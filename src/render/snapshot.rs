@@ -55,6 +55,8 @@ pub struct Shading {
     /// What the air outside of all glass absorbs, per metre; light from the environment has passed it already.
     pub air: Vec3,
     pub(super) ambient: AmbientLight,
+    /// Whether each material looks up a texture, and so needs surface coordinates.
+    pub(super) textured: Vec<bool>,
     /// What each material adds itself.
     pub(super) emission: Vec<Option<Emission>>,
     pub lights: LightTable,
@@ -103,9 +105,21 @@ impl Shading {
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),
         };
+        let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
         let ambient = AmbientLight::of(&environment);
         let air = Vec3::ZERO;
-        Self { materials, textures, environment, air, ambient, emission, lights, environment_sampler, features }
+        Self {
+            materials,
+            textures,
+            environment,
+            air,
+            ambient,
+            textured,
+            emission,
+            lights,
+            environment_sampler,
+            features,
+        }
     }
 
     /// The same under air that absorbs light, per metre.

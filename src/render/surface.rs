@@ -18,7 +18,7 @@ pub(super) struct Vertex {
     pub geometric_normal: Vec3,
     /// Unit, and never facing away from the ray.
     pub normal: Vec3,
-    /// Surface coordinates, see [`super::Texture`].
+    /// Surface coordinates, see [`super::Texture`]; on spheres only for materials that ask for them.
     pub uv: Vec2,
     /// Whether the ray met the front: the outside of a closed surface.
     pub front: bool,
@@ -30,8 +30,9 @@ pub(super) struct Vertex {
 }
 
 impl Vertex {
+    /// `material`: that of the hit, see [`material_of`].
     #[inline]
-    pub fn new(scene: &Snapshot, ray: &Ray, hit: &Hit) -> Self {
+    pub fn new(scene: &Snapshot, ray: &Ray, hit: &Hit, material: MaterialId) -> Self {
         let geometry = &*scene.geometry;
         let point = geometry.tree.surface_point(ray, hit);
         let wo = -ray.dir;
@@ -71,6 +72,8 @@ impl Vertex {
                 let local = point.position - *origin;
                 uv = Vec2::new(local.dot(frame.x), local.dot(frame.y));
             }
+            // Longitude and latitude cost as much as all the rest.
+            Shape::Sphere { .. } | Shape::Spheres { .. } if !scene.shading.textured[material as usize] => {}
             Shape::Sphere { .. } => {
                 uv = sphere_uv(match &geometry.objects[hit.object as usize].turned {
                     Some(object_from_world) => *object_from_world * point.geometric_normal,
@@ -289,7 +292,7 @@ mod tests {
             if disc <= 0.0 {
                 continue;
             }
-            let (outwards, vertex) = (ray_point(&ray, &map, d, b, disc), Vertex::new(&scene, &ray, &hit));
+            let (outwards, vertex) = (ray_point(&ray, &map, d, b, disc), Vertex::new(&scene, &ray, &hit, 0));
             let wi = map.transform_vector3(light).normalize();
             let truth = outwards.dot(light).max(0.0);
             let arriving = |vertex: &Vertex| {
@@ -336,7 +339,7 @@ mod tests {
             let within = Ray::new(Vec3::new(0.1, 0.2, 0.05), (ray.origin - Vec3::Z * 3.5).normalize());
             for (scene, ray, size) in [(&flat, &ray, 1e-6), (&smooth, &within, 1e-6), (&smooth, &ray, 0.1)] {
                 if let Some(hit) = scene.geometry.tree.closest_hit(ray) {
-                    let lift = Vertex::new(scene, ray, &hit).lift.length();
+                    let lift = Vertex::new(scene, ray, &hit, 0).lift.length();
                     assert!(lift <= size, "{lift}");
                 }
             }

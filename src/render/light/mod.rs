@@ -246,9 +246,8 @@ impl Light {
             ColorInput::Constant(radiance) => radiance,
             ColorInput::Texture(texture) => {
                 let uv = match (&self.shape, &self.turned) {
-                    (LightShape::Sphere { center, .. }, Some(object_from_world)) => {
-                        sphere_uv((*object_from_world * (point.target - *center)).normalize())
-                    }
+                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * point.normal),
+                    (LightShape::Sphere { .. }, None) => sphere_uv(point.normal),
                     _ => point.uv,
                 };
                 textures[texture as usize].eval(uv)

@@ -43,7 +43,9 @@ pub(super) struct LightPoint {
     pub wi: Vec3,
     /// Per steradian.
     pub pdf: f32,
-    /// Surface coordinates for textured emission.
+    /// Unit, at the point.
+    pub normal: Vec3,
+    /// Surface coordinates of flat lights, for textured emission; those of a sphere follow from its normal.
     pub uv: Vec2,
 }
 
@@ -106,7 +108,7 @@ impl LightShape {
                     None => area_pdf(distance, wi, normal, area)?,
                 };
                 let error = robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs());
-                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, uv })
+                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv })
             }
             Self::Triangle { vertices, normal, area } => {
                 let [a, b, c] = vertices;
@@ -137,7 +139,7 @@ impl LightShape {
                     None => area_pdf(distance, wi, normal, area)?,
                 };
                 let error = robust::gamma(7) * (a.abs() + b.abs() + c.abs());
-                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, uv: weights })
+                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: weights })
             }
         }
     }
@@ -206,21 +208,9 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
         target: lifted(point, error, normal, distance),
         wi,
         pdf: cone_pdf(one_minus_cos_max),
-        uv: sphere_uv(normal),
+        normal,
+        uv: Vec2::ZERO,
     })
-}
-
-/// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
-fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
-    let z = 1.0 - 2.0 * u.x;
-    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let normal = Vec3::new(r * cos_phi, r * sin_phi, z);
-    let point = center + radius * normal;
-    let (wi, distance) = direction(position, point)?;
-    let pdf = area_pdf(distance, wi, normal, 4.0 * std::f32::consts::PI * radius * radius)?;
-    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
-    Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, uv: sphere_uv(normal) })
 }
 
 /// A sphere seen as a point in its centre, where all of its light is: π r² of radiance over distance².
@@ -237,8 +227,22 @@ pub(super) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Opti
         target: lifted(center - radius * wi, error, -wi, distance),
         wi,
         pdf: (distance / radius).powi(2) / std::f32::consts::PI,
-        uv: sphere_uv(-wi),
+        normal: -wi,
+        uv: Vec2::ZERO,
     })
+}
+
+/// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
+fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
+    let z = 1.0 - 2.0 * u.x;
+    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    let normal = Vec3::new(r * cos_phi, r * sin_phi, z);
+    let point = center + radius * normal;
+    let (wi, distance) = direction(position, point)?;
+    let pdf = area_pdf(distance, wi, normal, 4.0 * std::f32::consts::PI * radius * radius)?;
+    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
+    Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: Vec2::ZERO })
 }
 
 /// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.

@@ -123,7 +123,7 @@ impl PhongWave {
                 walk.weight *= walk.media.transmittance(scene, hit.t);
             }
             let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &ray, &hit);
+            let vertex = Vertex::new(scene, &ray, &hit, material);
             if let Some(emission) = shading.emission[material as usize]
                 && vertex.front
                 && !shading.lights.light_of(hit.object, hit.prim).is_some_and(|id| {

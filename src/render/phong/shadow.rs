@@ -7,7 +7,7 @@ use super::super::surface::{Vertex, material_of};
 use super::super::{Material, MaterialId, Snapshot};
 use super::finish::straight_through;
 use crate::geometry::{Ray, robust};
-use crate::kdtree::{HitBatch, RayBatch, RayClass};
+use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use glam::Vec3;
 
 /// Light that arrives unless something is in its way.
@@ -78,7 +78,7 @@ impl Shadows {
                 let ray = self.rays.get(i);
                 let distance = hit.t * ray.dir.length();
                 let unit = Ray { dir: ray.dir.normalize(), ..ray };
-                let vertex = Vertex::new(scene, &unit, &crate::kdtree::Hit { t: distance, ..hit });
+                let vertex = Vertex::new(scene, &unit, &Hit { t: distance, ..hit }, id);
                 let mut light = arriving.light * straight_through(scene, id, &vertex);
                 if !vertex.front {
                     light *= inside(scene, id, distance);
