@@ -76,6 +76,16 @@ impl Material {
         }
     }
 
+    /// Whether the inside of it takes light away.
+    pub(super) fn absorbs(&self) -> bool {
+        match self {
+            Self::Glass { absorption, .. } | Self::Phong { absorption, .. } => {
+                self.is_clear() && *absorption != Vec3::ZERO
+            }
+            _ => false,
+        }
+    }
+
     /// Whether it, or a part of it, looks up a texture.
     pub(super) fn is_textured(&self, materials: &[Self]) -> bool {
         let color = |input: &ColorInput| matches!(input, ColorInput::Texture(_));

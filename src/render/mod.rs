@@ -16,12 +16,14 @@ mod light;
 mod material;
 mod medium;
 mod path;
+mod paths;
 mod phong;
 mod renderer;
 mod snapshot;
 mod surface;
 mod techniques;
 mod texture;
+mod wide;
 
 pub use camera::Camera;
 pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};

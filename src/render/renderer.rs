@@ -31,12 +31,15 @@ pub struct RenderSettings {
     pub seed: u32,
     pub filter: PixelFilter,
     pub techniques: Techniques,
+    /// Shade sixteen paths at a time where that is possible; off for tests, which compare the two.
+    #[doc(hidden)]
+    pub wide: bool,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
         let (filter, techniques) = (PixelFilter::Box, Techniques::default());
-        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0, filter, techniques }
+        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0, filter, techniques, wide: true }
     }
 }
 

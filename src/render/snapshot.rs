@@ -6,6 +6,7 @@
 use super::ambient::AmbientLight;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
+use super::wide::{MaterialTable, SurfaceTable};
 use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
 use crate::kdtree::{SceneTree, Shape};
 use crate::mesh::Mesh;
@@ -24,6 +25,7 @@ pub struct Snapshot {
 pub struct Geometry {
     pub objects: Vec<Object>,
     pub tree: SceneTree,
+    pub(super) surfaces: SurfaceTable,
 }
 
 /// What an object needs beyond its shape.
@@ -61,6 +63,7 @@ pub struct Shading {
     pub(super) emission: Vec<Option<Emission>>,
     pub lights: LightTable,
     pub(super) environment_sampler: Option<EnvironmentSampler>,
+    pub(super) material_table: MaterialTable,
     pub features: Features,
 }
 
@@ -75,13 +78,17 @@ pub struct Features {
     pub light_sampling: bool,
     /// The surroundings shine.
     pub environment: bool,
+    /// Some material looks up a texture.
+    pub textures: bool,
 }
 
 impl Geometry {
     /// The two lists run in parallel.
     pub fn build(shapes: Vec<Shape>, objects: Vec<Object>) -> Self {
         assert_eq!(shapes.len(), objects.len(), "each shape needs its object");
-        Self { objects, tree: SceneTree::build(shapes) }
+        let tree = SceneTree::build(shapes);
+        let surfaces = SurfaceTable::build(&tree);
+        Self { objects, tree, surfaces }
     }
 }
 
@@ -101,10 +108,12 @@ impl Shading {
         let glass = materials.iter().any(Material::is_clear);
         let features = Features {
             glass,
-            media: glass,
+            media: materials.iter().any(Material::absorbs),
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),
+            textures: materials.iter().any(|material| material.is_textured(&materials)),
         };
+        let material_table = MaterialTable::build(geometry, &materials);
         let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
         let ambient = AmbientLight::of(&environment);
         let air = Vec3::ZERO;
@@ -118,6 +127,7 @@ impl Shading {
             emission,
             lights,
             environment_sampler,
+            material_table,
             features,
         }
     }

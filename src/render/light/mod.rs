@@ -5,6 +5,7 @@
 
 mod selection;
 mod shape;
+mod wide;
 
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;
@@ -13,6 +14,8 @@ use glam::{Mat3, Vec2, Vec3};
 use selection::Selection;
 use shape::LightShape;
 pub(super) use shape::sphere_uv;
+pub(super) use wide::LightLanes;
+use wide::WideLights;
 
 /// How many sample dimensions [`LightTable::sample_each`] uses.
 pub(super) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
@@ -37,6 +40,7 @@ pub struct LightTable {
     /// For each object: where its primitives stand among the lights.
     by_object: Vec<ObjectLights>,
     selection: Selection,
+    wide: Option<WideLights>,
 }
 
 /// Which lights the primitives of an object are.
@@ -133,7 +137,8 @@ impl LightTable {
             })
             .collect();
         let selection = Selection::build(&lights);
-        Self { lights, by_object, selection }
+        let wide = WideLights::build(&lights);
+        Self { lights, by_object, selection, wide }
     }
 
     pub fn len(&self) -> usize {

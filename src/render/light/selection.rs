@@ -1,6 +1,7 @@
 //! Which light to ask: a few lights by what each could send to the point, many by their power.
 
 use super::{Light, LightShape, Techniques};
+use crate::lanes::{Float, Simd, Vector, select};
 use crate::sampling::AliasTable;
 use glam::Vec3;
 
@@ -16,7 +17,7 @@ pub(super) struct Selection {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct LightBounds {
+pub(super) struct LightBounds {
     center: Vec3,
     radius: f32,
     /// Of a flat light; zero for a sphere.
@@ -89,6 +90,12 @@ impl Selection {
         }
     }
 
+    /// Of few lights.
+    #[inline]
+    pub fn bounds(&self) -> &[LightBounds] {
+        &self.bounds
+    }
+
     #[inline]
     fn estimates(&self, position: Vec3, normal: Vec3) -> ([f32; MAX_ESTIMATED], f32) {
         let mut estimates = [0.0; MAX_ESTIMATED];
@@ -145,4 +152,32 @@ impl LightBounds {
         let emitter = if self.normal == Vec3::ZERO { 1.0 } else { bound(-wi.dot(self.normal)) };
         self.intensity * receiver * emitter / distance2
     }
+
+    /// The same for sixteen points.
+    #[inline(always)]
+    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+        let s = position.x.s;
+        let (r2, one) = (self.radius * self.radius, Float::splat(s, 1.0));
+        let offset = Vector::splat(s, self.center) - position;
+        let distance2 = offset.length_squared();
+        let distance = distance2.sqrt();
+        let wi = offset * (one / distance);
+        let sin_u = one.all(self.radius) / distance;
+        let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
+        let mut estimate = largest_cosine(wi.dot(normal), cos_u, sin_u) * self.intensity;
+        if self.normal != Vec3::ZERO {
+            estimate = estimate * largest_cosine(-wi.dot(Vector::splat(s, self.normal)), cos_u, sin_u);
+        }
+        let within = one.all(self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE));
+        select(distance2.le(one.all(r2)), within, estimate / distance2)
+    }
+}
+
+/// The largest cosine to any direction within the cone, a little more so that rounding hides none.
+#[inline(always)]
+fn largest_cosine<S: Simd>(cos: Float<S>, cos_u: Float<S>, sin_u: Float<S>) -> Float<S> {
+    let one = cos.all(1.0);
+    let sin = (one - cos * cos).at_least(0.0).sqrt();
+    let bound = (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).at_least(0.0).at_most(1.0);
+    select(cos_u.le(cos), one, bound)
 }
