@@ -17,7 +17,6 @@ use super::wide::{self, Group, SEVERAL};
 use super::{Material, MaterialId, Snapshot, Techniques};
 use crate::geometry::Ray;
 use crate::kdtree::{Hit, HitBatch, RayClass};
-use crate::lanes::InstructionSet;
 use crate::sampling::Sampler;
 use glam::Vec3;
 
@@ -36,6 +35,20 @@ pub(super) const DIM_DIRECTION: u32 = 1;
 pub(super) const DIM_LIGHT: u32 = 2;
 pub(super) const DIM_LOBE: u32 = 3;
 pub(super) const DIM_ROULETTE: u32 = 4;
+
+impl From<CameraPath> for Path {
+    fn from(CameraPath { ray, sampler, slot, weight }: CameraPath) -> Self {
+        Self {
+            throughput: Vec3::splat(weight),
+            pdf: f32::INFINITY,
+            position: ray.origin,
+            normal: ray.dir,
+            sampler,
+            slot,
+            media: MediumStack::default(),
+        }
+    }
+}
 
 /// A camera ray and where its light goes.
 pub(super) struct CameraPath {
@@ -80,20 +93,23 @@ pub(super) struct PathWave {
 
 /// Kinds of hits: misses, then those of materials.
 const KINDS: usize = Material::KINDS + 1;
+const EMITTERS: usize = 1;
 
 impl PathWave {
-    /// Follows `camera_paths` to their ends and adds what they find to `radiance`, indexed by slot.
+    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// slot.
     ///
     /// `None` when `stop` said so; what is in `radiance` then is of no use.
     pub fn trace(
         &mut self,
         scene: &Snapshot,
         settings: &RenderSettings,
-        camera_paths: impl Iterator<Item = CameraPath>,
+        start: impl FnOnce(&mut PathBatch),
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        self.start(scene, camera_paths, radiance.len());
+        self.paths.start(radiance.len(), scene.shading.features.glass);
+        start(&mut self.paths);
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
         let tree = &scene.geometry.tree;
         for depth in 1..=settings.max_depth {
@@ -115,53 +131,37 @@ impl PathWave {
         Some(counts)
     }
 
-    /// - `n`: at most this many paths.
-    fn start(&mut self, scene: &Snapshot, camera_paths: impl Iterator<Item = CameraPath>, n: usize) {
-        self.paths.start(n, scene.shading.features.glass);
-        for CameraPath { ray, sampler, slot, weight } in camera_paths {
-            let path = Path {
-                throughput: Vec3::splat(weight),
-                pdf: f32::INFINITY,
-                position: ray.origin,
-                normal: ray.dir,
-                sampler,
-                slot,
-                media: MediumStack::default(),
-            };
-            self.paths.push(&ray, &path);
-        }
-    }
-
     fn shade(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
         self.next.start(self.paths.len(), scene.shading.features.glass);
         self.shadows.start(self.paths.len());
         let starts = self.sort_by_material(scene);
         let is_last = depth == settings.max_depth;
+        let features = &scene.shading.features;
+        let emitters_have_lanes =
+            scene.shading.lights.has_lanes() && !features.textures && scene.shading.environment_sampler.is_none();
         for kind in 0..KINDS {
             let order = starts[kind] as usize..starts[kind + 1] as usize;
             if order.is_empty() {
                 continue;
             }
-            match kind {
-                0 => self.shade_misses(scene, &settings.techniques, order, radiance),
+            let group = Group {
+                scene,
+                techniques: &settings.techniques,
+                dimension: first_dimension(depth),
+                survival: Survival::at(depth, &settings.techniques),
+                paths: &self.paths,
+                hits: &self.hits,
+                materials: &self.materials,
+                order: &self.order[order.clone()],
+                next: &mut self.next,
+                shadows: &mut self.shadows,
+            };
+            match (settings.lanes, kind) {
+                (_, 0) => self.shade_misses(scene, &settings.techniques, order, radiance),
+                (Some(set), EMITTERS) if emitters_have_lanes => wide::shade_emitters(set, group, radiance),
                 // What emits no light and is the end of its path adds nothing.
-                _ if wide::knows(kind - 1) && settings.wide => {
-                    if !is_last {
-                        let group = Group {
-                            scene,
-                            techniques: &settings.techniques,
-                            dimension: first_dimension(depth),
-                            survival: Survival::at(depth, &settings.techniques),
-                            paths: &self.paths,
-                            hits: &self.hits,
-                            materials: &self.materials,
-                            order: &self.order[order],
-                            next: &mut self.next,
-                            shadows: &mut self.shadows,
-                        };
-                        wide::shade(InstructionSet::detect(), kind - 1, group);
-                    }
-                }
+                (Some(_), _) if wide::knows(kind - 1) && is_last => {}
+                (Some(set), _) if wide::knows(kind - 1) => wide::shade(set, kind - 1, group),
                 _ => {
                     for k in order {
                         self.shade_one(scene, depth, settings, self.order[k] as usize, radiance);
@@ -181,9 +181,17 @@ impl PathWave {
         if !scene.shading.features.environment {
             return;
         }
+        let always = scene.shading.environment_sampler.is_none();
         for &i in &self.order[order] {
-            let path = self.paths.get(i as usize);
-            let dir = self.paths.rays.get(i as usize).dir;
+            let i = i as usize;
+            let dir = self.paths.rays.get(i).dir;
+            if always {
+                // Bounces alone find it.
+                radiance[self.paths.slot[i] as usize] +=
+                    self.paths.throughput_of(i) * scene.shading.environment.radiance(dir);
+                continue;
+            }
+            let path = self.paths.get(i);
             radiance[path.slot as usize] += path.throughput * environment_light(scene, techniques, &path, dir);
         }
     }

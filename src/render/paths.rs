@@ -105,6 +105,11 @@ impl PathBatch {
     }
 
     #[inline]
+    pub fn throughput_of(&self, i: usize) -> Vec3 {
+        get(&self.throughput, i)
+    }
+
+    #[inline]
     pub fn sampler(&self, i: usize) -> Sampler {
         Sampler::from_parts([self.stream[i], self.reversed_index[i]])
     }

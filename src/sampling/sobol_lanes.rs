@@ -38,8 +38,16 @@ fn hash<S: Simd>(x: Bits<S>) -> Bits<S> {
 }
 
 #[inline(always)]
-pub(crate) fn hash_combine<S: Simd>(seed: Bits<S>, value: u32) -> Bits<S> {
+fn hash_combine<S: Simd>(seed: Bits<S>, value: u32) -> Bits<S> {
     hash(seed * 0x9e37_79b1 + hash_u32(value ^ 0x5bd1_e995))
+}
+
+impl<S: Simd> Bits<S> {
+    /// See [`super::hash_combine`].
+    #[inline(always)]
+    pub fn hash_combine(self, value: Self) -> Self {
+        hash(self * 0x9e37_79b1 + hash(value ^ 0x5bd1_e995))
+    }
 }
 
 #[inline(always)]
@@ -61,7 +69,7 @@ fn sobol_second_reversed<S: Simd>(index: Bits<S>) -> Bits<S> {
 
 /// Bits back to front.
 #[inline(always)]
-pub(crate) fn reverse<S: Simd>(x: Bits<S>) -> Bits<S> {
+fn reverse<S: Simd>(x: Bits<S>) -> Bits<S> {
     let x = x.shr(16) | x.shl(16);
     let x = (x & 0xff00_ff00).shr(8) | (x & 0x00ff_00ff).shl(8);
     let x = (x & 0xf0f0_f0f0).shr(4) | (x & 0x0f0f_0f0f).shl(4);

@@ -127,6 +127,40 @@ impl LightTable {
         Some(sample)
     }
 
+    /// Whether sixteen points at a time can be asked.
+    pub(in crate::render) fn has_lanes(&self) -> bool {
+        self.wide.is_some()
+    }
+
+    /// See [`Self::pdf`]; only where [`Self::has_lanes`].
+    #[inline(always)]
+    pub(in crate::render) fn pdf_lanes<S: Simd>(
+        &self,
+        techniques: &Techniques,
+        id: Bits<S>,
+        position: Vector<S>,
+        normal: Vector<S>,
+        wi: Vector<S>,
+        distance: Float<S>,
+    ) -> Float<S> {
+        let wide = self.wide.as_ref().expect("lanes are asked only where there are any");
+        let one = distance.all(1.0);
+        let pdf = wide.pdf(techniques.solid_angle, id, position, wi, distance);
+        if wide.n == 1 {
+            return pdf;
+        }
+        if !techniques.light_selection {
+            return pdf * (1.0 / wide.n as f32);
+        }
+        let (mut own, mut sum) = (one.all(0.0), one.all(0.0));
+        for (i, bounds) in (0..).zip(self.selection.bounds()) {
+            let estimate = bounds.estimate_lanes(position, normal);
+            own = select(id.equals(i), estimate, own);
+            sum += estimate;
+        }
+        select(sum.is_positive(), pdf * own / sum, one.all(0.0))
+    }
+
     /// A light for each lane, its probability, and the lanes that some light can reach.
     #[inline(always)]
     fn select_lanes<S: Simd>(
@@ -197,6 +231,49 @@ impl WideLights {
                 }
             }
         }
+    }
+
+    /// See [`LightShape::pdf`].
+    #[inline(always)]
+    fn pdf<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        position: Vector<S>,
+        wi: Vector<S>,
+        distance: Float<S>,
+    ) -> Float<S> {
+        let flags = Bits::gather(&self.flags, id);
+        let origin = Vector::gather(&self.origin, id);
+        let area = Float::gather(&self.area, id);
+        let relative = origin - position;
+        let (zero, one) = (distance.all(0.0), distance.all(1.0));
+        let mut pdf = zero;
+        if self.has_quads {
+            let normal = Vector::gather(&self.normal, id);
+            let cos = -wi.dot(normal);
+            let by_area = distance * distance / (cos * area);
+            pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
+            if by_angle {
+                let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+                let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
+                let (x, y, height) = (relative.dot(unit_u), relative.dot(unit_v), relative.dot(normal));
+                let angle = QuadLanes::new(x, y, height, length_u, length_v, area).solid_angle;
+                pdf = select(flags.has(RECTANGLE) & one.all(SMALL_SOLID_ANGLE).le(angle), one / angle, pdf);
+            }
+        }
+        if self.has_spheres {
+            let radius = Float::gather(&self.radius, id);
+            let (distance2, r2) = (relative.length_squared(), radius * radius);
+            let of_sphere = if by_angle {
+                cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
+            } else {
+                let cos = wi.dot(relative - wi * distance) / radius;
+                select(cos.is_positive(), distance * distance / (cos * area), zero)
+            };
+            pdf = select(flags.has(SPHERE), select(r2.lt(distance2), of_sphere, zero), pdf);
+        }
+        pdf
     }
 
     #[inline(always)]

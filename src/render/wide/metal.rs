@@ -126,7 +126,6 @@ fn sample_visible_normal<S: Simd>(wo: Vector<S>, alpha: Float<S>, u: [Float<S>; 
     // The square of the radius is uniform, and so is the height.
     let r2 = (x * x + y * y).at_most(1.0);
     let z = (one - r2) * (wo_std.z + 1.0) - wo_std.z;
-    // sin θ over the radius: (1 − z)(1 + z) with 1 + z = (1 − r²)(1 + cos) + 1 − cos.
     let sin_theta = (one - z * z).at_least(0.0).sqrt();
     let r = r2.sqrt();
     let middle = r2.is_zero();

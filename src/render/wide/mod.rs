@@ -7,6 +7,7 @@
 //!
 //! Start reading at [`shade`].
 
+mod camera;
 mod metal;
 pub(super) mod place;
 mod tables;
@@ -24,6 +25,7 @@ use crate::lanes::{
     Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, frame_around, select, select_vector,
 };
 use crate::sampling::{Sampler, SamplerLanes};
+pub(super) use camera::{Lens, Pixels};
 use glam::{Vec2, Vec3};
 use metal::MetalLanes;
 use place::{At, Place};
@@ -87,6 +89,62 @@ fn shade_glass<S: Simd>(s: S, group: Group) {
 #[inline(always)]
 fn shade_metal<S: Simd>(s: S, group: Group) {
     shade_kind::<S, METAL>(s, group);
+}
+
+/// Adds the light of hits on emitters, weighted against light sampling having found it.
+///
+/// Only where [`super::LightTable::has_lanes`] and no emission is textured; `dimension`, `survival`, `next` and
+/// `shadows` of the group are not used.
+pub(super) fn shade_emitters(set: InstructionSet, group: Group, radiance: &mut [Vec3]) {
+    dispatch!(set, shade_emissive(group: Group, radiance: &mut [Vec3]));
+}
+
+#[inline(always)]
+fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
+    let Group { scene, techniques, paths, hits, materials, order, .. } = group;
+    let shading = &*scene.shading;
+    for chunk in order.chunks(LANES) {
+        let mut indices = [chunk[0]; LANES];
+        indices[..chunk.len()].copy_from_slice(chunk);
+        let mask = if chunk.len() == LANES { Mask::MAX } else { (1 << chunk.len()) - 1 };
+        let index = Bits::load(s, &indices);
+        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = Place::new(s, &at);
+        let pdf = Float::gather(&paths.pdf, index);
+        let distance = Float::gather(&hits.t, index);
+        let color = Vector::gather(&shading.material_table.color, Bits::gather(materials, index));
+        let mut light = Vector::gather(&paths.throughput, index).times(color);
+        let rivals = mask & place.front & pdf.lt(pdf.all(f32::INFINITY));
+        if rivals != 0 {
+            let mut id = [0; LANES];
+            let mut known = 0;
+            for lane in lanes_of(rivals) {
+                let i = indices[lane] as usize;
+                if let Some(light) = shading.lights.light_of(hits.object[i], hits.prim[i]) {
+                    id[lane] = light;
+                    known |= 1 << lane;
+                }
+            }
+            let (position, normal) = (Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index));
+            let id = Bits::load(s, &id);
+            let other = shading.lights.pdf_lanes(techniques, id, position, normal, -place.wo, distance);
+            let weight = if techniques.mis {
+                light_weight(techniques, pdf, other)
+            } else {
+                select(other.is_positive(), pdf.all(0.0), pdf.all(1.0))
+            };
+            light = light * select(known, weight, pdf.all(1.0));
+        }
+        if scene.shading.features.media {
+            let media = indices.map(|i| paths.media_of(i as usize));
+            light = light.times(transmittance(s, scene, mask, &media, distance));
+        }
+        let light = light.to_arrays();
+        for lane in lanes_of(mask & place.front) {
+            let slot = paths.slot[indices[lane] as usize];
+            radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
+        }
+    }
 }
 
 /// How the surface of each lane scatters.

@@ -78,7 +78,7 @@ pub(in crate::render) const TEXTURED: u32 = 4;
 /// The parameters of all materials of one lobe.
 #[derive(Debug, Default)]
 pub(in crate::render) struct MaterialTable {
-    /// Albedo or reflectance.
+    /// Albedo, reflectance or emitted radiance.
     pub color: [Vec<f32>; 3],
     pub alpha: Vec<f32>,
     pub flags: Vec<u32>,
@@ -95,7 +95,9 @@ impl MaterialTable {
         let mut table = Self::default();
         for material in materials {
             let (color, alpha) = match material {
-                Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => (color, 0.0),
+                Material::Diffuse { albedo: color }
+                | Material::Mirror { reflectance: color }
+                | Material::Emissive { radiance: color } => (color, 0.0),
                 Material::Metal { alpha, reflectance, .. } => {
                     (reflectance, if let ScalarInput::Constant(alpha) = alpha { alpha.clamp(0.0, 1.0) } else { 0.0 })
                 }
