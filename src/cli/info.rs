@@ -11,6 +11,12 @@ use std::sync::Arc;
 pub struct InfoArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    /// Build many trees over each mesh instead, and tell what they and their rays cost.
+    #[arg(long)]
+    tree: bool,
+    /// Print one JSON object.
+    #[arg(long, requires = "tree")]
+    json: bool,
 }
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
@@ -21,6 +27,9 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let extraction = Extraction::new(&inputs, &scene.trees);
     for problem in &extraction.problems {
         eprintln!("warning: {problem}");
+    }
+    if args.tree {
+        return super::trees::run(&inputs, &extraction, args.json);
     }
     let film = *world.resource::<FilmSize>();
     println!("{}", scene.source.title());

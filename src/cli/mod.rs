@@ -5,6 +5,7 @@ mod render;
 mod report;
 mod show;
 mod simplify;
+mod trees;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use firstlight::render::{Integrator, PixelFilter};

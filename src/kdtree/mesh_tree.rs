@@ -27,8 +27,9 @@ impl BuildPreset {
             bins: 16,
             exact_below: 32,
             block,
-            block_cost: 3.0,
+            block_cost: BLOCK_COST,
             empty_factor: 0.9,
+            leaf_limit: 1,
             max_depth: 40,
             max_growth: 8.0,
             clip: true,
@@ -37,13 +38,16 @@ impl BuildPreset {
         match self {
             Self::Best => best,
             Self::Quick => BuildConfig { bins: 8, exact_below: 0, clip: false, max_growth: 2.0, max_depth: 32, ..best },
-            Self::Median => BuildConfig { clip: false, median: true, max_depth: 24, ..best },
+            Self::Median => BuildConfig { clip: false, median: true, leaf_limit: block, max_depth: 24, ..best },
         }
     }
 }
 
 /// Triangles in a leaf block: what one AVX-512 instruction tests.
 pub(super) const BLOCK: usize = 16;
+
+/// Cost of testing a block of a mesh, in visits of an inner node.
+pub(super) const BLOCK_COST: f32 = 3.0;
 
 /// Triangles of a leaf side by side, one array per coordinate.
 ///
@@ -153,11 +157,21 @@ impl Primitives for Triangles<'_> {
 impl MeshTree {
     /// Indices must lie within `positions`, and positions must be finite.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset) -> Self {
+        Self::build_by(positions, triangles, &preset.config(BLOCK))
+    }
+
+    /// The same with leaves of at most `leaf_limit` triangles, at least 1, that are split no further, whatever it
+    /// would save; for comparison. [`Self::build`] leaves that to the cost, or in a median tree to the block.
+    pub fn build_limited(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset, leaf_limit: usize) -> Self {
+        Self::build_by(positions, triangles, &BuildConfig { leaf_limit: leaf_limit.max(1), ..preset.config(BLOCK) })
+    }
+
+    fn build_by(positions: &[Vec3], triangles: &[[u32; 3]], config: &BuildConfig) -> Self {
         assert!(triangles.len() < FOLLOWED as usize, "a mesh of more than 2^31 triangles");
         let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
         let view = Triangles { positions: &positions, triangles: &triangles };
         let mut blocks = Vec::new();
-        let nodes = build(&view, &preset.config(BLOCK), |prims| {
+        let nodes = build(&view, config, |prims| {
             let first = blocks.len() as u32;
             blocks.extend(prims.chunks(BLOCK).map(|prims| TriangleBlock::new(prims, |prim| view.vertices(prim))));
             let n_followed = blocks.len().saturating_sub(first as usize + 1);
@@ -209,6 +223,21 @@ impl MeshTree {
             (leaves, blocks) = (leaves + 1, blocks + count as usize);
             self.offer_leaf(ray, &shear, &mut nearest, first, count);
             nearest.t
+        };
+        self.nodes.walk_counting(&tree_ray, ray.t_max, visit, || inner += 1);
+        Visits { inner, leaves, blocks }
+    }
+
+    /// What lies along a ray that nothing stops, the empty leaves left out: [`KdTreeStats`] has the mean of it over
+    /// all lines through the bounds.
+    ///
+    /// [`KdTreeStats`]: super::KdTreeStats
+    pub fn count_visits_through(&self, ray: &Ray) -> Visits {
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &Shear::new(ray.dir), self.extent);
+        let (mut leaves, mut blocks, mut inner) = (0, 0, 0);
+        let visit = |_, count| {
+            (leaves, blocks) = (leaves + 1, blocks + count as usize);
+            ray.t_max
         };
         self.nodes.walk_counting(&tree_ray, ray.t_max, visit, || inner += 1);
         Visits { inner, leaves, blocks }

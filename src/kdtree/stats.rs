@@ -1,6 +1,6 @@
 //! What a tree looks like: counts for reports, and the invariants that tests rely on.
 
-use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
+use super::mesh_tree::{BLOCK, BLOCK_COST, MeshTree, TriangleBlock};
 use super::nodes::{KdNode, KdNodes, Node};
 use super::wide::WideNode;
 use crate::geometry::Aabb;
@@ -39,6 +39,12 @@ pub struct Visits {
 impl KdTreeStats {
     pub fn references_per_primitive(&self) -> f64 {
         self.references as f64 / self.primitives.max(1) as f64
+    }
+
+    /// What a line through the bounds costs on average if nothing stops it, in visits of an inner node: what the
+    /// surface area heuristic makes small.
+    pub fn sah_cost(&self) -> f64 {
+        self.expected_inner_visits + f64::from(BLOCK_COST) * self.expected_block_tests
     }
 }
 
