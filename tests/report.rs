@@ -74,7 +74,8 @@ fn every_technique_switched_off_leaves_the_mean_alone() {
 #[test]
 fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
     let room = room();
-    let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
+    // Direct light alone: caustics fall too unevenly to be told anything of in so few pixels.
+    let settings = RenderSettings { seed: 1, max_depth: 2, ..RenderSettings::default() };
     let size = (32, 24);
     let mut told = Vec::new();
     let rungs = climb(&room, &settings, size, Limits { spp: 48, seconds: None }, &mut |share| told.push(share));
@@ -160,7 +161,7 @@ fn the_command_writes_a_page_and_a_table() {
 /// pixels may lie beside it by chance.
 #[test]
 fn estimated_error_is_the_true_error_on_every_builtin_scene() {
-    let size = (48, 36);
+    let size = (96, 72);
     for (name, _, _) in BUILTIN_SCENES {
         let source = SceneSource::Builtin((*name).to_owned());
         let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
@@ -168,13 +169,13 @@ fn estimated_error_is_the_true_error_on_every_builtin_scene() {
         scene.spawn(&mut world);
         let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
         let settings = world.resource::<Rendering>().0;
-        let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 8192).0;
+        let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 2048).0;
         let truth = LinearPicture::of(&truth);
         // Sums of squares, estimated and true, a step.
-        let mut sums = vec![(0.0, 0.0); 8];
-        for seed in 0..6 {
+        let mut sums = vec![(0.0, 0.0); 7];
+        for seed in 0..4 {
             let settings = RenderSettings { seed, ..settings };
-            let rungs = climb(&snapshot, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| ());
+            let rungs = climb(&snapshot, &settings, size, Limits { spp: 64, seconds: None }, &mut |_| ());
             let ladder = Ladder::measure(&rungs, &truth, &Display::default());
             for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
                 sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));
