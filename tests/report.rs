@@ -9,9 +9,7 @@ use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, RenderSettings, ScalarInput, Snapshot, Techniques,
 };
 use firstlight::report::{Key, Ladder, Limits, LinearPicture, ReferenceStore, climb};
-use firstlight::scene::{
-    BUILTIN_SCENES, Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load,
-};
+use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
 /// A room with lights of every shape, one much brighter than the others, matte, glossy and mirroring things.
@@ -156,14 +154,15 @@ fn the_command_writes_a_page_and_a_table() {
     assert!(fail(&["cornel"]).contains("cornell"));
 }
 
-/// On every built-in scene, from 16 samples a pixel on, the estimate agrees with the true error within ×1.25: as root
-/// of the mean of squares over several renders, because where rare bright samples rule (gallery), one render of so few
-/// pixels may lie beside it by chance.
+/// From 16 samples a pixel on, the estimate agrees with the true error within ×1.25, with caustics, soft shadows, wide
+/// lenses, tiny and glossy lights: as root of the mean of squares over several renders, because where rare bright
+/// samples rule (gallery), one render of so few pixels may lie beside it by chance. `firstlight report` shows the ratio
+/// for any scene.
 #[test]
-fn estimated_error_is_the_true_error_on_every_builtin_scene() {
+fn estimated_error_is_the_true_error() {
     let size = (96, 72);
-    for (name, _, _) in BUILTIN_SCENES {
-        let source = SceneSource::Builtin((*name).to_owned());
+    for name in ["gallery", "cornell", "cornell-balls", "dof-balls", "veach-mis"] {
+        let source = SceneSource::Builtin(name.to_owned());
         let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
@@ -172,7 +171,7 @@ fn estimated_error_is_the_true_error_on_every_builtin_scene() {
         let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 2048).0;
         let truth = LinearPicture::of(&truth);
         // Sums of squares, estimated and true, a step.
-        let mut sums = vec![(0.0, 0.0); 7];
+        let mut sums = [(0.0, 0.0); 7];
         for seed in 0..4 {
             let settings = RenderSettings { seed, ..settings };
             let rungs = climb(&snapshot, &settings, size, Limits { spp: 64, seconds: None }, &mut |_| ());

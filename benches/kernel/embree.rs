@@ -77,6 +77,7 @@ pub struct Embree {
     device: Handle,
     new_scene: unsafe extern "C" fn(Handle) -> Handle,
     set_quality: unsafe extern "C" fn(Handle, c_int),
+    set_flags: unsafe extern "C" fn(Handle, c_int),
     new_geometry: unsafe extern "C" fn(Handle, c_int) -> Handle,
     #[allow(clippy::type_complexity)]
     set_buffer: unsafe extern "C" fn(Handle, c_int, u32, c_int, *const c_void, usize, usize, usize),
@@ -110,7 +111,7 @@ impl Embree {
             };
             macro_rules! function {
                 ($name:literal) => {
-                    std::mem::transmute::<*mut c_void, _>(symbol($name)?)
+                    std::mem::transmute_copy(&symbol($name)?)
                 };
             }
             let new_device: unsafe extern "C" fn(*const c_char) -> Handle = function!("rtcNewDevice");
@@ -122,6 +123,7 @@ impl Embree {
                 device,
                 new_scene: function!("rtcNewScene"),
                 set_quality: function!("rtcSetSceneBuildQuality"),
+                set_flags: function!("rtcSetSceneFlags"),
                 new_geometry: function!("rtcNewGeometry"),
                 set_buffer: function!("rtcSetSharedGeometryBuffer"),
                 commit_geometry: function!("rtcCommitGeometry"),
@@ -143,6 +145,9 @@ impl Embree {
         let scene = unsafe {
             let scene = (self.new_scene)(self.device);
             (self.set_quality)(scene, 2);
+            if std::env::var_os("FIRSTLIGHT_EMBREE_ROBUST").is_some() {
+                (self.set_flags)(scene, 1 << 2);
+            }
             let geometry = (self.new_geometry)(self.device, 0);
             (self.set_buffer)(geometry, 1, 0, 0x9003, positions.as_ptr().cast(), 0, 12, positions.len() - 1);
             (self.set_buffer)(geometry, 0, 0, 0x5003, triangles.as_ptr().cast(), 0, 12, triangles.len());

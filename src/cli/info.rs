@@ -74,6 +74,7 @@ fn kind_of_material(material: &Material) -> &'static str {
         Material::Metal { .. } => "metal",
         Material::Glass { .. } => "glass",
         Material::Blend { .. } => "blend",
+        Material::Phong { .. } => "phong",
         Material::Emissive { .. } => "emissive",
     }
 }

@@ -7,7 +7,7 @@ mod show;
 mod simplify;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use firstlight::render::Integrator;
+use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::{BUILTIN_SCENES, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 use std::process::ExitCode;
 
@@ -63,6 +63,27 @@ impl From<IntegratorArg> for Integrator {
         match arg {
             IntegratorArg::Path => Self::Path,
             IntegratorArg::Phong => Self::Phong,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FilterArg {
+    Box,
+    Tent,
+    Gaussian,
+    BlackmanHarris,
+    Mitchell,
+}
+
+impl From<FilterArg> for PixelFilter {
+    fn from(arg: FilterArg) -> Self {
+        match arg {
+            FilterArg::Box => Self::Box,
+            FilterArg::Tent => Self::Tent,
+            FilterArg::Gaussian => Self::Gaussian,
+            FilterArg::BlackmanHarris => Self::BlackmanHarris,
+            FilterArg::Mitchell => Self::Mitchell,
         }
     }
 }

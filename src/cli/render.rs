@@ -1,6 +1,6 @@
 //! `firstlight render SCENE -o out.png`: a picture without a window.
 
-use super::{Failure, IntegratorArg, SceneArgs, parse_positive, parse_size};
+use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
 use clap::Args;
 use firstlight::frame::{OfflineReport, Target, check_writable, render_offline, write_film};
 use firstlight::render::{Film, RenderSettings};
@@ -42,6 +42,9 @@ pub struct RenderArgs {
     /// The light model; the scene's own when not given.
     #[arg(long, value_enum)]
     pub integrator: Option<IntegratorArg>,
+    /// How the light around a pixel is weighted; the scene's own when not given.
+    #[arg(long, value_enum)]
+    pub filter: Option<FilterArg>,
     /// Longest path in segments; 1 shows lights alone.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: Option<u32>,
@@ -127,6 +130,7 @@ fn settings(args: &RenderArgs, of_scene: RenderSettings) -> RenderSettings {
         integrator: args.integrator.map_or(of_scene.integrator, Into::into),
         max_depth: args.max_depth.unwrap_or(of_scene.max_depth),
         seed: args.seed,
+        filter: args.filter.map_or(of_scene.filter, Into::into),
         ..of_scene
     }
 }

@@ -57,6 +57,7 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         threads: args.threads,
         seed: args.seed,
         integrator: None,
+        filter: None,
         max_depth: None,
         exposure: 0.0,
         json: false,

@@ -108,6 +108,9 @@ pub fn compare_settings(old: &RenderSettings, new: &RenderSettings, changes: &mu
     if old.max_depth != new.max_depth {
         changes.add(Level::Restart, "maximum depth");
     }
+    if old.filter != new.filter {
+        changes.add(Level::Restart, "pixel filter");
+    }
     if old.seed != new.seed {
         changes.add(Level::Restart, "seed");
     }

@@ -32,6 +32,17 @@ pub(super) struct NearestLanes {
     pub found: Mask,
 }
 
+/// What waits to be visited: node, lanes, and their intervals. Made once for many packets, for clearing it takes
+/// longer than tracing some of them.
+pub(super) struct PacketStack<S: Simd>([(u32, Mask, S::F, S::F); MAX_DEPTH]);
+
+impl<S: Simd> PacketStack<S> {
+    #[inline(always)]
+    pub fn new(s: S) -> Self {
+        Self([(0, 0, s.splat(0.0), s.splat(0.0)); MAX_DEPTH])
+    }
+}
+
 /// What all rays of a group share, and their reciprocals.
 struct Group<S: Simd> {
     inv_lo: [S::F; 3],
@@ -47,7 +58,7 @@ struct Group<S: Simd> {
 impl<S: Simd> MeshPacket<S> {
     /// Finds the nearest hits; with `ANY` a ray ends at its first hit.
     #[inline(always)]
-    pub fn trace<const ANY: bool>(&mut self, s: S, tree: &MeshTree) {
+    pub fn trace<const ANY: bool>(&mut self, s: S, tree: &MeshTree, stack: &mut PacketStack<S>) {
         let [x, y, z] = [s.abs(self.dir[0]), s.abs(self.dir[1]), s.abs(self.dir[2])];
         let along_x = s.le(y, x) & s.le(z, x);
         let along_y = !along_x & s.le(z, y);
@@ -62,12 +73,20 @@ impl<S: Simd> MeshPacket<S> {
             left &= !group;
             let octant = (0..3).fold(0, |octant, axis| octant | usize::from(down[axis] >> first & 1) << axis);
             let kz = if along_x >> first & 1 != 0 { 0 } else { 2 - usize::from(along_y >> first & 1) };
-            self.trace_group::<ANY>(s, tree, group, octant, kz);
+            self.trace_group::<ANY>(s, tree, stack, group, octant, kz);
         }
     }
 
     #[inline(always)]
-    fn trace_group<const ANY: bool>(&mut self, s: S, tree: &MeshTree, lanes: Mask, octant: usize, kz: usize) {
+    fn trace_group<const ANY: bool>(
+        &mut self,
+        s: S,
+        tree: &MeshTree,
+        stack: &mut PacketStack<S>,
+        lanes: Mask,
+        octant: usize,
+        kz: usize,
+    ) {
         let one = s.splat(1.0);
         let inv = [s.div(one, self.dir[0]), s.div(one, self.dir[1]), s.div(one, self.dir[2])];
         let (shorter, longer) = (s.splat(1.0 - WIDEN), s.splat(1.0 + WIDEN));
@@ -86,12 +105,12 @@ impl<S: Simd> MeshPacket<S> {
         let (mut t0, mut t1) = (s.splat(0.0), s.load(&self.nearest.t));
         for axis in 0..3 {
             let down = octant >> axis & 1;
+            let (entry, exit) = (bounds[down], bounds[1 - down]);
             // NaN as the first argument loses against the second.
-            t0 = s.max(self.crossing(s, &group, axis, bounds[down][axis]).0, t0);
-            t1 = s.min(self.crossing(s, &group, axis, bounds[1 - down][axis]).1, t1);
+            t0 = s.max(self.crossing(s, &group, axis, entry[axis]).0, t0);
+            t1 = s.min(self.crossing(s, &group, axis, exit[axis]).1, t1);
         }
         let mut mask = lanes & s.le(t0, t1);
-        let mut stack = [(0u32, 0 as Mask, t0, t1); MAX_DEPTH];
         let mut height = 0;
         let mut index = 0u32;
         while mask != 0 {
@@ -105,7 +124,7 @@ impl<S: Simd> MeshPacket<S> {
                         (index, mask, t0) = (far, far_mask, s.max(lo, t0));
                     } else {
                         if far_mask != 0 {
-                            stack[height % MAX_DEPTH] = (far, far_mask, s.max(lo, t0), t1);
+                            stack.0[height % MAX_DEPTH] = (far, far_mask, s.max(lo, t0), t1);
                             height += 1;
                         }
                         (index, mask, t1) = (near, near_mask, s.min(hi, t1));
@@ -123,7 +142,7 @@ impl<S: Simd> MeshPacket<S> {
             mask = 0;
             while height > 0 && mask == 0 {
                 height -= 1;
-                (index, mask, t0, t1) = stack[height % MAX_DEPTH];
+                (index, mask, t0, t1) = stack.0[height % MAX_DEPTH];
                 let limit = s.load(&self.nearest.t);
                 mask &= s.le(t0, limit);
                 if ANY {
@@ -143,7 +162,7 @@ impl<S: Simd> MeshPacket<S> {
 
     #[inline(always)]
     fn test_leaf(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mask: Mask) {
-        let n_triangles = block.len();
+        let n_triangles = block.count(s);
         if (mask.count_ones() as usize) < n_triangles {
             self.test_by_ray(s, group, block, mask);
         } else {

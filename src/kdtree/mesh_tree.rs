@@ -3,6 +3,7 @@
 use super::build::{BuildConfig, Primitives, build, clip_triangle};
 use super::nodes::KdNodes;
 use super::ray::{Nearest, TreeRay};
+use super::simd::Simd;
 use super::stats::Visits;
 use super::wide::{WideNode, widen};
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
@@ -90,6 +91,12 @@ impl TriangleBlock {
     #[inline(always)]
     pub fn is_followed(&self) -> bool {
         self.prims[0] & FOLLOWED != 0
+    }
+
+    /// [`Self::len`] in two instructions.
+    #[inline(always)]
+    pub fn count<S: Simd>(&self, s: S) -> usize {
+        s.lt_u(s.load_u(&self.prims), s.splat_u(u32::MAX)).count_ones() as usize
     }
 
     /// How many lanes hold a triangle.

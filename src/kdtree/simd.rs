@@ -35,8 +35,6 @@ pub(super) trait Simd: Copy {
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
     fn abs(self, a: Self::F) -> Self::F;
-    /// `a · b + c`, rounded once.
-    fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `a · b - c`, rounded once.
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `c - a · b`, rounded once.
@@ -212,10 +210,6 @@ impl Simd for Portable {
         a.map(f32::abs)
     }
     #[inline(always)]
-    fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
-        std::array::from_fn(|i| a[i].mul_add(b[i], c[i]))
-    }
-    #[inline(always)]
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         std::array::from_fn(|i| a[i].mul_add(b[i], -c[i]))
     }
@@ -347,7 +341,6 @@ mod tests {
                 s.min(a, b),
                 s.max(a, b),
                 s.abs(a),
-                s.mul_add(a, b, c),
                 s.mul_sub(a, b, c),
                 s.neg_mul_add(a, b, c),
                 s.select(0x5A3C, a, b),

@@ -58,7 +58,6 @@ impl Simd for Avx512 {
         fn min(a: __m512, b: __m512) -> __m512 { _mm512_min_ps(a, b) }
         fn max(a: __m512, b: __m512) -> __m512 { _mm512_max_ps(a, b) }
         fn abs(a: __m512) -> __m512 { _mm512_abs_ps(a) }
-        fn mul_add(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmadd_ps(a, b, c) }
         fn mul_sub(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmsub_ps(a, b, c) }
         fn neg_mul_add(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fnmadd_ps(a, b, c) }
         fn negative(a: __m512) -> Mask { _mm512_movepi32_mask(_mm512_castps_si512(a)) }
@@ -207,7 +206,6 @@ impl Simd for Avx2 {
             let sign = _mm256_set1_ps(-0.0);
             [_mm256_andnot_ps(sign, a[0]), _mm256_andnot_ps(sign, a[1])]
         }
-        fn mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fmadd_ps(a, b, c)) }
         fn mul_sub(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fmsub_ps(a, b, c)) }
         fn neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fnmadd_ps(a, b, c)) }
         fn negative(a: Self::F) -> Mask { bits_of(a[0], a[1]) }

@@ -10,7 +10,7 @@ use super::lanes::{may_hit, resolve, shear};
 use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
 use super::ray::{Nearest, TreeRay};
 use super::simd::Simd;
-use super::wide::{DescentRay, LEAF, STACK, Stack, WideNode};
+use super::wide::{DescentRay, LEAF, Stack, WideNode};
 use crate::geometry::{Ray, Shear};
 
 /// Rays in flight.
@@ -141,25 +141,22 @@ pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut 
             let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
             let t1 = if slot.nearest.t < slot.t1 { slot.nearest.t } else { slot.t1 };
             slot.height = s.descend(&wide[slot.child as usize], &slot.descent, slot.t0, t1, stack, slot.height);
-            slot.pop(stack);
-            if prefetch {
-                fetch(s, wide, blocks, slot.child);
-            }
+        }
+        // A loop of its own: what it guesses wrong throws little away.
+        for &i in &list[..len] {
+            let slot = &mut slots[i as usize % SLOTS];
+            slot.pop(&stacks[i as usize % SLOTS]);
+            fetch::<S, 2>(s, prefetch, wide, blocks, slot.child);
             inner.push_if(slot.child < DONE, i);
             leaf.push_if(slot.child > DONE, i);
             idle.push_if(slot.child == DONE, i);
         }
         let (list, len) = leaf.take();
-        if prefetch {
-            for &i in &list[..len] {
-                let at = blocks.as_ptr().wrapping_add((slots[i as usize % SLOTS].child & !LEAF) as usize);
-                for line in 2..size_of::<TriangleBlock>() / 64 {
-                    s.prefetch(at.cast::<u8>().wrapping_add(64 * line));
-                }
-            }
+        for &i in &list[..len] {
+            fetch::<S, { size_of::<TriangleBlock>() / 64 }>(s, prefetch, wide, blocks, slots[i as usize % SLOTS].child);
         }
         for &i in &list[..len] {
-            let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
+            let slot = &mut slots[i as usize % SLOTS];
             let mut block = (slot.child & !LEAF) as usize;
             loop {
                 test_block(s, &blocks[block], &slot.leaf, &mut slot.nearest);
@@ -168,13 +165,14 @@ pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut 
                 }
                 block += 1;
             }
-            slot.pop(stack);
+        }
+        for &i in &list[..len] {
+            let slot = &mut slots[i as usize % SLOTS];
+            slot.pop(&stacks[i as usize % SLOTS]);
             if ANY && slot.nearest.found {
                 slot.child = DONE;
             }
-            if prefetch {
-                fetch(s, wide, blocks, slot.child);
-            }
+            fetch::<S, 2>(s, prefetch, wide, blocks, slot.child);
             inner.push_if(slot.child < DONE, i);
             leaf.push_if(slot.child > DONE, i);
             idle.push_if(slot.child == DONE, i);
@@ -182,14 +180,17 @@ pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut 
     }
 }
 
-/// Asks for the first lines of what will be visited next, whatever it is.
+/// Asks for the first `LINES` cache lines of what will be visited next, whatever it is.
 #[inline(always)]
-fn fetch<S: Simd>(s: S, wide: &[WideNode], blocks: &[TriangleBlock], child: u32) {
-    let node = wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
-    let block = blocks.as_ptr().wrapping_add((child & !LEAF) as usize).cast::<u8>();
-    let at = if child & LEAF != 0 { block } else { node };
-    s.prefetch(at);
-    s.prefetch(at.wrapping_add(64));
+fn fetch<S: Simd, const LINES: usize>(s: S, wanted: bool, wide: &[WideNode], blocks: &[TriangleBlock], child: u32) {
+    if wanted {
+        let node = wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
+        let block = blocks.as_ptr().wrapping_add((child & !LEAF) as usize).cast::<u8>();
+        let at = if child & LEAF != 0 { block } else { node };
+        for line in 0..LINES {
+            s.prefetch(at.wrapping_add(64 * line));
+        }
+    }
 }
 
 /// Starts the next ray that meets the bounds; false if there are no more.
@@ -235,10 +236,10 @@ impl Slot {
     #[inline(always)]
     fn pop(&mut self, stack: &Stack) {
         let mut top = self.height - 1;
-        while stack.t0[top % STACK] > self.nearest.t {
+        while stack.t0[top] > self.nearest.t {
             top -= 1;
         }
         self.height = top;
-        (self.child, self.t0, self.t1) = (stack.child[top % STACK], stack.t0[top % STACK], stack.t1[top % STACK]);
+        (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], stack.t1[top]);
     }
 }

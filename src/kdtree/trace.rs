@@ -4,7 +4,7 @@
 //! packet when the caller says that they belong together, otherwise in a stream. None of this changes what is found.
 
 use super::batch::{HitBatch, RayBatch};
-use super::mesh_packet::{MeshPacket, NearestLanes};
+use super::mesh_packet::{MeshPacket, NearestLanes, PacketStack};
 use super::objects::{Packet, SimpleObjects};
 use super::ray::Nearest;
 use super::scene_tree::{RayClass, SceneTree, Shape};
@@ -66,6 +66,7 @@ impl FlatScene {
 
 #[inline(always)]
 fn closest<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
+    let mut stack = PacketStack::new(s);
     for chunk in (0..rays.len()).step_by(CHUNK) {
         let chunk = chunk..(chunk + CHUNK).min(rays.len());
         for first in chunk.clone().step_by(LANES) {
@@ -74,7 +75,14 @@ fn closest<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, 
             if class == RayClass::Coherent {
                 for &object in &flat.instances {
                     if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        trace_packet::<S, false>(s, tree, &scene.instances[object as usize], object, &mut packet);
+                        trace_packet::<S, false>(
+                            s,
+                            tree,
+                            &scene.instances[object as usize],
+                            object,
+                            &mut packet,
+                            &mut stack,
+                        );
                     }
                 }
             }
@@ -100,6 +108,7 @@ fn closest<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, 
 
 #[inline(always)]
 fn any<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]) {
+    let mut stack = PacketStack::new(s);
     for chunk in (0..rays.len()).step_by(CHUNK) {
         let chunk = chunk..(chunk + CHUNK).min(rays.len());
         for first in chunk.clone().step_by(LANES) {
@@ -108,7 +117,14 @@ fn any<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, clas
             if class == RayClass::Coherent {
                 for &object in &flat.instances {
                     if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        trace_packet::<S, true>(s, tree, &scene.instances[object as usize], object, &mut packet);
+                        trace_packet::<S, true>(
+                            s,
+                            tree,
+                            &scene.instances[object as usize],
+                            object,
+                            &mut packet,
+                            &mut stack,
+                        );
                     }
                 }
             }
@@ -156,6 +172,7 @@ fn trace_packet<S: Simd, const ANY: bool>(
     instance: &Instance,
     object: u32,
     packet: &mut Packet<S>,
+    stack: &mut PacketStack<S>,
 ) {
     let lanes = if ANY { packet.lanes & !packet.found } else { packet.lanes };
     if lanes == 0 {
@@ -175,7 +192,7 @@ fn trace_packet<S: Simd, const ANY: bool>(
     let wins_ties: Mask = packet.found & s.lt_u(s.splat_u(object), packet.object);
     s.store_u(s.select_u(wins_ties, s.splat_u(u32::MAX), s.splat_u(0)), &mut nearest.prim);
     let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest };
-    mesh_packet.trace::<ANY>(s, tree);
+    mesh_packet.trace::<ANY>(s, tree, stack);
     let nearest = mesh_packet.nearest;
     let take = nearest.found;
     packet.t = s.select(take, s.load(&nearest.t), packet.t);

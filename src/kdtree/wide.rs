@@ -28,8 +28,9 @@ const _: () = assert!(size_of::<WideNode>() == 128);
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Entries that a walk may have on its stack, and room for one full store beyond.
-pub(super) const STACK: usize = 128;
+/// Entries that a walk may have on its stack, and room for one full store beyond. An odd number of cache lines, so
+/// that the stacks of many rays do not compete for the same few sets of the cache.
+pub(super) const STACK: usize = 144;
 
 /// What waits to be visited, nearest on top.
 #[repr(C, align(64))]
@@ -216,7 +217,7 @@ mod tests {
                     WideNode { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
                 let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
-                (0..7).for_each(|plane| node.axes |= next() % 3 << (3 * plane));
+                (0..7).for_each(|plane| node.axes |= (next() % 3) << (3 * plane));
                 if next() % 4 == 0 {
                     node.splits[2] = f32::INFINITY;
                 }

@@ -71,7 +71,8 @@ impl Mesh {
         let max = self.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
         let size = (max - min).max_element();
         // Squared lengths and areas of the box must stay finite in single precision.
-        if !(16.0 * size * size <= f64::from(f32::MAX)) {
+        let square = 16.0 * size * size;
+        if square.is_nan() || square > f64::from(f32::MAX) {
             return Err(MeshError::TooLarge { size });
         }
         self.validate_attributes()

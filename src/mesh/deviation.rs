@@ -142,7 +142,8 @@ mod tests {
             assert!((found.mean - 0.25).abs() < 1e-12 && (found.rms - 0.25).abs() < 1e-12);
             assert!((found.max - 0.25).abs() < 1e-12);
         }
-        assert_eq!(Deviation::between(&plate, &plate, 1000).max(), 0.0);
+        // Points on a face are known to rounding, and so is their distance to it.
+        assert!(Deviation::between(&plate, &plate, 1000).max() < 1e-12);
     }
 
     #[test]
@@ -162,7 +163,7 @@ mod tests {
         let mut part = whole.clone();
         part.triangles.truncate(2);
         let deviation = Deviation::between(&part, &whole, 2000);
-        assert_eq!(deviation.forward.max, 0.0);
+        assert!(deviation.forward.max < 1e-12, "{deviation:?}");
         assert!((deviation.backward.max - 1.0).abs() < 1e-6, "{deviation:?}");
     }
 }

@@ -82,7 +82,7 @@ impl Topology {
     fn count_vertices(&mut self, triangles: &[[u32; 3]], places: usize) {
         // Fans at a vertex: its corners, joined when they share an edge that ends there.
         let mut spokes: Vec<(u32, u32, u32)> = Vec::with_capacity(triangles.len() * 6);
-        for (t, &[a, b, c]) in triangles.iter().enumerate().filter(|(_, t)| distinct(*t)) {
+        for (t, &[a, b, c]) in triangles.iter().enumerate().filter(|(_, t)| distinct(t)) {
             for (corner, (at, others)) in [(a, [b, c]), (b, [c, a]), (c, [a, b])].into_iter().enumerate() {
                 spokes.extend(others.map(|other| (at, other, (3 * t + corner) as u32)));
             }

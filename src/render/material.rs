@@ -47,12 +47,36 @@ pub enum Material {
     /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
     /// is constant: see [`Emission::of`].
     Blend { weight: ScalarInput, a: MaterialId, b: MaterialId },
+    /// The classic local model. For paths it is matte, mirror and glass in shares that sum to 1: `transparency`, of
+    /// the rest `specular`, of the rest `diffuse`.
+    Phong {
+        diffuse: ColorInput,
+        /// Of the ambient light, the share of `diffuse` that comes back.
+        ambient: f32,
+        /// Share that is mirrored; lights appear in it as highlights.
+        specular: ScalarInput,
+        /// Exponent of the highlights.
+        shininess: f32,
+        transparency: f32,
+        /// Of the transparent part, as for glass.
+        ior: f32,
+        absorption: Vec3,
+    },
     /// A black body: emits on its front (a sphere outwards, a face along its normal), reflects nothing.
     Emissive { radiance: ColorInput },
 }
 
 impl Material {
-    pub(super) const KINDS: usize = 6;
+    /// Whether light can pass through the surface.
+    pub(super) fn is_clear(&self) -> bool {
+        match self {
+            Self::Glass { .. } => true,
+            Self::Phong { transparency, .. } => *transparency > 0.0,
+            _ => false,
+        }
+    }
+
+    pub(super) const KINDS: usize = 7;
 
     /// A number below [`Self::KINDS`] for each kind, to sort by.
     #[inline]
@@ -63,7 +87,8 @@ impl Material {
             Self::Mirror { .. } => 2,
             Self::Glass { .. } => 3,
             Self::Metal { .. } => 4,
-            Self::Blend { .. } => 5,
+            Self::Phong { .. } => 5,
+            Self::Blend { .. } => 6,
         }
     }
 }

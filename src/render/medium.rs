@@ -23,6 +23,7 @@ impl MediumStack {
         self.0.iter().rev().copied().find(|&id| id != NONE)
     }
 
+    #[cfg(test)]
     pub fn is_empty(&self) -> bool {
         self.0[0] == NONE
     }
@@ -56,19 +57,22 @@ impl MediumStack {
     /// What is left of light after `distance` metres (Beer–Lambert).
     #[inline]
     pub fn transmittance(&self, scene: &Snapshot, distance: f32) -> Vec3 {
-        match self.top().map(|id| &scene.shading.materials[id as usize]) {
-            Some(Material::Glass { absorption, .. }) if *absorption != Vec3::ZERO => {
-                // 0 · ∞ would be NaN: a channel without absorption keeps everything, however far.
-                Vec3::select(absorption.cmpgt(Vec3::ZERO), (-*absorption * distance).exp(), Vec3::ONE)
-            }
-            _ => Vec3::ONE,
+        let absorption = match self.top().map(|id| &scene.shading.materials[id as usize]) {
+            Some(Material::Glass { absorption, .. } | Material::Phong { absorption, .. }) => *absorption,
+            Some(_) => Vec3::ZERO,
+            None => scene.shading.air,
+        };
+        if absorption == Vec3::ZERO {
+            return Vec3::ONE;
         }
+        // 0 · ∞ would be NaN: a channel without absorption keeps everything, however far.
+        Vec3::select(absorption.cmpgt(Vec3::ZERO), (-absorption * distance).exp(), Vec3::ONE)
     }
 }
 
 fn ior(scene: &Snapshot, id: Option<MaterialId>) -> f32 {
     match id.map(|id| &scene.shading.materials[id as usize]) {
-        Some(Material::Glass { ior, .. }) => *ior,
+        Some(Material::Glass { ior, .. } | Material::Phong { ior, .. }) => *ior,
         _ => 1.0,
     }
 }

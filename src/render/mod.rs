@@ -2,6 +2,7 @@
 //!
 //! Start reading at [`Snapshot`] (what is rendered), [`advance`] (how) and [`Film`] (where it goes).
 
+mod ambient;
 mod bsdf;
 mod camera;
 mod develop;
@@ -9,11 +10,13 @@ mod dielectric;
 mod environment;
 mod estimate;
 mod film;
+mod filter;
 mod ggx;
 mod light;
 mod material;
 mod medium;
 mod path;
+mod phong;
 mod renderer;
 mod snapshot;
 mod surface;
@@ -25,6 +28,7 @@ pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encod
 pub use environment::Environment;
 pub use estimate::ErrorEstimate;
 pub use film::Film;
+pub use filter::PixelFilter;
 pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
 pub use renderer::{BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, replay_sample};

@@ -12,7 +12,7 @@ use super::medium::MediumStack;
 use super::renderer::{RayCounts, RenderSettings};
 use super::surface::{Vertex, blend_at, lobe_at, material_of};
 use super::{Material, MaterialId, Snapshot, Techniques};
-use crate::geometry::{Ray, robust};
+use crate::geometry::Ray;
 use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use crate::sampling::Sampler;
 use glam::Vec3;
@@ -38,6 +38,8 @@ pub(super) struct CameraPath {
     pub ray: Ray,
     pub sampler: Sampler,
     pub slot: u32,
+    /// Of what it finds, see [`super::filter`].
+    pub weight: f32,
 }
 
 /// The state of one path between two bounces.
@@ -114,10 +116,10 @@ impl PathWave {
     fn start(&mut self, camera_paths: impl Iterator<Item = CameraPath>) {
         self.rays.clear();
         self.paths.clear();
-        for CameraPath { ray, sampler, slot } in camera_paths {
+        for CameraPath { ray, sampler, slot, weight } in camera_paths {
             self.rays.push(&ray);
             self.paths.push(Path {
-                throughput: Vec3::ONE,
+                throughput: Vec3::splat(weight),
                 pdf: f32::INFINITY,
                 position: ray.origin,
                 normal: ray.dir,
@@ -143,7 +145,7 @@ impl PathWave {
                 radiance[path.slot as usize] += path.throughput * environment_light(scene, techniques, &path, ray.dir);
                 continue;
             };
-            if scene.shading.features.glass && !path.media.is_empty() {
+            if scene.shading.features.media {
                 path.throughput *= path.media.transmittance(scene, hit.t);
             }
             let material = material_of(scene, &hit);
@@ -158,7 +160,7 @@ impl PathWave {
                 continue;
             }
             let step = Step { scene, techniques, path: &path, vertex: &vertex, material, depth };
-            if let Material::Blend { .. } = &scene.shading.materials[material as usize] {
+            if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
                 if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
                     self.scatter(step, &blend);
                 }
@@ -227,16 +229,20 @@ impl PathWave {
             (Some(sample.target), sample)
         };
         let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
-        // Light must reach the true side of the surface, not only that of the interpolated normal.
-        if pdf <= 0.0 || sample.wi.dot(vertex.geometric_normal) <= 0.0 {
+        if pdf <= 0.0 || !vertex.is_reached_from(sample.wi) {
             return;
         }
         let weight = light_weight(techniques, sample.pdf, pdf) / sample.pdf;
-        let light = path.throughput * value * sample.radiance * weight;
+        let mut light = path.throughput * value * sample.radiance * weight;
         if light == Vec3::ZERO {
             return;
         }
-        let origin = robust::offset_ray_origin(vertex.position, vertex.error, vertex.geometric_normal, sample.wi);
+        if shading.features.media
+            && let Some(target) = target
+        {
+            light *= path.media.transmittance(scene, vertex.position.distance(target));
+        }
+        let origin = vertex.leaving(sample.wi);
         let shadow_ray = match target {
             // The direction spans the way to the light's own bounded point, where the ray ends: t = 1, excluded.
             Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
@@ -257,7 +263,7 @@ impl PathWave {
         let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
         // The true surface decides which side a direction leads to.
         let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
-        if beyond != sample.transmitted {
+        if if sample.transmitted { !beyond } else { !vertex.is_reached_from(sample.wi) } {
             return;
         }
         path.throughput *= sample.weight;
@@ -267,7 +273,7 @@ impl PathWave {
         if depth >= if techniques.roulette { ROULETTE_DEPTH } else { ENDLESS_DEPTH } {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
-            let most = path.throughput.max_element() * ior * ior;
+            let most = path.throughput.abs().max_element() * ior * ior;
             let survival = if depth >= ENDLESS_DEPTH { most.min(0.95) } else { most.min(1.0) };
             if survival < 1.0 {
                 if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -282,7 +288,7 @@ impl PathWave {
         path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
         path.position = vertex.position;
         path.normal = vertex.normal;
-        let origin = robust::offset_ray_origin(vertex.position, vertex.error, vertex.geometric_normal, sample.wi);
+        let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         self.next_rays.push(&Ray::new(origin, sample.wi));
         self.next_paths.push(path);
     }

@@ -1,7 +1,9 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
 use super::film::{Film, FilmTile};
+use super::filter::{FilterSampler, PixelFilter};
 use super::path::{CameraPath, PathWave};
+use super::phong::PhongWave;
 use super::{Snapshot, Techniques};
 use crate::geometry::Ray;
 use crate::sampling::Sampler;
@@ -27,12 +29,14 @@ pub struct RenderSettings {
     /// Longest path in segments; 1 shows emitters alone. `u32::MAX` is unbounded.
     pub max_depth: u32,
     pub seed: u32,
+    pub filter: PixelFilter,
     pub techniques: Techniques,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0, techniques: Techniques::default() }
+        let (filter, techniques) = (PixelFilter::Box, Techniques::default());
+        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0, filter, techniques }
     }
 }
 
@@ -90,10 +94,11 @@ pub fn advance(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
     let size = UVec2::new(film.width(), film.height());
+    let pass = Pass { snapshot, settings, filter: FilterSampler::new(settings.filter), size };
     let reports: Vec<PassReport> = film
         .tiles
         .par_iter_mut()
-        .map_init(PathWave::default, |wave, tile| advance_tile(snapshot, settings, size, tile, target_spp, stop, wave))
+        .map_init(Wave::default, |wave, tile| advance_tile(&pass, tile, target_spp, stop, wave))
         .collect();
     let mut total = PassReport { completed: true, ..PassReport::default() };
     for report in reports {
@@ -111,14 +116,44 @@ const MAX_LISTED_BAD: usize = 16;
 /// Paths in flight at once: enough to keep the kernel busy, few enough for their state to stay in the cache.
 const WAVE_SIZE: usize = 4096;
 
+/// Scratch memory of one worker.
+#[derive(Default)]
+struct Wave {
+    path: PathWave,
+    phong: PhongWave,
+}
+
+impl Wave {
+    /// See [`PathWave::trace`].
+    fn trace(
+        &mut self,
+        scene: &Snapshot,
+        settings: &RenderSettings,
+        camera_paths: impl Iterator<Item = CameraPath>,
+        radiance: &mut [Vec3],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<RayCounts> {
+        match settings.integrator {
+            Integrator::Path => self.path.trace(scene, settings, camera_paths, radiance, stop),
+            Integrator::Phong => self.phong.trace(scene, settings.max_depth, camera_paths, radiance, stop),
+        }
+    }
+}
+
+/// What all tiles share.
+struct Pass<'a> {
+    snapshot: &'a Snapshot,
+    settings: &'a RenderSettings,
+    filter: FilterSampler,
+    size: UVec2,
+}
+
 fn advance_tile(
-    snapshot: &Snapshot,
-    settings: &RenderSettings,
-    film_size: UVec2,
+    pass: &Pass,
     tile: &mut FilmTile,
     target_spp: u32,
     stop: &(dyn Fn() -> bool + Sync),
-    wave: &mut PathWave,
+    wave: &mut Wave,
 ) -> PassReport {
     let mut report = PassReport { completed: true, ..PassReport::default() };
     let n_pixels = tile.n_pixels();
@@ -133,11 +168,11 @@ fn advance_tile(
             let (tile, order) = (&*tile, &order);
             order.iter().map(move |&local| {
                 let pixel = tile.origin + UVec2::new(local % tile.size.x, local / tile.size.x);
-                let (ray, sampler) = camera_ray(snapshot, settings, film_size, pixel, first + s as u32);
-                CameraPath { ray, sampler, slot: s as u32 * n_pixels as u32 + local }
+                let (ray, sampler, weight) = pass.camera_ray(pixel, first + s as u32);
+                CameraPath { ray, sampler, slot: s as u32 * n_pixels as u32 + local, weight }
             })
         });
-        let Some(rays) = wave.trace(snapshot, settings, camera_paths, &mut radiance, stop) else {
+        let Some(rays) = wave.trace(pass.snapshot, pass.settings, camera_paths, &mut radiance, stop) else {
             report.completed = false;
             break;
         };
@@ -159,28 +194,26 @@ fn advance_tile(
 
 /// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film.
 pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
-    let (ray, sampler) = camera_ray(snapshot, settings, film_size, UVec2::new(at.x, at.y), at.sample);
+    let pass = Pass { snapshot, settings, filter: FilterSampler::new(settings.filter), size: film_size };
+    let (ray, sampler, weight) = pass.camera_ray(UVec2::new(at.x, at.y), at.sample);
     let mut radiance = [Vec3::ZERO];
-    let path = CameraPath { ray, sampler, slot: 0 };
-    PathWave::default().trace(snapshot, settings, std::iter::once(path), &mut radiance, &|| false);
+    let path = CameraPath { ray, sampler, slot: 0, weight };
+    Wave::default().trace(snapshot, settings, std::iter::once(path), &mut radiance, &|| false);
     radiance[0]
 }
 
-/// A ray through a uniform point of the pixel's square (box filter) and of the lens.
-#[inline]
-fn camera_ray(
-    snapshot: &Snapshot,
-    settings: &RenderSettings,
-    film_size: UVec2,
-    pixel: UVec2,
-    sample: u32,
-) -> (Ray, Sampler) {
-    let Techniques { even_samples, .. } = settings.techniques;
-    let new_sampler = if even_samples { Sampler::new } else { Sampler::independent };
-    let sampler = new_sampler(settings.seed, pixel.x, pixel.y, sample);
-    let film = pixel.as_vec2() + sampler.pair(0);
-    let lens = if snapshot.camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
-    (snapshot.camera.ray(film, film_size.as_vec2(), lens), sampler)
+impl Pass<'_> {
+    /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
+    #[inline]
+    fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
+        let new_sampler = if self.settings.techniques.even_samples { Sampler::new } else { Sampler::independent };
+        let sampler = new_sampler(self.settings.seed, pixel.x, pixel.y, sample);
+        let (offset, weight) = self.filter.sample(sampler.pair(0));
+        let film = pixel.as_vec2() + offset;
+        let camera = &self.snapshot.camera;
+        let lens = if camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
+        (camera.ray(film, self.size.as_vec2(), lens), sampler, weight)
+    }
 }
 
 /// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.

@@ -3,11 +3,13 @@
 //! It comes in three parts with lives of their own, so that a change replaces no more than it must: a moved camera
 //! keeps [`Geometry`] and [`Shading`], a new material keeps [`Geometry`].
 
+use super::ambient::AmbientLight;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
 use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
 use crate::kdtree::{SceneTree, Shape};
 use crate::mesh::Mesh;
+use glam::{Mat3, Vec3};
 use std::sync::Arc;
 
 #[derive(Clone, Debug)]
@@ -25,12 +27,23 @@ pub struct Geometry {
 }
 
 /// What an object needs beyond its shape.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Object {
     /// Normals, texture coordinates and slots of a mesh; `None` for all other shapes.
     pub mesh: Option<Arc<Mesh>>,
     /// One material a slot; all shapes but meshes have one slot.
     pub materials: Vec<MaterialId>,
+    /// From the world to the object's own axes, a rotation; turns the texture of a lone sphere. `None` for none.
+    pub turned: Option<Mat3>,
+    /// A sphere that stands for a point light: the classic model puts all of its light into its centre.
+    pub is_point_light: bool,
+}
+
+impl Object {
+    /// Anything but a mesh, of one material.
+    pub fn plain(material: MaterialId) -> Self {
+        Self { materials: vec![material], ..Self::default() }
+    }
 }
 
 /// How everything looks and shines; built for one [`Geometry`], because lights are objects.
@@ -39,6 +52,9 @@ pub struct Shading {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub environment: Environment,
+    /// What the air outside of all glass absorbs, per metre; light from the environment has passed it already.
+    pub air: Vec3,
+    pub(super) ambient: AmbientLight,
     /// What each material adds itself.
     pub(super) emission: Vec<Option<Emission>>,
     pub lights: LightTable,
@@ -51,6 +67,8 @@ pub struct Shading {
 pub struct Features {
     /// Some surface can send a path through itself, so paths keep track of what they are inside of.
     pub glass: bool,
+    /// Something absorbs light between surfaces: there may be glass, or there is air that does.
+    pub media: bool,
     /// Some light can be found by choosing a point or direction on it.
     pub light_sampling: bool,
     /// The surroundings shine.
@@ -78,11 +96,22 @@ impl Shading {
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(&materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, &textures);
         let environment_sampler = EnvironmentSampler::build(&environment);
+        let glass = materials.iter().any(Material::is_clear);
         let features = Features {
-            glass: materials.iter().any(|material| matches!(material, Material::Glass { .. })),
+            glass,
+            media: glass,
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),
         };
-        Self { materials, textures, environment, emission, lights, environment_sampler, features }
+        let ambient = AmbientLight::of(&environment);
+        let air = Vec3::ZERO;
+        Self { materials, textures, environment, air, ambient, emission, lights, environment_sampler, features }
+    }
+
+    /// The same under air that absorbs light, per metre.
+    pub fn with_air(mut self, absorption: Vec3) -> Self {
+        self.air = absorption;
+        self.features.media |= absorption != Vec3::ZERO;
+        self
     }
 }

@@ -18,17 +18,20 @@ pub struct Techniques {
     pub roulette: bool,
 }
 
+impl Techniques {
+    pub const ALL: Self = Self {
+        light_sampling: true,
+        mis: true,
+        even_samples: true,
+        solid_angle: true,
+        light_selection: true,
+        roulette: true,
+    };
+}
+
 impl Default for Techniques {
-    /// All of them.
     fn default() -> Self {
-        Self {
-            light_sampling: true,
-            mis: true,
-            even_samples: true,
-            solid_angle: true,
-            light_selection: true,
-            roulette: true,
-        }
+        Self::ALL
     }
 }
 

@@ -13,7 +13,7 @@ const PIXELS_PER_DEGREE: f32 = 67.020_64;
 
 /// Mean FLIP of two pictures of the same size, `width` pixels wide, in linear Rec. 709 display light, 0..1.
 pub fn flip(reference: &[Vec3], test: &[Vec3], width: usize) -> f64 {
-    assert!(width > 0 && reference.len() == test.len() && reference.len() % width == 0, "sizes differ");
+    assert!(width > 0 && reference.len() == test.len() && reference.len().is_multiple_of(width), "sizes differ");
     let map = flip_map(reference, test, width);
     map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64
 }

@@ -19,6 +19,36 @@ pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
         "four lights of equal power over four plates, from polished to dull",
         include_str!("../../assets/scenes/veach-mis.ron"),
     ),
+    ("ball", "one blue ball on a checkered floor", include_str!("../../assets/scenes/ball.ron")),
+    (
+        "kd-tree",
+        "a large mesh over fifty balls on a reflecting checkered floor",
+        include_str!("../../assets/scenes/kd-tree.ron"),
+    ),
+    ("models", "six models around a point", include_str!("../../assets/scenes/models.ron")),
+    (
+        "simplify",
+        "one model with all of its triangles, a fifth, a fiftieth",
+        include_str!("../../assets/scenes/simplify.ron"),
+    ),
+    ("soft-shadow", "a ball and its soft shadow", include_str!("../../assets/scenes/soft-shadow.ron")),
+    (
+        "everything",
+        "two mirrors, glass, balls and models in one room",
+        include_str!("../../assets/scenes/everything.ron"),
+    ),
+    ("gi-ball", "one ball under a large ball of light", include_str!("../../assets/scenes/gi-ball.ron")),
+    ("gi-balls", "matte and mirror balls beside a large mesh", include_str!("../../assets/scenes/gi-balls.ron")),
+    (
+        "glass-balls",
+        "glass balls and a glass torus with their caustics",
+        include_str!("../../assets/scenes/glass-balls.ron"),
+    ),
+    (
+        "ten-thousand-balls",
+        "a mesh of 344,064 triangles above 10,000 balls",
+        include_str!("../../assets/scenes/ten-thousand-balls.ron"),
+    ),
 ];
 
 /// The scene file of a built-in scene.

@@ -107,6 +107,15 @@ pub enum Material {
         ior: f32,
         absorption: Vec3,
     },
+    Phong {
+        diffuse: Paint,
+        ambient: f32,
+        specular: Amount,
+        shininess: f32,
+        transparency: f32,
+        ior: f32,
+        absorption: Vec3,
+    },
     /// Of material entities; at most one part is emissive, and then `weight` is a number.
     Blend {
         weight: Amount,
@@ -120,6 +129,9 @@ pub enum Material {
 
 /// Plain materials that a blend may come to, however it is nested.
 pub const MAX_LOBES: usize = 8;
+
+/// For how many of them a Phong surface counts.
+pub const PHONG_LOBES: usize = 3;
 
 impl Material {
     /// The one of surfaces that have none.
@@ -203,12 +215,17 @@ pub struct SceneEnvironment {
     pub light: render::Environment,
     /// What the scene file says, for saving.
     pub part: super::file::EnvironmentPart,
+    /// What the air absorbs, per metre; `light` has passed it already.
+    pub air: Vec3,
 }
 
 impl PartialEq for SceneEnvironment {
     /// Pictures are equal when they are the same one in memory.
     fn eq(&self, other: &Self) -> bool {
         use render::Environment::{Black, Constant, Gradient, Image};
+        if self.air != other.air {
+            return false;
+        }
         match (&self.light, &other.light) {
             (Black, Black) => true,
             (Constant(a), Constant(b)) => a == b,

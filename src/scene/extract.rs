@@ -3,7 +3,7 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`Part`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{Amount, Balls, MAX_LOBES, Material, Paint, Shape, SurfaceTexture};
+use super::components::{Amount, Balls, MAX_LOBES, Material, PHONG_LOBES, Paint, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
@@ -13,7 +13,7 @@ use crate::render::{
     self, Camera, ColorInput, Geometry, MaterialId, Object, ScalarInput, Shading, Snapshot, TextureId,
 };
 use bevy_ecs::prelude::Entity;
-use glam::{Affine3A, DAffine3, DVec3, Vec3};
+use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -195,9 +195,9 @@ impl Extraction {
                     let last = keys[keys.len() - 1];
                     keys.resize(keys.len().max(n_slots), last);
                     geometry.0.push(shape);
-                    geometry
-                        .1
-                        .push(Object { mesh, materials: keys.into_iter().map(|key| materials.id(key)).collect() });
+                    let materials = keys.into_iter().map(|key| materials.id(key)).collect();
+                    let turned = turned(object);
+                    geometry.1.push(Object { mesh, materials, turned, is_point_light: false });
                     entities.push(object.entity);
                 }
                 Err(reason) => {
@@ -214,7 +214,8 @@ impl Extraction {
                 continue;
             }
             geometry.0.push(kdtree::Shape::Sphere { center, radius });
-            geometry.1.push(Object { mesh: None, materials: vec![materials.id(MaterialKey::Light(light.entity))] });
+            let glow = materials.id(MaterialKey::Light(light.entity));
+            geometry.1.push(Object { is_point_light: true, ..Object::plain(glow) });
             entities.push(light.entity);
         }
         let geometry = Arc::new(Geometry::build(geometry.0, geometry.1));
@@ -340,6 +341,14 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
     Ok((shape, None))
 }
 
+/// How the texture of a lone sphere is turned.
+fn turned(object: &ObjectInput) -> Option<Mat3> {
+    let Shape::Sphere { .. } = object.shape else { return None };
+    let m = object.placement.affine().matrix3;
+    let object_from_world = (m * object.placement.even_scale()?.recip()).transpose().as_mat3();
+    (object_from_world != Mat3::IDENTITY).then_some(object_from_world)
+}
+
 fn has_area(u: Vec3, v: Vec3) -> bool {
     let area = u.as_dvec3().cross(v.as_dvec3()).length();
     area.is_finite() && area > 0.0
@@ -391,6 +400,7 @@ fn shading_of(inputs: &SceneInputs, geometry: &Geometry, table: &mut MaterialTab
         });
     }
     Shading::build(geometry, materials, textures.textures, inputs.environment.light.clone())
+        .with_air(inputs.environment.air)
 }
 
 fn material_of(
@@ -409,6 +419,17 @@ fn material_of(
             compensate: *compensate,
         },
         Material::Glass { ior, absorption } => render::Material::Glass { ior: *ior, absorption: *absorption },
+        Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
+            render::Material::Phong {
+                diffuse: textures.color(diffuse),
+                ambient: *ambient,
+                specular: textures.scalar(specular),
+                shininess: *shininess,
+                transparency: *transparency,
+                ior: *ior,
+                absorption: *absorption,
+            }
+        }
         // What blends itself, or too much, is grey.
         Material::Blend { .. } if !is_fit(material, by_entity) => {
             render::Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) }
@@ -434,6 +455,7 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
                 open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
             }
             Some(Some(Material::Emissive { .. })) => (lobes, glowing) = (lobes + 1, glowing + 1),
+            Some(Some(Material::Phong { .. })) => lobes += PHONG_LOBES,
             Some(_) => lobes += 1,
             None => break,
         }

@@ -5,7 +5,7 @@ use super::components::{Balls, Shape};
 use super::error::{Problem, SceneError, suggestion};
 use super::extract::Trees;
 use super::file::{
-    EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, locate,
+    EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, ball_grid, locate,
 };
 use super::meshes::{LoadedMesh, load_mesh, plain_io};
 use super::picture::read_picture;
@@ -186,6 +186,10 @@ fn resolve(
                         Err(error) => note(format!("objects/{i}/source"), error),
                     }
                 }
+            }
+            ObjectPart::BallGrid { first, steps, radius, .. } => {
+                let centers = ball_grid(*first, steps);
+                balls = Some(Arc::new(Balls::new(&centers, centers.iter().map(|_| *radius))));
             }
             ObjectPart::Spheres { centers, radii, .. } => {
                 balls = Some(Arc::new(match radii {

@@ -46,6 +46,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
             horizon: Rgb(Vec3::new(0.85, 0.9, 0.95)),
             ground: Rgb(Vec3::splat(0.3)),
         },
+        air: Rgb::default(),
         textures: Named::default(),
         materials: Named(materials),
         objects: vec![

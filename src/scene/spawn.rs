@@ -84,13 +84,18 @@ impl LoadedScene {
 
     fn insert_resources(&self, world: &mut World) {
         let file = &self.file;
-        world.insert_resource(SceneEnvironment { light: self.environment(), part: file.environment.clone() });
+        world.insert_resource(SceneEnvironment {
+            light: self.environment(),
+            part: file.environment.clone(),
+            air: file.air.0,
+        });
         world.insert_resource(FilmSize { width: file.film.width, height: file.film.height });
         let seed = world.get_resource::<Rendering>().map_or(0, |rendering| rendering.0.seed);
         world.insert_resource(Rendering(RenderSettings {
             integrator: file.integrator.into(),
             max_depth: file.max_depth.unwrap_or(u32::MAX),
             seed,
+            filter: file.film.filter.into(),
             ..RenderSettings::default()
         }));
         let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
@@ -146,7 +151,7 @@ impl LoadedScene {
                 let mesh = self.meshes[i].as_ref().expect("every mesh object has been loaded");
                 (Shape::Mesh(mesh.mesh.clone()), placement)
             }
-            ObjectPart::Spheres { .. } => {
+            ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. } => {
                 (Shape::Spheres(self.balls[i].clone().expect("every cloud has been made")), placement)
             }
         }
@@ -190,6 +195,17 @@ fn material(
             compensate: *compensate,
         },
         MaterialPart::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: absorption.0 },
+        MaterialPart::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
+            Material::Phong {
+                diffuse: paint(diffuse),
+                ambient: *ambient,
+                specular: amount(specular),
+                shininess: *shininess,
+                transparency: *transparency,
+                ior: *ior,
+                absorption: absorption.0,
+            }
+        }
         MaterialPart::Blend { weight, a, b } => {
             Material::Blend { weight: amount(weight), a: materials[a.as_str()], b: materials[b.as_str()] }
         }

@@ -53,8 +53,7 @@ pub fn scene(
     environment: Environment,
     camera: Camera,
 ) -> Snapshot {
-    let (shapes, objects) =
-        shapes.into_iter().map(|(shape, m)| (shape, Object { mesh: None, materials: vec![m] })).unzip();
+    let (shapes, objects) = shapes.into_iter().map(|(shape, m)| (shape, Object::plain(m))).unzip();
     let geometry = Geometry::build(shapes, objects);
     let shading = Shading::build(&geometry, materials, Vec::new(), environment);
     Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 const TOOLS: &[&str] = &["Xvfb", "openbox", "xdotool", "wmctrl", "import"];
 /// Far more than anything here takes, even where other work holds the processors.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(90);
 
 pub struct Desktop {
     // Ended in this order.
@@ -62,11 +62,14 @@ impl Desktop {
             number.ends_with('\n').then(|| number.trim().to_owned())
         });
         let display = format!(":{number}");
+        // A window without a manager has no focus, and gets no keys. A window that opens while the manager is starting
+        // may never be shown; it runs this command when it is done.
+        let ready_file = folder.path().join("manager");
         let mut manager = Command::new("openbox");
-        // A window without a manager has no focus, and gets no keys.
+        manager.arg("--startup").arg(format!("touch '{}'", ready_file.display()));
         let window_manager = quiet(&mut manager, &display, &folder).spawn().map(Ended).expect("openbox starts");
         let desktop = Self { _window_manager: window_manager, _server: server, display, folder };
-        until("openbox to be ready", || desktop.tool("wmctrl", &["-m"]));
+        until("openbox to be ready", || ready_file.exists().then_some(()));
         Some(desktop)
     }
 

@@ -46,5 +46,5 @@ fn open_grid(nu: u32, nv: u32) -> Vec<[u32; 3]> {
 /// The diagonals alternate, so that no direction is favoured.
 fn cell(vertex: impl Fn(u32, u32) -> u32, i: u32, j: u32) -> [[u32; 3]; 2] {
     let (a, b, c, d) = (vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
-    if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+    if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
 }

@@ -151,7 +151,7 @@ impl Greedy {
     fn is_twin(&mut self, e: u32, [p, q]: [u32; 2], version: u32) -> bool {
         let (low, high) = (p.min(q), p.max(q));
         let hash = (low.wrapping_mul(0x9e37_79b1) ^ high).wrapping_mul(0x85eb_ca77);
-        let cell = (u64::from(hash) * self.seen.len() as u64 >> 32) as usize;
+        let cell = ((u64::from(hash) * self.seen.len() as u64) >> 32) as usize;
         let other = std::mem::replace(&mut self.seen[cell], e);
         let twin = other != NONE && other != e && {
             let other = &self.edges[other as usize];

@@ -1,7 +1,8 @@
 //! Melax's simplifier: half-edge collapses in order of edge length times bend.
 //!
 //! Source: Melax 1998, "A Simple, Fast, and Effective Polygon Reduction Algorithm"; the 2013 program used it. Here
-//! the queue is a true one, costs are renewed wherever they can have changed, and the guards of [`Surface`] hold.
+//! the queue is a true one, costs are renewed wherever they can have changed, lines bend too, and the guards of
+//! [`Surface`] hold.
 
 use super::greedy::{Collapse, Log};
 use super::heap::IndexedHeap;
@@ -98,10 +99,24 @@ impl Melax {
                 .fan(from)
                 .map(|(_, b, c)| ((place(b) - here).cross(place(c) - here).normalize_or_zero(), b, c)),
         );
+        // On a border or seam the bend of the line counts as well: in a flat sheet nothing else would hold a corner.
+        let on_line = |to: u32| {
+            let shared = normals.iter().filter(|(_, b, c)| *b == to || *c == to).count() as u32;
+            self.surface.is_constraint(from, to, shared)
+        };
+        let line: Vec<u32> =
+            if kind == Kind::Curve { neighbors.iter().copied().filter(|&n| on_line(n)).collect() } else { Vec::new() };
+        let turn = |to: u32| {
+            let behind = line.iter().find(|&&n| n != to && line.contains(&to));
+            behind.map_or(0.0, |&n| {
+                let (before, after) = ((here - place(n)).normalize_or_zero(), (place(to) - here).normalize_or_zero());
+                0.5 * (1.0 - before.dot(after))
+            })
+        };
         let mut found: Vec<(f32, u32)> = neighbors
             .iter()
             .filter(|&&to| self.surface.kinds[to as usize] >= kind)
-            .map(|&to| ((place(to).distance(here) * bend(&normals, to)) as f32, to))
+            .map(|&to| ((place(to).distance(here) * bend(&normals, to).max(turn(to))) as f32, to))
             .collect();
         found.sort_unstable_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
         (self.neighbors, self.normals) = (neighbors, normals);

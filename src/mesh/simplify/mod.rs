@@ -153,3 +153,27 @@ fn within_error(mesh: &Mesh, method: Method, error: f64) -> Result<Mesh, Simplif
     }
     Ok(best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::procedural::{DisplacedSphere, displaced_sphere};
+
+    #[test]
+    fn many_parts_are_as_accurate_as_one_queue() {
+        let mesh = displaced_sphere(&DisplacedSphere { frequency: 50, ..DisplacedSphere::default() });
+        let rms = |parts| {
+            let mut prepared = Prepared::of(&mesh, true);
+            let limits = Limits { faces: mesh.triangles.len() / 5, cost: f32::INFINITY, mean_square: f64::INFINITY };
+            parts::simplify_in(parts, &mut prepared, limits, false);
+            let result = finish(&mesh, prepared);
+            assert!(result.triangles.len() <= limits.faces && result.triangles.len() + 2 > limits.faces);
+            Deviation::between(&mesh, &result, 40_000).rms()
+        };
+        let one = rms(1);
+        for parts in [2, 12, 40] {
+            let many = rms(parts);
+            assert!(many < 1.05 * one, "{parts} parts: {many}, one queue: {one}");
+        }
+    }
+}

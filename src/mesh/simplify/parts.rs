@@ -21,6 +21,11 @@ const LEFT_TO_WHOLE: usize = 16;
 /// Simplifies in place: afterwards `prepared` holds what is left, and vertices keep their numbers.
 pub(super) fn simplify(prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
     let count = prepared.triangles.len().div_ceil(PART_TRIANGLES);
+    simplify_in(count, prepared, limits, keep_log)
+}
+
+/// With one part this is the plain method with one queue, against which the other is tested.
+pub(super) fn simplify_in(count: usize, prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
     let mut log = Log::default();
     if count > 1 && prepared.triangles.len() > limits.faces {
         let mut parts = split(prepared, count);

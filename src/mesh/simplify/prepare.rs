@@ -227,7 +227,7 @@ impl Prepared {
     }
 
     /// For each triangle side at `vertex` that ends at another vertex on a line, and is itself border or seam, the
-    /// plane through it that stands on the triangle.
+    /// line through it: the triangle's plane and the one that stands on it there.
     fn add_edge_planes(&self, around: &Around, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
         let here = self.positions[vertex].as_dvec3();
         for &corner in around.corners(vertex) {
@@ -237,9 +237,13 @@ impl Prepared {
                     continue;
                 }
                 let along = self.positions[end as usize].as_dvec3() - here;
-                if let Some(normal) = along.cross(normals[corner as usize / 3].0).try_normalize() {
-                    // As heavy as a square on the edge: a border moves as reluctantly as the surface does.
-                    *sum += Quadric::of_plane(here, normal, along.length_squared());
+                let face_normal = normals[corner as usize / 3].0;
+                if let Some(normal) = along.cross(face_normal).try_normalize() {
+                    // Both planes through the edge alike, so that the distance to its line counts and nothing pulls
+                    // to one side; heavy, because a border that moves is seen against what lies behind.
+                    let weight = 10.0 * along.length_squared();
+                    *sum += Quadric::of_plane(here, normal, weight);
+                    *sum += Quadric::of_plane(here, face_normal, weight);
                 }
             }
         }

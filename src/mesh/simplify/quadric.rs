@@ -57,17 +57,17 @@ impl Quadric {
     /// The place of least error near `guess`.
     ///
     /// Where planes are all but parallel their common point lies far away or nowhere; a pull towards `guess`, a
-    /// millionth of the weight, decides what they leave open and moves nothing that they determine.
+    /// hundred-millionth of the weight, decides what they leave open and moves nothing that they determine.
     #[inline]
     pub fn minimum_near(&self, guess: DVec3) -> DVec3 {
-        let pull = 1e-6 * self.weight;
+        let pull = 1e-8 * self.weight;
         let [xx, yy, zz, xy, xz, yz] = self.a;
         let (xx, yy, zz) = (xx + pull, yy + pull, zz + pull);
         // Solves for the step away from the guess: (A + pull) step = −gradient / 2, by Cramer's rule.
         let r = -(self.times(guess) + self.b);
         let (c0, c1, c2) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
         let determinant = xx * c0 + xy * c1 + xz * c2;
-        if !(determinant > 0.0) {
+        if determinant.is_nan() || determinant <= 0.0 {
             return guess;
         }
         let (c3, c4, c5) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);

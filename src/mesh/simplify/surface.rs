@@ -194,7 +194,7 @@ impl Surface {
     }
 
     /// Whether the edge itself is border, seam or material edge; `shared` triangles lie at it.
-    fn is_constraint(&self, from: u32, to: u32, shared: u32) -> bool {
+    pub fn is_constraint(&self, from: u32, to: u32, shared: u32) -> bool {
         if shared == 1 {
             return true;
         }

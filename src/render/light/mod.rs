@@ -8,10 +8,14 @@ mod shape;
 
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;
-use glam::{Vec2, Vec3};
+use crate::sampling::Sampler;
+use glam::{Mat3, Vec2, Vec3};
 use selection::Selection;
 use shape::LightShape;
 pub(super) use shape::sphere_uv;
+
+/// How many sample dimensions [`LightTable::sample_each`] uses.
+pub(super) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
 
 /// One emitter: a sphere, a quad or a triangle.
 #[derive(Clone, Debug)]
@@ -20,6 +24,10 @@ pub(super) struct Light {
     pub emission: Emission,
     /// Mean over the surface, luminance.
     pub mean_radiance: f32,
+    /// Stands for a point light, see [`super::Object::is_point_light`].
+    pub is_point: bool,
+    /// See [`super::Object::turned`].
+    turned: Option<Mat3>,
 }
 
 /// All finite emitters of a scene.
@@ -76,7 +84,8 @@ impl LightTable {
                 };
                 let first = lights.len() as u32;
                 let mut push = |emission: Emission, shape: LightShape| {
-                    lights.push(Light { shape, emission, mean_radiance: mean(emission) });
+                    let (is_point, turned) = (object.is_point_light, object.turned);
+                    lights.push(Light { shape, emission, mean_radiance: mean(emission), is_point, turned });
                     lights.len() as u32 - 1
                 };
                 let only = emission[0].filter(|_| emission.len() == 1);
@@ -160,14 +169,45 @@ impl LightTable {
         u: Vec2,
     ) -> Option<LightSample> {
         let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select)?;
-        let light = &self.lights[id as usize];
-        let point = light.shape.sample(position, techniques.solid_angle, u)?;
-        let radiance = light.emission.scale
-            * match light.emission.radiance {
-                ColorInput::Constant(radiance) => radiance,
-                ColorInput::Texture(texture) => textures[texture as usize].eval(point.uv),
+        self.lights[id as usize].sample(textures, techniques, position, u, pmf)
+    }
+
+    /// Tells `found` of one point on every light, or on one of them where there are many.
+    ///
+    /// Point lights are points. Uses [`EACH_DIMENSIONS`] dimensions of `sampler`, `dimension` being the first.
+    #[inline]
+    pub(super) fn sample_each(
+        &self,
+        textures: &[Texture],
+        position: Vec3,
+        sampler: &Sampler,
+        dimension: u32,
+        mut found: impl FnMut(LightSample),
+    ) {
+        let mut ask = |id: u32, pmf: f32, dimension: u32| {
+            let light = &self.lights[id as usize];
+            let sample = match light.shape {
+                LightShape::Sphere { center, radius } if light.is_point => {
+                    shape::sphere_as_point(center, radius, position).map(|point| light.shining(textures, &point, pmf))
+                }
+                _ => light.sample(textures, &Techniques::default(), position, sampler.pair(dimension), pmf),
             };
-        Some(LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance })
+            if let Some(sample) = sample {
+                found(sample);
+            }
+        };
+        if self.lights.len() <= selection::MAX_ESTIMATED {
+            for id in 0..self.lights.len() as u32 {
+                ask(id, 1.0, dimension + id);
+            }
+        } else if let Some((id, pmf)) = self.selection.by_power(sampler.single(dimension)) {
+            ask(id, pmf, dimension + 1);
+        }
+    }
+
+    #[inline]
+    pub(super) fn is_point(&self, id: u32) -> bool {
+        self.lights[id as usize].is_point
     }
 
     /// The density with which [`Self::sample`] at `position` finds the point of light `id` in direction `wi`,
@@ -184,6 +224,38 @@ impl LightTable {
     ) -> f32 {
         let pmf = self.selection.pmf(&self.lights, techniques, id, position, normal);
         pmf * self.lights[id as usize].shape.pdf(position, techniques.solid_angle, wi, distance)
+    }
+}
+
+impl Light {
+    #[inline]
+    fn sample(
+        &self,
+        textures: &[Texture],
+        techniques: &Techniques,
+        position: Vec3,
+        u: Vec2,
+        pmf: f32,
+    ) -> Option<LightSample> {
+        self.shape.sample(position, techniques.solid_angle, u).map(|point| self.shining(textures, &point, pmf))
+    }
+
+    #[inline]
+    fn shining(&self, textures: &[Texture], point: &shape::LightPoint, pmf: f32) -> LightSample {
+        let radiance = match self.emission.radiance {
+            ColorInput::Constant(radiance) => radiance,
+            ColorInput::Texture(texture) => {
+                let uv = match (&self.shape, &self.turned) {
+                    (LightShape::Sphere { center, .. }, Some(object_from_world)) => {
+                        sphere_uv((*object_from_world * (point.target - *center)).normalize())
+                    }
+                    _ => point.uv,
+                };
+                textures[texture as usize].eval(uv)
+            }
+        };
+        let radiance = self.emission.scale * radiance;
+        LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::sampling::AliasTable;
 use glam::Vec3;
 
 /// Up to this many lights their contributions are estimated one by one; more would cost more than they save.
-const MAX_ESTIMATED: usize = 16;
+pub const MAX_ESTIMATED: usize = 16;
 
 #[derive(Debug, Default)]
 pub(super) struct Selection {
@@ -65,6 +65,13 @@ impl Selection {
                 Some((id, pmf))
             }
         }
+    }
+
+    /// Of many lights, one by its power alone, and the probability of the choice.
+    #[inline]
+    pub fn by_power(&self, u: f32) -> Option<(u32, f32)> {
+        let (id, pmf, _) = self.alias.sample(u);
+        (pmf > 0.0).then_some((id, pmf))
     }
 
     /// The probability that [`Self::sample`] picks light `id`.

@@ -223,6 +223,24 @@ fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Opt
     Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, uv: sphere_uv(normal) })
 }
 
+/// A sphere seen as a point in its centre, where all of its light is: π r² of radiance over distance².
+///
+/// `None` from inside of it.
+#[inline]
+pub(super) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Option<LightPoint> {
+    let (wi, distance) = direction(position, center)?;
+    if distance <= radius {
+        return None;
+    }
+    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
+    Some(LightPoint {
+        target: lifted(center - radius * wi, error, -wi, distance),
+        wi,
+        pdf: (distance / radius).powi(2) / std::f32::consts::PI,
+        uv: sphere_uv(-wi),
+    })
+}
+
 /// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.
 #[inline]
 pub(in crate::render) fn sphere_uv(normal: Vec3) -> Vec2 {

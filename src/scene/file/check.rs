@@ -5,7 +5,7 @@ use super::parts::{
     TexturePart, TransformPart,
 };
 use super::value::{Amount, Paint, Rgb};
-use crate::scene::components::MAX_LOBES;
+use crate::scene::components::{MAX_LOBES, PHONG_LOBES};
 use crate::scene::error::suggestion;
 use crate::scene::meshes::BUILTIN_NAMES;
 use crate::scene::placement::Placement;
@@ -98,6 +98,7 @@ impl Check<'_> {
     }
 
     fn environment(&mut self) {
+        self.light("air", self.file.air);
         match &self.file.environment {
             EnvironmentPart::Black => {}
             EnvironmentPart::Constant(radiance) => self.light("environment", *radiance),
@@ -142,9 +143,23 @@ impl Check<'_> {
                 self.share(&path, "reflectance", reflectance);
             }
             MaterialPart::Glass { ior, absorption } => {
-                if !(ior.is_finite() && *ior > 0.0) {
-                    self.wrong(&format!("{path}/ior"), format!("`ior` is {ior}, but must be positive: 1.5 is glass"));
+                self.ior(&path, *ior);
+                self.light(&format!("{path}/absorption"), *absorption);
+            }
+            MaterialPart::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
+                self.share(&path, "diffuse", diffuse);
+                self.amount(&path, "specular", specular);
+                for (field, value) in [("ambient", ambient), ("transparency", transparency)] {
+                    if !(0.0..=1.0).contains(value) {
+                        self.wrong(&format!("{path}/{field}"), format!("`{field}` is {value}, but must lie in 0..1"));
+                    }
                 }
+                if !(shininess.is_finite() && *shininess >= 0.0) {
+                    let message =
+                        format!("`shininess` is {shininess}, but must be 0 or positive: 20 is dull, 200 sharp");
+                    self.wrong(&format!("{path}/shininess"), message);
+                }
+                self.ior(&path, *ior);
                 self.light(&format!("{path}/absorption"), *absorption);
             }
             MaterialPart::Blend { weight, a, b } => {
@@ -171,6 +186,12 @@ impl Check<'_> {
                 Paint::Rgb(rgb) => self.light(&format!("{path}/radiance"), Rgb(*rgb)),
                 Paint::Texture(texture) => self.texture_name(&format!("{path}/radiance"), texture),
             },
+        }
+    }
+
+    fn ior(&mut self, path: &str, ior: f32) {
+        if !(ior.is_finite() && ior > 0.0) {
+            self.wrong(&format!("{path}/ior"), format!("`ior` is {ior}, but must be positive: 1.5 is glass"));
         }
     }
 
@@ -203,6 +224,7 @@ impl Check<'_> {
             match self.materials.get(name) {
                 Some(MaterialPart::Blend { a, b, .. }) => open.extend([a.as_str(), b.as_str()]),
                 Some(MaterialPart::Emissive { .. }) => (lobes, glowing) = (lobes + 1, glowing + 1),
+                Some(MaterialPart::Phong { .. }) => lobes += PHONG_LOBES,
                 _ => lobes += 1,
             }
         }
@@ -214,7 +236,8 @@ impl Check<'_> {
             self.material_name(&format!("{path}/material"), name);
         }
         let placement = self.transform(&format!("{path}/transform"), object.transform());
-        let must_scale_evenly = matches!(object, ObjectPart::Sphere { .. } | ObjectPart::Spheres { .. });
+        let must_scale_evenly =
+            matches!(object, ObjectPart::Sphere { .. } | ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. });
         if must_scale_evenly && placement.is_some_and(|placement| placement.even_scale().is_none()) {
             self.wrong(
                 &format!("{path}/transform"),
@@ -258,7 +281,24 @@ impl Check<'_> {
                     );
                 }
             }
+            ObjectPart::BallGrid { first, steps, radius, .. } => {
+                self.size(&format!("{path}/radius"), "the radius", *radius);
+                self.steps(path, *first, steps);
+            }
             ObjectPart::Spheres { centers, radii, .. } => self.balls(path, centers, radii),
+        }
+    }
+
+    fn steps(&mut self, path: &str, first: DVec3, steps: &[(u32, DVec3)]) {
+        let n: u64 = steps.iter().map(|(count, _)| u64::from(*count)).fold(1, u64::saturating_mul);
+        let reach = steps.iter().map(|(count, step)| f64::from(*count) * step.abs()).fold(first.abs(), |a, b| a + b);
+        if n == 0 || n > SceneFile::MAX_GRID_BALLS || steps.len() > 3 {
+            let message =
+                format!("a grid has one to three rows and up to {} balls, not {n}", SceneFile::MAX_GRID_BALLS);
+            self.wrong(&format!("{path}/steps"), message);
+        } else {
+            self.point(&format!("{path}/first"), first);
+            self.point(&format!("{path}/steps"), reach);
         }
     }
 

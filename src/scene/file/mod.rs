@@ -13,9 +13,9 @@ mod value;
 pub use check::check_film_size;
 pub use locate::locate;
 pub use parts::{
-    CameraPart, DisplayPart, EnvironmentPart, FilmPart, FresnelPart, IntegratorPart, LightPart, MaterialPart,
-    MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart, ToneCurvePart,
-    TransformPart, WrapPart,
+    CameraPart, DisplayPart, EnvironmentPart, FilmPart, FilterPart, FresnelPart, IntegratorPart, LightPart,
+    MaterialPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart,
+    ToneCurvePart, TransformPart, WrapPart, ball_grid,
 };
 pub use value::{Amount, Named, Paint, Rgb};
 
@@ -24,6 +24,8 @@ use ron::extensions::Extensions;
 use std::path::Path;
 
 impl SceneFile {
+    /// Balls of one grid at most.
+    pub const MAX_GRID_BALLS: u64 = 4_000_000;
     /// Pixels along one side of a film at most.
     pub const MAX_FILM_SIDE: u32 = 65_536;
     /// Pixels of a film at most: its sums take 24 bytes each, 6 GiB in all.

@@ -1,7 +1,7 @@
 //! The parts of a scene file, as written. Meaning and limits are checked in `check`.
 
 use super::value::{Amount, Named, Paint, Rgb};
-use crate::render::{Fresnel, Integrator, ToneCurve, Wrap};
+use crate::render::{Fresnel, Integrator, PixelFilter, ToneCurve, Wrap};
 use glam::{DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +21,9 @@ pub struct SceneFile {
     pub display: DisplayPart,
     #[serde(default)]
     pub environment: EnvironmentPart,
+    /// What the air absorbs, per metre. Light from the environment has passed it already.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub air: Rgb,
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub textures: Named<TexturePart>,
     #[serde(default, skip_serializing_if = "Named::is_empty")]
@@ -63,11 +66,37 @@ pub struct CameraPart {
 pub struct FilmPart {
     pub width: u32,
     pub height: u32,
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub filter: FilterPart,
 }
 
 impl Default for FilmPart {
     fn default() -> Self {
-        Self { width: 1280, height: 720 }
+        Self { width: 1280, height: 720, filter: FilterPart::default() }
+    }
+}
+
+/// How the light around a pixel is weighted; see [`PixelFilter`] for their widths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterPart {
+    #[default]
+    Box,
+    Tent,
+    Gaussian,
+    BlackmanHarris,
+    Mitchell,
+}
+
+impl From<FilterPart> for PixelFilter {
+    fn from(part: FilterPart) -> Self {
+        match part {
+            FilterPart::Box => Self::Box,
+            FilterPart::Tent => Self::Tent,
+            FilterPart::Gaussian => Self::Gaussian,
+            FilterPart::BlackmanHarris => Self::BlackmanHarris,
+            FilterPart::Mitchell => Self::Mitchell,
+        }
     }
 }
 
@@ -217,6 +246,27 @@ pub enum MaterialPart {
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: Rgb,
     },
+    /// The classic local model. Path tracing takes it for shares of matte, mirror and glass.
+    Phong {
+        diffuse: Paint,
+        /// Of the ambient light, the share of `diffuse` that comes back.
+        #[serde(default = "one")]
+        ambient: f32,
+        /// Share that is mirrored; lights appear in it as highlights.
+        #[serde(default = "no_amount", skip_serializing_if = "is_no_amount")]
+        specular: Amount,
+        /// Exponent of the highlights.
+        #[serde(default = "default_shininess")]
+        shininess: f32,
+        /// Share that is glass.
+        #[serde(default, skip_serializing_if = "is_default")]
+        transparency: f32,
+        #[serde(default = "default_ior")]
+        ior: f32,
+        /// Per metre.
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: Rgb,
+    },
     Blend {
         weight: Amount,
         a: String,
@@ -305,6 +355,19 @@ pub enum ObjectPart {
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
+    /// Balls of one material in rows, layers or blocks: one at `first`, then by each step in turn that many times.
+    BallGrid {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        #[serde(default, skip_serializing_if = "is_default")]
+        first: DVec3,
+        /// Up to three pairs: how many balls in a row, and the way from each to the next.
+        steps: Vec<(u32, DVec3)>,
+        radius: f64,
+        material: String,
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
     /// Many balls, one material.
     Spheres {
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -325,6 +388,7 @@ impl ObjectPart {
             | Self::Quad { name, .. }
             | Self::Triangle { name, .. }
             | Self::Mesh { name, .. }
+            | Self::BallGrid { name, .. }
             | Self::Spheres { name, .. } => name.as_deref(),
         }
     }
@@ -335,6 +399,7 @@ impl ObjectPart {
             | Self::Plane { material, .. }
             | Self::Quad { material, .. }
             | Self::Triangle { material, .. }
+            | Self::BallGrid { material, .. }
             | Self::Spheres { material, .. } => Some(material),
             Self::Mesh { material, .. } => material.as_deref(),
         }
@@ -347,9 +412,18 @@ impl ObjectPart {
             | Self::Quad { transform, .. }
             | Self::Triangle { transform, .. }
             | Self::Mesh { transform, .. }
+            | Self::BallGrid { transform, .. }
             | Self::Spheres { transform, .. } => transform,
         }
     }
+}
+
+/// The centres of a [`ObjectPart::BallGrid`].
+pub fn ball_grid(first: DVec3, steps: &[(u32, DVec3)]) -> Vec<DVec3> {
+    steps.iter().fold(vec![first], |centers, &(count, step)| {
+        let row = |center: DVec3| (0..count).map(move |i| center + f64::from(i) * step);
+        centers.into_iter().flat_map(row).collect()
+    })
 }
 
 /// Where the triangles of a mesh come from.
@@ -462,6 +536,22 @@ fn default_up() -> DVec3 {
 
 fn default_vfov() -> f64 {
     40.0
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn default_shininess() -> f32 {
+    20.0
+}
+
+fn no_amount() -> Amount {
+    Amount::Number(0.0)
+}
+
+fn is_no_amount(value: &Amount) -> bool {
+    *value == no_amount()
 }
 
 fn default_ior() -> f32 {

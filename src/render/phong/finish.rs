@@ -1,0 +1,142 @@
+//! What the classic model makes of a material: a matte part, highlights, mirrors and panes.
+
+use super::super::bsdf::{MAX_LOBES, SMALLEST_ALPHA};
+use super::super::dielectric::fresnel;
+use super::super::medium::MediumStack;
+use super::super::surface::Vertex;
+use super::super::{Material, MaterialId, Snapshot};
+use glam::Vec3;
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+/// A surface at a point, all inputs looked up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Finish {
+    /// Share of the ambient light that comes back.
+    pub ambient: Vec3,
+    /// Lambert's albedo.
+    pub diffuse: Vec3,
+    shiny: [Shiny; MAX_LOBES],
+    n_shiny: usize,
+}
+
+/// A part that sends rays of its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Shiny {
+    /// A mirror that shows lights as they are.
+    Mirror { tint: Vec3 },
+    /// Lights as highlights, (n + 1) / 2π · cosⁿ about the mirrored direction, which sum up to `tint`; all else
+    /// mirrored, within the same lobe if it is `rough`, else sharply (Whitted 1980).
+    Gloss { tint: Vec3, exponent: f32, rough: bool },
+    /// A smooth interface; `eta` as in [`fresnel`].
+    Pane { share: f32, eta: f32, id: MaterialId },
+}
+
+impl Finish {
+    pub fn at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Self {
+        let nothing = Shiny::Mirror { tint: Vec3::ZERO };
+        let mut finish = Self { ambient: Vec3::ZERO, diffuse: Vec3::ZERO, shiny: [nothing; MAX_LOBES], n_shiny: 0 };
+        finish.add(scene, id, vertex, media, 1.0);
+        finish
+    }
+
+    fn add(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack, weight: f32) {
+        let uv = vertex.uv;
+        match &scene.shading.materials[id as usize] {
+            _ if weight == 0.0 => {}
+            Material::Emissive { .. } => {}
+            Material::Diffuse { albedo } => {
+                let albedo = weight * albedo.eval(scene, uv);
+                self.diffuse += albedo;
+                self.ambient += albedo;
+            }
+            Material::Mirror { reflectance } => {
+                self.push(Shiny::Mirror { tint: weight * reflectance.eval(scene, uv) });
+            }
+            Material::Metal { alpha, reflectance, fresnel, .. } => {
+                let tint = weight * fresnel.reflectance(reflectance.eval(scene, uv), vertex.normal.dot(vertex.wo));
+                let alpha = alpha.eval(scene, uv).clamp(0.0, 1.0);
+                self.push(if alpha < SMALLEST_ALPHA {
+                    Shiny::Mirror { tint }
+                } else {
+                    // The lobe about the mirrored direction is four times as wide in solid angle as that of the half
+                    // vector, whose exponent is 2 / α² − 2 (Walter et al. 2007, section 5).
+                    Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
+                });
+            }
+            Material::Glass { .. } => {
+                self.push(Shiny::Pane { share: weight, eta: media.eta(scene, id, vertex.front), id });
+            }
+            Material::Phong { diffuse, ambient, specular, shininess, transparency, .. } => {
+                let specular = specular.eval(scene, uv).clamp(0.0, 1.0);
+                let opaque = weight * (1.0 - transparency);
+                let diffuse = opaque * (1.0 - specular) * diffuse.eval(scene, uv);
+                self.diffuse += diffuse;
+                self.ambient += *ambient * diffuse;
+                if opaque * specular > 0.0 {
+                    let tint = Vec3::splat(opaque * specular);
+                    self.push(Shiny::Gloss { tint, exponent: *shininess, rough: false });
+                }
+                if *transparency > 0.0 {
+                    let eta = media.eta(scene, id, vertex.front);
+                    self.push(Shiny::Pane { share: weight * transparency, eta, id });
+                }
+            }
+            Material::Blend { weight: share, a, b } => {
+                let share = share.eval(scene, uv).clamp(0.0, 1.0);
+                self.add(scene, *a, vertex, media, weight * (1.0 - share));
+                self.add(scene, *b, vertex, media, weight * share);
+            }
+        }
+    }
+
+    fn push(&mut self, shiny: Shiny) {
+        self.shiny[self.n_shiny] = shiny;
+        self.n_shiny += 1;
+    }
+
+    pub fn shiny(&self) -> &[Shiny] {
+        &self.shiny[..self.n_shiny]
+    }
+
+    /// Whether lights make a difference to it by themselves.
+    pub fn is_lit(&self) -> bool {
+        let matte = self.diffuse != Vec3::ZERO || self.ambient != Vec3::ZERO;
+        matte || self.shiny().iter().any(|shiny| matches!(shiny, Shiny::Gloss { .. }))
+    }
+
+    /// Radiance towards `wo` from light that brings an irradiance of 1 at a right angle, from `wi`.
+    ///
+    /// - `mirrored`: unit, `wo` mirrored by the normal.
+    #[inline]
+    pub fn reflected(&self, wi: Vec3, normal: Vec3, mirrored: Vec3) -> Vec3 {
+        let cos = normal.dot(wi);
+        if cos <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let mut sum = self.diffuse * (FRAC_1_PI * cos);
+        for shiny in self.shiny() {
+            if let Shiny::Gloss { tint, exponent, .. } = shiny {
+                let near = mirrored.dot(wi).max(0.0);
+                sum += *tint * ((exponent + 1.0) / TAU * near.powf(*exponent));
+            }
+        }
+        sum
+    }
+}
+
+/// The share of light that goes straight through a surface, for shadows: refraction is left out.
+pub(super) fn straight_through(scene: &Snapshot, id: MaterialId, vertex: &Vertex) -> f32 {
+    match &scene.shading.materials[id as usize] {
+        // Unbent light meets both sides at the same angle: that of entering counts.
+        Material::Glass { ior, .. } => 1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), 1.0 / ior).0,
+        Material::Phong { ior, transparency, .. } if *transparency > 0.0 => {
+            transparency * (1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), 1.0 / ior).0)
+        }
+        Material::Blend { weight, a, b } => {
+            let share = weight.eval(scene, vertex.uv).clamp(0.0, 1.0);
+            let part = |id, share: f32| if share > 0.0 { share * straight_through(scene, id, vertex) } else { 0.0 };
+            part(*a, 1.0 - share) + part(*b, share)
+        }
+        _ => 0.0,
+    }
+}
