@@ -122,10 +122,10 @@ fn memory(scene: &LoadedScene, inputs: &SceneInputs, film: FilmSize) -> String {
     format!("meshes {}, trees {}, film {}", mib(meshes as f64), mib(scene.trees.bytes() as f64), mib(film as f64))
 }
 
-const FEATURES: [&str; 7] =
-    ["lens", "textures", "glass", "light sampling", "environment light", "blends", "rough metal"];
+const FEATURES: [&str; 8] =
+    ["lens", "textures", "glass", "light sampling", "environment light", "caustics", "blends", "rough metal"];
 
-fn features(extraction: &Extraction, lens: &Lens) -> [bool; 7] {
+fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
     let shading = &extraction.snapshot.shading;
     let has = |kind: &str| shading.materials.iter().any(|material| kind_of_material(material) == kind);
     [
@@ -134,6 +134,7 @@ fn features(extraction: &Extraction, lens: &Lens) -> [bool; 7] {
         shading.features.glass,
         shading.features.light_sampling,
         shading.features.environment,
+        shading.features.caustics,
         has("blend"),
         has("metal"),
     ]
