@@ -213,32 +213,8 @@ fn environment(environment: &Environment) -> String {
     }
 }
 
-<<<<<<< HEAD
-/// Bytes of what was read and built, and of the film.
-fn memory(scene: &LoadedScene, inputs: &SceneInputs, film: FilmSize) -> String {
-    let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
-    for object in &inputs.objects {
-        if let Shape::Mesh(mesh) = &object.shape {
-            let bytes = mesh.positions.len() * 12
-                + mesh.triangles.len() * 12
-                + mesh.normals.len() * 12
-                + mesh.uvs.len() * 8
-                + mesh.slots.len() * 2;
-            meshes.insert(Arc::as_ptr(mesh) as usize, bytes);
-        }
-    }
-    let meshes: usize = meshes.values().sum();
-    let film = u64::from(film.width) * u64::from(film.height) * 24;
-    let mib = |bytes: f64| format!("{:.1} MiB", bytes / f64::from(1 << 20));
-    format!("meshes {}, trees {}, film {}", mib(meshes as f64), mib(scene.trees.bytes() as f64), mib(film as f64))
-}
-
 const FEATURES: [&str; 8] =
     ["lens", "textures", "glass", "light sampling", "environment light", "caustics", "blends", "rough metal"];
-=======
-const FEATURES: [&str; 7] =
-    ["lens", "textures", "glass", "light sampling", "environment light", "blends", "rough metal"];
->>>>>>> files
 
 fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
     let shading = &extraction.snapshot.shading;

@@ -147,11 +147,13 @@ impl LightWave {
             };
             let Some(surface) = surface else { continue };
             let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices };
-            if n_vertices > 1 && surface.is_smooth() && path.media == MediumStack::default() {
-                if let Some((ray, film, light)) = step.join(&surface) {
-                    self.shadow_rays.push(&ray);
-                    self.arrivals.push((film, light));
-                }
+            if n_vertices > 1
+                && surface.is_smooth()
+                && path.media == MediumStack::default()
+                && let Some((ray, film, light)) = step.join(&surface)
+            {
+                self.shadow_rays.push(&ray);
+                self.arrivals.push((film, light));
             }
             // One more vertex, and the way to the eye: two more segments.
             if n_vertices + 2 <= pass.max_depth
