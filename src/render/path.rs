@@ -8,20 +8,24 @@
 //! asked of it as the reference. Start reading at [`PathWave::trace`].
 
 use super::bsdf::Scatter;
+use super::caustics::{Bounce, CausticPass, Track};
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::paths::{Path, PathBatch, ShadowBatch};
 use super::renderer::{RayCounts, RenderSettings};
-use super::surface::{Vertex, blend_at, lobe_at, material_of};
-use super::wide::{self, Group, SEVERAL};
+use super::surface::{Vertex, blend_at, lobe_at};
+use super::wide::{self, Group, KINDS, SortedHits};
 use super::{Material, MaterialId, Snapshot, Techniques};
 use crate::geometry::Ray;
-use crate::kdtree::{Hit, HitBatch, RayClass};
+use crate::kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use crate::sampling::Sampler;
 use glam::Vec3;
 
 /// Segments before Russian roulette begins: the first bounces carry most of the light.
-const ROULETTE_DEPTH: u32 = 5;
+const ROULETTE_DEPTH: u32 = 4;
+
+/// Paths that keep a quarter of their light and more are not ended: what they would still find is worth their cost.
+pub(super) const ROULETTE_GRACE: f32 = 4.0;
 
 /// From here on even paths that lose nothing are ended now and then: between perfect mirrors they would go on for
 /// ever.
@@ -46,6 +50,7 @@ impl From<CameraPath> for Path {
             sampler,
             slot,
             media: MediumStack::default(),
+            track: Track::default(),
         }
     }
 }
@@ -83,16 +88,12 @@ pub(super) struct PathWave {
     paths: PathBatch,
     next: PathBatch,
     hits: HitBatch,
-    /// The material of each hit.
-    materials: Vec<MaterialId>,
-    kinds: Vec<u8>,
-    /// Hits in the order in which they are shaded: by kind of material.
-    order: Vec<u32>,
+    sorted: SortedHits,
     shadows: ShadowBatch,
 }
 
-/// Kinds of hits: misses, then those of materials.
-const KINDS: usize = Material::KINDS + 1;
+/// Of hits, see [`SortedHits::of_kind`]; the others are one more than [`Material::kind`].
+const MISSES: usize = 0;
 const EMITTERS: usize = 1;
 
 impl PathWave {
@@ -104,11 +105,12 @@ impl PathWave {
         &mut self,
         scene: &Snapshot,
         settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
         start: impl FnOnce(&mut PathBatch),
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        self.paths.start(radiance.len(), scene.shading.features.glass);
+        self.paths.start(radiance.len(), scene.shading.features.glass, caustics.is_some());
         start(&mut self.paths);
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
         let tree = &scene.geometry.tree;
@@ -122,7 +124,7 @@ impl PathWave {
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             tree.closest_hits(&self.paths.rays, class, &mut self.hits);
-            self.shade(scene, depth, settings, radiance);
+            self.shade(scene, depth, settings, caustics, radiance);
             self.shadows.settle(radiance, |rays, occluded| tree.any_hits(rays, class, occluded));
             counts.shadow += self.shadows.rays.len() as u64;
             counts.bounce += self.next.len() as u64;
@@ -131,58 +133,71 @@ impl PathWave {
         Some(counts)
     }
 
-    fn shade(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
-        self.next.start(self.paths.len(), scene.shading.features.glass);
+    fn shade(
+        &mut self,
+        scene: &Snapshot,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        radiance: &mut [Vec3],
+    ) {
+        self.next.start(self.paths.len(), scene.shading.features.glass, caustics.is_some());
         self.shadows.start(self.paths.len());
-        let starts = self.sort_by_material(scene);
+        let set = settings.lanes.unwrap_or(InstructionSet::Portable);
+        self.sorted.sort(set, scene, &self.hits, self.paths.len());
         let is_last = depth == settings.max_depth;
         let features = &scene.shading.features;
-        let emitters_have_lanes =
-            scene.shading.lights.has_lanes() && !features.textures && scene.shading.environment_sampler.is_none();
+        let emitters_have_lanes = caustics.is_none()
+            && scene.shading.lights.has_lanes()
+            && !features.textures
+            && scene.shading.environment_sampler.is_none();
         for kind in 0..KINDS {
-            let order = starts[kind] as usize..starts[kind + 1] as usize;
+            let order = self.sorted.of_kind(kind);
             if order.is_empty() {
                 continue;
             }
             let group = Group {
                 scene,
                 techniques: &settings.techniques,
+                caustics,
+                depth,
                 dimension: first_dimension(depth),
                 survival: Survival::at(depth, &settings.techniques),
                 paths: &self.paths,
                 hits: &self.hits,
-                materials: &self.materials,
-                order: &self.order[order.clone()],
+                materials: &self.sorted.materials,
+                order,
                 next: &mut self.next,
                 shadows: &mut self.shadows,
             };
             match (settings.lanes, kind) {
-                (_, 0) => self.shade_misses(scene, &settings.techniques, order, radiance),
+                (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
                 (Some(set), EMITTERS) if emitters_have_lanes => wide::shade_emitters(set, group, radiance),
                 // What emits no light and is the end of its path adds nothing.
                 (Some(_), _) if wide::knows(kind - 1) && is_last => {}
                 (Some(set), _) if wide::knows(kind - 1) => wide::shade(set, kind - 1, group),
                 _ => {
-                    for k in order {
-                        self.shade_one(scene, depth, settings, self.order[k] as usize, radiance);
+                    for k in 0..order.len() {
+                        self.shade_one(
+                            scene,
+                            depth,
+                            settings,
+                            caustics,
+                            self.sorted.of_kind(kind)[k] as usize,
+                            radiance,
+                        );
                     }
                 }
             }
         }
     }
 
-    fn shade_misses(
-        &mut self,
-        scene: &Snapshot,
-        techniques: &Techniques,
-        order: std::ops::Range<usize>,
-        radiance: &mut [Vec3],
-    ) {
+    fn shade_misses(&mut self, scene: &Snapshot, techniques: &Techniques, radiance: &mut [Vec3]) {
         if !scene.shading.features.environment {
             return;
         }
         let always = scene.shading.environment_sampler.is_none();
-        for &i in &self.order[order] {
+        for &i in self.sorted.of_kind(MISSES) {
             let i = i as usize;
             let dir = self.paths.rays.get(i).dir;
             if always {
@@ -197,7 +212,15 @@ impl PathWave {
     }
 
     /// Shades one hit: the light that it emits, a light sample and a bounce.
-    fn shade_one(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, i: usize, radiance: &mut [Vec3]) {
+    fn shade_one(
+        &mut self,
+        scene: &Snapshot,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        i: usize,
+        radiance: &mut [Vec3],
+    ) {
         let techniques = &settings.techniques;
         let mut path = self.paths.get(i);
         let ray = self.paths.rays.get(i);
@@ -205,18 +228,20 @@ impl PathWave {
         if scene.shading.features.media {
             path.throughput *= path.media.transmittance(scene, hit.t);
         }
-        let material = self.materials[i];
+        let material = self.sorted.materials[i];
         let vertex = Vertex::new(scene, &ray, &hit, material);
         if let Some(emission) = scene.shading.emission[material as usize]
             && vertex.front
         {
-            let weight = emission.scale * emitter_weight(scene, techniques, &path, &hit, ray.dir);
+            let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, &path.media, &hit, &vertex));
+            let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+            let weight = emission.scale * weight;
             radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
         }
         if depth == settings.max_depth {
             return;
         }
-        let step = Step { scene, techniques, path: &path, vertex: &vertex, material, depth };
+        let step = Step { scene, techniques, path: &path, vertex: &vertex, hit: &hit, material, depth, caustics };
         if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
             if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
                 self.scatter(step, &blend);
@@ -232,39 +257,6 @@ impl PathWave {
             self.sample_light(&step, bsdf);
         }
         self.bounce(&step, bsdf);
-    }
-
-    /// Hits of one kind of material follow each other; those of kind `k` are `order[starts[k]..starts[k + 1]]`.
-    fn sort_by_material(&mut self, scene: &Snapshot) -> [u32; KINDS + 1] {
-        let table = &scene.shading.material_table;
-        let n = self.paths.len();
-        let mut starts = [0u32; KINDS + 1];
-        self.kinds.resize(n, 0);
-        self.materials.resize(n, 0);
-        for i in 0..n {
-            let mut kind = 0;
-            if self.hits.object[i] != HitBatch::MISS {
-                let mut material = table.of_object[self.hits.object[i] as usize];
-                if material == SEVERAL {
-                    material = self.hits.get(i).map_or(0, |hit| material_of(scene, &hit));
-                }
-                self.materials[i] = material;
-                kind = 1 + table.kind[material as usize];
-            }
-            self.kinds[i] = kind;
-            starts[usize::from(kind) + 1] += 1;
-        }
-        for k in 1..starts.len() {
-            starts[k] += starts[k - 1];
-        }
-        self.order.resize(n, 0);
-        let mut next = starts;
-        for (i, &kind) in self.kinds.iter().enumerate() {
-            let at = &mut next[usize::from(kind)];
-            self.order[*at as usize] = i as u32;
-            *at += 1;
-        }
-        starts
     }
 
     /// Next-event estimation: one point on one light, and a shadow ray to it.
@@ -316,10 +308,25 @@ impl PathWave {
         if sample.transmitted {
             path.media = path.media.crossed(material, vertex.front);
         }
+        if let Some(pass) = step.caustics {
+            let bounce = Bounce {
+                vertex,
+                hit: step.hit,
+                eye: (depth == 1).then_some(path.position),
+                wi: sample.wi,
+                pdf: sample.pdf,
+                transmitted: sample.transmitted,
+                blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+                before: step.path.media,
+                after: path.media,
+            };
+            path.track = pass.follow(path.track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+        }
         if let Some(most_kept) = Survival::at(depth, techniques).share {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
-            let survival = (path.throughput.abs().max_element() * ior * ior).min(most_kept);
+            let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior;
+            let survival = most.min(most_kept);
             if survival < 1.0 {
                 if sampler.single(dimension + DIM_ROULETTE) >= survival {
                     return;
@@ -344,9 +351,11 @@ struct Step<'a> {
     techniques: &'a Techniques,
     path: &'a Path,
     vertex: &'a Vertex,
+    hit: &'a Hit,
     material: MaterialId,
     /// Segments so far.
     depth: u32,
+    caustics: Option<&'a CausticPass<'a>>,
 }
 
 impl Step<'_> {

@@ -1,5 +1,6 @@
 //! Paths and shadow rays in flight, as structures of arrays.
 
+use super::caustics::Track;
 use super::medium::MediumStack;
 use crate::geometry::Ray;
 use crate::kdtree::{RayBatch, append, append_bits};
@@ -20,6 +21,8 @@ pub(super) struct Path {
     pub sampler: Sampler,
     pub slot: u32,
     pub media: MediumStack,
+    /// Against paths from the lamps.
+    pub track: Track,
 }
 
 /// Many paths and the rays that they go on along. The arrays may be longer than there are paths.
@@ -35,6 +38,8 @@ pub(super) struct PathBatch {
     pub slot: Vec<u32>,
     /// Kept only where some surface lets light through.
     pub media: Option<Vec<MediumStack>>,
+    /// Kept only where paths are traced from the lamps as well.
+    pub tracks: Option<Vec<Track>>,
 }
 
 /// Sixteen paths, of those that have a bit in some mask.
@@ -58,7 +63,7 @@ impl PathBatch {
     }
 
     /// Forgets all paths; there is room for `n` new ones afterwards.
-    pub fn start(&mut self, n: usize, with_media: bool) {
+    pub fn start(&mut self, n: usize, with_media: bool, with_tracks: bool) {
         self.rays.clear();
         self.rays.make_room(n);
         let least = n + LANES;
@@ -69,11 +74,8 @@ impl PathBatch {
                 array.resize(least, 0);
             }
         }
-        if with_media {
-            self.media.get_or_insert_default().clear();
-        } else {
-            self.media = None;
-        }
+        restart(&mut self.media, with_media);
+        restart(&mut self.tracks, with_tracks);
     }
 
     #[inline]
@@ -88,6 +90,9 @@ impl PathBatch {
         if let Some(media) = &mut self.media {
             media.push(path.media);
         }
+        if let Some(tracks) = &mut self.tracks {
+            tracks.push(path.track);
+        }
         self.rays.push(ray);
     }
 
@@ -101,6 +106,7 @@ impl PathBatch {
             sampler: self.sampler(i),
             slot: self.slot[i],
             media: self.media_of(i),
+            track: self.track_of(i),
         }
     }
 
@@ -119,13 +125,18 @@ impl PathBatch {
         self.media.as_ref().map_or(MediumStack::default(), |media| media[i])
     }
 
+    #[inline]
+    pub fn track_of(&self, i: usize) -> Track {
+        self.tracks.as_ref().map_or(Track::default(), |tracks| tracks[i])
+    }
+
     #[inline(always)]
     pub fn sampler_lanes<S: Simd>(&self, at: Bits<S>) -> SamplerLanes<S> {
         let (stream, reversed_index) = (Bits::gather(&self.stream, at), Bits::gather(&self.reversed_index, at));
         SamplerLanes { stream, reversed_index }
     }
 
-    /// Appends the lanes of `mask`, without their media.
+    /// Appends the lanes of `mask`, without their media and tracks.
     #[inline(always)]
     pub fn append<S: Simd>(&mut self, mask: Mask, origin: Vector<S>, dir: Vector<S>, path: &PathLanes<S>) {
         let at = self.len();
@@ -192,6 +203,15 @@ impl ShadowBatch {
                 radiance[self.slot[i] as usize] += get(&self.light, i);
             }
         }
+    }
+}
+
+/// Empties a list, and drops or makes it as wanted.
+fn restart<T>(list: &mut Option<Vec<T>>, wanted: bool) {
+    if wanted {
+        list.get_or_insert_default().clear();
+    } else {
+        *list = None;
     }
 }
 

@@ -4,6 +4,7 @@
 //! keeps [`Geometry`] and [`Shading`], a new material keeps [`Geometry`].
 
 use super::ambient::AmbientLight;
+use super::caustics::CasterTable;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
 use super::wide::{MaterialTable, SurfaceTable};
@@ -64,6 +65,8 @@ pub struct Shading {
     pub lights: LightTable,
     pub(super) environment_sampler: Option<EnvironmentSampler>,
     pub(super) material_table: MaterialTable,
+    /// What gathers light, where something does.
+    pub(super) casters: Option<CasterTable>,
     pub features: Features,
 }
 
@@ -80,6 +83,8 @@ pub struct Features {
     pub environment: bool,
     /// Some material looks up a texture.
     pub textures: bool,
+    /// Something smooth gathers the light of some lamp, so paths are traced from lamps as well.
+    pub caustics: bool,
 }
 
 impl Geometry {
@@ -105,6 +110,7 @@ impl Shading {
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(&materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, &textures);
         let environment_sampler = EnvironmentSampler::build(&environment);
+        let casters = CasterTable::build(geometry, &materials, &lights);
         let glass = materials.iter().any(Material::is_clear);
         let features = Features {
             glass,
@@ -112,6 +118,7 @@ impl Shading {
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),
             textures: materials.iter().any(|material| material.is_textured(&materials)),
+            caustics: casters.is_some(),
         };
         let material_table = MaterialTable::build(geometry, &materials);
         let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
@@ -128,6 +135,7 @@ impl Shading {
             lights,
             environment_sampler,
             material_table,
+            casters,
             features,
         }
     }

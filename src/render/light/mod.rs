@@ -12,7 +12,7 @@ use crate::kdtree::Shape;
 use crate::sampling::Sampler;
 use glam::{Mat3, Vec2, Vec3};
 use selection::Selection;
-use shape::LightShape;
+pub(super) use shape::LightShape;
 pub(super) use shape::sphere_uv;
 pub(super) use wide::LightLanes;
 use wide::WideLights;
@@ -149,6 +149,11 @@ impl LightTable {
         self.lights.is_empty()
     }
 
+    #[inline]
+    pub(super) fn light(&self, id: u32) -> &Light {
+        &self.lights[id as usize]
+    }
+
     /// The light that a primitive is, if it is one.
     #[inline]
     pub(super) fn light_of(&self, object: u32, prim: u32) -> Option<u32> {
@@ -162,7 +167,7 @@ impl LightTable {
     /// A point on some light, or `None` when the choice fell on one that cannot be seen from `position`.
     ///
     /// - `normal`: unit; only light from its side matters.
-    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`.
+    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`; `u_select` is asked for where there are many lights.
     #[inline]
     pub(super) fn sample(
         &self,
@@ -171,9 +176,9 @@ impl LightTable {
         position: Vec3,
         normal: Vec3,
         u_select: impl FnOnce() -> f32,
-        u: Vec2,
+        mut u: Vec2,
     ) -> Option<LightSample> {
-        let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select)?;
+        let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select, &mut u.x)?;
         self.lights[id as usize].sample(textures, techniques, position, u, pmf)
     }
 
@@ -245,20 +250,26 @@ impl Light {
         self.shape.sample(position, techniques.solid_angle, u).map(|point| self.shining(textures, &point, pmf))
     }
 
+    /// What the point with this normal and these surface coordinates sends out, W·m⁻²·sr⁻¹.
     #[inline]
-    fn shining(&self, textures: &[Texture], point: &shape::LightPoint, pmf: f32) -> LightSample {
+    pub fn radiance(&self, textures: &[Texture], normal: Vec3, uv: Vec2) -> Vec3 {
         let radiance = match self.emission.radiance {
             ColorInput::Constant(radiance) => radiance,
             ColorInput::Texture(texture) => {
                 let uv = match (&self.shape, &self.turned) {
-                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * point.normal),
-                    (LightShape::Sphere { .. }, None) => sphere_uv(point.normal),
-                    _ => point.uv,
+                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * normal),
+                    (LightShape::Sphere { .. }, None) => sphere_uv(normal),
+                    _ => uv,
                 };
                 textures[texture as usize].eval(uv)
             }
         };
-        let radiance = self.emission.scale * radiance;
+        self.emission.scale * radiance
+    }
+
+    #[inline]
+    fn shining(&self, textures: &[Texture], point: &shape::LightPoint, pmf: f32) -> LightSample {
+        let radiance = self.radiance(textures, point.normal, point.uv);
         LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance }
     }
 }

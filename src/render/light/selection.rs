@@ -37,6 +37,9 @@ impl Selection {
     }
 
     /// A light and the probability of the choice; `None` when no light can reach the point.
+    ///
+    /// Few lights are chosen by `u`, which is left as a uniform number again: then the points on each light are spread
+    /// as evenly as the choices.
     #[inline]
     pub fn sample(
         &self,
@@ -44,25 +47,34 @@ impl Selection {
         techniques: &Techniques,
         position: Vec3,
         normal: Vec3,
-        u: impl FnOnce() -> f32,
+        u_select: impl FnOnce() -> f32,
+        u: &mut f32,
     ) -> Option<(u32, f32)> {
         match lights.len() {
             0 => None,
             1 => Some((0, 1.0)),
-            n if !techniques.light_selection => Some(((u() * n as f32) as u32, 1.0 / n as f32)),
+            n if !techniques.light_selection => {
+                let scaled = *u * n as f32;
+                *u = scaled.fract();
+                Some((scaled as u32, 1.0 / n as f32))
+            }
             n if n <= MAX_ESTIMATED => {
                 let (estimates, sum) = self.estimates(position, normal);
-                let mut rest = u() * sum;
+                let mut rest = *u * sum;
                 let chosen = (0..n).find(|&i| {
                     rest -= estimates[i];
                     rest < 0.0
                 });
                 // Rounding may leave a rest after the last light that counts.
                 let chosen = chosen.or_else(|| (0..n).rev().find(|&i| estimates[i] > 0.0))?;
+                if rest < 0.0 {
+                    rest += estimates[chosen];
+                }
+                *u = (rest / estimates[chosen]).clamp(0.0, 1.0f32.next_down());
                 (estimates[chosen] > 0.0).then(|| (chosen as u32, estimates[chosen] / sum))
             }
             _ => {
-                let (id, pmf, _) = self.alias.sample(u());
+                let (id, pmf, _) = self.alias.sample(u_select());
                 Some((id, pmf))
             }
         }

@@ -13,7 +13,6 @@ use crate::lanes::{
     Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
 };
 use crate::render::ColorInput;
-use crate::sampling::SamplerLanes;
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
@@ -108,7 +107,7 @@ impl WideLights {
 }
 
 impl LightTable {
-    /// As [`Self::sample`] for the lanes of `mask`; `None` where only that can do it. `dimension` chooses the light.
+    /// As [`Self::sample`] for the lanes of `mask`; `None` where only that can do it.
     #[inline(always)]
     pub(in crate::render) fn sample_lanes<S: Simd>(
         &self,
@@ -116,11 +115,10 @@ impl LightTable {
         mask: Mask,
         position: Vector<S>,
         normal: Vector<S>,
-        (sampler, dimension): (&SamplerLanes<S>, u32),
-        u: [Float<S>; 2],
+        mut u: [Float<S>; 2],
     ) -> Option<LightLanes<S>> {
         let wide = self.wide.as_ref()?;
-        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, position, normal, (sampler, dimension));
+        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, position, normal, &mut u[0]);
         let mut sample = wide.points(techniques.solid_angle, id, mask, position, u);
         sample.pdf = sample.pdf * pmf;
         sample.radiance = Vector::gather(&wide.radiance, id);
@@ -170,15 +168,17 @@ impl LightTable {
         mask: Mask,
         position: Vector<S>,
         normal: Vector<S>,
-        (sampler, dimension): (&SamplerLanes<S>, u32),
+        u: &mut Float<S>,
     ) -> (Bits<S>, Float<S>, Mask) {
         let s = position.x.s;
         if wide.n == 1 {
             return (Bits::splat(s, 0), Float::splat(s, 1.0), mask);
         }
-        let u = sampler.single(dimension);
         if !techniques.light_selection {
-            return ((u * wide.n as f32).truncate(), Float::splat(s, 1.0 / wide.n as f32), mask);
+            let scaled = *u * wide.n as f32;
+            let id = scaled.truncate();
+            *u = scaled - id.to_float();
+            return (id, Float::splat(s, 1.0 / wide.n as f32), mask);
         }
         let mut estimates = [Float::splat(s, 0.0); LANES];
         let mut sum = Float::splat(s, 0.0);
@@ -186,7 +186,8 @@ impl LightTable {
             *estimate = bounds.estimate_lanes(position, normal);
             sum += *estimate;
         }
-        let mut rest = u * sum;
+        let mut rest = *u * sum;
+        let mut within = rest;
         let (mut id, mut chosen) = (Bits::splat(s, 0), Float::splat(s, 0.0));
         let mut open = mask;
         for (i, &estimate) in (0..).zip(&estimates[..wide.n]) {
@@ -194,9 +195,11 @@ impl LightTable {
             let take = open & estimate.is_positive();
             id = Bits { s, v: s.select_u(take, s.splat_u(i), id.v) };
             chosen = select(take, estimate, chosen);
+            within = select(take, rest, within);
             rest = rest - estimate;
             open &= !rest.lt(rest.all(0.0));
         }
+        *u = (within / chosen).at_least(0.0).at_most(1.0f32.next_down());
         (id, chosen / sum, mask & chosen.is_positive())
     }
 }

@@ -83,6 +83,9 @@ fn start<S: Simd>(s: S, lens: Lens, pixels: &Pixels, sample: u32, slot: u32, to:
         if let Some(media) = &mut to.media {
             media.resize(media.len() + count, Default::default());
         }
+        if let Some(tracks) = &mut to.tracks {
+            tracks.resize(tracks.len() + count, Default::default());
+        }
     }
 }
 

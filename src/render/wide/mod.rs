@@ -10,15 +10,19 @@
 mod camera;
 mod metal;
 pub(super) mod place;
+mod sort;
 mod tables;
 pub(super) mod warp;
 
-use super::bsdf::SMALLEST_ALPHA;
+use super::bsdf::{SMALLEST_ALPHA, Scatter};
+use super::caustics::{CausticPass, Track};
 use super::light::LightLanes;
 use super::medium::MediumStack;
-use super::path::{DIM_DIRECTION, DIM_LIGHT, DIM_LIGHT_POINT, DIM_LOBE, DIM_ROULETTE, Survival, choose_light_point};
+use super::path::{
+    DIM_DIRECTION, DIM_LIGHT_POINT, DIM_LOBE, DIM_ROULETTE, ROULETTE_GRACE, Survival, choose_light_point,
+};
 use super::paths::{PathBatch, PathLanes, ShadowBatch};
-use super::surface::{color_at, scalar_at};
+use super::surface::{Vertex, color_at, lobe_at, scalar_at};
 use super::{Material, Snapshot, Techniques};
 use crate::kdtree::HitBatch;
 use crate::lanes::{
@@ -29,14 +33,18 @@ pub(super) use camera::{Lens, Pixels};
 use glam::{Vec2, Vec3};
 use metal::MetalLanes;
 use place::{At, Place};
+pub(super) use sort::{KINDS, SortedHits};
 use std::f32::consts::FRAC_1_PI;
-pub(super) use tables::{MaterialTable, SEVERAL, SurfaceTable};
+pub(super) use tables::{MaterialTable, SurfaceTable};
 use warp::cosine_hemisphere;
 
 /// Hits of one kind of material, and where their light and their paths go on.
 pub(super) struct Group<'a> {
     pub scene: &'a Snapshot,
     pub techniques: &'a Techniques,
+    pub caustics: Option<&'a CausticPass<'a>>,
+    /// Segments so far.
+    pub depth: u32,
     /// The first sample dimension of the vertices.
     pub dimension: u32,
     pub survival: Survival,
@@ -167,7 +175,8 @@ struct Bounce<S: Simd> {
 
 #[inline(always)]
 fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
-    let Group { scene, techniques, dimension, survival, paths, hits, materials, order, next, shadows } = group;
+    let Group { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, next, shadows } =
+        group;
     let features = &scene.shading.features;
     for chunk in order.chunks(LANES) {
         let mut indices = [chunk[0]; LANES];
@@ -239,7 +248,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                 let ior = Float::load(s, &ior);
                 most = most * ior * ior;
             }
-            let kept = most.at_most(most_kept);
+            let kept = (most * ROULETTE_GRACE).at_most(most_kept);
             let at_stake = go_on & kept.lt(kept.all(1.0));
             if at_stake != 0 {
                 let survives = sampler.single(dimension + DIM_ROULETTE).lt(kept);
@@ -256,6 +265,9 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
         if KIND == GLASS {
             origin = select_vector(bounce.transmitted, place.passing(), origin);
         }
+        if let (Some(pass), Some(tracks)) = (caustics, &mut next.tracks) {
+            tracks.extend(follow(pass, &at, &place, &bounce, go_on, depth == 1, &media));
+        }
         let pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
         let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
         next.append(go_on, origin, bounce.wi, &path);
@@ -263,6 +275,53 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             next_media.extend(lanes_of(go_on).map(|lane| media[lane]));
         }
     }
+}
+
+/// What the lanes of `go_on` must remember against paths from the lamps, one at a time.
+///
+/// - `media`: behind the bounce; `is_first`: these are the hits of camera rays.
+#[inline(always)]
+fn follow<S: Simd>(
+    pass: &CausticPass,
+    at: &At<S>,
+    place: &Place<S>,
+    bounce: &Bounce<S>,
+    go_on: Mask,
+    is_first: bool,
+    media: &[MediumStack; LANES],
+) -> impl Iterator<Item = Track> {
+    let vectors = [place.position, place.geometric_normal, place.normal, place.wo, bounce.wi].map(|v| v.to_arrays());
+    let [us, vs, pdfs] = [place.uv[0], place.uv[1], bounce.pdf].map(|x| x.to_array());
+    let (front, transmitted) = (place.front, bounce.transmitted);
+    lanes_of(go_on).map(move |lane| {
+        let i = at.indices[lane] as usize;
+        let [position, geometric_normal, normal, wo, wi] =
+            std::array::from_fn(|k| Vec3::new(vectors[k][0][lane], vectors[k][1][lane], vectors[k][2][lane]));
+        let vertex = Vertex {
+            position,
+            error: Vec3::ZERO,
+            geometric_normal,
+            normal,
+            uv: Vec2::new(us[lane], vs[lane]),
+            front: front >> lane & 1 != 0,
+            wo,
+            lift: Vec3::ZERO,
+        };
+        let (before, after) = (at.paths.media_of(i), media[lane]);
+        let bounce = super::caustics::Bounce {
+            vertex: &vertex,
+            hit: &at.hits.get(i).expect("a hit is being shaded"),
+            eye: is_first.then(|| at.paths.rays.get(i).origin),
+            wi,
+            pdf: pdfs[lane],
+            transmitted: transmitted >> lane & 1 != 0,
+            blended: false,
+            before,
+            after,
+        };
+        let lobe = || lobe_at(at.scene, at.materials[i], &vertex, &before);
+        pass.follow(at.paths.track_of(i), &bounce, || lobe().map_or(0.0, |lobe| lobe.eval(wi, wo, normal).1))
+    })
 }
 
 #[inline(always)]
@@ -421,14 +480,7 @@ fn light_points<S: Simd>(
     let shading = &*scene.shading;
     if shading.environment_sampler.is_none() {
         let u = sampler.pair(dimension + DIM_LIGHT_POINT);
-        let found = shading.lights.sample_lanes(
-            techniques,
-            mask,
-            place.position,
-            place.normal,
-            (sampler, dimension + DIM_LIGHT),
-            u,
-        );
+        let found = shading.lights.sample_lanes(techniques, mask, place.position, place.normal, u);
         if let Some(LightLanes { found, target, wi, pdf, radiance }) = found {
             return Points { found, infinite: 0, target, wi, pdf, radiance };
         }

@@ -83,7 +83,9 @@ pub(in crate::render) struct MaterialTable {
     pub alpha: Vec<f32>,
     pub flags: Vec<u32>,
     /// See [`Material::kind`].
-    pub kind: Vec<u8>,
+    pub kind: Vec<u32>,
+    /// One bit a kind, for those that there are.
+    pub kinds: u32,
     /// The material of each object; [`SEVERAL`] where its primitives differ.
     pub of_object: Vec<MaterialId>,
 }
@@ -111,15 +113,23 @@ impl MaterialTable {
             push(&mut table.color, if let ColorInput::Constant(color) = color { *color } else { Vec3::ZERO });
             table.alpha.push(alpha);
             table.flags.push(flags);
-            table.kind.push(material.kind() as u8);
+            table.kind.push(material.kind() as u32);
+            table.kinds |= 1 << material.kind();
         }
-        let Self { color, alpha, flags, kind, .. } = table;
+        let Self { color, alpha, flags, kind, kinds, .. } = table;
         let of_object = geometry
             .objects
             .iter()
             .map(|object| if let [only] = object.materials[..] { only } else { SEVERAL })
             .collect();
-        Self { color: color.map(padded), alpha: padded(alpha), flags: padded(flags), kind, of_object }
+        Self {
+            color: color.map(padded),
+            alpha: padded(alpha),
+            flags: padded(flags),
+            kind: padded(kind),
+            kinds,
+            of_object: padded(of_object),
+        }
     }
 }
 
