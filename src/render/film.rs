@@ -40,6 +40,9 @@ impl Film {
     /// Pixels along the side of a tile, unless asked otherwise.
     pub const TILE_SIZE: u32 = 32;
 
+    /// Memory that a pixel takes: its sums, and its mean at the last power of two.
+    pub const BYTES_A_PIXEL: usize = 2 * size_of::<DVec3>();
+
     /// Width and height in pixels, at least 1 each.
     pub fn new(width: u32, height: u32) -> Self {
         Self::with_tile_size(width, height, Self::TILE_SIZE)
