@@ -5,6 +5,7 @@
 //! one that counts, so surfaces are always looked at from the eye's side here.
 
 use super::aim::LINE_DIMENSIONS;
+use super::guide::Trace;
 use super::layer::Splat;
 use super::weight::{Bounce, etendue_gain, is_reversible};
 use super::{CausticPass, aim};
@@ -101,6 +102,48 @@ impl LightWave {
         Some((splats, counts))
     }
 
+    /// Follows paths to where they first scatter, for [`super::guide`].
+    pub fn explore(
+        &mut self,
+        pass: &CausticPass,
+        first: u32,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<Trace>> {
+        let mut traces = Vec::new();
+        self.start(pass, first, n);
+        let mut n_vertices = 0;
+        while !self.rays.is_empty() {
+            if stop() {
+                return None;
+            }
+            n_vertices += 1;
+            pass.scene.geometry.tree.closest_hits(&self.rays, RayClass::Incoherent, &mut self.hits);
+            self.next_rays.clear();
+            self.next_paths.clear();
+            for i in 0..self.rays.len() {
+                let path = self.paths[i];
+                let Some(hit) = self.hits.get(i) else { continue };
+                if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
+                    continue;
+                }
+                let ray = self.rays.get(i);
+                let Some((vertex, material, surface)) = surface_at(pass, &ray, &hit, &path.media) else { continue };
+                if n_vertices > 1 && surface.is_smooth() {
+                    traces.push(Trace { at: vertex.position, from: ray.origin });
+                }
+                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices };
+                if let Some((ray, path, true)) = step.go_on(&surface) {
+                    self.next_rays.push(&ray);
+                    self.next_paths.push(path);
+                }
+            }
+            std::mem::swap(&mut self.rays, &mut self.next_rays);
+            std::mem::swap(&mut self.paths, &mut self.next_paths);
+        }
+        Some(traces)
+    }
+
     fn start(&mut self, pass: &CausticPass, first: u32, n: u32) {
         self.rays.clear();
         self.paths.clear();
@@ -136,16 +179,8 @@ impl LightWave {
             if scene.shading.features.media {
                 path.throughput *= path.media.transmittance(scene, hit.t);
             }
-            let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &self.rays.get(i), &hit, material);
-            let is_blend =
-                matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
-            let surface = if is_blend {
-                blend_at(scene, material, &vertex, &path.media).map(|blend| Surface::Blend(Box::new(blend)))
-            } else {
-                lobe_at(scene, material, &vertex, &path.media).map(Surface::Lobe)
-            };
-            let Some(surface) = surface else { continue };
+            let found = surface_at(pass, &self.rays.get(i), &hit, &path.media);
+            let Some((vertex, material, surface)) = found else { continue };
             let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices };
             if n_vertices > 1
                 && surface.is_smooth()
@@ -157,13 +192,28 @@ impl LightWave {
             }
             // One more vertex, and the way to the eye: two more segments.
             if n_vertices + 2 <= pass.max_depth
-                && let Some((ray, path)) = step.go_on(&surface)
+                && let Some((ray, path, _)) = step.go_on(&surface)
             {
                 self.next_rays.push(&ray);
                 self.next_paths.push(path);
             }
         }
     }
+}
+
+/// `None` where the surface is black.
+fn surface_at(pass: &CausticPass, ray: &Ray, hit: &Hit, media: &MediumStack) -> Option<(Vertex, MaterialId, Surface)> {
+    let scene = pass.scene;
+    let material = material_of(scene, hit);
+    let vertex = Vertex::new(scene, ray, hit, material);
+    let is_blend =
+        matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
+    let surface = if is_blend {
+        Surface::Blend(Box::new(blend_at(scene, material, &vertex, media)?))
+    } else {
+        Surface::Lobe(lobe_at(scene, material, &vertex, media)?)
+    };
+    Some((vertex, material, surface))
 }
 
 /// One vertex of one path.
@@ -232,8 +282,8 @@ impl Step<'_> {
         Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
     }
 
-    /// Chooses how the path goes on, and whether.
-    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath)> {
+    /// Chooses how the path goes on, and whether; and tells whether it does so off something perfectly smooth.
+    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath, bool)> {
         let &Self { pass, vertex, material, n_vertices, .. } = self;
         let scene = pass.scene;
         let mut path = *self.path;
@@ -302,7 +352,7 @@ impl Step<'_> {
         }
         path.aimed_at = aim::NO_CASTER;
         let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
-        Some((Ray::new(origin, sample.wi), path))
+        Some((Ray::new(origin, sample.wi), path, is_smooth))
     }
 }
 
