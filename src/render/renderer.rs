@@ -163,7 +163,7 @@ fn advance_tile(
         let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
         radiance.clear();
         radiance.resize(n_samples * n_pixels, Vec3::ZERO);
-        let first = tile.spp;
+        let first = tile.next_sample();
         let camera_paths = (0..n_samples).flat_map(|s| {
             let (tile, order) = (&*tile, &order);
             order.iter().map(move |&local| {
