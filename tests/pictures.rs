@@ -28,6 +28,13 @@ fn fails(folder: &Path, line: &str, status: i32) -> String {
     said
 }
 
+/// Two files hold the same bytes.
+#[track_caller]
+fn assert_equal(folder: &Path, a: &str, b: &str) {
+    // Without the bytes themselves: nobody could read them.
+    assert!(bytes(folder, a) == bytes(folder, b), "{a} and {b} differ");
+}
+
 fn bytes(folder: &Path, name: &str) -> Vec<u8> {
     std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
@@ -59,14 +66,14 @@ fn a_picture_opens_as_the_scene_that_it_shows_and_renders_to_the_same_bytes() {
     for kind in ["png", "exr"] {
         does(path, &format!("render scenes/room.ron -o first.{kind} {how}"));
         does(path, &format!("render first.{kind} -o again.{kind}"));
-        assert_eq!(bytes(path, &format!("first.{kind}")), bytes(path, &format!("again.{kind}")), "{kind}");
+        assert_equal(path, &format!("first.{kind}"), &format!("again.{kind}"));
     }
     // A range of samples, a built-in scene and a model come back as well; so does a picture of a picture.
     std::fs::copy(path.join("scenes/tent.obj"), path.join("tent.obj")).unwrap();
     for scene in ["dof-balls --samples 3..7", "tent.obj --up z --spp 3", "first.png --spp 2"] {
         does(path, &format!("render {scene} -o a.exr --size 24x16 --seed 1"));
         does(path, "render a.exr -o b.exr");
-        assert_eq!(bytes(path, "a.exr"), bytes(path, "b.exr"), "{scene}");
+        assert_equal(path, "a.exr", "b.exr");
     }
     // Twice the size is another picture of the same view, and more samples are more.
     does(path, "render first.png -o large.png --scale 2 --spp 1");
@@ -97,12 +104,9 @@ fn a_scene_that_has_changed_since_the_picture_is_noticed() {
     // Another camera or size in the file changes nothing: the picture has its own.
     std::fs::write(path.join("room.ron"), ROOM.replace("eye: (0.3, 1, 4)", "eye: (0.4, 1, 4)")).unwrap();
     assert_eq!(does(path, "render a.png -o b.png"), "");
-    assert_eq!(bytes(path, "a.png"), bytes(path, "b.png"));
+    assert_equal(path, "a.png", "b.png");
     std::fs::write(path.join("room.ron"), ROOM.replace("radiance: 7", "radiance: 8")).unwrap();
-    assert!(
-        does(path, "render a.png -o b.png").contains("a.png: ./room.ron has changed")
-            || does(path, "render a.png -o b.png").contains("room.ron has changed since")
-    );
+    assert!(does(path, "render a.png -o b.png").contains("room.ron has changed since the picture was taken"));
     // A vertex of the mesh moves.
     std::fs::write(path.join("room.ron"), ROOM).unwrap();
     assert_eq!(does(path, "render a.png -o b.png"), "");
@@ -129,16 +133,16 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
     render("b", "64..128");
     does(path, "merge a.exr b.exr -o ab.exr --picture ab.png");
     does(path, "merge b.exr a.exr -o ba.exr");
-    assert_eq!(bytes(path, "whole.exr"), bytes(path, "ab.exr"));
-    assert_eq!(bytes(path, "whole.exr"), bytes(path, "ba.exr"));
-    assert_eq!(bytes(path, "whole.png"), bytes(path, "ab.png"));
+    assert_equal(path, "whole.exr", "ab.exr");
+    assert_equal(path, "whole.exr", "ba.exr");
+    assert_equal(path, "whole.png", "ab.png");
 
     // Odd cuts give the same light; what they cannot know is how fast the error fell between the powers of two.
     for (name, samples) in [("c", "0..7"), ("d", "100..128"), ("e", "7..100")] {
         render(name, samples);
     }
     does(path, "merge c.exr d.exr e.exr -o cde.exr --picture cde.png");
-    assert_eq!(bytes(path, "whole.png"), bytes(path, "cde.png"));
+    assert_equal(path, "whole.png", "cde.png");
 
     // What cannot be added up is refused with the reason.
     for (line, expected) in [
@@ -177,8 +181,8 @@ fn a_film_is_gone_on_with_as_if_it_had_never_stopped() {
     // Size, seed and the rest are as the film has them; the film names its scene as well.
     does(path, "render room.ron -o part.png --film part.exr --resume --spp 17");
     does(path, "render part.exr -o part.png --resume --spp 24");
-    assert_eq!(bytes(path, "whole.exr"), bytes(path, "part.exr"));
-    assert_eq!(bytes(path, "whole.png"), bytes(path, "part.png"));
+    assert_equal(path, "whole.exr", "part.exr");
+    assert_equal(path, "whole.png", "part.png");
     // A film shows its picture to everyone.
     let shown = image::open(path.join("part.exr")).unwrap().into_rgb32f();
     assert_eq!(shown.dimensions(), (40, 30));
@@ -198,7 +202,7 @@ fn a_film_is_gone_on_with_as_if_it_had_never_stopped() {
     std::fs::write(path.join("room.ron"), ROOM.replace("radiance: 7", "radiance: 8")).unwrap();
     let said = fails(path, "render room.ron -o p.png --film part.exr --resume", 1);
     assert!(said.contains("another scene, or of this one before it was changed"), "{said}");
-    assert_eq!(bytes(path, "part.exr"), before);
+    assert!(bytes(path, "part.exr") == before, "nothing was lost");
     for line in ["render room.ron -o p.png --resume", "render room.ron -o p.png --film f.png"] {
         fails(path, line, 2);
     }
@@ -255,8 +259,9 @@ fn ctrl_c_saves_what_is_there_and_it_can_be_gone_on_with() {
     let spp = json["spp"].as_u64().unwrap();
     assert!(spp > 0 && json["stopped"] == true, "{json}");
     // Gone on with, it is as if nothing had happened.
-    let goal = spp + 3;
+    // Some pixels have a few samples more than others.
+    let goal = spp + 40;
     does(path, &format!("render a.exr -o a.png --resume --spp {goal}"));
     does(path, &format!("render cornell-balls -o b.png --film b.exr --size 64x64 --spp {goal}"));
-    assert_eq!(bytes(path, "a.exr"), bytes(path, "b.exr"));
+    assert_equal(path, "a.exr", "b.exr");
 }
