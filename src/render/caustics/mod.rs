@@ -29,9 +29,9 @@ use guide::Guide;
 use rayon::prelude::*;
 use trace::LightWave;
 
-/// Paths from the lamps for each path from the eye. They cost about half as much, and all of them carry light that the
-/// others hardly find.
-const LIGHT_PATHS_PER_PIXEL: f32 = 0.5;
+/// Paths from the lamps for each path from the eye: they cost less, and all of them carry light that the others hardly
+/// find.
+const LIGHT_PATHS_PER_PIXEL: f32 = 0.25;
 
 /// What tracing from the lamps and weighting against it need to know of a picture.
 pub(super) struct CausticPass<'a> {
