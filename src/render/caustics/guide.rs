@@ -13,14 +13,14 @@ use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone};
 use glam::{Vec2, Vec3};
 
 /// Most exits in one list. Each costs a few multiplications an evaluation.
-const LIST: usize = 16;
+const LIST: usize = 32;
 
 /// The neighbour of an exit that its ball reaches: wide enough to overlap, narrow enough to tell one side of a lens from the
 /// other.
 const NEIGHBOR: usize = 3;
 
 /// Share of directions that are chosen by the list where there is one.
-const SHARE: f32 = 0.5;
+const SHARE: f32 = 0.35;
 
 /// Where gathered light went, and where it came from last.
 #[derive(Clone, Copy, Debug)]

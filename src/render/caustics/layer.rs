@@ -11,9 +11,9 @@ use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Paths from the lamps for each path from the eye. They cost about half as much, and all of them carry light that the
-/// others hardly find.
-const LIGHT_PATHS_PER_PIXEL: f64 = 0.5;
+/// Paths from the lamps for each path from the eye: they cost less, and all of them carry light that the others hardly
+/// find.
+const LIGHT_PATHS_PER_PIXEL: f64 = 0.25;
 
 /// Paths in a batch, at most.
 const MAX_BATCH: u32 = 4096;
