@@ -1,6 +1,7 @@
 //! `firstlight info --tree SCENE|MODEL`: what each way to split each mesh costs to build and to trace.
 
 use super::Failure;
+use super::console::{print, remark};
 use firstlight::kdtree::{self, BuildPreset};
 use firstlight::mesh::Mesh;
 use firstlight::report::{MeanVisits, TreePlan, TreeRow, TreeTable, tree_plans};
@@ -21,15 +22,15 @@ pub fn run(inputs: &SceneInputs, extraction: &Extraction, json: bool) -> Result<
         let table = TreeTable::measure(mesh, *world_from_mesh, &plans, |plan| {
             done += 1;
             let what = plan_name(plan);
-            eprintln!("{name}: tree {done} of {}, {} {}", plans.len(), what.0, what.1);
+            remark(format_args!("{name}: tree {done} of {}, {} {}", plans.len(), what.0, what.1));
         });
         if !json {
-            println!("{}", text(name, &table));
+            print(text(name, &table))?;
         }
         tables.push(as_json(name, &table));
     }
     if json {
-        println!("{}", serde_json::json!({ "meshes": tables }));
+        print(serde_json::json!({ "meshes": tables }))?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use super::extract::Trees;
 use super::file::{
     EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, ball_grid, locate,
 };
+use super::limits::{Limits, open_file};
 use super::meshes::{LoadedMesh, load_mesh, plain_io};
 use super::picture::read_picture;
 use super::showcase;
@@ -280,14 +281,12 @@ impl LoadedScene {
 /// The text of a scene file, within its limit.
 fn read_text(path: &Path) -> Result<String, SceneError> {
     let fail = |error: std::io::Error| SceneError::in_file(path, format!("cannot be read: {}", plain_io(&error)));
-    let file = std::fs::File::open(path).map_err(fail)?;
-    if file.metadata().map_err(fail)?.is_dir() {
-        return Err(SceneError::in_file(path, "cannot be read: it is a folder"));
-    }
+    let limit = Limits::of_this_process().scene_bytes;
     let mut text = String::new();
-    file.take(SceneFile::MAX_TEXT + 1).read_to_string(&mut text).map_err(fail)?;
-    if text.len() as u64 > SceneFile::MAX_TEXT {
-        return Err(SceneError::in_file(path, format!("is longer than {} bytes", SceneFile::MAX_TEXT)));
+    open_file(path).map_err(fail)?.take(limit.saturating_add(1)).read_to_string(&mut text).map_err(fail)?;
+    if text.len() as u64 > limit {
+        let advice = Limits::advice();
+        return Err(SceneError::in_file(path, format!("is longer than {limit} bytes, the limit for scenes: {advice}")));
     }
     Ok(text)
 }

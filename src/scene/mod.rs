@@ -12,15 +12,18 @@ mod extract;
 pub mod file;
 mod fingerprint;
 mod inputs;
+mod limits;
 mod load;
 mod meshes;
 pub mod obj;
 mod picture;
 mod placement;
+pub mod shot;
 mod showcase;
 mod spawn;
 mod upright;
 mod view;
+pub mod whole_file;
 
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use components::{
@@ -32,6 +35,8 @@ pub use extent::{Extent, ExtentCache};
 pub use extract::{Extraction, Part, Trees, origin_for};
 pub use fingerprint::Fingerprint;
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
+pub use limits::Limits;
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+pub use picture::{read_picture, read_picture_within};
 pub use placement::{Linear, Placement};
 pub use view::{Lens, Projection, View, ViewError};
