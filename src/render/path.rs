@@ -8,7 +8,7 @@
 //! asked of it as the reference. Start reading at [`PathWave::trace`].
 
 use super::bsdf::Scatter;
-use super::caustics::{Bounce, CausticPass, Track};
+use super::caustics::{Bounce, CausticPass, Guided, Track};
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::paths::{Path, PathBatch, ShadowBatch};
@@ -89,6 +89,9 @@ pub(super) struct PathWave {
     next: PathBatch,
     hits: HitBatch,
     sorted: SortedHits,
+    /// Of the hits of one kind, those with hints of where gathered light comes from, and the others.
+    told: Vec<u32>,
+    untold: Vec<u32>,
     shadows: ShadowBatch,
 }
 
@@ -152,9 +155,28 @@ impl PathWave {
             && !features.textures
             && scene.shading.environment_sampler.is_none();
         for kind in 0..KINDS {
-            let order = self.sorted.of_kind(kind);
+            let mut order = self.sorted.of_kind(kind);
             if order.is_empty() {
                 continue;
+            }
+            // Where there are hints, they are followed one path at a time.
+            self.told.clear();
+            if let Some(pass) = caustics
+                && kind > MISSES
+                && wide::scatters(kind - 1)
+                && settings.lanes.is_some()
+            {
+                let (paths, hits) = (&self.paths, &self.hits);
+                let is_told = |i: &u32| {
+                    let i = *i as usize;
+                    pass.hints(&paths.track_of(i), depth, paths.rays.get(i).at(hits.t[i])).is_some()
+                };
+                self.told.extend(order.iter().copied().filter(is_told));
+                if !self.told.is_empty() {
+                    self.untold.clear();
+                    self.untold.extend(order.iter().copied().filter(|i| !is_told(i)));
+                    order = &self.untold;
+                }
             }
             let group = Group {
                 scene,
@@ -178,16 +200,13 @@ impl PathWave {
                 (Some(set), _) if wide::knows(kind - 1) => wide::shade(set, kind - 1, group),
                 _ => {
                     for k in 0..order.len() {
-                        self.shade_one(
-                            scene,
-                            depth,
-                            settings,
-                            caustics,
-                            self.sorted.of_kind(kind)[k] as usize,
-                            radiance,
-                        );
+                        let i = self.sorted.of_kind(kind)[k] as usize;
+                        self.shade_one(scene, depth, settings, caustics, i, radiance);
                     }
                 }
+            }
+            for k in 0..self.told.len() {
+                self.shade_one(scene, depth, settings, caustics, self.told[k] as usize, radiance);
             }
         }
     }
@@ -241,13 +260,34 @@ impl PathWave {
         if depth == settings.max_depth {
             return;
         }
-        let step = Step { scene, techniques, path: &path, vertex: &vertex, hit: &hit, material, depth, caustics };
+        let step = Step {
+            scene,
+            techniques,
+            path: &path,
+            vertex: &vertex,
+            hit: &hit,
+            material,
+            depth,
+            caustics,
+            is_told: false,
+        };
         if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
             if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
-                self.scatter(step, &blend);
+                self.scatter_told(step, &blend);
             }
         } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
-            self.scatter(step, &lobe);
+            self.scatter_told(step, &lobe);
+        }
+    }
+
+    /// With hints, where there are any, of where gathered light comes from.
+    #[inline]
+    fn scatter_told(&mut self, step: Step, bsdf: &impl Scatter) {
+        let Step { path, vertex, depth, .. } = step;
+        let hints = step.caustics.filter(|_| bsdf.is_smooth());
+        match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
+            Some(hints) => self.scatter(Step { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
+            None => self.scatter(step, bsdf),
         }
     }
 
@@ -320,12 +360,13 @@ impl PathWave {
                 before: step.path.media,
                 after: path.media,
             };
-            path.track = pass.follow(path.track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+            let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
+            path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
         }
         if let Some(most_kept) = Survival::at(depth, techniques).share {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
-            let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior;
+            let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior * path.track.gain;
             let survival = most.min(most_kept);
             if survival < 1.0 {
                 if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -356,6 +397,8 @@ struct Step<'a> {
     /// Segments so far.
     depth: u32,
     caustics: Option<&'a CausticPass<'a>>,
+    /// Some directions are chosen by hints.
+    is_told: bool,
 }
 
 impl Step<'_> {

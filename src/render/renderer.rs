@@ -114,7 +114,11 @@ pub fn advance(
     let Some(caustics) = &pass.caustics else {
         return advance_tiles(&pass, film, target_spp, stop);
     };
-    film.light.get_or_insert_with(|| LightLayer::new(size));
+    if !caustics.prepare(stop) {
+        return PassReport::default();
+    }
+    let first = film.first_sample();
+    film.light.get_or_insert_with(|| LightLayer::new(size, first));
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp() < target_spp {
@@ -236,7 +240,7 @@ fn advance_tile(
         let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
         radiance.clear();
         radiance.resize(n_samples * n_pixels, Vec3::ZERO);
-        let first = tile.spp;
+        let first = tile.next_sample();
         let samples = first..first + n_samples as u32;
         let Some(rays) = wave.trace(pass, samples, n_pixels as u32, &mut radiance, stop) else {
             report.completed = false;
@@ -266,6 +270,9 @@ fn advance_tile(
 pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
     let caustics = CausticPass::of(snapshot, settings, film_size);
     let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size: film_size };
+    if let Some(caustics) = &pass.caustics {
+        caustics.prepare(&|| false);
+    }
     let mut radiance = [Vec3::ZERO];
     let mut wave = Wave { pixels: Pixels { x: vec![at.x], y: vec![at.y], local: vec![0] }, ..Wave::default() };
     wave.trace(&pass, at.sample..at.sample + 1, 1, &mut radiance, &|| false);

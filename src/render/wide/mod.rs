@@ -69,6 +69,11 @@ pub(super) fn knows(kind: usize) -> bool {
     (DIFFUSE..=METAL).contains(&kind)
 }
 
+/// Whether [`shade`] knows the kind, and light sampling finds something for it.
+pub(super) fn scatters(kind: usize) -> bool {
+    [DIFFUSE, METAL].contains(&kind)
+}
+
 /// Shades hits on materials of one [`Material::kind`].
 pub(super) fn shade(set: InstructionSet, kind: usize, group: Group) {
     match kind {
@@ -247,6 +252,9 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                 }
                 let ior = Float::load(s, &ior);
                 most = most * ior * ior;
+            }
+            if paths.tracks.is_some() {
+                most = most * Float::load(s, &indices.map(|i| paths.track_of(i as usize).gain));
             }
             let kept = (most * ROULETTE_GRACE).at_most(most_kept);
             let at_stake = go_on & kept.lt(kept.all(1.0));
