@@ -5,6 +5,7 @@
 
 mod selection;
 mod shape;
+mod tree;
 
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;
