@@ -103,7 +103,8 @@ pub fn advance(
     if !caustics.prepare(stop) {
         return PassReport::default();
     }
-    film.light.get_or_insert_with(|| LightLayer::new(size));
+    let first = film.first_sample();
+    film.light.get_or_insert_with(|| LightLayer::new(size, first));
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp() < target_spp {
@@ -201,7 +202,7 @@ fn advance_tile(
         let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
         radiance.clear();
         radiance.resize(n_samples * n_pixels, Vec3::ZERO);
-        let first = tile.spp;
+        let first = tile.next_sample();
         let camera_paths = (0..n_samples).flat_map(|s| {
             let (tile, order) = (&*tile, &order);
             order.iter().map(move |&local| {

@@ -75,7 +75,7 @@ impl LightWave {
     pub fn trace(
         &mut self,
         pass: &CausticPass,
-        first: u32,
+        first: u64,
         n: u32,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Vec<Splat>, RayCounts)> {
@@ -109,7 +109,7 @@ impl LightWave {
     pub fn explore(
         &mut self,
         pass: &CausticPass,
-        first: u32,
+        first: u64,
         n: u32,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<Vec<Trace>> {
@@ -147,14 +147,15 @@ impl LightWave {
         Some(traces)
     }
 
-    fn start(&mut self, pass: &CausticPass, first: u32, n: u32) {
+    fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
         self.rays.clear();
         self.paths.clear();
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
         // One sequence for all paths: its stream is none of any pixel's.
         let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
-        for i in first..first + n {
-            let sampler = new_sampler(seed, u32::MAX, u32::MAX, i);
+        for i in first..first + u64::from(n) {
+            // A sequence has 2³² points.
+            let sampler = new_sampler(seed, u32::MAX, u32::MAX - (i >> 32) as u32, i as u32);
             let Some(line) = pass.casters.sample(pass.scene, &sampler) else { continue };
             let throughput = line.radiance / line.density;
             if throughput == Vec3::ZERO {
