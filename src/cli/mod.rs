@@ -5,6 +5,7 @@ mod render;
 mod report;
 mod show;
 mod simplify;
+mod stability;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use firstlight::render::{Integrator, PixelFilter};
@@ -27,6 +28,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Measure speed against error: how fast scenes get right, and what each technique is worth.
     Report(report::ReportArgs),
+    /// Count failures on hard cases: leaks, self-hits, missed hits, wrong depths, bad samples, lost light.
+    Stability(stability::StabilityArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
     /// Write a model with fewer triangles, and measure how far it is from the original.
@@ -123,6 +126,7 @@ pub fn main() -> ExitCode {
     let result = match line.command {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Report(args)) => report::run(&args),
+        Some(Command::Stability(args)) => stability::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),

@@ -38,8 +38,11 @@ impl Camera {
         let point =
             if self.blades < 3 { uniform_disc(lens) } else { polygon_disc(lens, self.blades, self.blade_rotation) };
         let offset = self.lens_radius * (point.x * self.right + point.y * self.up);
-        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye.
-        Ray::new(self.eye + offset, (direction - offset / self.focus_distance).normalize())
+        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye. Or
+        // the other way round, for a plane so near that the quotient would leave the range of f32.
+        let focus = self.focus_distance;
+        let towards = if focus >= 1.0 { direction - offset / focus } else { direction * focus - offset };
+        Ray::new(self.eye + offset, (towards / towards.abs().max_element()).normalize())
     }
 
     /// From the eye through a point of the film to the plane one metre ahead; not unit.
