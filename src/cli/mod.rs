@@ -1,15 +1,19 @@
 //! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not understood.
 
+mod console;
 mod info;
 mod render;
 mod report;
 mod show;
 mod simplify;
 mod stability;
+mod trees;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use console::remark;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::{BUILTIN_SCENES, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// An interactive, progressive path tracer: open a model, fly through it, watch it converge.
@@ -101,13 +105,22 @@ impl SceneArgs {
 
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
-        let source = SceneSource::parse(&self.scene).map_err(|error| Failure::Failed(error.to_string()))?;
+        let source = self.source()?;
         let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
-            eprintln!("warning: {warning}");
+            remark(format_args!("warning: {warning}"));
         }
         Ok(scene)
+    }
+
+    /// What the word on the command line means.
+    fn source(&self) -> Result<SceneSource, Failure> {
+        SceneSource::parse(&self.scene).map_err(|error| {
+            // A word that is neither a scene nor a file is a slip of the pen; a file may be wanting or unfit.
+            let is_name = Path::new(&self.scene).extension().is_none() && !Path::new(&self.scene).exists();
+            if is_name { Failure::Usage(error.to_string()) } else { Failure::Failed(error.to_string()) }
+        })
     }
 }
 
@@ -137,7 +150,7 @@ pub fn main() -> ExitCode {
         Err(Failure::Failed(message)) => (message, 1),
     };
     for line in message.lines() {
-        eprintln!("error: {line}");
+        remark(format_args!("error: {line}"));
     }
     ExitCode::from(code)
 }

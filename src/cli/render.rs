@@ -1,10 +1,12 @@
 //! `firstlight render SCENE -o out.png`: a picture without a window.
 
+use super::console::{print, remark};
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
 use clap::Args;
-use firstlight::frame::{OfflineReport, Target, check_writable, render_offline, write_film};
+use firstlight::frame::{OfflineReport, PictureFormat, Target, render_offline, write_film};
 use firstlight::render::{Film, RenderSettings};
 use firstlight::report::cpu_seconds;
+use firstlight::scene::whole_file::check_writable;
 use firstlight::scene::{Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -25,19 +27,19 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
     /// Samples per pixel; 256 unless a time or an error is given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Stop after so many seconds of rendering.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     pub time: Option<f64>,
     /// Stop when the picture's relative error, by its own estimate, is down to this: 0.01 is one per cent.
-    #[arg(long, value_name = "SHARE", value_parser = parse_positive)]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = parse_positive)]
     pub error: Option<f64>,
     /// Worker threads; all cores when not given. The picture does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Another seed gives other noise.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 0)]
     pub seed: u32,
     /// The light model; the scene's own when not given.
     #[arg(long, value_enum)]
@@ -46,7 +48,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum)]
     pub filter: Option<FilterArg>,
     /// Longest path in segments; 1 shows lights alone.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: Option<u32>,
     /// Brighter or darker by factors of two, on top of the scene's own exposure; .exr keeps the linear light.
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0)]
@@ -54,12 +56,16 @@ pub struct RenderArgs {
     /// Print one JSON object with times and counts as the last line.
     #[arg(long)]
     pub json: bool,
+    /// Said once the scene has been read.
+    #[arg(skip)]
+    pub announcement: Option<String>,
 }
 
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     if !args.exposure.is_finite() {
         return Err(Failure::Usage("--exposure must be a finite number of stops".to_owned()));
     }
+    PictureFormat::of(&args.output).map_err(Failure::Usage)?;
     // A picture that cannot be written is not worth the wait.
     check_writable(&args.output).map_err(Failure::Failed)?;
     let pool = rayon::ThreadPoolBuilder::new()
@@ -73,6 +79,9 @@ fn render(args: &RenderArgs) -> Result<(), Failure> {
     let bar = progress_bar();
     let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
     let scene = args.scene.load(aspect, &|text| bar.set_message(text.to_owned()))?;
+    if let Some(announcement) = &args.announcement {
+        bar.suspend(|| remark(announcement));
+    }
 
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
@@ -80,7 +89,7 @@ fn render(args: &RenderArgs) -> Result<(), Failure> {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     let build_seconds = scene.build_seconds + start.elapsed().as_secs_f64();
     for problem in &extraction.problems {
-        eprintln!("warning: {problem}");
+        remark(format_args!("warning: {problem}"));
     }
 
     let settings = settings(args, world.resource::<Rendering>().0);
@@ -110,17 +119,17 @@ fn render(args: &RenderArgs) -> Result<(), Failure> {
     write_film(&film, &display, &args.output).map_err(Failure::Failed)?;
     if report.n_bad > 0 {
         let total = u64::from(film.spp()) * u64::from(width) * u64::from(height);
-        eprintln!("warning: {} of {total} samples were not finite and were left out", report.n_bad);
+        remark(format_args!("warning: {} of {total} samples were not finite and were left out", report.n_bad));
     }
     if args.json {
-        println!("{}", json(&scene, build_seconds, &report, cpu_seconds, &film));
+        print(json(&scene, build_seconds, &report, cpu_seconds, &film))?;
     } else if std::io::stderr().is_terminal() {
-        eprintln!(
+        remark(format_args!(
             "{}: {width} x {height}, {} samples per pixel in {:.1} s",
             args.output.display(),
             film.spp(),
             report.seconds
-        );
+        ));
     }
     Ok(())
 }

@@ -27,7 +27,7 @@ mod worker;
 
 pub use command::Command;
 pub use offline::{OfflineReport, Progress, Target, render_offline};
-pub use picture_file::{PictureFormat, check_writable, write_film, write_new_film};
+pub use picture_file::{PictureFormat, Print, write_film};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use scheduler::{Scheduler, Step, StepReport};
 pub use session::{Session, SessionOptions, Stage};

@@ -169,7 +169,8 @@ impl SceneTree {
                 let (point, wide) = (point.as_dvec3(), normal.as_dvec3());
                 let near = ray.origin.as_dvec3() + f64::from(hit.t) * ray.dir.as_dvec3();
                 let position = (near - wide * ((near - point).dot(wide) / wide.length_squared())).as_vec3();
-                let error = 2.0 * UNIT_ROUNDOFF * position.abs();
+                let wide_error = WIDE_ERROR * (point.abs().max_element() + position.as_dvec3().abs().max_element());
+                let error = 2.0 * UNIT_ROUNDOFF * position.abs() + wide_error as f32;
                 SurfacePoint { position, error, geometric_normal: *normal, uv }
             }
         }
@@ -234,12 +235,16 @@ fn wide_cross(a: Vec3, b: Vec3) -> (Vec3, f32) {
     if largest > 0.0 { ((cross / largest).as_vec3(), largest as f32) } else { (Vec3::ZERO, 0.0) }
 }
 
+/// What a few roundings in `f64` add, here and in the test of the next ray, relative to the numbers that they work on.
+const WIDE_ERROR: f64 = 16.0 * f64::EPSILON;
+
 /// The hit projected onto the sphere, its error, and the outward normal.
 #[inline]
 fn sphere_point(ray: &Ray, t: f32, center: Vec3, radius: f32) -> (Vec3, Vec3, Vec3) {
     let near = ray.origin.as_dvec3() + f64::from(t) * ray.dir.as_dvec3();
     let outwards = (near - center.as_dvec3()).normalize();
     let position = (center.as_dvec3() + f64::from(radius) * outwards).as_vec3();
-    // One rounding to f32; everything before it is exact by comparison.
-    (position, 2.0 * UNIT_ROUNDOFF * position.abs(), outwards.as_vec3())
+    // One rounding to f32, and next to the origin, where f32 has more digits than the centre has in f64, those of f64.
+    let wide_error = WIDE_ERROR * f64::from(center.abs().max_element() + radius);
+    (position, 2.0 * UNIT_ROUNDOFF * position.abs() + wide_error as f32, outwards.as_vec3())
 }

@@ -1,7 +1,9 @@
 //! Where light is summed up: linear, unclamped, in tiles that workers own one at a time.
 
+use super::caustics::LightLayer;
 use super::estimate::{ErrorEstimate, TileConvergence};
 use glam::{DVec3, UVec2, Vec3};
+use rayon::prelude::*;
 
 /// Sums and counts of one picture.
 ///
@@ -14,6 +16,8 @@ pub struct Film {
     pub(super) tiles: Vec<FilmTile>,
     tiles_x: u32,
     tile_size: u32,
+    /// From paths that began at the lamps; `None` until there is some.
+    pub(super) light: Option<LightLayer>,
 }
 
 /// The pixels of one tile, row by row.
@@ -36,6 +40,9 @@ impl Film {
     /// Pixels along the side of a tile, unless asked otherwise.
     pub const TILE_SIZE: u32 = 32;
 
+    /// Memory that a pixel takes: its sums, and its mean at the last power of two.
+    pub const BYTES_A_PIXEL: usize = 2 * size_of::<DVec3>();
+
     /// Width and height in pixels, at least 1 each.
     pub fn new(width: u32, height: u32) -> Self {
         Self::with_tile_size(width, height, Self::TILE_SIZE)
@@ -52,7 +59,7 @@ impl Film {
                 FilmTile::new(origin, size)
             })
             .collect();
-        Self { width, height, tiles, tiles_x, tile_size }
+        Self { width, height, tiles, tiles_x, tile_size, light: None }
     }
 
     pub fn width(&self) -> u32 {
@@ -65,13 +72,19 @@ impl Film {
 
     /// Samples that every pixel has at least.
     pub fn spp(&self) -> u32 {
-        self.tiles.iter().map(|tile| tile.spp).min().unwrap_or(0)
+        let from_lamps = self.light.as_ref().map(LightLayer::spp);
+        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
     }
 
     /// Mean radiance of a pixel, row 0 at the top; black where there is no sample yet.
     pub fn mean(&self, x: u32, y: u32) -> Vec3 {
         let (tile, local) = self.locate(x, y);
-        tile.mean(local).as_vec3()
+        (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3()
+    }
+
+    /// The part of [`Self::mean`] that paths from the lamps have found.
+    pub fn light_from_lamps(&self, x: u32, y: u32) -> DVec3 {
+        self.light.as_ref().map_or(DVec3::ZERO, |layer| layer.mean((y * self.width + x) as usize))
     }
 
     /// Mean radiance of the pixels of one row, from the left.
@@ -79,7 +92,9 @@ impl Film {
         let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
         tiles.iter().flat_map(move |tile| {
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
-            (first..first + tile.size.x as usize).map(move |local| tile.mean(local).as_vec3())
+            (first..first + tile.size.x as usize)
+                .zip(tile.origin.x..)
+                .map(move |(local, x)| (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3())
         })
     }
 
@@ -96,6 +111,12 @@ impl Film {
     /// How wrong the picture still is, as far as its own samples tell; `None` before the fourth sample of a pixel.
     pub fn error_estimate(&self) -> Option<ErrorEstimate> {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
+    }
+
+    /// Tells every tile's part of the error estimate how far the picture is; all tiles have as many samples.
+    pub(super) fn record_convergence(&mut self) {
+        let (light, width) = (self.light.as_ref(), self.width);
+        self.tiles.par_iter_mut().for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
     }
 
     fn locate(&self, x: u32, y: u32) -> (&FilmTile, usize) {
@@ -135,10 +156,22 @@ impl FilmTile {
             }
         }
         self.spp += 1;
-        if self.spp.is_power_of_two() {
-            let mut convergence = std::mem::take(&mut self.convergence);
-            convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(|local| self.mean(local)));
-            self.convergence = convergence;
+    }
+
+    /// At powers of two, tells the error estimate of the picture so far; `light`: from the lamps, and the width of the film.
+    pub fn record_convergence(&mut self, light: Option<(&LightLayer, u32)>) {
+        if !self.spp.is_power_of_two() {
+            return;
         }
+        let mut convergence = std::mem::take(&mut self.convergence);
+        let mean = |local: usize| {
+            let from_lamps = light.map_or(DVec3::ZERO, |(layer, width)| {
+                let pixel = self.origin + UVec2::new(local as u32 % self.size.x, local as u32 / self.size.x);
+                layer.mean((pixel.y * width + pixel.x) as usize)
+            });
+            self.mean(local) + from_lamps
+        };
+        convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(mean));
+        self.convergence = convergence;
     }
 }

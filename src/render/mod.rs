@@ -5,6 +5,7 @@
 mod ambient;
 mod bsdf;
 mod camera;
+mod caustics;
 mod develop;
 mod dielectric;
 mod environment;

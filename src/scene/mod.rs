@@ -18,10 +18,12 @@ mod meshes;
 pub mod obj;
 mod picture;
 mod placement;
+pub mod shot;
 mod showcase;
 mod spawn;
 mod upright;
 mod view;
+pub mod whole_file;
 
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use components::{

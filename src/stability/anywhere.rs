@@ -219,8 +219,8 @@ pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
             }
         }
         if let (Some(a), Some(b)) = (a, b) {
-            // A snapshot's origin is within some hundred metres: 2⁻¹⁴ m is many roundings of such coordinates, at grazing angles.
-            let off = f64::from((a.t - b.t).abs()) / 1e-3;
+            // What `scene::origin_for` promises: 887 · 2⁻²⁴ of the viewing distance.
+            let off = f64::from((a.t - b.t).abs()) / (887.0 * 90.0 / f64::from(1 << 24));
             tally.wrong_t += u64::from(off > 1.0);
             tally.offer(off, 0, i, || format!("{} against {}", tell(&ray_b, &Some(b)), tell(&ray_a, &Some(a))));
         }

@@ -49,6 +49,17 @@ pub(super) struct LightPoint {
     pub uv: Vec2,
 }
 
+/// A point of a light, whoever looks at it.
+pub(in crate::render) struct SurfaceOfLight {
+    pub position: Vec3,
+    /// Bound on its error, metres per axis.
+    pub error: Vec3,
+    /// Unit.
+    pub normal: Vec3,
+    /// As of [`LightPoint`].
+    pub uv: Vec2,
+}
+
 /// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
 /// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
 const SMALL_SOLID_ANGLE: f32 = 1e-3;
@@ -79,6 +90,50 @@ impl LightShape {
         match self {
             Self::Sphere { radius, .. } => 4.0 * std::f32::consts::PI * radius * radius,
             Self::Quad { area, .. } | Self::Triangle { area, .. } => *area,
+        }
+    }
+
+    /// The middle of a sphere or quad, some point inside of a triangle.
+    pub fn center(&self) -> Vec3 {
+        match self {
+            Self::Sphere { center, .. } => *center,
+            Self::Quad { corner, edge_u, edge_v, .. } => *corner + 0.5 * (*edge_u + *edge_v),
+            Self::Triangle { vertices: [a, b, c], .. } => (*a + *b + *c) / 3.0,
+        }
+    }
+
+    /// A point evenly over the area of a flat light; of a sphere, that which faces as [`uniform_sphere`] says.
+    pub fn at_area(&self, u: Vec2) -> SurfaceOfLight {
+        match self {
+            Self::Sphere { .. } => self.at_normal(uniform_sphere(u)),
+            Self::Quad { corner, edge_u, edge_v, normal, .. } => SurfaceOfLight {
+                position: *corner + u.x * *edge_u + u.y * *edge_v,
+                error: robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs()),
+                normal: *normal,
+                uv: u,
+            },
+            Self::Triangle { vertices: [a, b, c], normal, .. } => {
+                let weights = uniform_triangle(u);
+                SurfaceOfLight {
+                    position: *a + weights.x * (*b - *a) + weights.y * (*c - *a),
+                    error: robust::gamma(7) * (a.abs() + b.abs() + c.abs()),
+                    normal: *normal,
+                    uv: weights,
+                }
+            }
+        }
+    }
+
+    /// The point of a sphere with this outward normal; the middle of a flat light, which has but one.
+    pub fn at_normal(&self, outwards: Vec3) -> SurfaceOfLight {
+        match self {
+            Self::Sphere { center, radius } => SurfaceOfLight {
+                position: *center + *radius * outwards,
+                error: robust::gamma(6) * (center.abs() + Vec3::splat(*radius)),
+                normal: outwards,
+                uv: Vec2::ZERO,
+            },
+            _ => self.at_area(Vec2::splat(0.5)),
         }
     }
 
@@ -193,6 +248,9 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
     let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
     let (local, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
     let frame = Frame::around(to_center / distance2.sqrt());
+    if distance2 < 2.0 * r2 {
+        return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));
+    }
     // The angle at the centre that belongs to the angle at the shading point (Pharr et al., section 6.2.4), written
     // so that nothing cancels for a sphere of few pixels.
     let sin2 = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0);
@@ -211,6 +269,29 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
         normal,
         uv: Vec2::ZERO,
     })
+}
+
+/// Where the direction `wi` (about the centre) meets a sphere that fills much of the sky.
+///
+/// Right above the surface all points that are seen lie within an angle at the centre that `f32` cannot resolve, so the way to
+/// the surface is what is computed, and its length from the power of the point, which does not cancel.
+#[cold]
+fn sphere_from_close_by(center: Vec3, radius: f32, position: Vec3, wi: Vec3, one_minus_cos_max: f32) -> LightPoint {
+    let (to_center, dir, r) = (center.as_dvec3() - position.as_dvec3(), wi.as_dvec3().normalize(), f64::from(radius));
+    let middle = to_center.dot(dir);
+    let power = to_center.length_squared() - r * r;
+    let distance = power / (middle + (middle * middle - power).max(0.0).sqrt());
+    let normal = (distance * dir - to_center).normalize();
+    let point = (center.as_dvec3() + r * normal).as_vec3();
+    let error = 2.0 * robust::UNIT_ROUNDOFF * point.abs();
+    let normal = normal.as_vec3();
+    LightPoint {
+        target: lifted(point, error, normal, distance as f32),
+        wi,
+        pdf: cone_pdf(one_minus_cos_max),
+        normal,
+        uv: Vec2::ZERO,
+    }
 }
 
 /// A sphere seen as a point in its centre, where all of its light is: π r² of radiance over distance².
@@ -234,15 +315,20 @@ pub(super) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Opti
 
 /// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
 fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
-    let z = 1.0 - 2.0 * u.x;
-    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let normal = Vec3::new(r * cos_phi, r * sin_phi, z);
+    let normal = uniform_sphere(u);
     let point = center + radius * normal;
     let (wi, distance) = direction(position, point)?;
     let pdf = area_pdf(distance, wi, normal, 4.0 * std::f32::consts::PI * radius * radius)?;
     let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
     Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: Vec2::ZERO })
+}
+
+/// Even over all directions.
+fn uniform_sphere(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.x;
+    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    Vec3::new(r * cos_phi, r * sin_phi, z)
 }
 
 /// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.
