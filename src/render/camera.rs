@@ -140,6 +140,17 @@ mod tests {
         }
     }
 
+    /// `offset / focus` left the range of `f32`, or its square did, and rays had no direction.
+    #[test]
+    fn no_lens_and_no_focus_leave_a_ray_without_direction() {
+        for lens in [1e-30, 1e-3, 1.0, 1e12] {
+            for focus in [f32::MIN_POSITIVE, 1e-30, 1e-20, 1e-3, 1.0, 1e12, f32::MAX, f32::INFINITY] {
+                let ray = camera(lens, focus).ray(Vec2::new(3.0, 90.0), Vec2::new(200.0, 100.0), Vec2::new(0.1, 0.9));
+                assert!((ray.dir.length() - 1.0).abs() < 1e-6, "{lens} {focus}: {}", ray.dir);
+            }
+        }
+    }
+
     #[test]
     fn focus_at_infinity_gives_parallel_rays() {
         let camera = camera(0.3, f32::INFINITY);

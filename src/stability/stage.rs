@@ -127,18 +127,18 @@ impl Stage {
     fn self_hit(&self, ray: &Ray, from: &Hit, next: &Ray, again: &Option<Hit>) -> Option<&'static str> {
         let is_same = again.is_some_and(|again| (again.object, again.prim) == (from.object, from.prim));
         match self.judge.solid(from) {
-            Solid::Sphere { center, radius } => {
+            Solid::Sphere { radius, .. } => {
                 // From inside, the far side is one chord away, and must be met.
-                let normal = self.scene.surface_point(ray, from).geometric_normal;
-                let cos = f64::from(-next.dir.dot(normal));
+                let point = self.scene.surface_point(ray, from);
+                let cos = f64::from(-next.dir.dot(point.geometric_normal));
                 let chord = 2.0 * radius * cos;
                 if cos < 0.0 {
                     return is_same.then_some("acne");
                 }
-                let origin_error = (next.origin.as_dvec3() - *center).length() - radius;
+                let error = f64::from(point.geometric_normal.abs().dot(point.error));
                 match again {
                     // Where the chord drowns in the rounding of the origin nothing can be said.
-                    _ if chord < 64.0 * origin_error.abs() / cos.max(1e-30) => None,
+                    _ if chord * cos < 64.0 * error => None,
                     None => Some("leak"),
                     Some(again) if is_same && f64::from(again.t) < 0.5 * chord => Some("acne"),
                     _ => None,
