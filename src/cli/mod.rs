@@ -9,6 +9,7 @@ mod report;
 mod save;
 mod show;
 mod simplify;
+mod stability;
 mod stop;
 mod trees;
 
@@ -39,6 +40,8 @@ enum Command {
     Merge(merge::MergeArgs),
     /// Write a scene file of a model, a built-in scene, or of what a picture shows.
     Save(save::SaveArgs),
+    /// Count failures on hard cases: leaks, self-hits, missed hits, wrong depths, bad samples, lost light.
+    Stability(stability::StabilityArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
     /// Write a model with fewer triangles, and measure how far it is from the original.
@@ -148,6 +151,7 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Save(args)) => save::run(&args),
+        Some(Command::Stability(args)) => stability::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),
