@@ -220,4 +220,22 @@ mod tests {
         }
         assert!(BUILTIN_NAMES.is_sorted());
     }
+
+    #[test]
+    fn highlights_of_material_files_keep_their_peak() {
+        let material = |specular: f32, shininess: f32, illumination_model: Option<u8>| ImportedMaterial {
+            specular: Some(Vec3::splat(specular)),
+            shininess: Some(shininess),
+            illumination_model,
+            ..ImportedMaterial::default()
+        };
+        for (strength, exponent) in [(0.3, 9.0), (0.8, 30.0), (1.0, 100.0)] {
+            let (share, shininess) = highlight_of(&material(strength, exponent, Some(2))).unwrap();
+            // What `render::phong` makes of it at its peak, against Lambert's albedo of the same strength.
+            assert!((share * (shininess + 1.0) / 2.0 - strength).abs() < 1e-6, "{strength} {exponent}");
+        }
+        assert_eq!(highlight_of(&material(0.8, 30.0, Some(1))), None, "matte by its illumination model");
+        assert_eq!(highlight_of(&material(0.5, 1000.0, None)), None, "nobody would see it");
+        assert_eq!(highlight_of(&ImportedMaterial::default()), None);
+    }
 }
