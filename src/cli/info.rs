@@ -12,6 +12,9 @@ use std::sync::Arc;
 pub struct InfoArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    /// Build many trees over each mesh instead, and tell what they and their rays cost.
+    #[arg(long)]
+    tree: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -25,6 +28,9 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let extraction = Extraction::new(&inputs, &scene.trees);
     for problem in &extraction.problems {
         remark(format_args!("warning: {problem}"));
+    }
+    if args.tree {
+        return super::trees::run(&inputs, &extraction, args.json);
     }
     let film = *world.resource::<FilmSize>();
     let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film };
@@ -207,10 +213,10 @@ fn environment(environment: &Environment) -> String {
     }
 }
 
-const FEATURES: [&str; 7] =
-    ["lens", "textures", "glass", "light sampling", "environment light", "blends", "rough metal"];
+const FEATURES: [&str; 8] =
+    ["lens", "textures", "glass", "light sampling", "environment light", "caustics", "blends", "rough metal"];
 
-fn features(extraction: &Extraction, lens: &Lens) -> [bool; 7] {
+fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
     let shading = &extraction.snapshot.shading;
     let has = |kind: &str| shading.materials.iter().any(|material| kind_of_material(material) == kind);
     [
@@ -219,6 +225,7 @@ fn features(extraction: &Extraction, lens: &Lens) -> [bool; 7] {
         shading.features.glass,
         shading.features.light_sampling,
         shading.features.environment,
+        shading.features.caustics,
         has("blend"),
         has("metal"),
     ]

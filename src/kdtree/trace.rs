@@ -1,42 +1,72 @@
 //! Batches of rays through a scene: which objects are tested by which traversal.
 //!
-//! Simple objects are tested by all rays of a packet at once. Rays that meet the box of an instance go on through its own tree, as a
-//! packet when the caller says that they belong together, otherwise in a stream. None of this changes what is found.
+//! A handful of simple objects is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
+//! box of an instance go on through its own tree, as a packet when the caller says that they belong together, otherwise
+//! in a stream. Of many instances each ray asks for the nearest first, and rays that ask for the same one go together, round
+//! after round. None of this changes what is found.
 
+use super::MeshTree;
 use super::batch::{HitBatch, RayBatch};
+use super::block_tree::BlockTree;
+use super::blocks::LeafBlock;
+use super::instance_tree::{Entry, InstanceTree, Recent};
+use super::loose::LooseTrees;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketStack};
 use super::objects::{Packet, SimpleObjects};
 use super::ray::Nearest;
 use super::scene_tree::{RayClass, SceneTree, Shape};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
-use super::stream::{self, Source};
+use super::stream::{self, Source, Stacks};
 use super::surface::Instance;
-use super::{MeshTree, SphereTree};
-use crate::geometry::{Ray, Shear};
+use crate::geometry::Ray;
 use glam::Affine3A;
 
-/// Rays that one stream takes on at a time.
+/// Rays that are taken through all objects before the next ones start.
 const CHUNK: usize = 2048;
 
-/// A scene of few objects: no tree above them.
+/// The same where there are many instances, of which each may be met by few rays.
+const LARGE_CHUNK: usize = 8192;
+
+/// The objects of a scene, by how rays get to them.
 #[derive(Debug, Default)]
-pub(super) struct FlatScene {
+pub(super) struct TopLevel {
+    /// Tested by every ray; planes are among them.
     pub simple: SimpleObjects,
-    /// Objects with a space of their own.
-    pub instances: Vec<u32>,
+    /// The numbers of `simple`.
+    pub simple_objects: Vec<u32>,
+    pub loose: LooseTrees,
+    pub instances: Instances,
 }
 
-/// More objects of a kind than this, and a tree above them pays.
-pub(super) const MAX_SIMPLE: usize = 48;
-pub(super) const MAX_INSTANCES: usize = 12;
+/// Objects with a space of their own.
+#[derive(Debug)]
+pub(super) enum Instances {
+    /// Few enough for every ray to look at each.
+    Few(Vec<u32>),
+    Many(InstanceTree),
+}
 
-impl FlatScene {
-    /// `None` if a tree over the objects will do better.
-    pub fn new(shapes: &[Shape]) -> Option<Self> {
+impl Default for Instances {
+    fn default() -> Self {
+        Self::Few(Vec::new())
+    }
+}
+
+/// With more instances than this a tree above them pays.
+const MAX_INSTANCES: usize = 12;
+
+impl TopLevel {
+    pub fn new(shapes: &[Shape]) -> Self {
+        let (loose, simple_objects) = LooseTrees::build(shapes);
         let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
-        let (instances, simple): (Vec<u32>, Vec<u32>) = (0..shapes.len() as u32).partition(is_instance);
-        (simple.len() <= MAX_SIMPLE && instances.len() <= MAX_INSTANCES)
-            .then(|| Self { simple: SimpleObjects::new(shapes, simple.into_iter()), instances })
+        let instances: Vec<u32> = (0..shapes.len() as u32).filter(is_instance).collect();
+        let instances = if instances.len() > MAX_INSTANCES {
+            Instances::Many(InstanceTree::build(shapes, instances))
+        } else {
+            Instances::Few(instances)
+        };
+        let simple = SimpleObjects::new(shapes, simple_objects.iter().copied());
+        Self { simple, simple_objects, loose, instances }
     }
 
     pub fn closest_hits(
@@ -47,8 +77,8 @@ impl FlatScene {
         class: RayClass,
         hits: &mut HitBatch,
     ) {
-        let flat = self;
-        dispatch!(set, closest(flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch));
+        let top = self;
+        dispatch!(set, closest(top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch));
     }
 
     pub fn any_hits(
@@ -59,93 +89,114 @@ impl FlatScene {
         class: RayClass,
         occluded: &mut [bool],
     ) {
-        let flat = self;
-        dispatch!(set, any(flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]));
+        let top = self;
+        dispatch!(set, any(top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]));
     }
 }
 
 #[inline(always)]
-fn closest<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
-    let mut stack = PacketStack::new(s);
-    for chunk in (0..rays.len()).step_by(CHUNK) {
-        let chunk = chunk..(chunk + CHUNK).min(rays.len());
-        for first in chunk.clone().step_by(LANES) {
-            let mut packet = Packet::load(s, rays, first);
-            packet.test_objects::<false>(s, &flat.simple);
-            if class == RayClass::Coherent {
-                for &object in &flat.instances {
-                    if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        trace_packet::<S, false>(
-                            s,
-                            tree,
-                            &scene.instances[object as usize],
-                            object,
-                            &mut packet,
-                            &mut stack,
-                        );
-                    }
-                }
-            }
-            packet.store(s, hits, first);
-        }
-        for &object in &flat.instances {
-            let instance = &scene.instances[object as usize];
-            let mut source = Closest { rays, hits, instance, object, queue: Queue::new() };
-            match &scene.shapes()[object as usize] {
-                Shape::Mesh { tree, .. } if class == RayClass::Incoherent => {
-                    source.queue.fill(chunk.clone());
-                    stream::run::<S, false>(s, tree, &mut source);
-                }
-                Shape::Spheres { tree, .. } => {
-                    source.queue.fill(chunk.clone());
-                    each_ray(tree, &mut source, false);
-                }
-                _ => {}
-            }
+fn closest<S: Simd>(s: S, top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
+    trace::<S, HitBatch, false>(s, top, scene, rays, class, hits);
+}
+
+#[inline(always)]
+fn any<S: Simd>(s: S, top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]) {
+    trace::<S, [bool], true>(s, top, scene, rays, class, occluded);
+}
+
+/// Where the answers to a batch are kept.
+trait Answers {
+    /// Distance and object of the hit so far; `None` if the ray needs no other.
+    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)>;
+
+    fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest);
+
+    /// What a packet found for the rays from `first` on.
+    fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize);
+}
+
+impl Answers for HitBatch {
+    #[inline(always)]
+    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
+        let object = self.object[ray];
+        Some(if object == Self::MISS { (t_max, None) } else { (self.t[ray], Some(object)) })
+    }
+
+    #[inline(always)]
+    fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest) {
+        (self.t[ray], self.u[ray], self.v[ray]) = (nearest.t, nearest.u, nearest.v);
+        (self.prim[ray], self.object[ray]) = (prim, object);
+    }
+
+    #[inline(always)]
+    fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize) {
+        packet.store(s, self, first);
+    }
+}
+
+/// Whether a ray is occluded.
+impl Answers for [bool] {
+    #[inline(always)]
+    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
+        (!self[ray]).then_some((t_max, None))
+    }
+
+    #[inline(always)]
+    fn set(&mut self, ray: usize, _: u32, _: u32, _: &Nearest) {
+        self[ray] = true;
+    }
+
+    #[inline(always)]
+    fn store<S: Simd>(&mut self, _: S, packet: &Packet<S>, first: usize) {
+        for (lane, occluded) in self[first..].iter_mut().take(LANES).enumerate() {
+            *occluded = packet.found >> lane & 1 != 0;
         }
     }
 }
 
 #[inline(always)]
-fn any<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]) {
-    let mut stack = PacketStack::new(s);
-    for chunk in (0..rays.len()).step_by(CHUNK) {
-        let chunk = chunk..(chunk + CHUNK).min(rays.len());
-        for first in chunk.clone().step_by(LANES) {
+fn trace<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+    s: S,
+    top: &TopLevel,
+    scene: &SceneTree,
+    rays: &RayBatch,
+    class: RayClass,
+    answers: &mut A,
+) {
+    let mut packet_stack = PacketStack::new(s);
+    let mut stacks = Stacks::new();
+    let mut rounds = Rounds::default();
+    let (few, chunk) = match &top.instances {
+        Instances::Few(few) => (&few[..], CHUNK),
+        Instances::Many(_) => (&[][..], LARGE_CHUNK),
+    };
+    let all: Vec<u32> = (0..rays.len() as u32).collect();
+    for queue in all.chunks(chunk) {
+        for sixteen in queue.chunks(LANES) {
+            let first = sixteen[0] as usize;
             let mut packet = Packet::load(s, rays, first);
-            packet.test_objects::<true>(s, &flat.simple);
+            packet.test_objects::<ANY>(s, &top.simple);
             if class == RayClass::Coherent {
-                for &object in &flat.instances {
+                for &object in few {
                     if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        trace_packet::<S, true>(
-                            s,
-                            tree,
-                            &scene.instances[object as usize],
-                            object,
-                            &mut packet,
-                            &mut stack,
-                        );
+                        let instance = &scene.instances[object as usize];
+                        trace_packet::<S, ANY>(s, tree, instance, object, &mut packet, &mut packet_stack);
                     }
                 }
             }
-            for (lane, occluded) in occluded[first..].iter_mut().take(LANES).enumerate() {
-                *occluded = packet.found >> lane & 1 != 0;
+            answers.store(s, &packet, first);
+        }
+        stream_loose::<S, _, A, ANY>(s, top.loose.spheres.as_ref(), rays, answers, queue, &mut stacks);
+        stream_loose::<S, _, A, ANY>(s, top.loose.quads.as_ref(), rays, answers, queue, &mut stacks);
+        stream_loose::<S, _, A, ANY>(s, top.loose.triangles.as_ref(), rays, answers, queue, &mut stacks);
+        for &object in few {
+            let is_done = class == RayClass::Coherent && matches!(scene.shapes()[object as usize], Shape::Mesh { .. });
+            if !is_done {
+                stream_instance::<S, A, ANY>(s, scene, object, rays, answers, queue, &mut stacks);
             }
         }
-        for &object in &flat.instances {
-            let instance = &scene.instances[object as usize];
-            let mut source = Any { rays, occluded, instance, queue: Queue::new() };
-            match &scene.shapes()[object as usize] {
-                Shape::Mesh { tree, .. } if class == RayClass::Incoherent => {
-                    source.queue.fill(chunk.clone());
-                    stream::run::<S, true>(s, tree, &mut source);
-                }
-                Shape::Spheres { tree, .. } => {
-                    source.queue.fill(chunk.clone());
-                    each_ray(tree, &mut source, true);
-                }
-                _ => {}
-            }
+        if let Instances::Many(tree) = &top.instances {
+            rounds.trace::<S, A, ANY>(s, tree, scene, rays, answers, queue, &mut stacks);
         }
     }
 }
@@ -192,7 +243,7 @@ fn trace_packet<S: Simd, const ANY: bool>(
     let wins_ties: Mask = packet.found & s.lt_u(s.splat_u(object), packet.object);
     s.store_u(s.select_u(wins_ties, s.splat_u(u32::MAX), s.splat_u(0)), &mut nearest.prim);
     let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest };
-    mesh_packet.trace::<ANY>(s, tree, stack);
+    mesh_packet.trace::<ANY>(s, &tree.tree, stack);
     let nearest = mesh_packet.nearest;
     let take = nearest.found;
     packet.t = s.select(take, s.load(&nearest.t), packet.t);
@@ -203,91 +254,182 @@ fn trace_packet<S: Simd, const ANY: bool>(
     packet.found |= take;
 }
 
-/// Rays of the batch that are still to be traced.
-struct Queue {
-    next: usize,
-    end: usize,
-}
-
-impl Queue {
-    fn new() -> Self {
-        Self { next: 0, end: 0 }
-    }
-
-    fn fill(&mut self, rays: std::ops::Range<usize>) {
-        (self.next, self.end) = (rays.start, rays.end);
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<usize> {
-        (self.next < self.end).then(|| {
-            self.next += 1;
-            self.next - 1
-        })
+/// Streams rays through the tree of one instance.
+#[inline(always)]
+fn stream_instance<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+    s: S,
+    scene: &SceneTree,
+    object: u32,
+    rays: &RayBatch,
+    answers: &mut A,
+    queue: &[u32],
+    stacks: &mut Stacks,
+) {
+    let mut source = InstanceRays { rays, answers, instance: &scene.instances[object as usize], object, queue };
+    match &scene.shapes()[object as usize] {
+        Shape::Mesh { tree, .. } => stream::run::<S, _, ANY>(s, &tree.tree, &mut source, stacks),
+        Shape::Spheres { tree, .. } => stream::run::<S, _, ANY>(s, &tree.tree, &mut source, stacks),
+        _ => {}
     }
 }
 
-struct Closest<'a> {
+/// Streams rays through a tree over simple objects, if there is one.
+#[inline(always)]
+fn stream_loose<S: Simd, B: LeafBlock, A: Answers + ?Sized, const ANY: bool>(
+    s: S,
+    tree: Option<&BlockTree<B>>,
+    rays: &RayBatch,
+    answers: &mut A,
+    queue: &[u32],
+    stacks: &mut Stacks,
+) {
+    if let Some(tree) = tree {
+        stream::run::<S, B, ANY>(s, tree, &mut LooseRays { rays, answers, queue }, stacks);
+    }
+}
+
+/// The rays of a batch on their way into one instance.
+struct InstanceRays<'a, A: ?Sized> {
     rays: &'a RayBatch,
-    hits: &'a mut HitBatch,
+    answers: &'a mut A,
     instance: &'a Instance,
     object: u32,
-    queue: Queue,
+    queue: &'a [u32],
 }
 
-impl Source for Closest<'_> {
-    #[inline(always)]
-    fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
-        let i = self.queue.pop()?;
-        let ray = self.rays.get(i);
-        let mut nearest = Nearest::before(ray.t_max);
-        if self.hits.object[i] != HitBatch::MISS {
-            nearest.t = self.hits.t[i];
-            // At equal distance the lower object wins, whatever its primitive.
-            nearest.prim = if self.object < self.hits.object[i] { u32::MAX } else { 0 };
-        }
-        Some((self.instance.ray(&ray), nearest, i as u32))
-    }
-
-    #[inline(always)]
-    fn finish(&mut self, ray: u32, nearest: &Nearest) {
-        if nearest.found {
-            let (i, hits) = (ray as usize, &mut *self.hits);
-            (hits.t[i], hits.u[i], hits.v[i]) = (nearest.t, nearest.u, nearest.v);
-            (hits.prim[i], hits.object[i]) = (nearest.prim, self.object);
-        }
-    }
-}
-
-struct Any<'a> {
-    rays: &'a RayBatch,
-    occluded: &'a mut [bool],
-    instance: &'a Instance,
-    queue: Queue,
-}
-
-impl Source for Any<'_> {
+impl<A: Answers + ?Sized> Source for InstanceRays<'_, A> {
     #[inline(always)]
     fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
         loop {
-            let i = self.queue.pop()?;
-            if !self.occluded[i] {
-                let ray = self.rays.get(i);
-                return Some((self.instance.ray(&ray), Nearest::before(ray.t_max), i as u32));
+            let (&i, queue) = self.queue.split_first()?;
+            self.queue = queue;
+            let ray = self.rays.get(i as usize);
+            if let Some((t, object)) = self.answers.so_far(i as usize, ray.t_max) {
+                let mut nearest = Nearest::before(t);
+                // At equal distance the lower object wins, whatever its primitive.
+                nearest.prim = if object.is_some_and(|object| self.object < object) { u32::MAX } else { 0 };
+                return Some((self.instance.ray(&ray), nearest, i));
             }
         }
     }
 
     #[inline(always)]
     fn finish(&mut self, ray: u32, nearest: &Nearest) {
-        self.occluded[ray as usize] |= nearest.found;
+        if nearest.found {
+            self.answers.set(ray as usize, self.object, nearest.prim, nearest);
+        }
     }
 }
 
-/// Balls have no stream.
-fn each_ray(tree: &SphereTree, source: &mut impl Source, any: bool) {
-    while let Some((ray, mut nearest, id)) = source.next() {
-        tree.offer_hits(&ray, &Shear::new(ray.dir), &mut nearest, any);
-        source.finish(id, &nearest);
+/// The rays of a batch on their way through a tree over objects.
+struct LooseRays<'a, A: ?Sized> {
+    rays: &'a RayBatch,
+    answers: &'a mut A,
+    queue: &'a [u32],
+}
+
+impl<A: Answers + ?Sized> Source for LooseRays<'_, A> {
+    #[inline(always)]
+    fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
+        loop {
+            let (&i, queue) = self.queue.split_first()?;
+            self.queue = queue;
+            let ray = self.rays.get(i as usize);
+            if let Some((t, object)) = self.answers.so_far(i as usize, ray.t_max) {
+                let mut nearest = Nearest::before(t);
+                nearest.prim = object.unwrap_or(0);
+                return Some((ray, nearest, i));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, ray: u32, nearest: &Nearest) {
+        if nearest.found {
+            self.answers.set(ray as usize, nearest.prim, 0, nearest);
+        }
+    }
+}
+
+/// Each ray looks at the instances along its way, front to back. In every round it enters the next one, together with all
+/// other rays that want the same.
+#[derive(Default)]
+struct Rounds {
+    /// Of all rays.
+    entries: Vec<Entry>,
+    pending: Vec<Pending>,
+    /// Instance and ray of this round.
+    wishes: Vec<(u32, u32)>,
+    together: Vec<u32>,
+}
+
+/// A ray on its way from instance to instance.
+struct Pending {
+    ray: u32,
+    /// Entries that are left of those found.
+    left: std::ops::Range<usize>,
+    /// From where others may follow.
+    from: f32,
+    recent: Recent,
+}
+
+impl Pending {
+    /// The next instance to enter; `None` if none can matter.
+    #[inline(always)]
+    fn next(&mut self, tree: &InstanceTree, ray: &Ray, t: f32, entries: &mut Vec<Entry>) -> Option<u32> {
+        loop {
+            // Beyond one that is too far lie only others that are.
+            if let Some(entry) = self.left.next().map(|entry| entries[entry])
+                && entry.t <= t
+            {
+                return Some(entry.object);
+            }
+            if self.from > t || self.from == f32::INFINITY {
+                return None;
+            }
+            self.left.start = entries.len();
+            self.from = tree.entries(ray, self.from, t, &mut self.recent, entries);
+            self.left.end = entries.len();
+        }
+    }
+}
+
+impl Rounds {
+    #[expect(clippy::too_many_arguments, reason = "a loop body, cut out")]
+    #[inline(always)]
+    fn trace<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+        &mut self,
+        s: S,
+        tree: &InstanceTree,
+        scene: &SceneTree,
+        rays: &RayBatch,
+        answers: &mut A,
+        queue: &[u32],
+        stacks: &mut Stacks,
+    ) {
+        self.entries.clear();
+        self.pending.clear();
+        let start = |&ray: &u32| Pending { ray, left: 0..0, from: 0.0, recent: Recent::default() };
+        self.pending.extend(queue.iter().map(start));
+        loop {
+            self.wishes.clear();
+            let (entries, wishes) = (&mut self.entries, &mut self.wishes);
+            self.pending.retain_mut(|pending| {
+                let ray = rays.get(pending.ray as usize);
+                let so_far = answers.so_far(pending.ray as usize, ray.t_max);
+                let next = so_far.and_then(|(t, _)| pending.next(tree, &ray, t, entries));
+                wishes.extend(next.map(|object| (object, pending.ray)));
+                next.is_some()
+            });
+            if self.wishes.is_empty() {
+                break;
+            }
+            self.wishes.sort_unstable();
+            for wish in self.wishes.chunk_by(|a, b| a.0 == b.0) {
+                self.together.clear();
+                self.together.extend(wish.iter().map(|&(_, ray)| ray));
+                stream_instance::<S, A, ANY>(s, scene, wish[0].0, rays, answers, &self.together, stacks);
+            }
+        }
     }
 }

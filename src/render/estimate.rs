@@ -51,26 +51,36 @@ impl ErrorEstimate {
         let n_values: f64 = tiles.clone().map(|tile| tile.n_values).sum();
         let step = |k: usize| tiles.clone().map(|tile| tile.steps[k]).sum::<f64>() / n_values;
         let last = step(level);
-        // The first steps say little of how fast later ones fall; independent samples where there is only one.
-        let span = (1..=level.min(2)).rev().find(|span| is_known(&(level - span)));
-        let exponent = match span {
-            Some(span) if last > 0.0 => {
-                ((step(level - span) / last).log2() / span as f64).clamp(MIN_EXPONENT, MAX_EXPONENT)
+        // Tiles are independent of each other: their scatter is the uncertainty of a sum over them, relative to it.
+        let n_tiles = tiles.clone().count() as f64;
+        let sigma = |k: usize| {
+            let mean = step(k);
+            if n_tiles < 2.0 || mean <= 0.0 {
+                return 1.0;
             }
-            _ => MIN_EXPONENT,
+            let scatter: f64 = tiles.clone().map(|tile| (tile.steps[k] - mean * tile.n_values).powi(2)).sum();
+            (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * mean)
+        };
+        // The first steps say little of how fast later ones fall; independent samples where there is only one.
+        let first = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
+        let first = (first..level).find(is_known);
+        let exponent = if let Some(first) = first
+            && last > 0.0
+        {
+            let span = (level - first) as f64;
+            let seen = (step(first) / last).log2() / span;
+            // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
+            // much as it is uncertain, where slopes of pictures lie about half around it.
+            let uncertainty = sigma(first).hypot(sigma(level)) / (span * std::f64::consts::LN_2);
+            let trust = 0.25 / (0.25 + uncertainty * uncertainty);
+            (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
+        } else {
+            MIN_EXPONENT
         };
         let spp_at_level = f64::from(2u32 << level);
         let variance_of_one = last / (exponent.exp2() - 1.0) * spp_at_level.powf(exponent);
-        // Tiles are independent of each other: their scatter is the uncertainty of the sum.
-        let n_tiles = tiles.clone().count() as f64;
-        let scatter: f64 = tiles.map(|tile| (tile.steps[level] - last * tile.n_values).powi(2)).sum();
-        let sigma = if n_tiles > 1.0 && last > 0.0 {
-            (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * last)
-        } else {
-            1.0
-        };
         // On the logarithm, where the sum of positive terms is closer to symmetric.
-        let factor = (0.5 * 1.96 * sigma).exp();
+        let factor = (0.5 * 1.96 * sigma(level)).exp();
         let mut estimate = Self { relative: 0.0, low: 0.0, high: 0.0, exponent, variance_of_one };
         estimate.relative = estimate.relative_at(spp);
         (estimate.low, estimate.high) = (estimate.relative / factor, estimate.relative * factor);

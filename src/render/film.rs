@@ -3,9 +3,11 @@
 //! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
 //! ([`Film::merge`]) to the very film that has all of them.
 
+use super::caustics::{LightLayer, joined};
 use super::estimate::{ErrorEstimate, TileConvergence};
 use super::exact_sum::ExactSum;
 use glam::{DVec3, UVec2, Vec3};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Sums and counts of one picture.
@@ -19,6 +21,8 @@ pub struct Film {
     pub(super) tiles: Vec<FilmTile>,
     tiles_x: u32,
     tile_size: u32,
+    /// From paths that began at the lamps; `None` until there is some.
+    pub(super) light: Option<LightLayer>,
 }
 
 /// The pixels of one tile, row by row.
@@ -62,7 +66,7 @@ impl Film {
                 FilmTile::new(origin, size)
             })
             .collect();
-        Self { width, height, tiles, tiles_x, tile_size }
+        Self { width, height, tiles, tiles_x, tile_size, light: None }
     }
 
     /// The same without samples, to begin with sample number `first`.
@@ -71,6 +75,7 @@ impl Film {
             *tile = FilmTile::new(tile.origin, tile.size);
             tile.ranges = vec![first..first];
         }
+        self.light = None;
         self
     }
 
@@ -89,12 +94,14 @@ impl Film {
 
     /// Samples that every pixel has at least.
     pub fn spp(&self) -> u32 {
-        self.tiles.iter().map(|tile| tile.spp).min().unwrap_or(0)
+        let from_lamps = self.light.as_ref().map(LightLayer::spp);
+        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
     }
 
-    /// Samples that the pixel with the most has.
+    /// Samples that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
     pub fn max_spp(&self) -> u32 {
-        self.tiles.iter().map(|tile| tile.spp).max().unwrap_or(0)
+        let from_lamps = self.light.as_ref().map(LightLayer::begun);
+        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).max().unwrap_or(0)
     }
 
     /// The number of the first sample.
@@ -130,16 +137,27 @@ impl Film {
                 ));
             }
         }
+        match (&mut self.light, &other.light) {
+            (None, None) => {}
+            (Some(light), Some(other)) => light.merge(other)?,
+            _ => return Err("one film has light that was traced from the lamps, the other has none".to_owned()),
+        }
         for (tile, other) in self.tiles.iter_mut().zip(&other.tiles) {
             tile.merge(other);
         }
+        self.record_convergence();
         Ok(())
     }
 
     /// Mean radiance of a pixel, row 0 at the top; black where there is no sample yet.
     pub fn mean(&self, x: u32, y: u32) -> Vec3 {
         let (tile, local) = self.locate(x, y);
-        tile.mean(local).as_vec3()
+        (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3()
+    }
+
+    /// The part of [`Self::mean`] that paths from the lamps have found.
+    pub fn light_from_lamps(&self, x: u32, y: u32) -> DVec3 {
+        self.light.as_ref().map_or(DVec3::ZERO, |layer| layer.mean((y * self.width + x) as usize))
     }
 
     /// Mean radiance of the pixels of one row, from the left.
@@ -147,7 +165,9 @@ impl Film {
         let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
         tiles.iter().flat_map(move |tile| {
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
-            (first..first + tile.size.x as usize).map(move |local| tile.mean(local).as_vec3())
+            (first..first + tile.size.x as usize)
+                .zip(tile.origin.x..)
+                .map(move |(local, x)| (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3())
         })
     }
 
@@ -164,6 +184,12 @@ impl Film {
     /// How wrong the picture still is, as far as its own samples tell; `None` before the fourth sample of a pixel.
     pub fn error_estimate(&self) -> Option<ErrorEstimate> {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
+    }
+
+    /// Tells every tile's part of the error estimate how far the picture is; all tiles have as many samples.
+    pub(super) fn record_convergence(&mut self) {
+        let (light, width) = (self.light.as_ref(), self.width);
+        self.tiles.par_iter_mut().for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
     }
 
     fn locate(&self, x: u32, y: u32) -> (&FilmTile, usize) {
@@ -211,16 +237,23 @@ impl FilmTile {
         if let Some(last) = self.ranges.last_mut() {
             last.end += 1;
         }
-        self.record();
     }
 
-    /// Lets the error estimate have a look when it wants one.
-    fn record(&mut self) {
-        if self.spp.is_power_of_two() {
-            let mut convergence = std::mem::take(&mut self.convergence);
-            convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(|local| self.mean(local)));
-            self.convergence = convergence;
+    /// At powers of two, tells the error estimate of the picture so far; `light`: from the lamps, and the width of the film.
+    pub fn record_convergence(&mut self, light: Option<(&LightLayer, u32)>) {
+        if !self.spp.is_power_of_two() {
+            return;
         }
+        let mut convergence = std::mem::take(&mut self.convergence);
+        let mean = |local: usize| {
+            let from_lamps = light.map_or(DVec3::ZERO, |(layer, width)| {
+                let pixel = self.origin + UVec2::new(local as u32 % self.size.x, local as u32 / self.size.x);
+                layer.mean((pixel.y * width + pixel.x) as usize)
+            });
+            self.mean(local) + from_lamps
+        };
+        convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(mean));
+        self.convergence = convergence;
     }
 
     /// Samples that both have.
@@ -244,19 +277,6 @@ impl FilmTile {
         self.spp += other.spp;
         self.bad.extend(&other.bad);
         self.bad.sort_unstable_by_key(|&(pixel, sample)| (sample, pixel));
-        let mut ranges: Vec<Range<u32>> = self.ranges.iter().chain(&other.ranges).cloned().collect();
-        ranges.retain(|range| !range.is_empty());
-        if ranges.is_empty() {
-            ranges.push(self.next_sample()..self.next_sample());
-        }
-        ranges.sort_by_key(|range| range.start);
-        self.ranges = ranges.into_iter().fold(Vec::new(), |mut joined: Vec<Range<u32>>, range| {
-            match joined.last_mut() {
-                Some(last) if last.end == range.start => last.end = range.end,
-                _ => joined.push(range),
-            }
-            joined
-        });
-        self.record();
+        self.ranges = joined(self.ranges.iter().chain(&other.ranges).cloned());
     }
 }

@@ -1,19 +1,29 @@
 //! A film as plain numbers, for keeping it on disk, and back.
 
 use super::Film;
+use super::caustics::LightLayer;
 use super::estimate::TileConvergence;
 use super::exact_sum::ExactSum;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Numbers for each pixel: three channels of the sum, of its rest, and of the mean at the last power of two.
-pub const N_PLANES: usize = 9;
+const N_PLANES: usize = 9;
+/// And of the sum and the rest of what was traced from the lamps.
+const N_LIGHT_PLANES: usize = 6;
+
+impl FilmLayout {
+    /// Numbers for each pixel.
+    pub fn n_planes(&self) -> usize {
+        N_PLANES + if self.light.is_some() { N_LIGHT_PLANES } else { 0 }
+    }
+}
 
 /// All that is in a film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmRecord {
     pub layout: FilmLayout,
-    /// Row by row from the top, [`N_PLANES`] of them.
+    /// Row by row from the top, as many as the layout says.
     pub planes: Vec<Vec<f64>>,
 }
 
@@ -26,6 +36,17 @@ pub struct FilmLayout {
     pub tile_size: u32,
     /// Row by row from the top.
     pub tiles: Vec<TileRecord>,
+    /// Of the light that was traced from the lamps, where there is any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightRecord>,
+}
+
+/// Light that was traced from the lamps; its sums are the last six planes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LightRecord {
+    pub batches: Vec<(u32, u32)>,
+    pub spp: u32,
+    pub next_sample: u32,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,14 +84,24 @@ impl Film {
                 steps: tile.convergence.steps.iter().map(|step| step.to_bits()).collect(),
             });
         }
-        let layout = FilmLayout { width: self.width(), height: self.height(), tile_size: self.tile_size(), tiles };
+        let light = self.light.as_ref().map(|light| {
+            for part in [|sum: &ExactSum| sum.sum, |sum: &ExactSum| sum.rest] {
+                for channel in 0..3 {
+                    planes.push(light.sums.iter().map(|sum| part(sum)[channel]).collect());
+                }
+            }
+            let batches = light.batches.iter().map(|range| (range.start, range.end)).collect();
+            LightRecord { batches, spp: light.spp, next_sample: light.next_sample }
+        });
+        let (width, height) = (self.width(), self.height());
+        let layout = FilmLayout { width, height, tile_size: self.tile_size(), tiles, light };
         FilmRecord { layout, planes }
     }
 
     /// # Errors
     /// When the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, String> {
-        let FilmLayout { width, height, tile_size, tiles } = &record.layout;
+        let FilmLayout { width, height, tile_size, tiles, light } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
         let n_pixels = u64::from(width) * u64::from(height);
         if n_pixels == 0 || tile_size == 0 {
@@ -78,7 +109,7 @@ impl Film {
         }
         let n_tiles = u64::from(width.div_ceil(tile_size)) * u64::from(height.div_ceil(tile_size));
         let planes_fit = record.planes.iter().all(|plane| plane.len() as u64 == n_pixels);
-        if tiles.len() as u64 != n_tiles || record.planes.len() != N_PLANES || !planes_fit {
+        if tiles.len() as u64 != n_tiles || record.planes.len() != record.layout.n_planes() || !planes_fit {
             return Err("its parts do not have the size that it names".to_owned());
         }
         let mut film = Self::with_tile_size(width, height, tile_size);
@@ -117,6 +148,19 @@ impl Film {
                     steps: record_of_tile.steps.iter().map(|&bits| f64::from_bits(bits)).collect(),
                 };
             }
+        }
+        if let Some(LightRecord { batches, spp, next_sample }) = light {
+            if batches.is_empty() || batches.iter().any(|(start, end)| start > end) {
+                return Err("its light from the lamps has ranges that run backwards".to_owned());
+            }
+            let vector = |first: usize, at: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));
+            let sum = |at: usize| ExactSum { sum: vector(N_PLANES, at), rest: vector(N_PLANES + 3, at) };
+            film.light = Some(LightLayer {
+                sums: (0..n_pixels as usize).map(sum).collect(),
+                batches: batches.iter().map(|&(start, end)| start..end).collect(),
+                spp: *spp,
+                next_sample: *next_sample,
+            });
         }
         Ok(film)
     }

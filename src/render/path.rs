@@ -7,6 +7,7 @@
 //! Start reading at [`PathWave::trace`].
 
 use super::bsdf::Scatter;
+use super::caustics::{Bounce, CausticPass, Track};
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::renderer::{RayCounts, RenderSettings};
@@ -55,6 +56,8 @@ struct Path {
     sampler: Sampler,
     slot: u32,
     media: MediumStack,
+    /// Against paths from the lamps.
+    track: Track,
 }
 
 /// Scratch memory of one worker: cleared between waves, never given back.
@@ -82,6 +85,7 @@ impl PathWave {
         &mut self,
         scene: &Snapshot,
         settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
         camera_paths: impl Iterator<Item = CameraPath>,
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
@@ -98,7 +102,7 @@ impl PathWave {
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
-            self.shade(scene, depth, settings, radiance);
+            self.shade(scene, depth, settings, caustics, radiance);
             scene.geometry.tree.any_hits(&self.shadow_rays, class, &mut self.occluded);
             for (&(slot, light), &occluded) in self.shadow_light.iter().zip(&self.occluded) {
                 if !occluded {
@@ -126,11 +130,19 @@ impl PathWave {
                 sampler,
                 slot,
                 media: MediumStack::default(),
+                track: Track::default(),
             });
         }
     }
 
-    fn shade(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
+    fn shade(
+        &mut self,
+        scene: &Snapshot,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        radiance: &mut [Vec3],
+    ) {
         let techniques = &settings.techniques;
         self.next_rays.clear();
         self.next_paths.clear();
@@ -153,13 +165,15 @@ impl PathWave {
             if let Some(emission) = scene.shading.emission[material as usize]
                 && vertex.front
             {
-                let weight = emission.scale * emitter_weight(scene, techniques, &path, &hit, ray.dir);
+                let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, &path.media, &hit, &vertex));
+                let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+                let weight = emission.scale * weight;
                 radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
             }
             if depth == settings.max_depth {
                 continue;
             }
-            let step = Step { scene, techniques, path: &path, vertex: &vertex, material, depth };
+            let step = Step { scene, techniques, path: &path, vertex: &vertex, hit: &hit, material, depth, caustics };
             if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
                 if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
                     self.scatter(step, &blend);
@@ -270,6 +284,20 @@ impl PathWave {
         if sample.transmitted {
             path.media = path.media.crossed(material, vertex.front);
         }
+        if let Some(pass) = step.caustics {
+            let bounce = Bounce {
+                vertex,
+                hit: step.hit,
+                eye: (depth == 1).then_some(path.position),
+                wi: sample.wi,
+                pdf: sample.pdf,
+                transmitted: sample.transmitted,
+                blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+                before: step.path.media,
+                after: path.media,
+            };
+            path.track = pass.follow(path.track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+        }
         if depth >= if techniques.roulette { ROULETTE_DEPTH } else { ENDLESS_DEPTH } {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
@@ -300,9 +328,11 @@ struct Step<'a> {
     techniques: &'a Techniques,
     path: &'a Path,
     vertex: &'a Vertex,
+    hit: &'a Hit,
     material: MaterialId,
     /// Segments so far.
     depth: u32,
+    caustics: Option<&'a CausticPass<'a>>,
 }
 
 impl Step<'_> {

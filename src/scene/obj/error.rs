@@ -1,4 +1,5 @@
 use crate::mesh::MeshError;
+use crate::scene::Limits;
 use std::path::PathBuf;
 
 /// Why an OBJ file could not be loaded: which file, which line, what was expected.
@@ -11,7 +12,7 @@ pub enum ObjError {
     Write(String),
     #[error("{}: is not a regular file", path.display())]
     NotAFile { path: PathBuf },
-    #[error("{}: has {bytes} bytes, more than the limit of {limit}", path.display())]
+    #[error("{}: has {bytes} bytes, more than the limit of {limit}: {}", path.display(), Limits::advice())]
     TooLarge { path: PathBuf, bytes: u64, limit: u64 },
     #[error("{}: has no faces (lines that start with `f`): is it a Wavefront OBJ file?", path.display())]
     NoFaces { path: PathBuf },

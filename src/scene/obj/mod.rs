@@ -18,6 +18,7 @@ pub use write::{ObjExtras, save_obj};
 
 use self::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight};
+use crate::scene::Limits;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::io::{Cursor, Read};
@@ -66,7 +67,8 @@ impl Default for ObjOptions {
     /// coarse (the faces of an icosahedron meet at 42°, those of an 8-sided column at 45°).
     fn default() -> Self {
         let normals = ObjNormals::FileOrComputed { crease_angle: 60_f32.to_radians() };
-        Self { normals, max_bytes: 1 << 30, max_library_bytes: 16 << 20 }
+        let limits = Limits::of_this_process();
+        Self { normals, max_bytes: limits.model_bytes, max_library_bytes: limits.library_bytes }
     }
 }
 
