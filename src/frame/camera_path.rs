@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 /// first without a jump.
 pub fn turntable(start: &Rig, n: u32) -> Vec<Rig> {
     let view = |i: u32| orbit(&start.view, TAU * f64::from(i) / f64::from(n), 0.0, Turning::Turntable);
-    (0..n).map(|i| Rig { view: view(i), ..*start }).collect()
+    // Even a turn by nothing would round.
+    (0..n).map(|i| if i == 0 { *start } else { Rig { view: view(i), ..*start } }).collect()
 }
 
 /// `n` views from the first stop through all others to the last; the same time from each to the next.

@@ -17,14 +17,17 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+/// No scene when it is the same as before.
+type ReadAgain = Result<Option<LoadedScene>, SceneError>;
+
 /// Looks after the files of the open scene.
 #[derive(Resource, Default)]
 pub struct HotReload {
     watch: Option<Watch>,
     /// What the watch has found.
     changed: Arc<Mutex<Vec<PathBuf>>>,
-    /// What came of reading it again; no scene when it is the same.
-    loaded: Arc<Mutex<Option<Result<Option<LoadedScene>, SceneError>>>>,
+    /// What came of reading it again.
+    loaded: Arc<Mutex<Option<ReadAgain>>>,
     waker: Option<Waker>,
     /// Whose files are looked after, and the scene file it is known by.
     watched: Option<(Arc<LoadedScene>, Option<PathBuf>)>,
@@ -144,7 +147,7 @@ fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
     now != clean.unwrap_or_else(|| current.content_fingerprint())
 }
 
-fn take(world: &mut World, old: &LoadedScene, result: Result<Option<LoadedScene>, SceneError>, now: Duration) {
+fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) {
     let mut scene = match result {
         Ok(Some(scene)) => scene,
         Ok(None) => return,

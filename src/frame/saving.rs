@@ -65,8 +65,7 @@ pub fn save(world: &mut World) {
     let finished = {
         let mut saving = world.resource_mut::<Saving>();
         saving.threads.retain(|thread| !thread.is_finished());
-        let finished = std::mem::take(&mut *saving.finished.lock().unwrap_or_else(PoisonError::into_inner));
-        finished
+        std::mem::take(&mut *saving.finished.lock().unwrap_or_else(PoisonError::into_inner))
     };
     for Saved { path, result, content } in finished {
         match result {

@@ -73,7 +73,7 @@ impl Film {
     pub fn starting_at(mut self, first: u32) -> Self {
         for tile in &mut self.tiles {
             *tile = FilmTile::new(tile.origin, tile.size);
-            tile.ranges = vec![first..first];
+            tile.ranges = std::iter::once(first..first).collect();
         }
         self.light = None;
         self
@@ -202,7 +202,7 @@ impl Film {
 impl FilmTile {
     fn new(origin: UVec2, size: UVec2) -> Self {
         let n = (size.x * size.y) as usize;
-        let (sums, ranges) = (vec![ExactSum::default(); n], vec![0..0]);
+        let (sums, ranges) = (vec![ExactSum::default(); n], std::iter::once(0..0).collect());
         Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence: TileConvergence::default() }
     }
 

@@ -275,7 +275,7 @@ fn note_of(path: &Path) -> Result<String, String> {
             .headers
             .iter()
             .flat_map(|header| header.shared_attributes.other.iter().chain(&header.own_attributes.other));
-        let mut texts = notes.filter(|(key, _)| key.to_string() == NOTE_KEY);
+        let mut texts = notes.filter(|(key, _)| **key == *NOTE_KEY);
         return match texts.next() {
             Some((_, exr::meta::attribute::AttributeValue::Text(text))) => Ok(text.to_string()),
             _ => Err(none.to_owned()),
