@@ -3,9 +3,9 @@
 use super::Failure;
 use super::console::{print, remark};
 use clap::{Args, ValueEnum};
-use firstlight::mesh::simplify::{Method, Target, simplify};
+use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Topology};
-use firstlight::scene::obj::{ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
+use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
 use firstlight::scene::whole_file::check_writable;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -72,8 +72,14 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
     for warning in &model.warnings {
         remark(format_args!("warning: {warning}"));
     }
+    for fault in faults(&model) {
+        remark(format_args!("warning: {}: {fault}", args.input.display()));
+    }
     let start = Instant::now();
-    let result = simplify(&model.mesh, method, target).map_err(|error| Failure::Usage(error.to_string()))?;
+    let result = simplify(&model.mesh, method, target).map_err(|error| match error {
+        SimplifyError::Degenerate => Failure::Failed(format!("{}: {error}", args.input.display())),
+        _ => Failure::Usage(error.to_string()),
+    })?;
     let seconds = start.elapsed().as_secs_f64();
     let before = model.mesh.triangles.len();
     let after = result.triangles.len();
@@ -125,4 +131,20 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
+}
+
+/// What is not as a simplifier would have it, and what becomes of it; a sentence each.
+fn faults(model: &ImportedObj) -> Vec<String> {
+    let found = Topology::of(&model.mesh);
+    [
+        (model.polygons, "faces of more than three corners were cut into triangles"),
+        (found.degenerate_triangles, "triangles are without area"),
+        (found.duplicate_triangles, "triangles lie on the same three places as an earlier one and are left out"),
+        (found.non_manifold_edges, "edges of three or more triangles stay as they are"),
+        (found.misoriented_edges, "edges between triangles that face opposite ways stay as they are"),
+    ]
+    .into_iter()
+    .filter(|&(count, _)| count > 0)
+    .map(|(count, fate)| format!("{count} {fate}"))
+    .collect()
 }

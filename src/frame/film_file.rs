@@ -6,7 +6,7 @@
 //! checksum; the note of the picture ([`Shot`]) says which scene it is, and makes it open as any picture.
 
 use super::picture_file::mean_channels;
-use crate::render::{Film, FilmLayout, FilmRecord};
+use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES};
 use crate::scene::file::check_film_size;
 use crate::scene::shot::NOTE_KEY;
 use crate::scene::whole_file::{WholeFile, unwritable};
@@ -113,8 +113,8 @@ fn read(path: &Path) -> Result<FilmFile, String> {
             _ => Err(damaged(&format!("the channel {name} is missing"))),
         }
     };
-    let mut planes = Vec::new();
-    for name in plane_names().take(film.layout.n_planes()) {
+    let mut planes = Vec::with_capacity(N_PLANES);
+    for name in plane_names() {
         let (upper, lower) = (words(format!("{name}.upper"))?, words(format!("{name}.lower"))?);
         let pairs = upper.iter().zip(lower);
         planes.push(pairs.map(|(&u, &l)| f64::from_bits(u64::from(u) << 32 | u64::from(l))).collect());
@@ -128,7 +128,7 @@ fn read(path: &Path) -> Result<FilmFile, String> {
 }
 
 fn plane_names() -> impl Iterator<Item = String> {
-    ["sum", "rest", "mean", "light", "light-rest"]
+    ["sum", "rest", "mean", "lamps.sum", "lamps.rest"]
         .into_iter()
         .flat_map(|part| ["R", "G", "B"].map(|channel| format!("{part}.{channel}")))
 }

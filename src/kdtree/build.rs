@@ -274,11 +274,7 @@ impl<P: Primitives> Builder<'_, P> {
         if depth >= self.config.max_depth || references.len() <= self.config.leaf_limit {
             return None;
         }
-        if self.config.median {
-            median_split(references, cell, self.config)
-        } else {
-            find_split(references, cell, self.config)
-        }
+        if self.config.median { median_split(references, cell) } else { find_split(references, cell, self.config) }
     }
 
     /// The parts of a reference on either side; none where its primitive does not reach.

@@ -62,20 +62,18 @@ impl ErrorEstimate {
             (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * mean)
         };
         // The first steps say little of how fast later ones fall; independent samples where there is only one.
-        let first = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
-        let first = (first..level).find(is_known);
-        let exponent = if let Some(first) = first
-            && last > 0.0
-        {
-            let span = (level - first) as f64;
-            let seen = (step(first) / last).log2() / span;
-            // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
-            // much as it is uncertain, where slopes of pictures lie about half around it.
-            let uncertainty = sigma(first).hypot(sigma(level)) / (span * std::f64::consts::LN_2);
-            let trust = 0.25 / (0.25 + uncertainty * uncertainty);
-            (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
-        } else {
-            MIN_EXPONENT
+        let earliest = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
+        let exponent = match (earliest..level).find(is_known) {
+            Some(first) if last > 0.0 => {
+                let span = (level - first) as f64;
+                let seen = (step(first) / last).log2() / span;
+                // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
+                // much as it is uncertain, where slopes of pictures lie about half around it.
+                let uncertainty = sigma(first).hypot(sigma(level)) / (span * std::f64::consts::LN_2);
+                let trust = 0.25 / (0.25 + uncertainty * uncertainty);
+                (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
+            }
+            _ => MIN_EXPONENT,
         };
         let spp_at_level = f64::from(2u32 << level);
         let variance_of_one = last / (exponent.exp2() - 1.0) * spp_at_level.powf(exponent);

@@ -3,7 +3,7 @@
 //! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
 //! ([`Film::merge`]) to the very film that has all of them.
 
-use super::caustics::{LightLayer, joined};
+use super::caustics::LightLayer;
 use super::estimate::{ErrorEstimate, TileConvergence};
 use super::exact_sum::ExactSum;
 use glam::{DVec3, UVec2, Vec3};
@@ -71,11 +71,11 @@ impl Film {
 
     /// The same without samples, to begin with sample number `first`.
     pub fn starting_at(mut self, first: u32) -> Self {
+        self.light = None;
         for tile in &mut self.tiles {
             *tile = FilmTile::new(tile.origin, tile.size);
             tile.ranges = std::iter::once(first..first).collect();
         }
-        self.light = None;
         self
     }
 
@@ -94,7 +94,7 @@ impl Film {
 
     /// Samples that every pixel has at least.
     pub fn spp(&self) -> u32 {
-        let from_lamps = self.light.as_ref().map(LightLayer::spp);
+        let from_lamps = self.light.as_ref().map(|light| light.spp);
         self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
     }
 
@@ -137,13 +137,13 @@ impl Film {
                 ));
             }
         }
-        match (&mut self.light, &other.light) {
-            (None, None) => {}
-            (Some(light), Some(other)) => light.merge(other)?,
-            _ => return Err("one film has light that was traced from the lamps, the other has none".to_owned()),
-        }
         for (tile, other) in self.tiles.iter_mut().zip(&other.tiles) {
             tile.merge(other);
+        }
+        match (&mut self.light, &other.light) {
+            (Some(light), Some(other)) => light.merge(other),
+            (light, Some(other)) => *light = Some(other.clone()),
+            (_, None) => {}
         }
         self.record_convergence();
         Ok(())
@@ -186,7 +186,7 @@ impl Film {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
     }
 
-    /// Tells every tile's part of the error estimate how far the picture is; all tiles have as many samples.
+    /// Tells every tile's part of the error estimate how far the picture is.
     pub(super) fn record_convergence(&mut self) {
         let (light, width) = (self.light.as_ref(), self.width);
         self.tiles.par_iter_mut().for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
@@ -277,6 +277,18 @@ impl FilmTile {
         self.spp += other.spp;
         self.bad.extend(&other.bad);
         self.bad.sort_unstable_by_key(|&(pixel, sample)| (sample, pixel));
-        self.ranges = joined(self.ranges.iter().chain(&other.ranges).cloned());
+        let mut ranges: Vec<Range<u32>> = self.ranges.iter().chain(&other.ranges).cloned().collect();
+        ranges.retain(|range| !range.is_empty());
+        if ranges.is_empty() {
+            ranges.push(self.next_sample()..self.next_sample());
+        }
+        ranges.sort_by_key(|range| range.start);
+        self.ranges = ranges.into_iter().fold(Vec::new(), |mut joined: Vec<Range<u32>>, range| {
+            match joined.last_mut() {
+                Some(last) if last.end == range.start => last.end = range.end,
+                _ => joined.push(range),
+            }
+            joined
+        });
     }
 }

@@ -4,26 +4,18 @@ use super::Film;
 use super::caustics::LightLayer;
 use super::estimate::TileConvergence;
 use super::exact_sum::ExactSum;
-use glam::DVec3;
+use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
-/// Numbers for each pixel: three channels of the sum, of its rest, and of the mean at the last power of two.
-const N_PLANES: usize = 9;
-/// And of the sum and the rest of what was traced from the lamps.
-const N_LIGHT_PLANES: usize = 6;
-
-impl FilmLayout {
-    /// Numbers for each pixel.
-    pub fn n_planes(&self) -> usize {
-        N_PLANES + if self.light.is_some() { N_LIGHT_PLANES } else { 0 }
-    }
-}
+/// Numbers for each pixel: three channels of the sum, of its rest, of the mean at the last power of two, and of sum and
+/// rest of the light from the lamps.
+pub const N_PLANES: usize = 15;
 
 /// All that is in a film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmRecord {
     pub layout: FilmLayout,
-    /// Row by row from the top, as many as the layout says.
+    /// Row by row from the top, [`N_PLANES`] of them.
     pub planes: Vec<Vec<f64>>,
 }
 
@@ -36,17 +28,17 @@ pub struct FilmLayout {
     pub tile_size: u32,
     /// Row by row from the top.
     pub tiles: Vec<TileRecord>,
-    /// Of the light that was traced from the lamps, where there is any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub light: Option<LightRecord>,
+    /// What is known of the light from the lamps, where there is such light.
+    pub lamps: Option<LampRecord>,
 }
 
-/// Light that was traced from the lamps; its sums are the last six planes.
+/// Paths from the lamps that are in the film.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LightRecord {
-    pub batches: Vec<(u32, u32)>,
+pub struct LampRecord {
+    /// First batch and the one after the last, of each range.
+    pub batches: Vec<(u64, u64)>,
+    /// Samples of the whole picture that are complete.
     pub spp: u32,
-    pub next_sample: u32,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,24 +76,24 @@ impl Film {
                 steps: tile.convergence.steps.iter().map(|step| step.to_bits()).collect(),
             });
         }
-        let light = self.light.as_ref().map(|light| {
-            for part in [|sum: &ExactSum| sum.sum, |sum: &ExactSum| sum.rest] {
-                for channel in 0..3 {
-                    planes.push(light.sums.iter().map(|sum| part(sum)[channel]).collect());
+        let lamps = self.light.as_ref().map(|light| {
+            for (at, sum) in light.sums.iter().enumerate() {
+                let numbers = [sum.sum, sum.rest];
+                for (plane, number) in planes[9..].iter_mut().zip(numbers.iter().flat_map(DVec3::to_array)) {
+                    plane[at] = number;
                 }
             }
-            let batches = light.batches.iter().map(|range| (range.start, range.end)).collect();
-            LightRecord { batches, spp: light.spp, next_sample: light.next_sample }
+            LampRecord { batches: light.done.iter().map(|range| (range.start, range.end)).collect(), spp: light.spp }
         });
-        let (width, height) = (self.width(), self.height());
-        let layout = FilmLayout { width, height, tile_size: self.tile_size(), tiles, light };
+        let (width, height, tile_size) = (self.width(), self.height(), self.tile_size());
+        let layout = FilmLayout { width, height, tile_size, tiles, lamps };
         FilmRecord { layout, planes }
     }
 
     /// # Errors
     /// When the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, String> {
-        let FilmLayout { width, height, tile_size, tiles, light } = &record.layout;
+        let FilmLayout { width, height, tile_size, tiles, lamps } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
         let n_pixels = u64::from(width) * u64::from(height);
         if n_pixels == 0 || tile_size == 0 {
@@ -109,17 +101,13 @@ impl Film {
         }
         let n_tiles = u64::from(width.div_ceil(tile_size)) * u64::from(height.div_ceil(tile_size));
         let planes_fit = record.planes.iter().all(|plane| plane.len() as u64 == n_pixels);
-        if tiles.len() as u64 != n_tiles || record.planes.len() != record.layout.n_planes() || !planes_fit {
+        if tiles.len() as u64 != n_tiles || record.planes.len() != N_PLANES || !planes_fit {
             return Err("its parts do not have the size that it names".to_owned());
         }
         let mut film = Self::with_tile_size(width, height, tile_size);
         for (tile, record_of_tile) in film.tiles.iter_mut().zip(tiles) {
             let n_pixels = tile.n_pixels();
-            let ascending = record_of_tile.samples.windows(2).all(|pair| pair[0].1 < pair[1].0);
-            let whole = record_of_tile.samples.iter().all(|(start, end)| start <= end);
-            if !ascending || !whole || record_of_tile.samples.is_empty() {
-                return Err("its ranges of samples overlap or run backwards".to_owned());
-            }
+            check_ranges(&record_of_tile.samples)?;
             let spp: u64 = record_of_tile.samples.iter().map(|(start, end)| u64::from(end - start)).sum();
             tile.spp = u32::try_from(spp).map_err(|_| "it has more samples than can be counted".to_owned())?;
             tile.ranges = record_of_tile.samples.iter().map(|&(start, end)| start..end).collect();
@@ -149,19 +137,26 @@ impl Film {
                 };
             }
         }
-        if let Some(LightRecord { batches, spp, next_sample }) = light {
-            if batches.is_empty() || batches.iter().any(|(start, end)| start > end) {
-                return Err("its light from the lamps has ranges that run backwards".to_owned());
+        if let Some(lamps) = lamps {
+            check_ranges(&lamps.batches)?;
+            let mut light = LightLayer::new(UVec2::new(width, height), 0);
+            for (at, sum) in light.sums.iter_mut().enumerate() {
+                let vector = |first: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));
+                *sum = ExactSum { sum: vector(9), rest: vector(12) };
             }
-            let vector = |first: usize, at: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));
-            let sum = |at: usize| ExactSum { sum: vector(N_PLANES, at), rest: vector(N_PLANES + 3, at) };
-            film.light = Some(LightLayer {
-                sums: (0..n_pixels as usize).map(sum).collect(),
-                batches: batches.iter().map(|&(start, end)| start..end).collect(),
-                spp: *spp,
-                next_sample: *next_sample,
-            });
+            light.done = lamps.batches.iter().map(|&(start, end)| start..end).collect();
+            light.spp = lamps.spp;
+            film.light = Some(light);
         }
         Ok(film)
     }
+}
+
+fn check_ranges<T: PartialOrd>(ranges: &[(T, T)]) -> Result<(), String> {
+    let ascending = ranges.windows(2).all(|pair| pair[0].1 < pair[1].0);
+    let whole = ranges.iter().all(|(start, end)| start <= end);
+    if ascending && whole && !ranges.is_empty() {
+        return Ok(());
+    }
+    Err("its ranges of samples overlap or run backwards".to_owned())
 }

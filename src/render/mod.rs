@@ -31,7 +31,7 @@ pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encod
 pub use environment::Environment;
 pub use estimate::ErrorEstimate;
 pub use film::Film;
-pub use film_record::{FilmLayout, FilmRecord, LightRecord, TileRecord};
+pub use film_record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
 pub use filter::PixelFilter;
 pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};

@@ -7,7 +7,7 @@
 //! Start reading at [`PathWave::trace`].
 
 use super::bsdf::Scatter;
-use super::caustics::{Bounce, CausticPass, Track};
+use super::caustics::{Bounce, CausticPass, Guided, Track};
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::renderer::{RayCounts, RenderSettings};
@@ -173,14 +173,35 @@ impl PathWave {
             if depth == settings.max_depth {
                 continue;
             }
-            let step = Step { scene, techniques, path: &path, vertex: &vertex, hit: &hit, material, depth, caustics };
+            let step = Step {
+                scene,
+                techniques,
+                path: &path,
+                vertex: &vertex,
+                hit: &hit,
+                material,
+                depth,
+                caustics,
+                is_told: false,
+            };
             if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
                 if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
-                    self.scatter(step, &blend);
+                    self.scatter_told(step, &blend);
                 }
             } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
-                self.scatter(step, &lobe);
+                self.scatter_told(step, &lobe);
             }
+        }
+    }
+
+    /// With hints, where there are any, of where gathered light comes from.
+    #[inline]
+    fn scatter_told(&mut self, step: Step, bsdf: &impl Scatter) {
+        let Step { path, vertex, depth, .. } = step;
+        let hints = step.caustics.filter(|_| bsdf.is_smooth());
+        match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
+            Some(hints) => self.scatter(Step { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
+            None => self.scatter(step, bsdf),
         }
     }
 
@@ -296,12 +317,13 @@ impl PathWave {
                 before: step.path.media,
                 after: path.media,
             };
-            path.track = pass.follow(path.track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+            let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
+            path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
         }
         if depth >= if techniques.roulette { ROULETTE_DEPTH } else { ENDLESS_DEPTH } {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
-            let most = path.throughput.abs().max_element() * ior * ior;
+            let most = path.throughput.abs().max_element() * ior * ior * path.track.gain;
             let survival = if depth >= ENDLESS_DEPTH { most.min(0.95) } else { most.min(1.0) };
             if survival < 1.0 {
                 if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -333,6 +355,8 @@ struct Step<'a> {
     /// Segments so far.
     depth: u32,
     caustics: Option<&'a CausticPass<'a>>,
+    /// Some directions are chosen by hints.
+    is_told: bool,
 }
 
 impl Step<'_> {

@@ -100,6 +100,9 @@ pub fn advance(
     let Some(caustics) = &pass.caustics else {
         return advance_tiles(&pass, film, target_spp, stop);
     };
+    if !caustics.prepare(stop) {
+        return PassReport::default();
+    }
     let first = film.first_sample();
     film.light.get_or_insert_with(|| LightLayer::new(size, first));
     let mut total = PassReport { completed: true, ..PassReport::default() };
@@ -238,6 +241,9 @@ fn advance_tile(
 pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
     let caustics = CausticPass::of(snapshot, settings, film_size);
     let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size: film_size };
+    if let Some(caustics) = &pass.caustics {
+        caustics.prepare(&|| false);
+    }
     let (ray, sampler, weight) = pass.camera_ray(UVec2::new(at.x, at.y), at.sample);
     let mut radiance = [Vec3::ZERO];
     let path = CameraPath { ray, sampler, slot: 0, weight };

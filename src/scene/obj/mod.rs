@@ -35,6 +35,8 @@ pub struct ImportedObj {
     pub libraries: Vec<PathBuf>,
     /// Whether every corner had a usable normal in the file; otherwise they were computed.
     pub normals_from_file: bool,
+    /// Faces of more than three corners; they were cut into triangles.
+    pub polygons: usize,
     /// What was left out or replaced, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -133,7 +135,8 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     };
     mesh.validate().map_err(mesh_error)?;
     let (materials, libraries) = find_materials(path, screened, options.max_library_bytes, &mut warnings);
-    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, warnings: warnings.into_list() })
+    let polygons = parsed.face_arities.iter().filter(|&&corners| corners > 3).count();
+    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, polygons, warnings: warnings.into_list() })
 }
 
 /// Differences and products of `f32` numbers are exact enough in `f64` for corners on a line to give exactly nothing.
