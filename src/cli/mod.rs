@@ -1,6 +1,7 @@
 //! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
 //! understood; 130: stopped by Ctrl+C, what there was is saved.
 
+mod animate;
 mod console;
 mod info;
 mod merge;
@@ -114,7 +115,7 @@ impl SceneArgs {
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
-        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
+        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), known: None };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
             remark(format_args!("warning: {warning}"));

@@ -50,7 +50,7 @@ impl Beside {
                 });
                 this.wake();
             };
-            let options = LoadOptions { up, aspect: Some(aspect), progress: Some(&say) };
+            let options = LoadOptions { up, aspect: Some(aspect), progress: Some(&say), known: None };
             let result = guarded(|| pool.install(|| load(&source, &options)))
                 .unwrap_or_else(|panic| Err(SceneError::in_file(source.title(), panic)));
             this.with(|board| {

@@ -111,6 +111,10 @@ pub enum Command {
     SetThreads {
         threads: usize,
     },
+    /// Save the scene as a scene file; one that is there is replaced.
+    SaveScene {
+        path: PathBuf,
+    },
     /// Open a scene file, a model or, when there is no such file, the built-in scene of that name.
     Open {
         path: PathBuf,

@@ -1,6 +1,7 @@
 //! Carries out what a person asks for: commands become changes of components and resources.
 
 use super::navigation::{self, Rig, Turning};
+use super::saving::Saving;
 use super::status::{MessageKind, Status};
 use super::systems::{Around, Clock, Paused, PictureSize, Renderer, Shown, Threads};
 use super::{Command, beside::Beside};
@@ -35,6 +36,7 @@ pub struct Desk<'w, 's> {
     shown: ResMut<'w, Shown>,
     status: ResMut<'w, Status>,
     beside: Res<'w, Beside>,
+    saving: ResMut<'w, Saving>,
     renderer: Res<'w, Renderer>,
     clock: Res<'w, Clock>,
     up: Res<'w, ModelUp>,
@@ -102,6 +104,7 @@ impl Desk<'_, '_> {
                 Ok(source) => self.beside.load(source, self.up.0, self.size.aspect(), self.renderer.0.pool()),
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
+            Command::SaveScene { path } => self.saving.requests.push(path),
             // Everything else steers, and there is no camera to be steered.
             _ => {}
         }

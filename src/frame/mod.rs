@@ -13,26 +13,36 @@
 //! A [`Session`] holds all of it. The workers follow a [`Scheduler`] that knows no threads and no clock.
 
 mod beside;
+mod camera_path;
 mod command;
 mod film_file;
 mod input;
 pub mod navigation;
 mod offline;
 mod picture_file;
+mod recording;
+mod reload;
 mod reset;
+mod saving;
 mod scheduler;
 mod session;
+mod settings;
 mod status;
 mod systems;
+mod watch;
 mod worker;
 
+pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use film_file::{FilmFile, read_film_file, write_film_file};
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until};
 pub use picture_file::{PictureFormat, Print, write_film};
+pub use recording::{ReplayOptions, Replayed, replay};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
+pub use saving::SavedAs;
 pub use scheduler::{Scheduler, Step, StepReport};
 pub use session::{Session, SessionOptions, Stage};
+pub use settings::{SceneBookmarks, Settings, SettingsStore};
 pub use status::{Message, MessageKind, Picture, Status};
 pub use systems::{Around, CurrentScene, Found, Paused, PictureSize, StopAt, Threads};
 pub use worker::Waker;

@@ -3,6 +3,7 @@
 use super::beside::{Beside, Finished};
 use super::navigation::Surroundings;
 use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
+use super::saving::SavedAs;
 use super::status::{MessageKind, Picture, Status};
 use super::worker::{Job, Worker};
 use super::{Target, navigation};
@@ -72,6 +73,10 @@ impl Around {
 /// The scene that is open, for saving and reopening.
 #[derive(Resource, Clone)]
 pub struct CurrentScene(pub Arc<LoadedScene>);
+
+/// How many scenes have taken their place so far.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Adopted(pub u64);
 
 /// What the workers have been given, to compare with.
 #[derive(Resource, Default)]
@@ -186,6 +191,8 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
         status.say(now, MessageKind::Warning, warning.clone());
     }
     world.insert_resource(CurrentScene(Arc::new(scene)));
+    world.insert_resource(SavedAs::default());
+    world.resource_mut::<Adopted>().0 += 1;
 }
 
 /// Finds out what changed, and makes anew that part of the snapshot and no other.

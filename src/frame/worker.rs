@@ -313,7 +313,7 @@ impl<'a> Loop<'a> {
 
     /// One step of the scheduler, and the picture that comes of it.
     fn render(&mut self, step: Step) {
-        let Step::Render { divider, target_spp, at_most } = step else { return };
+        let Step::Render { divider, mut target_spp, mut at_most } = step else { return };
         let Some(job) = &self.job else { return };
         if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
             let film = Film::new(job.width.div_ceil(divider), job.height.div_ceil(divider));
@@ -324,6 +324,10 @@ impl<'a> Loop<'a> {
             self.stats.bad.clear();
         }
         let Some((_, film)) = &mut self.film else { return };
+        if divider == 1 && !self.to_keep.is_empty() {
+            // Who keeps a picture wants to be able to make it again, so all pixels get as many samples.
+            (target_spp, at_most) = (film.max_spp().max(1), None);
+        }
         let pool = lock(&self.shared.pool).clone();
         let start = Instant::now();
         let interrupt = &self.shared.interrupt;
@@ -371,7 +375,7 @@ impl<'a> Loop<'a> {
             return;
         }
         if let Some((divider, film)) = self.visible()
-            && (*divider == 1 || no_better)
+            && ((*divider == 1 && film.max_spp() == film.spp()) || no_better)
         {
             let film = film.clone();
             for sender in self.to_keep.drain(..) {

@@ -3,6 +3,7 @@
 use super::error::SceneError;
 use super::file::{Amount, MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
 use super::obj::{ImportedMaterial, ObjError, ObjNormals, ObjOptions, load_obj_with};
+use super::stamp::{Stamp, stamp};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use glam::{DVec2, DVec3, Vec3};
 use std::io;
@@ -50,6 +51,8 @@ pub struct LoadedMesh {
     /// Textures that `slots` name, and where their pictures lie.
     pub textures: Vec<(String, TexturePart, PathBuf)>,
     pub warnings: Vec<String>,
+    /// What was read for it, and what that was then.
+    pub files: Vec<(PathBuf, Stamp)>,
 }
 
 /// Reads or makes a mesh, then simplifies and shades it as asked.
@@ -65,12 +68,20 @@ pub fn load_mesh(
             let (mesh, crease) =
                 builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?;
             let mesh = shaded(simplified(mesh, simplify)?, shading, crease);
-            Ok(LoadedMesh { mesh: Arc::new(mesh), slots: Vec::new(), textures: Vec::new(), warnings: Vec::new() })
+            Ok(LoadedMesh {
+                mesh: Arc::new(mesh),
+                slots: Vec::new(),
+                textures: Vec::new(),
+                warnings: Vec::new(),
+                files: Vec::new(),
+            })
         }
     }
 }
 
 fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Result<LoadedMesh, SceneError> {
+    // Before it is read: what changes in the meantime is read again.
+    let before = stamp(path);
     let read = |normals| {
         load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
             // The reader's own words for a missing file speak of an error number.
@@ -97,7 +108,11 @@ fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Res
         imported.mesh = shaded(simplified(imported.mesh, simplify)?, shading, None);
     }
     let mesh = Arc::new(imported.mesh);
-    let mut loaded = LoadedMesh { mesh, slots: Vec::new(), textures: Vec::new(), warnings: imported.warnings };
+    let files = std::iter::once((path.to_owned(), before))
+        .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
+        .collect();
+    let (slots, textures, warnings) = (Vec::new(), Vec::new(), imported.warnings);
+    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, files };
     // A file without any material leaves the choice to whoever uses it.
     if imported.materials.iter().any(|material| !material.name.is_empty()) {
         for material in &imported.materials {
@@ -128,6 +143,11 @@ fn shaded(mesh: Mesh, shading: MeshShadingPart, crease: Option<f32>) -> Mesh {
 }
 
 impl LoadedMesh {
+    /// Whether the files that it was read from are still the same.
+    pub fn is_fresh(&self) -> bool {
+        self.files.iter().all(|(path, then)| then.is_some() && stamp(path) == *then)
+    }
+
     /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
     /// matte, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {

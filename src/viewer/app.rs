@@ -9,11 +9,13 @@ use super::display::Display;
 use super::input::Input;
 use super::keys::Action;
 use super::presenter::{PresentError, Presenter};
-use super::saver::{Saved, Saver};
+use super::saver::{Saved, Saver, new_scene_file};
 use super::status;
 use super::toasts::{Toasts, Tone};
 use super::{camera_text, display, overlay};
-use crate::frame::{Command, MessageKind, PictureFormat, Session, SessionOptions, Target, Waker};
+use crate::frame::{
+    Command, MessageKind, PictureFormat, Session, SessionOptions, Settings, SettingsStore, Target, Waker,
+};
 use crate::render::Integrator;
 use crate::scene::{SceneSource, UpAxis};
 use std::io::Write as _;
@@ -42,6 +44,8 @@ pub struct ViewerOptions {
     pub up: Option<UpAxis>,
     /// Where kept pictures go.
     pub folder: PathBuf,
+    /// Where to write down what is done.
+    pub record: Option<PathBuf>,
 }
 
 /// Why the window could not be opened, or closed by itself.
@@ -102,6 +106,8 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     };
     let mut app = App::new(options, pending, waker)?;
     event_loop.run_app(&mut app).map_err(ViewerError::EventLoop)?;
+    app.session.end_record();
+    app.keep_window_size();
     for saved in app.saver.finish() {
         app.tell_saved(saved);
     }
@@ -124,6 +130,8 @@ struct App {
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
     title: String,
+    /// Logical pixels.
+    window_size: (u32, u32),
     occluded: bool,
     /// Something happened since the last tick.
     stirred: bool,
@@ -153,6 +161,9 @@ impl App {
             waker: Some(waker.clone()),
         })
         .map_err(ViewerError::Session)?;
+        if let Some(path) = &options.record {
+            session.record(path, &options.source, options.up).map_err(ViewerError::Session)?;
+        }
         session.open(options.source.clone());
         let start = Instant::now();
         Ok(Self {
@@ -168,6 +179,7 @@ impl App {
             presenter: None,
             window: None,
             title: String::new(),
+            window_size: (options.width, options.height),
             occluded: false,
             stirred: true,
             shown_picture: None,
@@ -179,6 +191,15 @@ impl App {
             failure: None,
             options,
         })
+    }
+
+    /// For the next window.
+    fn keep_window_size(&self) {
+        let store = SettingsStore::of_platform();
+        let settings = Settings { window: Some(self.window_size), ..store.settings().0 };
+        if let Err(error) = store.keep_settings(&settings) {
+            log::warn!("{error}");
+        }
     }
 
     fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
@@ -198,6 +219,10 @@ impl App {
     fn resized(&mut self) {
         let (Some(window), Some(presenter)) = (&self.window, &self.presenter) else { return };
         let size = window.inner_size();
+        let logical = size.to_logical::<u32>(window.scale_factor());
+        if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
+            self.window_size = (logical.width, logical.height);
+        }
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
         self.input.resize(width, height);
         self.session.send(Command::Resize { width, height });
@@ -357,6 +382,11 @@ impl App {
                 self.session.send(Command::SetIntegrator(other));
             }
             Action::Screenshot { linear } => self.screenshot(linear),
+            Action::SaveScene { new } => {
+                let known = self.session.scene_file().filter(|_| !new);
+                let path = known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene));
+                self.session.send(Command::SaveScene { path });
+            }
             Action::PrintView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
                 // Standard output may be closed; the window goes on.
@@ -384,7 +414,9 @@ impl App {
         let status = self.session.status();
         let picture = self.session.picture();
         let size = (picture.width.max(1), picture.height.max(1));
-        self.saver.save(self.session.keep_film(), status.display, size, &status.scene, format);
+        let (display, scene) = (status.display, status.scene.clone());
+        let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
+        self.saver.save(self.session.keep_film(), draft, display, size, &scene, format);
     }
 
     fn tell_saved(&mut self, saved: Saved) {

@@ -72,6 +72,10 @@ pub enum Action {
     Screenshot {
         linear: bool,
     },
+    /// As a scene file: the one that is open, or a new one.
+    SaveScene {
+        new: bool,
+    },
     PrintView,
     ToggleHelp,
     ToggleOverlays,
@@ -99,6 +103,10 @@ const fn shifted(key: Typed, shift: bool, action: Action) -> Trigger {
 
 const fn ctrl(key: &'static str, action: Action) -> Trigger {
     Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: None }, action)
+}
+
+const fn ctrl_shifted(key: &'static str, shift: bool, action: Action) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: Some(shift) }, action)
 }
 
 const fn send(key: &'static str, command: Command) -> Trigger {
@@ -253,7 +261,18 @@ pub static BINDINGS: &[Group] = &[
                 ],
                 effect: "keep its linear light as a new EXR file",
             },
-            Binding { triggers: &[Trigger::Mouse("Drop a file")], effect: "open a scene (.ron) or a model (.obj)" },
+            Binding {
+                triggers: &[ctrl_shifted("s", false, Action::SaveScene { new: false })],
+                effect: "save the scene file, or the scene as a new one",
+            },
+            Binding {
+                triggers: &[ctrl_shifted("s", true, Action::SaveScene { new: true })],
+                effect: "save the scene as a new scene file",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Drop a file")],
+                effect: "open a scene (.ron), a model (.obj) or a picture that was kept (.png, .exr)",
+            },
         ],
     },
     Group {
