@@ -232,7 +232,7 @@ fn a_lamp_in_pieces_shines_like_the_whole() {
         let materials = vec![diffuse(0.5), emissive(5.0), metal];
         scene(shapes, materials, Environment::Black, camera(Vec3::new(0.0, 1.5, 4.0), Vec3::Y * 0.3, 50.0))
     };
-    let mean = |side, seed| {
+    let mean = |side, seed: u32| {
         let means: Vec<f64> =
             (0..8).map(|k| picture_mean(&render(&room(side), &settings(seed + k), 20, 16, 64).0).0).collect();
         let mean = means.iter().sum::<f64>() / 8.0;
