@@ -14,23 +14,36 @@
 
 mod beside;
 mod command;
+mod edit;
+mod focus;
+pub mod gizmo;
+mod history;
 mod input;
 pub mod navigation;
 mod offline;
 mod picture_file;
+mod remesh;
 mod reset;
 mod scheduler;
+mod selection;
 mod session;
 mod status;
 mod systems;
+mod views;
 mod worker;
 
 pub use command::Command;
+pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, textures};
+pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
+pub use history::History;
 pub use offline::{OfflineReport, Progress, Target, render_offline};
 pub use picture_file::{PictureFormat, check_writable, write_film, write_new_film};
+pub use remesh::MeshMeasure;
 pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use scheduler::{Scheduler, Step, StepReport};
+pub use selection::{OwnBox, Picked, Projector, Selection, pick};
 pub use session::{Session, SessionOptions, Stage};
 pub use status::{Message, MessageKind, Picture, Status};
-pub use systems::{Around, CurrentScene, Found, Paused, PictureSize, StopAt, Threads};
-pub use worker::Waker;
+pub use systems::{Around, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, StopAt, Threads};
+pub use views::{Bookmarks, ViewTrail};
+pub use worker::{Look, Waker};

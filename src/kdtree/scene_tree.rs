@@ -8,7 +8,7 @@ use super::simd::InstructionSet;
 use super::sphere_tree::{WideRay, ball_bounds};
 use super::surface::Instance;
 use super::trace::FlatScene;
-use super::{HitBatch, MeshTree, RayBatch, SphereTree};
+use super::{HitBatch, MeshTree, RayBatch, SphereTree, Visits};
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
 use std::sync::Arc;
@@ -231,6 +231,41 @@ impl SceneTree {
             self.offer_object(object, &scene_ray, &mut best, Effort::Naive);
         }
         best
+    }
+
+    /// What the nearest hit of a ray costs, in this tree and those below it, whatever traversal finds it.
+    pub fn count_visits(&self, ray: &Ray) -> Visits {
+        let scene_ray = SceneRay::new(ray);
+        let mut best = None;
+        for &plane in &self.planes {
+            self.offer_object(plane, &scene_ray, &mut best, Effort::Closest);
+        }
+        let mut visits = Visits::default();
+        let Some(nodes) = &self.nodes else { return visits };
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &scene_ray.shear, self.extent);
+        let mut tested = Recent::default();
+        let (mut inner, mut below) = (0, Visits::default());
+        let t_max = best.map_or(ray.t_max, |hit| hit.t);
+        let visit = |first: u32, count: u32| {
+            below.leaves += 1;
+            for &object in &self.leaf_objects[first as usize..][..count as usize] {
+                if tested.is_new(object) {
+                    if let Shape::Mesh { tree, .. } = &self.shapes[object as usize] {
+                        let t_max = best.map_or(ray.t_max, |hit: Hit| hit.t);
+                        let own = tree.count_visits(&Ray { t_max, ..self.instances[object as usize].ray(ray) });
+                        below.inner += own.inner;
+                        below.leaves += own.leaves;
+                        below.blocks += own.blocks;
+                    }
+                    self.offer_object(object, &scene_ray, &mut best, Effort::Closest);
+                }
+            }
+            best.map_or(ray.t_max, |hit| hit.t)
+        };
+        nodes.walk_counting(&tree_ray, t_max, visit, || inner += 1);
+        visits.inner = inner + below.inner;
+        (visits.leaves, visits.blocks) = (below.leaves, below.blocks);
+        visits
     }
 
     fn trace(&self, ray: &Ray, any: bool) -> Option<Hit> {

@@ -87,6 +87,8 @@ pub(super) struct TileConvergence {
     checkpoint: Vec<DVec3>,
     /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (level² + 0.01), n = 2ᵏ.
     steps: Vec<f64>,
+    /// Each pixel's share of the last step, mean over channels.
+    last: Vec<f32>,
     /// Pixels times channels.
     n_values: f64,
 }
@@ -102,9 +104,17 @@ impl TileConvergence {
                 let (difference, level) = (*a - *b, level(&self.checkpoint, *a, width, i));
                 (difference * difference / (level * level + 0.01)).element_sum()
             });
-            let sum = relative.sum();
+            let mut last = std::mem::take(&mut self.last);
+            last.clear();
+            let sum = relative.inspect(|step| last.push((step / 3.0) as f32)).sum();
             self.steps.push(sum);
+            self.last = last;
         }
+    }
+
+    /// Of one pixel, relative and squared; 0 before the second sample.
+    pub fn last_step(&self, pixel: usize) -> f32 {
+        self.last.get(pixel).copied().unwrap_or(0.0)
     }
 }
 

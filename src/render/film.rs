@@ -98,6 +98,13 @@ impl Film {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
     }
 
+    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
+    /// mean over many pixels is the variance that is left. 0 before the second sample.
+    pub fn doubling_step(&self, x: u32, y: u32) -> f32 {
+        let (tile, local) = self.locate(x, y);
+        tile.convergence.last_step(local)
+    }
+
     fn locate(&self, x: u32, y: u32) -> (&FilmTile, usize) {
         let tile = &self.tiles[(y / self.tile_size * self.tiles_x + x / self.tile_size) as usize];
         let local = UVec2::new(x, y) - tile.origin;

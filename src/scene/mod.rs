@@ -33,5 +33,6 @@ pub use extract::{Extraction, Part, Trees, origin_for};
 pub use fingerprint::Fingerprint;
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase};
 pub use placement::{Linear, Placement};
 pub use view::{Lens, Projection, View, ViewError};
