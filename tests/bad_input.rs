@@ -158,6 +158,19 @@ fn files_that_a_scene_points_at_are_named_together_with_the_line_that_does() {
     assert_says(&bytes.unwrap_err().to_string(), &["bytes.ron", "UTF-8"]);
 }
 
+#[test]
+fn a_model_of_nothing_but_lines_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flat.obj");
+    // Two triangles, and in each of them three corners on one line, away from the origin.
+    std::fs::write(&path, "v 5 5 5\nv 6 6.5 7\nv 7 8 9\nv 5 5 5\nf 1 2 3\nf 1 4 2\n").unwrap();
+    let error = load(&SceneSource::Model(path.clone()), &LoadOptions::default()).unwrap_err().to_string();
+    assert_says(&error, &["flat.obj: none of its 2 triangles has an area"]);
+    // One thin triangle among them is a model.
+    std::fs::write(&path, "v 5 5 5\nv 6 6.5 7\nv 7 8 9\nv 5 5 5.000001\nf 1 2 3\nf 1 4 2\n").unwrap();
+    assert!(load(&SceneSource::Model(path), &LoadOptions::default()).is_ok());
+}
+
 fn firstlight() -> Command {
     Command::cargo_bin("firstlight").unwrap()
 }
@@ -193,19 +206,31 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     ] {
         fails(path, args, 2);
     }
-    // Failure, each before any ray is traced.
     for (args, expected) in [
         (&["render", "cornel", "-o", "a.png"][..], "did you mean `cornell`?"),
-        (&["render", "none.ron", "-o", "a.png"], "no such file"),
-        (&["render", "none.obj", "-o", "a.png"], "no such file"),
-        (&["render", "notes.txt", "-o", "a.png"], "use a scene (.ron) or a model (.obj)"),
+        (&["info", "cornel"], "did you mean `cornell`?"),
         (&["render", "cornell", "-o", "a.jpg"], "use .png or .exr"),
         (&["render", "cornell", "-o", "a"], "end it in .png or .exr"),
+        (&["render", "cornell", "-o", "a.png", "--spp", "-3"], "-3 is not in 1..="),
+        (&["render", "cornell", "-o", "a.png", "--error", "-0.1"], "must be a positive number"),
+        (&["simplify", "none.obj", "-o", "a.txt", "--ratio", "0.5"], "end the name in .obj"),
+    ] {
+        let said = fails(path, args, 2);
+        assert!(said.contains(expected) && !said.contains("tip:"), "{args:?}: {said}");
+    }
+    // Failure, each before any ray is traced.
+    for (args, expected) in [
+        (&["render", "none.ron", "-o", "a.png"][..], "no such file"),
+        (&["render", "none.obj", "-o", "a.png"], "no such file"),
+        (&["render", "notes.txt", "-o", "a.png"], "use a scene (.ron) or a model (.obj)"),
         (&["render", "cornell", "-o", "nowhere/a.png"], "there is no folder nowhere"),
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),
+        (&["simplify", "none.obj", "-o", "nowhere/a.obj", "--ratio", "0.5"], "there is no folder nowhere"),
+        (&["simplify", "none.obj", "-o", "a.obj", "--ratio", "0.5"], "No such file"),
     ] {
         let said = fails(path, args, 1);
+        assert!(!said.contains(".firstlight-"), "temporary names are nobody's business: {said}");
         assert!(said.starts_with("error: ") && said.contains(expected), "{args:?}: {said}");
     }
     assert_eq!(entries(), before, "nothing was written");

@@ -102,6 +102,50 @@ fn info_tells_what_is_in_a_scene_and_what_it_uses() {
 }
 
 #[test]
+fn info_tells_machines_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = firstlight(folder.path(), &["info", "cornell-balls", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["objects"], serde_json::json!({ "quad": 6, "sphere": 2 }));
+    assert_eq!((json["width"].as_u64(), json["emissive_objects"].as_u64()), (Some(512), Some(1)));
+    let list = |key: &str| json[key].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect::<Vec<_>>();
+    assert!(list("uses").contains(&"glass") && list("not_used").contains(&"textures"), "{json}");
+}
+
+#[test]
+fn whoever_closes_the_pipe_has_read_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    for args in [
+        &["info", "cornell"][..],
+        &["info", "cornell", "--json"],
+        &["render", "cornell", "-o", "c.png", "--size", "8x8", "--spp", "1", "--json"],
+        &["--help"],
+    ] {
+        let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("firstlight"))
+            .current_dir(folder.path())
+            .args(args)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Long before the program has anything to say, and for its remarks as well.
+        drop((child.stdout.take(), child.stderr.take()));
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{args:?}");
+    }
+}
+
+#[test]
+fn without_a_display_a_scene_that_is_not_there_is_one_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::cargo_bin("firstlight").unwrap();
+    command.current_dir(folder.path()).arg("missing.obj").env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "error: missing.obj: cannot be read: no such file\n");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
 fn a_model_alone_is_framed_and_lit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

@@ -328,7 +328,7 @@ fn mixed_scene(seed: u64, n: usize, preset: BuildPreset) -> (SceneTree, Soup) {
 
 #[test]
 fn scenes_of_all_shapes_agree() {
-    for (seed, n) in [(1, 3), (2, 7), (3, 14), (4, 40), (5, 150)] {
+    for (seed, n) in [(1, 3), (2, 7), (3, 14), (4, 40), (5, 150), (6, 400)] {
         for preset in PRESETS {
             let (scene, sheet) = mixed_scene(seed, n, preset);
             assert_agrees(&scene, &awkward_rays(seed, &sheet, 1500), &format!("scene {seed} of {n}, {preset:?}"));

@@ -82,8 +82,11 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
     let ladder = Ladder::measure(&rungs, &truth, &Display::default());
     // A rung is what a render of so many samples gives, to the bit.
     assert_eq!(rungs[3].picture, LinearPicture::of(&render(&room, &settings, size.0, size.1, 8).0));
+    // Against samples, which take no notice of what else the machine does; against its time, only which way it goes.
+    let fall = ladder.steps[2].distance.relative_mse / ladder.last().distance.relative_mse;
+    assert!((8f64.powf(0.6)..8f64.powf(1.6)).contains(&fall), "from 4 to 32 samples: {fall}");
     let slope = ladder.slope().expect("four steps make a line");
-    assert!((-1.6..-0.6).contains(&slope), "{slope}");
+    assert!(slope < 0.0, "{slope}");
     for pair in ladder.steps.windows(2) {
         assert!(pair[1].spent.wall_seconds >= pair[0].spent.wall_seconds);
         assert_eq!(pair[1].spent.camera_paths, 2 * pair[0].spent.camera_paths);
@@ -141,7 +144,7 @@ fn the_command_writes_a_page_and_a_table() {
     assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("NaN"), "the page needs the net");
     let table = std::fs::read_to_string(folder.path().join("deep/page/steps.csv")).unwrap();
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
-    assert_eq!(rows.len(), 1 + 7 * 3, "{table}");
+    assert_eq!(rows.len(), 1 + 8 * 3, "{table}");
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
 
     let fail = |args: &[&str]| {

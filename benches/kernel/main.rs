@@ -1,7 +1,7 @@
 //! How fast the ray kernel is, and how fast others are on the same rays.
 //!
 //! ```text
-//! cargo bench --bench kernel -- [FILTER] [--rounds N] [--quick] [--small]
+//! cargo bench --bench kernel -- [FILTER] [--class NAME] [--rounds N] [--quick] [--small] [--crowd]
 //! ```
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
@@ -14,6 +14,7 @@
 //! triangle for some.
 
 mod clock;
+mod crowd;
 #[cfg(unix)]
 mod embree;
 mod meshes;
@@ -31,13 +32,15 @@ const WAVE: usize = 4096;
 
 struct Options {
     filter: String,
+    /// Of rays; empty for all of them.
+    class: String,
     rounds: usize,
     preset: BuildPreset,
 }
 
 fn main() {
-    let mut options = Options { filter: String::new(), rounds: 7, preset: BuildPreset::Best };
-    let mut only_small = false;
+    let mut options = Options { filter: String::new(), class: String::new(), rounds: 7, preset: BuildPreset::Best };
+    let (mut only_small, mut only_crowd) = (false, false);
     // Builds too run on this thread alone, whose clock is read.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().unwrap();
     let mut args = std::env::args().skip(1);
@@ -47,9 +50,15 @@ fn main() {
             "--quick" => options.preset = BuildPreset::Quick,
             "--median" => options.preset = BuildPreset::Median,
             "--small" => only_small = true,
+            "--crowd" => only_crowd = true,
+            "--class" => options.class = args.next().expect("--class wants a name"),
             "--rounds" => options.rounds = args.next().and_then(|n| n.parse().ok()).expect("--rounds wants a number"),
             filter => options.filter = filter.to_string(),
         }
+    }
+    if only_crowd {
+        crowd::run(options.rounds);
+        return;
     }
     if only_small || options.filter.is_empty() {
         small::run(options.rounds);
@@ -93,6 +102,9 @@ fn main() {
         println!();
         let scene = SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::IDENTITY }]);
         for set in rays::classes(&scene, &mesh) {
+            if !options.class.is_empty() && options.class != set.name {
+                continue;
+            }
             check(&scene, &set);
             let mut hits = HitBatch::default();
             let mut occluded = Vec::new();

@@ -101,6 +101,11 @@ impl Random {
         (self.0 >> 40) as f32 / (1u64 << 24) as f32
     }
 
+    /// In the unit box.
+    pub fn point(&mut self) -> Vec3 {
+        vec3(self.unit(), self.unit(), self.unit())
+    }
+
     pub fn cosine(&mut self, normal: Vec3) -> Vec3 {
         let (r, phi) = (self.unit().sqrt(), std::f32::consts::TAU * self.unit());
         Frame::around(normal).to_world(vec3(r * phi.cos(), r * phi.sin(), (1.0 - r * r).max(0.0).sqrt()))

@@ -1,8 +1,9 @@
 //! `firstlight info SCENE`: what is in it, what it uses, what is not modelled, memory.
 
+use super::console::{print, remark};
 use super::{Failure, SceneArgs};
 use clap::Args;
-use firstlight::render::{Environment, Material};
+use firstlight::render::{Environment, Film, Material};
 use firstlight::scene::{Extraction, FilmSize, Lens, LoadedScene, SceneInputs, Shape};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,6 +12,12 @@ use std::sync::Arc;
 pub struct InfoArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    /// Build many trees over each mesh instead, and tell what they and their rays cost.
+    #[arg(long)]
+    tree: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
@@ -20,40 +27,152 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let inputs = SceneInputs::of(&mut world);
     let extraction = Extraction::new(&inputs, &scene.trees);
     for problem in &extraction.problems {
-        eprintln!("warning: {problem}");
+        remark(format_args!("warning: {problem}"));
+    }
+    if args.tree {
+        return super::trees::run(&inputs, &extraction, args.json);
     }
     let film = *world.resource::<FilmSize>();
-    println!("{}", scene.source.title());
-    let row = |name: &str, text: String| println!("  {name:14}{text}");
-    row("objects", counts(inputs.objects.iter().map(|object| kind_of_shape(&object.shape))));
-    for object in &inputs.objects {
-        let name = object.name.as_deref().unwrap_or("(no name)");
-        match &object.shape {
-            Shape::Mesh(mesh) => {
-                row("", format!("{name}: {} triangles, {} vertices", mesh.triangles.len(), mesh.positions.len()));
+    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film };
+    if args.json { print(told.json()) } else { print(told.text().trim_end()) }
+}
+
+/// What is told of a scene.
+struct Told<'a> {
+    scene: &'a LoadedScene,
+    inputs: &'a SceneInputs,
+    extraction: &'a Extraction,
+    film: FilmSize,
+}
+
+const NOT_MODELLED: [&str; 6] =
+    ["spectra", "polarisation", "motion blur", "media that scatter", "rough glass", "light behind a lens"];
+
+impl Told<'_> {
+    /// For people.
+    fn text(&self) -> String {
+        let Self { scene, inputs, extraction, film } = self;
+        let mut out = format!("{}\n", scene.source.title());
+        let mut row = |name: &str, text: String| out += &format!("  {name:14}{text}\n");
+        let counts = |counts: BTreeMap<&str, usize>| {
+            let parts: Vec<String> = counts.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
+            if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
+        };
+        row("objects", counts(self.objects()));
+        for object in &inputs.objects {
+            let name = object.name.as_deref().unwrap_or("(no name)");
+            match &object.shape {
+                Shape::Mesh(mesh) => {
+                    row("", format!("{name}: {} triangles, {} vertices", mesh.triangles.len(), mesh.positions.len()));
+                }
+                Shape::Spheres(balls) => row("", format!("{name}: {} balls", balls.centers.len())),
+                _ => {}
             }
-            Shape::Spheres(balls) => row("", format!("{name}: {} balls", balls.centers.len())),
-            _ => {}
         }
+        let shading = &extraction.snapshot.shading;
+        row("materials", counts(self.materials()));
+        row("textures", shading.textures.len().to_string());
+        row("lights", format!("{} emissive objects, {} point lights", self.emitters(), inputs.lights.len()));
+        row("environment", environment(&shading.environment));
+        let lens = self.lens();
+        row("camera", if lens.enabled { format!("lens of radius {} m", lens.radius) } else { "pinhole".to_owned() });
+        row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
+        let mib = |bytes: usize| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
+        let [meshes, trees, film] = self.bytes().map(mib);
+        row("memory", format!("meshes {meshes}, trees {trees}, film {film}"));
+        row("time", format!("{:.3} s to read, {:.3} s to build trees", scene.load_seconds, scene.build_seconds));
+        row("uses", list(&self.features(true)));
+        row("not used", list(&self.features(false)));
+        row("not modelled", NOT_MODELLED.join(", "));
+        out
     }
-    let shading = &extraction.snapshot.shading;
-    row("materials", counts(shading.materials.iter().map(kind_of_material)));
-    row("textures", shading.textures.len().to_string());
-    let emitters = inputs.objects.iter().filter(|object| glows(object, &inputs)).count();
-    row("lights", format!("{emitters} emissive objects, {} point lights", inputs.lights.len()));
-    row("environment", environment(&shading.environment));
-    let lens = inputs.camera.map_or_else(Lens::default, |camera| camera.lens);
-    row("camera", if lens.enabled { format!("lens of radius {} m", lens.radius) } else { "pinhole".to_owned() });
-    row("film", format!("{} x {}, box filter", film.width, film.height));
-    row("memory", memory(&scene, &inputs, film));
-    row("time", format!("{:.3} s to read, {:.3} s to build trees", scene.load_seconds, scene.build_seconds));
-    row("uses", list(&used(&extraction, &lens)));
-    row("not used", list(&unused(&extraction, &lens)));
-    row(
-        "not modelled",
-        "spectra, polarisation, motion blur, media that scatter, rough glass, light behind a lens".to_owned(),
-    );
-    Ok(())
+
+    /// One line for machines.
+    fn json(&self) -> serde_json::Value {
+        let Self { scene, inputs, extraction, film } = self;
+        let shading = &extraction.snapshot.shading;
+        let parts: Vec<_> = (inputs.objects.iter())
+            .filter_map(|object| match &object.shape {
+                Shape::Mesh(mesh) => Some(serde_json::json!({
+                    "name": object.name, "triangles": mesh.triangles.len(), "vertices": mesh.positions.len(),
+                })),
+                Shape::Spheres(balls) => Some(serde_json::json!({ "name": object.name, "balls": balls.centers.len() })),
+                _ => None,
+            })
+            .collect();
+        let lens = self.lens();
+        let [meshes, trees, film_bytes] = self.bytes();
+        serde_json::json!({
+            "scene": scene.source.title(),
+            "fingerprint": scene.fingerprint().to_string(),
+            "objects": self.objects(),
+            "parts": parts,
+            "materials": self.materials(),
+            "textures": shading.textures.len(),
+            "emissive_objects": self.emitters(),
+            "point_lights": inputs.lights.len(),
+            "environment": environment(&shading.environment),
+            "lens_radius": if lens.enabled { lens.radius } else { 0.0 },
+            "width": film.width,
+            "height": film.height,
+            "filter": self.filter(),
+            "bytes": { "meshes": meshes, "trees": trees, "film": film_bytes },
+            "load_s": scene.load_seconds,
+            "build_s": scene.build_seconds,
+            "uses": self.features(true),
+            "not_used": self.features(false),
+            "not_modelled": NOT_MODELLED,
+            "warnings": scene.warnings,
+            "problems": extraction.problems,
+        })
+    }
+
+    fn objects(&self) -> BTreeMap<&'static str, usize> {
+        counts(self.inputs.objects.iter().map(|object| kind_of_shape(&object.shape)))
+    }
+
+    fn materials(&self) -> BTreeMap<&'static str, usize> {
+        counts(self.extraction.snapshot.shading.materials.iter().map(kind_of_material))
+    }
+
+    fn emitters(&self) -> usize {
+        self.inputs.objects.iter().filter(|object| glows(object, self.inputs)).count()
+    }
+
+    fn lens(&self) -> Lens {
+        self.inputs.camera.map_or_else(Lens::default, |camera| camera.lens)
+    }
+
+    fn filter(&self) -> String {
+        // As the scene file spells it.
+        let words = format!("{:?}", self.scene.file.film.filter);
+        let spaced =
+            words.char_indices().flat_map(|(i, c)| (i > 0 && c.is_uppercase()).then_some(' ').into_iter().chain([c]));
+        spaced.collect::<String>().to_lowercase()
+    }
+
+    /// Of meshes, trees and the film.
+    fn bytes(&self) -> [usize; 3] {
+        let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
+        for object in &self.inputs.objects {
+            if let Shape::Mesh(mesh) = &object.shape {
+                let bytes = mesh.positions.len() * 12
+                    + mesh.triangles.len() * 12
+                    + mesh.normals.len() * 12
+                    + mesh.uvs.len() * 8
+                    + mesh.slots.len() * 2;
+                meshes.insert(Arc::as_ptr(mesh) as usize, bytes);
+            }
+        }
+        let film = self.film.width as usize * self.film.height as usize * Film::BYTES_A_PIXEL;
+        [meshes.values().sum(), self.scene.trees.bytes(), film]
+    }
+
+    /// What the scene has of [`FEATURES`], or what it lacks.
+    fn features(&self, used: bool) -> Vec<&'static str> {
+        let has = features(self.extraction, &self.lens());
+        FEATURES.into_iter().zip(has).filter(|(_, has)| *has == used).map(|(name, _)| name).collect()
+    }
 }
 
 fn kind_of_shape(shape: &Shape) -> &'static str {
@@ -94,29 +213,10 @@ fn environment(environment: &Environment) -> String {
     }
 }
 
-/// Bytes of what was read and built, and of the film.
-fn memory(scene: &LoadedScene, inputs: &SceneInputs, film: FilmSize) -> String {
-    let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
-    for object in &inputs.objects {
-        if let Shape::Mesh(mesh) = &object.shape {
-            let bytes = mesh.positions.len() * 12
-                + mesh.triangles.len() * 12
-                + mesh.normals.len() * 12
-                + mesh.uvs.len() * 8
-                + mesh.slots.len() * 2;
-            meshes.insert(Arc::as_ptr(mesh) as usize, bytes);
-        }
-    }
-    let meshes: usize = meshes.values().sum();
-    let film = u64::from(film.width) * u64::from(film.height) * 24;
-    let mib = |bytes: f64| format!("{:.1} MiB", bytes / f64::from(1 << 20));
-    format!("meshes {}, trees {}, film {}", mib(meshes as f64), mib(scene.trees.bytes() as f64), mib(film as f64))
-}
+const FEATURES: [&str; 8] =
+    ["lens", "textures", "glass", "light sampling", "environment light", "caustics", "blends", "rough metal"];
 
-const FEATURES: [&str; 7] =
-    ["lens", "textures", "glass", "light sampling", "environment light", "blends", "rough metal"];
-
-fn features(extraction: &Extraction, lens: &Lens) -> [bool; 7] {
+fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
     let shading = &extraction.snapshot.shading;
     let has = |kind: &str| shading.materials.iter().any(|material| kind_of_material(material) == kind);
     [
@@ -125,29 +225,20 @@ fn features(extraction: &Extraction, lens: &Lens) -> [bool; 7] {
         shading.features.glass,
         shading.features.light_sampling,
         shading.features.environment,
+        shading.features.caustics,
         has("blend"),
         has("metal"),
     ]
-}
-
-fn used(extraction: &Extraction, lens: &Lens) -> Vec<&'static str> {
-    FEATURES.into_iter().zip(features(extraction, lens)).filter(|(_, used)| *used).map(|(name, _)| name).collect()
-}
-
-fn unused(extraction: &Extraction, lens: &Lens) -> Vec<&'static str> {
-    FEATURES.into_iter().zip(features(extraction, lens)).filter(|(_, used)| !*used).map(|(name, _)| name).collect()
 }
 
 fn list(names: &[&str]) -> String {
     if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
 }
 
-/// `2 × quad, 1 × sphere`.
-fn counts<'a>(kinds: impl Iterator<Item = &'a str>) -> String {
+fn counts<'a>(kinds: impl Iterator<Item = &'a str>) -> BTreeMap<&'a str, usize> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for kind in kinds {
         *counts.entry(kind).or_default() += 1;
     }
-    let parts: Vec<String> = counts.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
-    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
+    counts
 }

@@ -1,14 +1,22 @@
-//! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not understood.
+//! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
+//! understood; 130: stopped by Ctrl+C, what there was is saved.
 
+mod console;
 mod info;
+mod merge;
 mod render;
 mod report;
+mod save;
 mod show;
 mod simplify;
+mod stop;
+mod trees;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use console::remark;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::{BUILTIN_SCENES, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// An interactive, progressive path tracer: open a model, fly through it, watch it converge.
@@ -27,6 +35,10 @@ enum Command {
     Render(render::RenderArgs),
     /// Measure speed against error: how fast scenes get right, and what each technique is worth.
     Report(report::ReportArgs),
+    /// Add up films of one picture that have different samples.
+    Merge(merge::MergeArgs),
+    /// Write a scene file of a model, a built-in scene, or of what a picture shows.
+    Save(save::SaveArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
     /// Write a model with fewer triangles, and measure how far it is from the original.
@@ -36,8 +48,8 @@ enum Command {
 /// What to open, and how.
 #[derive(Args, Clone, Debug)]
 struct SceneArgs {
-    /// A built-in scene, a scene file (.ron) or a model (.obj).
-    #[arg(value_name = "SCENE|MODEL", default_value = "gallery")]
+    /// A built-in scene, a scene file (.ron), a model (.obj), or a picture (.png, .exr) that this program made.
+    #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     scene: String,
     /// Which axis of a model points up; guessed from how it would stand when not given.
     #[arg(long, value_enum)]
@@ -98,13 +110,22 @@ impl SceneArgs {
 
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
-        let source = SceneSource::parse(&self.scene).map_err(|error| Failure::Failed(error.to_string()))?;
+        let source = self.source()?;
         let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
-            eprintln!("warning: {warning}");
+            remark(format_args!("warning: {warning}"));
         }
         Ok(scene)
+    }
+
+    /// What the word on the command line means.
+    fn source(&self) -> Result<SceneSource, Failure> {
+        SceneSource::parse(&self.scene).map_err(|error| {
+            // A word that is neither a scene nor a file is a slip of the pen; a file may be wanting or unfit.
+            let is_name = Path::new(&self.scene).extension().is_none() && !Path::new(&self.scene).exists();
+            if is_name { Failure::Usage(error.to_string()) } else { Failure::Failed(error.to_string()) }
+        })
     }
 }
 
@@ -113,6 +134,8 @@ enum Failure {
     /// The command itself cannot be right.
     Usage(String),
     Failed(String),
+    /// Somebody pressed Ctrl+C; says what was saved.
+    Stopped(String),
 }
 
 /// Runs what the command line asks for.
@@ -123,6 +146,8 @@ pub fn main() -> ExitCode {
     let result = match line.command {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Report(args)) => report::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
+        Some(Command::Save(args)) => save::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),
@@ -131,9 +156,13 @@ pub fn main() -> ExitCode {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Usage(message)) => (message, 2),
         Err(Failure::Failed(message)) => (message, 1),
+        Err(Failure::Stopped(message)) => {
+            remark(message);
+            return ExitCode::from(stop::STOPPED);
+        }
     };
     for line in message.lines() {
-        eprintln!("error: {line}");
+        remark(format_args!("error: {line}"));
     }
     ExitCode::from(code)
 }

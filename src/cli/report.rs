@@ -1,5 +1,6 @@
 //! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
 
+use super::console::{print, remark};
 use super::{Failure, SceneArgs, parse_positive, parse_size};
 use clap::Args;
 use firstlight::render::{RenderSettings, Snapshot, Techniques};
@@ -7,10 +8,11 @@ use firstlight::report::{
     Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv, page,
     summary_text,
 };
+use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Samples per pixel of the last step, unless given.
 const DEFAULT_SPP: u32 = 256;
@@ -33,19 +35,19 @@ pub struct ReportArgs {
     #[arg(long, value_name = "DIR", default_value = "report")]
     out: PathBuf,
     /// Most samples per pixel; 256 unless a time is given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
     /// Most seconds of rendering for a scene; the same again for each technique that is switched off.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     time: Option<f64>,
     /// Width and height in pixels; that of the reference, or the scene's own shape with about 50,000 pixels.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
     /// Worker threads; all cores when not given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Another seed gives other noise.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     seed: u32,
     /// Leave out what each technique is worth.
     #[arg(long)]
@@ -76,11 +78,10 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     let outcomes = pool.install(|| measure_all(args, &names, given.as_ref()))?;
 
     let (html, table) = (args.out.join("index.html"), args.out.join("steps.csv"));
-    write(&html, &page(&outcomes, &command_line()))?;
-    write(&table, &csv(&outcomes))?;
-    print!("{}", summary_text(&outcomes));
-    println!("{}\n{}", html.display(), table.display());
-    Ok(())
+    write_whole(&html, page(&outcomes, &command_line()).as_bytes()).map_err(Failure::Failed)?;
+    write_whole(&table, csv(&outcomes).as_bytes()).map_err(Failure::Failed)?;
+    print(summary_text(&outcomes).trim_end())?;
+    print(format_args!("{}\n{}", html.display(), table.display()))
 }
 
 fn measure_all(args: &ReportArgs, names: &[String], given: Option<&Reference>) -> Result<Vec<SceneOutcome>, Failure> {
@@ -114,7 +115,7 @@ impl Prepared {
         scene.spawn(&mut world);
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
         for problem in &extraction.problems {
-            eprintln!("warning: {problem}");
+            remark(format_args!("warning: {problem}"));
         }
         let FilmSize { width, height } = *world.resource();
         let of_reference = given.map(|given| (given.picture.width, given.picture.height));
@@ -200,7 +201,7 @@ impl Prepared {
         }
         let (reference, trouble) = store.make(&self.key, &self.snapshot, &self.settings, spp, &mut tell);
         if let Some(trouble) = trouble {
-            eprintln!("warning: {trouble}");
+            remark(format_args!("warning: {trouble}"));
         }
         reference
     }
@@ -250,23 +251,4 @@ fn command_line() -> String {
     let quoted = |word: String| if word.contains(char::is_whitespace) { format!("'{word}'") } else { word };
     let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
     std::iter::once("firstlight".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
-}
-
-/// Whole or not at all.
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let fail =
-        |error: &dyn std::fmt::Display| Failure::Failed(format!("{}: cannot be written: {error}", path.display()));
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".firstlight-").suffix(".part");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any new file: the user's mask decides.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let file = builder.tempfile_in(folder).map_err(|error| fail(&error))?;
-    std::fs::write(file.path(), text).map_err(|error| fail(&error))?;
-    file.persist(path).map_err(|error| fail(&error.error))?;
-    Ok(())
 }

@@ -13,11 +13,11 @@ pub struct ShowArgs {
     #[arg(long, value_name = "WxH", value_parser = super::parse_size)]
     size: Option<(u32, u32)>,
     /// Worker threads; one for each processor when not given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Another number, another noise.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u32,
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    seed: Option<u32>,
     /// Where the pictures go that are kept from the window.
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FOLDER", default_value = ".")]
@@ -34,23 +34,28 @@ pub fn run(args: &ShowArgs) -> Result<(), Failure> {
 
 #[cfg(feature = "viewer")]
 fn open_window(args: &ShowArgs) -> Result<(), Failure> {
-    use firstlight::scene::SceneSource;
     use firstlight::viewer::{ViewerOptions, run};
-    let source = SceneSource::parse(&args.scene.scene).map_err(|error| Failure::Failed(error.to_string()))?;
+    let source = args.scene.source()?;
     let (width, height) = args.size.unwrap_or((1280, 720));
     let threads = args.threads.map(usize::from);
     let folder = args.save_to.clone();
-    let options = ViewerOptions { source, width, height, threads, seed: args.seed, up: args.scene.up(), folder };
+    let options =
+        ViewerOptions { source, width, height, threads, seed: args.seed.unwrap_or(0), up: args.scene.up(), folder };
     run(options).map_err(|error| Failure::Failed(error.to_string()))
 }
 
 fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
     let output = free_name(&args.scene.scene);
-    eprintln!("no display: rendering to {} instead", output.display());
+    let announcement = Some(format!("no display: rendering to {} instead", output.display()));
     render::run(&RenderArgs {
+        announcement,
         scene: args.scene.clone(),
         output,
         size: args.size,
+        scale: None,
+        samples: None,
+        film: None,
+        resume: false,
         spp: None,
         time: None,
         error: None,

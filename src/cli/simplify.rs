@@ -1,10 +1,12 @@
 //! `firstlight simplify IN.obj -o OUT.obj`: fewer triangles, with the error measured.
 
 use super::Failure;
+use super::console::{print, remark};
 use clap::{Args, ValueEnum};
-use firstlight::mesh::simplify::{Method, Target, simplify};
+use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Topology};
-use firstlight::scene::obj::{ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
+use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
+use firstlight::scene::whole_file::check_writable;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -18,13 +20,13 @@ pub struct SimplifyArgs {
     #[arg(short, long, value_name = "OUT.obj")]
     output: PathBuf,
     /// Keep this share of the triangles, above 0 and at most 1.
-    #[arg(long, value_name = "R", group = "target")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, group = "target")]
     ratio: Option<f64>,
     /// Keep at most this many triangles.
-    #[arg(long, value_name = "N", group = "target")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, group = "target")]
     faces: Option<usize>,
     /// Keep as few triangles as this largest distance between the surfaces allows, in the file's unit.
-    #[arg(long, value_name = "E", group = "target")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, group = "target")]
     error: Option<f64>,
     #[arg(long, value_enum, default_value = "quadric")]
     method: MethodArg,
@@ -55,6 +57,12 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         MethodArg::Melax => Method::Melax,
     };
     let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
+    // A result that cannot be written is not worth the wait.
+    if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
+        let message = format!("{}: models are written as Wavefront OBJ: end the name in .obj", args.output.display());
+        return Err(Failure::Usage(message));
+    }
+    check_writable(&args.output).map_err(Failure::Failed)?;
     // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
     let mut model = load_obj_with(&args.input, &ObjOptions::default()).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
@@ -62,10 +70,16 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         model = load_obj_with(&args.input, &options).map_err(|error| failed(&error))?;
     }
     for warning in &model.warnings {
-        eprintln!("warning: {warning}");
+        remark(format_args!("warning: {warning}"));
+    }
+    for fault in faults(&model) {
+        remark(format_args!("warning: {}: {fault}", args.input.display()));
     }
     let start = Instant::now();
-    let result = simplify(&model.mesh, method, target).map_err(|error| Failure::Usage(error.to_string()))?;
+    let result = simplify(&model.mesh, method, target).map_err(|error| match error {
+        SimplifyError::Degenerate => Failure::Failed(format!("{}: {error}", args.input.display())),
+        _ => Failure::Usage(error.to_string()),
+    })?;
     let seconds = start.elapsed().as_secs_f64();
     let before = model.mesh.triangles.len();
     let after = result.triangles.len();
@@ -75,7 +89,7 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         Target::Error(_) => false,
     };
     if missed {
-        eprintln!("warning: borders, seams and joints allow no fewer than {after} triangles");
+        remark(format_args!("warning: borders, seams and joints allow no fewer than {after} triangles"));
     }
     let names: Vec<String> = model.materials.iter().map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
@@ -101,13 +115,12 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
             "closed": topology.is_closed(),
             "manifold": topology.is_manifold(),
         });
-        println!("{report}");
-        return Ok(());
+        return print(report);
     }
-    println!("{before} -> {after} triangles in {seconds:.3} s");
+    print(format_args!("{before} -> {after} triangles in {seconds:.3} s"))?;
     for (name, d) in [("original to result", deviation.forward), ("result to original", deviation.backward)] {
         let percent = |length: f64| 100.0 * length / diagonal;
-        println!(
+        print(format_args!(
             "{name}: mean {:.3e}, RMS {:.3e}, largest {:.3e} ({:.4} %, {:.4} %, {:.4} % of the diagonal)",
             d.mean,
             d.rms,
@@ -115,7 +128,23 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
             percent(d.mean),
             percent(d.rms),
             percent(d.max)
-        );
+        ))?;
     }
     Ok(())
+}
+
+/// What is not as a simplifier would have it, and what becomes of it; a sentence each.
+fn faults(model: &ImportedObj) -> Vec<String> {
+    let found = Topology::of(&model.mesh);
+    [
+        (model.polygons, "faces of more than three corners were cut into triangles"),
+        (found.degenerate_triangles, "triangles are without area"),
+        (found.duplicate_triangles, "triangles lie on the same three places as an earlier one and are left out"),
+        (found.non_manifold_edges, "edges of three or more triangles stay as they are"),
+        (found.misoriented_edges, "edges between triangles that face opposite ways stay as they are"),
+    ]
+    .into_iter()
+    .filter(|&(count, _)| count > 0)
+    .map(|(count, fate)| format!("{count} {fate}"))
+    .collect()
 }

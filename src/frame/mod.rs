@@ -15,6 +15,7 @@
 mod beside;
 mod command;
 mod edit;
+mod film_file;
 mod focus;
 pub mod gizmo;
 mod history;
@@ -34,10 +35,11 @@ mod worker;
 
 pub use command::Command;
 pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, textures};
+pub use film_file::{FilmFile, read_film_file, write_film_file};
 pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;
-pub use offline::{OfflineReport, Progress, Target, render_offline};
-pub use picture_file::{PictureFormat, check_writable, write_film, write_new_film};
+pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until};
+pub use picture_file::{PictureFormat, Print, write_film};
 pub use remesh::MeshMeasure;
 pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use scheduler::{Scheduler, Step, StepReport};

@@ -448,9 +448,11 @@ mod tests {
     #[test]
     fn strides_fit_the_scene() {
         let view = start();
-        assert_eq!(stride(&view, 0.0), 0.5 * view.pivot_distance);
-        assert_eq!(stride(&view, 1e9), 0.5 * view.pivot_distance);
-        assert_eq!(stride(&view, 0.5), 0.25);
+        assert_eq!(stride(&view, 0.0, None), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 1e9, None), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 0.5, None), 0.25);
+        assert_eq!(stride(&view, 0.5, Some(0.7)), 0.35, "half of the way to what is under the mouse");
+        assert_eq!(stride(&view, 0.5, Some(1e9)), 1.0, "and the horizon stays where it is");
     }
 
     #[test]

@@ -53,6 +53,19 @@ pub fn render_offline(
     settings: &RenderSettings,
     film: &mut Film,
     target: Target,
+    progress: impl FnMut(Progress) -> bool,
+) -> OfflineReport {
+    render_offline_until(snapshot, settings, film, target, &|| false, progress)
+}
+
+/// The same, ended within milliseconds by `stop`, which is asked often and by all workers; the film then may have a
+/// part of a pass, and even pixels without a sample.
+pub fn render_offline_until(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film: &mut Film,
+    target: Target,
+    stop: &(dyn Fn() -> bool + Sync),
     mut progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
     /// Seconds between reports, about.
@@ -66,21 +79,62 @@ pub fn render_offline(
     while film.spp() < goal {
         let slice_start = Instant::now();
         let before = film.spp();
-        let late = || before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline);
-        let pass = advance(snapshot, settings, film, before.saturating_add(step).min(goal), &late);
+        let late = || stop() || (before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline));
+        let at_most = before.saturating_add(step).min(goal);
+        let next = target.error.map_or(at_most, |error| first_worth_a_look(film, error, at_most));
+        let pass = advance(snapshot, settings, film, next, &late);
         report.rays += pass.rays;
         report.n_bad += pass.n_bad;
         report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));
         report.seconds = start.elapsed().as_secs_f64();
         let (spp, seconds, error) = (film.spp(), report.seconds, film.error_estimate());
         let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
-        if !go_on || target.reached(spp, seconds, error.map(|error| error.relative)) {
+        if !go_on || stop() || target.reached(spp, seconds, error.map(|error| error.relative)) {
             break;
         }
         // Whole passes as long as a slice, growing gently while the rate is still unknown.
-        let rate = f64::from(step) / slice_start.elapsed().as_secs_f64().max(1e-9);
+        let rate = f64::from(next - before) / slice_start.elapsed().as_secs_f64().max(1e-9);
         step = ((rate * SLICE) as u32).clamp(1, step.saturating_mul(4));
     }
     report.seconds = start.elapsed().as_secs_f64();
     report
+}
+
+/// The first number of samples up to `at_most` at which the film could turn out to be good enough: where its error so
+/// far, extended, is down to `target`, or at the next power of two, where it is measured anew.
+fn first_worth_a_look(film: &Film, target: f64, at_most: u32) -> u32 {
+    let now = film.spp();
+    let measured_next = (now + 1).checked_next_power_of_two().unwrap_or(u32::MAX);
+    let last = at_most.min(measured_next);
+    let estimate = film.error_estimate();
+    let is_enough = |spp: &u32| estimate.is_some_and(|estimate| estimate.relative_at(*spp) <= target);
+    (now + 1..last).find(is_enough).unwrap_or(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
+
+    /// Looks after every single sample, and finds no earlier one.
+    #[test]
+    fn a_target_error_ends_at_the_first_sample_that_meets_it() {
+        let scene = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
+        let settings = world.resource::<Rendering>().0;
+        for goal in [0.3, 0.2, 0.12] {
+            let mut film = Film::new(24, 24);
+            render_offline(&snapshot, &settings, &mut film, Target { error: Some(goal), ..Target::default() }, |_| {
+                true
+            });
+            let mut slow = Film::new(24, 24);
+            while slow.error_estimate().is_none_or(|error| error.relative > goal) {
+                let next = slow.spp() + 1;
+                advance(&snapshot, &settings, &mut slow, next, &|| false);
+            }
+            assert_eq!(film.spp(), slow.spp(), "to {goal}");
+        }
+    }
 }

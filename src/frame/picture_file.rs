@@ -1,10 +1,15 @@
 //! Pictures on disk: developed as PNG, linear as EXR; whole or not at all.
+//!
+//! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
 use crate::render::{Display, Film, develop};
-use image::codecs::openexr::OpenExrEncoder;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
-use std::io::{BufWriter, Write};
+use crate::scene::shot::NOTE_KEY;
+use crate::scene::whole_file::{WholeFile, unwritable};
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
+    WritableImage,
+};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What kinds of pictures can be written.
@@ -37,105 +42,88 @@ impl PictureFormat {
     }
 }
 
-/// Finds out whether a picture can be written here, without leaving anything behind.
-pub fn check_writable(path: &Path) -> Result<(), String> {
-    PictureFormat::of(path)?;
-    if path.is_dir() {
-        return Err(format!("{}: is a folder: name a file", path.display()));
-    }
-    temporary_beside(path).map(drop)
+/// A film as a picture.
+#[derive(Clone, Copy)]
+pub struct Print<'a> {
+    pub film: &'a Film,
+    pub display: &'a Display,
+    /// Pixels of a PNG, which a coarser film is stretched to; linear light stays as it was measured.
+    pub size: (u32, u32),
+    /// What the picture says about itself.
+    pub note: Option<&'a str>,
 }
 
-/// Writes a film as its name asks: to a temporary name first, which then takes the place of `path`.
+/// Writes a film as its name asks, without a note.
 pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), String> {
-    let size = (film.width(), film.height());
-    let file = encode_beside(film, display, size, PictureFormat::of(path)?, path)?;
-    file.persist(path).map_err(|error| unwritable(path, &error.error))?;
-    Ok(())
+    Print { film, display, size: (film.width(), film.height()), note: None }.write(path)
 }
 
-/// Writes a film into `folder` as `STEM-0001`, or with the first higher number that is free: never over a file that is
-/// there, even one that another program makes at the same moment. Answers with the path.
-///
-/// `size`: pixels of a PNG, which a coarser film is stretched to; linear light stays as it was measured.
-pub fn write_new_film(
-    film: &Film,
-    display: &Display,
-    size: (u32, u32),
-    folder: &Path,
-    stem: &str,
-    format: PictureFormat,
-) -> Result<PathBuf, String> {
-    let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
-    let mut file = encode_beside(film, display, size, format, &name(1))?;
-    for number in 1..=u32::MAX {
-        let path = name(number);
-        file = match file.persist_noclobber(&path) {
-            Ok(_) => return Ok(path),
-            Err(error) if error.error.kind() == std::io::ErrorKind::AlreadyExists => error.file,
-            Err(error) => return Err(unwritable(&path, &error.error)),
-        };
+impl Print<'_> {
+    /// Writes the picture as its name asks: to a temporary name first, which then takes the place of `path`.
+    pub fn write(&self, path: &Path) -> Result<(), String> {
+        self.encode_beside(PictureFormat::of(path)?, path)?.finish()
     }
-    Err(format!("{}: every number is taken: move some of the pictures away", name(u32::MAX).display()))
-}
 
-/// The whole picture in a temporary file in the folder of `path`.
-fn encode_beside(
-    film: &Film,
-    display: &Display,
-    (width, height): (u32, u32),
-    format: PictureFormat,
-    path: &Path,
-) -> Result<tempfile::NamedTempFile, String> {
-    let mut out = BufWriter::new(temporary_beside(path)?);
-    match format {
-        PictureFormat::Png => {
-            let mut rgba = Vec::new();
-            develop(film, display, width, height, &mut rgba);
-            let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-            PngEncoder::new(&mut out)
-                .write_image(&rgb, width, height, ExtendedColorType::Rgb8)
-                .map_err(|error| unwritable(path, &error))?;
-        }
-        PictureFormat::Exr => {
-            let bytes: Vec<u8> =
-                film.means().iter().flat_map(|mean| mean.to_array()).flat_map(f32::to_ne_bytes).collect();
-            // The encoder seeks, so it writes to memory first.
-            let mut memory = std::io::Cursor::new(Vec::new());
-            OpenExrEncoder::new(&mut memory)
-                .write_image(&bytes, film.width(), film.height(), ExtendedColorType::Rgb32F)
-                .map_err(|error| unwritable(path, &error))?;
-            out.write_all(memory.get_ref()).map_err(|error| unwritable(path, &error))?;
-        }
+    /// Writes the picture into `folder` as `STEM-0001`, or with the first higher number that is free: never over a
+    /// file that is there, even one that another program makes at the same moment. Answers with the path.
+    pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, String> {
+        let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
+        let file = self.encode_beside(format, &name(1))?;
+        let taken = || format!("{}: every number is taken: move some of the pictures away", name(u32::MAX).display());
+        file.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
     }
-    let file = out.into_inner().map_err(|error| unwritable(path, error.error()))?;
-    file.as_file().sync_all().map_err(|error| unwritable(path, &error))?;
-    Ok(file)
-}
 
-fn unwritable(path: &Path, error: &dyn std::fmt::Display) -> String {
-    format!("{}: cannot be written: {error}", path.display())
-}
-
-fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, String> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".firstlight-").suffix(".part");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any new file: the user's mask decides.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => {
-            format!("{}: cannot be written: there is no folder {}", path.display(), folder.display())
+    /// The whole picture in a temporary file in the folder of `path`.
+    fn encode_beside(&self, format: PictureFormat, path: &Path) -> Result<WholeFile, String> {
+        let mut out = WholeFile::begin(path)?;
+        match format {
+            PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, &error))?,
+            PictureFormat::Exr => {
+                let bytes = self.exr().map_err(|error| unwritable(path, &error))?;
+                out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
+            }
         }
-        _ => format!("{}: cannot be written: {error}", path.display()),
-    })
+        Ok(out)
+    }
+
+    fn png(&self, out: &mut impl Write) -> Result<(), png::EncodingError> {
+        let (width, height) = self.size;
+        let mut rgba = Vec::new();
+        develop(self.film, self.display, width, height, &mut rgba);
+        let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let mut encoder = png::Encoder::new(out, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        if let Some(note) = self.note {
+            encoder.add_itxt_chunk(NOTE_KEY.to_owned(), note.to_owned())?;
+        }
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&rgb)?;
+        writer.finish()
+    }
+
+    fn exr(&self) -> Result<Vec<u8>, exr::error::Error> {
+        let size = (self.film.width() as usize, self.film.height() as usize);
+        let attributes = LayerAttributes::named(env!("CARGO_PKG_NAME"));
+        let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(mean_channels(self.film)));
+        let mut image = Image::from_layer(layer);
+        if let Some(note) = self.note {
+            image.attributes.other.insert(Text::from(NOTE_KEY), AttributeValue::Text(Text::from(note)));
+        }
+        // The encoder seeks, so it writes to memory first.
+        let mut memory = std::io::Cursor::new(Vec::new());
+        image.write().non_parallel().to_buffered(&mut memory)?;
+        Ok(memory.into_inner())
+    }
+}
+
+/// What the film shows, as the red, green and blue channels of an EXR.
+pub(super) fn mean_channels(film: &Film) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
+    let means = film.means();
+    let channel =
+        |name: &str, c: usize| AnyChannel::new(name, FlatSamples::F32(means.iter().map(|mean| mean[c]).collect()));
+    SmallVec::from_vec(vec![channel("R", 0), channel("G", 1), channel("B", 2)])
 }
 
 #[cfg(test)]
@@ -147,7 +135,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (film, display) = (Film::new(5, 3), Display::default());
         std::fs::write(folder.path().join("gallery-0002.png"), "not ours").unwrap();
-        let save = |format| write_new_film(&film, &display, (10, 6), folder.path(), "gallery", format).unwrap();
+        let print = Print { film: &film, display: &display, size: (10, 6), note: None };
+        let save = |format| print.write_new(folder.path(), "gallery", format).unwrap();
         let first = save(PictureFormat::Png);
         assert_eq!(first, folder.path().join("gallery-0001.png"));
         assert_eq!(save(PictureFormat::Png), folder.path().join("gallery-0003.png"));
@@ -157,13 +146,5 @@ mod tests {
         let linear = image::image_dimensions(folder.path().join("gallery-0001.exr")).unwrap();
         assert_eq!(linear, (5, 3));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4, "nothing temporary is left");
-    }
-
-    #[test]
-    fn a_folder_that_is_not_there_is_named() {
-        let folder = tempfile::tempdir().unwrap().path().join("gone");
-        let error = write_new_film(&Film::new(1, 1), &Display::default(), (1, 1), &folder, "a", PictureFormat::Png)
-            .unwrap_err();
-        assert!(error.contains("there is no folder") && error.contains("gone"), "{error}");
     }
 }

@@ -96,11 +96,8 @@ impl Status {
 
     pub fn say(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>) {
         let text = text.into();
-        match kind {
-            MessageKind::Note => tracing::info!("{text}"),
-            MessageKind::Warning => tracing::warn!("{text}"),
-            MessageKind::Error => tracing::error!("{text}"),
-        }
+        // Whoever holds the session tells people; the log only keeps it for those who look for it.
+        tracing::info!("{kind:?}: {text}");
         if self.messages.len() == Self::MAX_MESSAGES {
             self.messages.pop_front();
         }

@@ -180,7 +180,7 @@ pub fn edit(world: &mut World) {
                 for problem in &error.problems {
                     status.say(now, MessageKind::Error, problem.to_string());
                 }
-                tracing::warn!("{} could not be opened", source.title());
+                tracing::debug!("{} could not be opened", source.title());
             }
         }
     }

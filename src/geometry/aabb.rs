@@ -7,6 +7,13 @@ pub struct Aabb {
     pub max: Vec3,
 }
 
+/// Empty.
+impl Default for Aabb {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Aabb {
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 

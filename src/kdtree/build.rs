@@ -26,6 +26,8 @@ pub(super) struct BuildConfig {
     pub block_cost: f32,
     /// Factor on the cost of a split that cuts off empty space.
     pub empty_factor: f32,
+    /// Nodes with at most this many references are leaves, whatever a split would save.
+    pub leaf_limit: usize,
     /// Depth of the deepest leaf.
     pub max_depth: u32,
     /// References per primitive that the whole tree may add.
@@ -269,14 +271,10 @@ impl<P: Primitives> Builder<'_, P> {
     }
 
     fn choose(&self, references: &[Reference], cell: &Aabb, depth: u32) -> Option<Split> {
-        if depth >= self.config.max_depth || references.len() <= 1 {
+        if depth >= self.config.max_depth || references.len() <= self.config.leaf_limit {
             return None;
         }
-        if self.config.median {
-            median_split(references, cell, self.config)
-        } else {
-            find_split(references, cell, self.config)
-        }
+        if self.config.median { median_split(references, cell) } else { find_split(references, cell, self.config) }
     }
 
     /// The parts of a reference on either side; none where its primitive does not reach.

@@ -16,6 +16,14 @@ pub(super) struct LaneHits<S: Simd> {
     pub v: S::F,
 }
 
+impl<S: Simd> LaneHits<S> {
+    #[inline(always)]
+    pub fn none(s: S) -> Self {
+        let zero = s.splat(0.0);
+        Self { mask: 0, t: zero, u: zero, v: zero }
+    }
+}
+
 /// Shears a vertex that is given along the ray's own axes.
 ///
 /// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.
@@ -74,6 +82,79 @@ pub(super) fn resolve<S: Simd>(
     let (w, u, v) = (s.mul(e0, inv), s.mul(e1, inv), s.mul(e2, inv));
     let depth = s.add(s.add(s.mul(w, a[2]), s.mul(u, b[2])), s.mul(v, c[2]));
     LaneHits { mask, t: s.mul(depth, sz), u, v }
+}
+
+/// Two triangles that share the diagonal `a c`, the first one first (`geometry::intersect_quad`).
+///
+/// - `corners`: `a`, `b`, `c`, `d` around the quad.
+#[inline(always)]
+pub(super) fn quad_hits<S: Simd>(s: S, lanes: Mask, corners: &[Sheared<S>; 4], sz: S::F) -> LaneHits<S> {
+    let [a, b, c, d] = corners;
+    let diagonal = plain(s, a, c);
+    let back = s.sub(s.splat(0.0), diagonal);
+    let first = lanes & same_sign(s, plain(s, c, b), diagonal, plain(s, b, a));
+    let second = lanes & same_sign(s, plain(s, d, c), plain(s, a, d), back);
+    if first | second == 0 {
+        return LaneHits::none(s);
+    }
+    let one = s.splat(1.0);
+    let (p, q) = (choose(s, first, b, c), choose(s, first, c, d));
+    let mut hits = resolve(s, first | second, a, &p, &q, sz);
+    let sum = s.min(s.add(hits.u, hits.v), one);
+    let (u, v) = (hits.u, hits.v);
+    hits.u = s.select(first, sum, u);
+    hits.v = s.select(first, v, sum);
+    // On the diagonal the plain signs may name the first triangle where only the second is hit.
+    let again = first & second & !hits.mask;
+    if again != 0 {
+        let other = resolve(s, again, a, c, d, sz);
+        hits.mask |= other.mask;
+        hits.t = s.select(again, other.t, hits.t);
+        hits.u = s.select(again, other.u, hits.u);
+        hits.v = s.select(again, s.min(s.add(other.u, other.v), one), hits.v);
+    }
+    hits
+}
+
+#[inline(always)]
+fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
+    [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
+}
+
+/// Where rays meet balls in front of them (`geometry::intersect_sphere`): the near side, from inside the far one.
+///
+/// - `to_center`: from the origin of the ray.
+/// - `inv_dir_squared`: `1 / (dir · dir)`.
+#[inline(always)]
+pub(super) fn sphere_hits<S: Simd>(
+    s: S,
+    lanes: Mask,
+    to_center: &[S::D; 3],
+    radius_squared: S::D,
+    dir: &[S::D; 3],
+    inv_dir_squared: S::D,
+) -> LaneHits<S> {
+    let t_middle = s.mul_d(dot(s, to_center, dir), inv_dir_squared);
+    let perpendicular = [
+        s.sub_d(to_center[0], s.mul_d(dir[0], t_middle)),
+        s.sub_d(to_center[1], s.mul_d(dir[1], t_middle)),
+        s.sub_d(to_center[2], s.mul_d(dir[2], t_middle)),
+    ];
+    let discriminant = s.sub_d(radius_squared, dot(s, &perpendicular, &perpendicular));
+    let mask = lanes & s.le_d(s.splat_d(0.0), discriminant);
+    if mask == 0 {
+        return LaneHits::none(s);
+    }
+    let half_chord = s.sqrt_d(s.mul_d(discriminant, inv_dir_squared));
+    let near = s.narrow(s.sub_d(t_middle, half_chord));
+    let far = s.narrow(s.add_d(t_middle, half_chord));
+    let zero = s.splat(0.0);
+    LaneHits { mask, t: s.select(s.lt(zero, near), near, far), u: zero, v: zero }
+}
+
+#[inline(always)]
+pub(super) fn dot<S: Simd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
+    s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
 }
 
 /// Does the lanes of `tiny` again in `f64`; returns the lanes that are still hit, all others included.

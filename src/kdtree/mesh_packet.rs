@@ -4,12 +4,12 @@
 //! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
 //! traced in groups.
 
+use super::block_tree::BlockTree;
+use super::blocks::{BLOCK, LeafBlock, ShearedRay, TriangleBlock};
 use super::lanes::{may_hit, resolve, shear};
-use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
 use super::nodes::{MAX_DEPTH, Node};
 use super::ray::{Nearest, WIDEN};
 use super::simd::{LANES, Mask, Simd};
-use super::stream::{LeafRay, test_block};
 
 /// Sixteen rays in the mesh's own space, and what they have hit so far.
 pub(super) struct MeshPacket<S: Simd> {
@@ -58,7 +58,7 @@ struct Group<S: Simd> {
 impl<S: Simd> MeshPacket<S> {
     /// Finds the nearest hits; with `ANY` a ray ends at its first hit.
     #[inline(always)]
-    pub fn trace<const ANY: bool>(&mut self, s: S, tree: &MeshTree, stack: &mut PacketStack<S>) {
+    pub fn trace<const ANY: bool>(&mut self, s: S, tree: &BlockTree<TriangleBlock>, stack: &mut PacketStack<S>) {
         let [x, y, z] = [s.abs(self.dir[0]), s.abs(self.dir[1]), s.abs(self.dir[2])];
         let along_x = s.le(y, x) & s.le(z, x);
         let along_y = !along_x & s.le(z, y);
@@ -81,7 +81,7 @@ impl<S: Simd> MeshPacket<S> {
     fn trace_group<const ANY: bool>(
         &mut self,
         s: S,
-        tree: &MeshTree,
+        tree: &BlockTree<TriangleBlock>,
         stack: &mut PacketStack<S>,
         lanes: Mask,
         octant: usize,
@@ -134,7 +134,7 @@ impl<S: Simd> MeshPacket<S> {
                     }
                 }
                 Node::Leaf { first, count } => {
-                    for block in &tree.blocks[first as usize..][..count as usize] {
+                    for block in tree.leaf(first, count) {
                         self.test_leaf(s, &group, block, mask);
                     }
                 }
@@ -162,7 +162,7 @@ impl<S: Simd> MeshPacket<S> {
 
     #[inline(always)]
     fn test_leaf(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mask: Mask) {
-        let n_triangles = block.count(s);
+        let n_triangles = block.prims.count(s);
         if (mask.count_ones() as usize) < n_triangles {
             self.test_by_ray(s, group, block, mask);
         } else {
@@ -181,7 +181,7 @@ impl<S: Simd> MeshPacket<S> {
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % LANES;
             mask &= mask - 1;
-            let ray = LeafRay {
+            let ray = ShearedRay {
                 axes: group.axes,
                 origin: [origin[0][lane], origin[1][lane], origin[2][lane]],
                 sx: sx[lane],
@@ -191,7 +191,7 @@ impl<S: Simd> MeshPacket<S> {
             let lanes = &mut self.nearest;
             let (t, prim) = (lanes.t[lane], lanes.prim[lane]);
             let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
-            test_block(s, block, &ray, &mut nearest);
+            TriangleBlock::test(s, block, &ray, &mut nearest);
             if nearest.found {
                 (lanes.t[lane], lanes.u[lane], lanes.v[lane]) = (nearest.t, nearest.u, nearest.v);
                 lanes.prim[lane] = nearest.prim;
@@ -223,7 +223,7 @@ impl<S: Simd> MeshPacket<S> {
         if ahead == 0 {
             return;
         }
-        let prim = s.splat_u(block.prim(lane));
+        let prim = s.splat_u(block.prims.get(lane));
         let old = s.load_u(&self.nearest.prim);
         let take = ahead & (s.lt(hits.t, best) | s.lt_u(prim, old));
         let nearest = &mut self.nearest;

@@ -5,8 +5,12 @@
 //! Knows nothing of materials or entities: positions go in, hits come out.
 
 mod batch;
+mod block_tree;
+mod blocks;
 mod build;
+mod instance_tree;
 mod lanes;
+mod loose;
 mod mesh_packet;
 mod mesh_tree;
 mod nodes;

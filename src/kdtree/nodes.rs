@@ -70,20 +70,23 @@ impl KdNodes {
     /// Calls `visit(first, count)` for the leaves along the ray, front to back, as long as they start no later than
     /// the limit that `visit` returns; the first limit is `t_max`.
     #[inline]
-    pub fn walk(&self, ray: &TreeRay, t_max: f32, visit: impl FnMut(u32, u32) -> f32) {
-        self.walk_counting(ray, t_max, visit, || ());
+    pub fn walk(&self, ray: &TreeRay, t_max: f32, mut visit: impl FnMut(u32, u32) -> f32) {
+        self.walk_cells(ray, 0.0, t_max, |first, count, _| visit(first, count), || ());
     }
 
-    /// The same, and calls `at_inner` at every inner node.
+    /// The same from `t_min` on; `visit` also gets where the ray leaves the cell at the latest, and every inner node calls
+    /// `at_inner`.
     #[inline]
-    pub fn walk_counting(
+    pub fn walk_cells(
         &self,
         ray: &TreeRay,
+        t_min: f32,
         t_max: f32,
-        mut visit: impl FnMut(u32, u32) -> f32,
+        mut visit: impl FnMut(u32, u32, f32) -> f32,
         mut at_inner: impl FnMut(),
     ) {
-        let (mut t0, mut t1) = ray.clip(&self.bounds, t_max);
+        let (t0, mut t1) = ray.clip(&self.bounds, t_max);
+        let mut t0 = t0.max(t_min);
         if t0 > t1 {
             return;
         }
@@ -115,7 +118,7 @@ impl KdNodes {
                 }
                 Node::Leaf { first, count } => {
                     if count > 0 {
-                        limit = visit(first, count);
+                        limit = visit(first, count, t1);
                     }
                 }
             }

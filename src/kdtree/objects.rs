@@ -4,7 +4,7 @@
 //! branch costs less than finding out which ones to leave away, however little the rays have in common.
 
 use super::batch::{HitBatch, RayBatch};
-use super::lanes::{LaneHits, Sheared, may_hit, plain, resolve, same_sign, shear};
+use super::lanes::{LaneHits, Sheared, dot, may_hit, quad_hits, resolve, shear, sphere_hits};
 use super::scene_tree::Shape;
 use super::simd::{LANES, Mask, Simd};
 use crate::geometry::quad_corners;
@@ -192,30 +192,12 @@ impl<S: Simd> Packet<S> {
         ANY && self.found & self.lanes == self.lanes
     }
 
-    /// Two triangles that share the diagonal `a c`, the first one first (`geometry::intersect_quad`).
     #[inline(always)]
     fn test_quad(&mut self, s: S, frame: &ShearFrame<S>, quad: &Quad) {
         let [a, b, c, d] = &quad.corners;
-        let [a, b, c, d] = [frame.shear(s, a), frame.shear(s, b), frame.shear(s, c), frame.shear(s, d)];
-        let diagonal = plain(s, &a, &c);
-        let back = s.sub(s.splat(0.0), diagonal);
-        let first = self.lanes & same_sign(s, plain(s, &c, &b), diagonal, plain(s, &b, &a));
-        let second = self.lanes & same_sign(s, plain(s, &d, &c), plain(s, &a, &d), back);
-        if first | second == 0 {
-            return;
-        }
-        let (p, q) = (choose(s, first, &b, &c), choose(s, first, &c, &d));
-        let mut hits = resolve(s, first | second, &a, &p, &q, frame.sz);
-        let sum = s.min(s.add(hits.u, hits.v), s.splat(1.0));
-        let (u, v) = (hits.u, hits.v);
-        hits.u = s.select(first, sum, u);
-        hits.v = s.select(first, v, sum);
-        // On the diagonal the plain signs may name the first triangle where only the second is hit.
-        let again = first & second & !hits.mask;
-        self.offer(s, hits, quad.object);
-        if again != 0 {
-            let mut hits = resolve(s, again, &a, &c, &d, frame.sz);
-            hits.v = s.min(s.add(hits.u, hits.v), s.splat(1.0));
+        let corners = [frame.shear(s, a), frame.shear(s, b), frame.shear(s, c), frame.shear(s, d)];
+        let hits = quad_hits(s, self.lanes, &corners, frame.sz);
+        if hits.mask != 0 {
             self.offer(s, hits, quad.object);
         }
     }
@@ -223,23 +205,11 @@ impl<S: Simd> Packet<S> {
     #[inline(always)]
     fn test_sphere(&mut self, s: S, wide: &WideFrame<S>, sphere: &Sphere) {
         let to_center = wide.towards(s, &sphere.center);
-        let t_middle = s.mul_d(dot(s, &to_center, &wide.dir), wide.inv_dir_squared);
-        let perpendicular = [
-            s.sub_d(to_center[0], s.mul_d(wide.dir[0], t_middle)),
-            s.sub_d(to_center[1], s.mul_d(wide.dir[1], t_middle)),
-            s.sub_d(to_center[2], s.mul_d(wide.dir[2], t_middle)),
-        ];
-        let discriminant = s.sub_d(s.splat_d(sphere.radius_squared), dot(s, &perpendicular, &perpendicular));
-        let mask = self.lanes & s.le_d(s.splat_d(0.0), discriminant);
-        if mask == 0 {
-            return;
+        let radius_squared = s.splat_d(sphere.radius_squared);
+        let hits = sphere_hits(s, self.lanes, &to_center, radius_squared, &wide.dir, wide.inv_dir_squared);
+        if hits.mask != 0 {
+            self.offer(s, hits, sphere.object);
         }
-        let half_chord = s.sqrt_d(s.mul_d(discriminant, wide.inv_dir_squared));
-        let near = s.narrow(s.sub_d(t_middle, half_chord));
-        let far = s.narrow(s.add_d(t_middle, half_chord));
-        let zero = s.splat(0.0);
-        let t = s.select(s.lt(zero, near), near, far);
-        self.offer(s, LaneHits { mask, t, u: zero, v: zero }, sphere.object);
     }
 }
 
@@ -297,11 +267,6 @@ fn by_axis<S: Simd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: S::F, 
     s.select(along_x, on_x, s.select(along_y, on_y, on_z))
 }
 
-#[inline(always)]
-fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
-    [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
-}
-
 /// The first sixteen, or all and `idle` for the rest.
 #[inline(always)]
 fn load_some<S: Simd>(s: S, from: &[f32], idle: f32) -> S::F {
@@ -357,9 +322,4 @@ impl<S: Simd> WideFrame<S> {
             s.sub_d(s.splat_d(point[2]), self.origin[2]),
         ]
     }
-}
-
-#[inline(always)]
-fn dot<S: Simd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
-    s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
 }

@@ -1,13 +1,13 @@
-//! The upper level: a tree over the finite objects of a scene, with the infinite planes beside it.
+//! The upper level: all objects of a scene.
 
-use super::build::{BuildConfig, Primitives, build};
-use super::mesh_tree::BuildPreset;
-use super::nodes::KdNodes;
+use super::block_tree::BlockTree;
+use super::blocks::LeafBlock;
+use super::instance_tree::Recent;
 use super::ray::{Nearest, TreeRay};
 use super::simd::InstructionSet;
 use super::sphere_tree::{WideRay, ball_bounds};
 use super::surface::Instance;
-use super::trace::FlatScene;
+use super::trace::{Instances, TopLevel};
 use super::{HitBatch, MeshTree, RayBatch, SphereTree, Visits};
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
@@ -72,13 +72,8 @@ pub struct Hit {
 pub struct SceneTree {
     shapes: Vec<Shape>,
     pub(super) instances: Vec<Instance>,
-    planes: Vec<u32>,
-    nodes: Option<KdNodes>,
-    /// What the leaves of `nodes` refer to.
-    leaf_objects: Vec<u32>,
-    extent: f32,
-    /// In scenes of few objects, for batches.
-    flat: Option<FlatScene>,
+    bounds: Aabb,
+    top: TopLevel,
 }
 
 /// Inverted in `f64`: the result is as good as `f32` can hold.
@@ -99,28 +94,9 @@ pub(super) fn transform_point(map: &Affine3A, p: Vec3) -> Vec3 {
     transform_vector(map, p) + Vec3::from(map.translation)
 }
 
-struct Objects<'a>(&'a [Shape]);
-
-impl Primitives for Objects<'_> {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn bounds(&self, prim: u32) -> Aabb {
-        object_bounds(&self.0[prim as usize])
-    }
-
-    fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
-        match &self.0[prim as usize] {
-            Shape::Triangle { vertices } => super::build::clip_triangle(vertices, axis, limit, below, padding),
-            _ => Some(Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY }),
-        }
-    }
-}
-
 /// The box around an object in the world, wide enough for the rounding of rays that are moved into its own space.
 /// Empty for planes and for objects without any surface.
-fn object_bounds(shape: &Shape) -> Aabb {
+pub(super) fn object_bounds(shape: &Shape) -> Aabb {
     let placed = |bounds: Aabb, map: &Affine3A| {
         if bounds.is_empty() {
             return bounds;
@@ -156,17 +132,9 @@ impl SceneTree {
     /// Object `i` of all later hits is `shapes[i]`.
     pub fn build(shapes: Vec<Shape>) -> Self {
         let instances = shapes.iter().map(Instance::new).collect();
-        let planes = (0u32..).zip(&shapes).filter(|(_, shape)| matches!(shape, Shape::Plane { .. }));
-        let planes = planes.map(|(object, _)| object).collect();
-        let config = BuildConfig { block_cost: 4.0, max_growth: 2.0, ..BuildPreset::Best.config(1) };
-        let mut leaf_objects = Vec::new();
-        let nodes = build(&Objects(&shapes), &config, |leaf| {
-            leaf_objects.extend_from_slice(leaf);
-            ((leaf_objects.len() - leaf.len()) as u32, leaf.len() as u32)
-        });
-        let extent = nodes.extent();
-        let flat = FlatScene::new(&shapes);
-        Self { shapes, instances, planes, nodes: Some(nodes), leaf_objects, extent, flat }
+        let bounds = shapes.iter().map(object_bounds).fold(Aabb::EMPTY, Aabb::union);
+        let top = TopLevel::new(&shapes);
+        Self { shapes, instances, bounds, top }
     }
 
     pub fn shapes(&self) -> &[Shape] {
@@ -175,7 +143,7 @@ impl SceneTree {
 
     /// The box around all finite objects; empty if there are none.
     pub fn bounds(&self) -> Aabb {
-        self.nodes.as_ref().map_or(Aabb::EMPTY, |nodes| nodes.bounds)
+        self.bounds
     }
 
     /// The nearest hit of each ray with `0 < t < t_max`; `hits` is reset to the size of the batch.
@@ -196,10 +164,7 @@ impl SceneTree {
     pub fn closest_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         assert!(set.is_available(), "this processor does not have {set:?}");
         hits.resize(rays.len());
-        match &self.flat {
-            Some(flat) => flat.closest_hits(set, self, rays, class, hits),
-            None => (0..rays.len()).for_each(|i| hits.set(i, self.closest_hit(&rays.get(i)))),
-        }
+        self.top.closest_hits(set, self, rays, class, hits);
     }
 
     /// As [`Self::closest_hits_with`].
@@ -207,10 +172,7 @@ impl SceneTree {
     pub fn any_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
         assert!(set.is_available(), "this processor does not have {set:?}");
         occluded.resize(rays.len(), false);
-        match &self.flat {
-            Some(flat) => flat.any_hits(set, self, rays, class, occluded),
-            None => (0..rays.len()).for_each(|i| occluded[i] = self.any_hit(&rays.get(i))),
-        }
+        self.top.any_hits(set, self, rays, class, occluded);
     }
 
     /// One ray, for the mouse.
@@ -233,65 +195,94 @@ impl SceneTree {
         best
     }
 
-    /// What the nearest hit of a ray costs, in this tree and those below it, whatever traversal finds it.
+    /// What the nearest hit of a ray costs in the trees of meshes and in the one above them, whatever traversal finds
+    /// it.
     pub fn count_visits(&self, ray: &Ray) -> Visits {
         let scene_ray = SceneRay::new(ray);
-        let mut best = None;
-        for &plane in &self.planes {
-            self.offer_object(plane, &scene_ray, &mut best, Effort::Closest);
+        let (mut best, mut visits) = (None, Visits::default());
+        for &object in &self.top.simple_objects {
+            self.offer_object(object, &scene_ray, &mut best, Effort::Closest);
         }
-        let mut visits = Visits::default();
-        let Some(nodes) = &self.nodes else { return visits };
-        let tree_ray = TreeRay::new(ray.origin, ray.dir, &scene_ray.shear, self.extent);
-        let mut tested = Recent::default();
-        let (mut inner, mut below) = (0, Visits::default());
-        let t_max = best.map_or(ray.t_max, |hit| hit.t);
-        let visit = |first: u32, count: u32| {
-            below.leaves += 1;
-            for &object in &self.leaf_objects[first as usize..][..count as usize] {
-                if tested.is_new(object) {
-                    if let Shape::Mesh { tree, .. } = &self.shapes[object as usize] {
-                        let t_max = best.map_or(ray.t_max, |hit: Hit| hit.t);
-                        let own = tree.count_visits(&Ray { t_max, ..self.instances[object as usize].ray(ray) });
-                        below.inner += own.inner;
-                        below.leaves += own.leaves;
-                        below.blocks += own.blocks;
-                    }
-                    self.offer_object(object, &scene_ray, &mut best, Effort::Closest);
-                }
+        let loose = &self.top.loose;
+        self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        let mut offer = |object: u32, best: &mut Option<Hit>| {
+            if let Shape::Mesh { tree, .. } = &self.shapes[object as usize] {
+                let t_max = best.map_or(ray.t_max, |hit| hit.t);
+                let own = tree.count_visits(&Ray { t_max, ..self.instances[object as usize].ray(ray) });
+                visits.inner += own.inner;
+                visits.leaves += own.leaves;
+                visits.blocks += own.blocks;
             }
-            best.map_or(ray.t_max, |hit| hit.t)
+            self.offer_object(object, &scene_ray, best, Effort::Closest);
         };
-        nodes.walk_counting(&tree_ray, t_max, visit, || inner += 1);
-        visits.inner = inner + below.inner;
-        (visits.leaves, visits.blocks) = (below.leaves, below.blocks);
-        visits
+        let mut above = Visits::default();
+        match &self.top.instances {
+            Instances::Few(instances) => instances.iter().for_each(|&object| offer(object, &mut best)),
+            Instances::Many(tree) => {
+                let tree_ray = TreeRay::new(ray.origin, ray.dir, &scene_ray.shear, tree.extent);
+                let mut tested = Recent::default();
+                let (mut leaves, mut inner) = (0, 0);
+                let t_max = best.map_or(ray.t_max, |hit| hit.t);
+                let visit = |first, count, _| {
+                    leaves += 1;
+                    for object in tree.leaf(first, count).filter(|&object| tested.is_new(object)) {
+                        offer(object, &mut best);
+                    }
+                    limit(&best, ray, Effort::Closest)
+                };
+                tree.nodes.walk_cells(&tree_ray, 0.0, t_max, visit, || inner += 1);
+                (above.leaves, above.inner) = (leaves, inner);
+            }
+        }
+        Visits { inner: visits.inner + above.inner, leaves: visits.leaves + above.leaves, ..visits }
     }
 
     fn trace(&self, ray: &Ray, any: bool) -> Option<Hit> {
         let scene_ray = SceneRay::new(ray);
         let effort = if any { Effort::Any } else { Effort::Closest };
         let mut best = None;
-        for &plane in &self.planes {
-            self.offer_object(plane, &scene_ray, &mut best, effort);
+        for &object in &self.top.simple_objects {
+            self.offer_object(object, &scene_ray, &mut best, effort);
         }
-        let done = |best: &Option<Hit>| any && best.is_some();
-        if let Some(nodes) = &self.nodes
-            && !done(&best)
-        {
-            let tree_ray = TreeRay::new(ray.origin, ray.dir, &scene_ray.shear, self.extent);
-            let mut tested = Recent::default();
-            let t_max = best.map_or(ray.t_max, |hit| hit.t);
-            nodes.walk(&tree_ray, t_max, |first, count| {
-                for &object in &self.leaf_objects[first as usize..][..count as usize] {
-                    if tested.is_new(object) {
+        let loose = &self.top.loose;
+        self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, effort);
+        self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, effort);
+        self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, effort);
+        match &self.top.instances {
+            Instances::Few(instances) => {
+                instances.iter().for_each(|&object| self.offer_object(object, &scene_ray, &mut best, effort));
+            }
+            Instances::Many(tree) => {
+                let tree_ray = TreeRay::new(ray.origin, ray.dir, &scene_ray.shear, tree.extent);
+                let mut tested = Recent::default();
+                tree.nodes.walk(&tree_ray, best.map_or(ray.t_max, |hit| hit.t), |first, count| {
+                    for object in tree.leaf(first, count).filter(|&object| tested.is_new(object)) {
                         self.offer_object(object, &scene_ray, &mut best, effort);
                     }
-                }
-                if done(&best) { f32::NEG_INFINITY } else { best.map_or(ray.t_max, |hit| hit.t) }
-            });
+                    limit(&best, ray, effort)
+                });
+            }
         }
         best
+    }
+
+    fn walk_loose<B: LeafBlock>(
+        &self,
+        tree: Option<&BlockTree<B>>,
+        ray: &SceneRay,
+        best: &mut Option<Hit>,
+        effort: Effort,
+    ) {
+        let Some(tree) = tree else { return };
+        let tree_ray = TreeRay::new(ray.ray.origin, ray.ray.dir, &ray.shear, tree.extent);
+        tree.nodes.walk(&tree_ray, best.map_or(ray.ray.t_max, |hit| hit.t), |first, count| {
+            for object in tree.leaf(first, count).iter().flat_map(|block| block.prims().iter()) {
+                self.offer_object(object, ray, best, effort);
+            }
+            limit(best, &ray.ray, effort)
+        });
     }
 
     fn offer_object(&self, object: u32, ray: &SceneRay, best: &mut Option<Hit>, effort: Effort) {
@@ -338,6 +329,15 @@ impl SceneTree {
     }
 }
 
+/// How far a walk goes on.
+fn limit(best: &Option<Hit>, ray: &Ray, effort: Effort) -> f32 {
+    match best {
+        Some(_) if effort == Effort::Any => f32::NEG_INFINITY,
+        Some(hit) => hit.t,
+        None => ray.t_max,
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Effort {
     Closest,
@@ -355,19 +355,5 @@ struct SceneRay {
 impl SceneRay {
     fn new(ray: &Ray) -> Self {
         Self { ray: *ray, shear: Shear::new(ray.dir), wide: WideRay::new(ray) }
-    }
-}
-
-/// The objects tested last: one that spans many cells need not be tested in each.
-#[derive(Default)]
-struct Recent {
-    /// Plus 1; 0 for none.
-    objects: [u32; 8],
-}
-
-impl Recent {
-    fn is_new(&mut self, object: u32) -> bool {
-        let slot = &mut self.objects[object as usize % 8];
-        std::mem::replace(slot, object + 1) != object + 1
     }
 }

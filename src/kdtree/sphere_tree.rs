@@ -1,8 +1,9 @@
 //! Kd-tree over many balls that share one material, in the space of their object.
 
-use super::build::{BuildConfig, Primitives, build};
+use super::block_tree::BlockTree;
+use super::blocks::{BLOCK, LeafBlock, MAX_PRIMS, SphereBlock};
+use super::build::Primitives;
 use super::mesh_tree::BuildPreset;
-use super::nodes::KdNodes;
 use super::ray::{Nearest, TreeRay};
 use crate::geometry::{Aabb, Ray, Shear, intersect_sphere};
 use glam::{DVec3, Vec3};
@@ -11,10 +12,7 @@ use glam::{DVec3, Vec3};
 pub struct SphereTree {
     pub(super) centers: Vec<Vec3>,
     pub(super) radii: Vec<f32>,
-    pub(super) nodes: KdNodes,
-    /// What the leaves refer to.
-    pub(super) prims: Vec<u32>,
-    pub(super) extent: f32,
+    pub(super) tree: BlockTree<SphereBlock>,
 }
 
 struct Balls<'a> {
@@ -29,30 +27,42 @@ pub(super) fn ball_bounds(center: Vec3, radius: f32) -> Aabb {
     Aabb { min: min - slack, max: max + slack }
 }
 
+/// The box around the part of a ball on one side of a plane: the rim of the cap may be narrower than the ball.
+/// Arguments as in [`Primitives::clipped`].
+pub(super) fn clip_ball(center: Vec3, radius: f32, axis: usize, limit: f32, below: bool, padding: f32) -> Aabb {
+    let mut bounds = ball_bounds(center, radius);
+    // How far the plane cuts beyond the centre, towards the side that is kept.
+    let height = if below { center[axis] - limit } else { limit - center[axis] };
+    if height > 0.0 {
+        let rim = (f64::from(radius).powi(2) - f64::from(height).powi(2)).max(0.0).sqrt() as f32;
+        let reach = rim + padding + super::ray::WIDEN * (center.abs().max_element() + radius);
+        for other in [(axis + 1) % 3, (axis + 2) % 3] {
+            bounds.min[other] = bounds.min[other].max(center[other] - reach);
+            bounds.max[other] = bounds.max[other].min(center[other] + reach);
+        }
+    }
+    bounds
+}
+
+impl Balls<'_> {
+    fn ball(&self, prim: u32) -> (Vec3, f32) {
+        (self.centers[prim as usize], self.radii[prim as usize])
+    }
+}
+
 impl Primitives for Balls<'_> {
     fn len(&self) -> usize {
         self.centers.len()
     }
 
     fn bounds(&self, prim: u32) -> Aabb {
-        ball_bounds(self.centers[prim as usize], self.radii[prim as usize])
+        let (center, radius) = self.ball(prim);
+        ball_bounds(center, radius)
     }
 
-    /// The box around the cap: its rim may be narrower than the ball.
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
-        let (center, radius) = (self.centers[prim as usize], self.radii[prim as usize]);
-        let mut bounds = self.bounds(prim);
-        // How far the plane cuts beyond the centre, towards the side that is kept.
-        let height = if below { center[axis] - limit } else { limit - center[axis] };
-        if height > 0.0 {
-            let rim = (f64::from(radius).powi(2) - f64::from(height).powi(2)).max(0.0).sqrt() as f32;
-            let reach = rim + padding + super::ray::WIDEN * (center.abs().max_element() + radius);
-            for other in [(axis + 1) % 3, (axis + 2) % 3] {
-                bounds.min[other] = bounds.min[other].max(center[other] - reach);
-                bounds.max[other] = bounds.max[other].min(center[other] + reach);
-            }
-        }
-        Some(bounds)
+        let (center, radius) = self.ball(prim);
+        Some(clip_ball(center, radius, axis, limit, below, padding))
     }
 }
 
@@ -61,19 +71,17 @@ impl SphereTree {
     pub fn build(centers: &[Vec3], radii: &[f32]) -> Self {
         assert_eq!(centers.len(), radii.len(), "each ball needs a centre and a radius");
         let (centers, radii) = (centers.to_vec(), radii.to_vec());
-        let mut prims = Vec::new();
-        let config = BuildConfig { block_cost: 2.0, ..BuildPreset::Best.config(4) };
-        let nodes = build(&Balls { centers: &centers, radii: &radii }, &config, |leaf| {
-            prims.extend_from_slice(leaf);
-            ((prims.len() - leaf.len()) as u32, leaf.len() as u32)
+        assert!(centers.len() < MAX_PRIMS, "a cloud of more than 2^31 balls");
+        let balls = Balls { centers: &centers, radii: &radii };
+        let tree = BlockTree::build(&balls, &BuildPreset::Best.config(BLOCK), |prims| {
+            SphereBlock::new(prims, |prim| balls.ball(prim))
         });
-        let extent = nodes.extent();
-        Self { centers, radii, nodes, prims, extent }
+        Self { centers, radii, tree }
     }
 
     /// The box around all balls; empty if there are none.
     pub fn bounds(&self) -> Aabb {
-        self.nodes.bounds
+        self.tree.nodes.bounds
     }
 
     /// Centre and radius of one ball, in the space of the object.
@@ -92,12 +100,14 @@ impl SphereTree {
 
     /// Offers the balls along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
-        let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.extent);
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.tree.extent);
         let wide = WideRay::new(ray);
-        self.nodes.walk(&tree_ray, nearest.t, |first, count| {
-            for &prim in &self.prims[first as usize..][..count as usize] {
-                let (center, radius) = self.sphere(prim);
-                wide.offer_sphere(center, radius, prim, nearest);
+        self.tree.nodes.walk(&tree_ray, nearest.t, |first, count| {
+            for block in self.tree.leaf(first, count) {
+                for (lane, prim) in block.prims().iter().enumerate() {
+                    let (center, radius) = block.sphere(lane);
+                    wide.offer_sphere(center, radius, prim, nearest);
+                }
             }
             if any && nearest.found { f32::NEG_INFINITY } else { nearest.t }
         });

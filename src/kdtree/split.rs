@@ -144,11 +144,8 @@ fn tight_bounds(references: &[Reference]) -> Aabb {
     Aabb { min: min.into(), max: max.into() }
 }
 
-/// The middle reference along the longest side of the cell, until a block is enough.
-pub(super) fn median_split(references: &[Reference], cell: &Aabb, config: &BuildConfig) -> Option<Split> {
-    if references.len() <= config.block {
-        return None;
-    }
+/// The middle reference along the longest side of the cell.
+pub(super) fn median_split(references: &[Reference], cell: &Aabb) -> Option<Split> {
     let size = cell.size();
     let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b]))?;
     let mut centers: Vec<f32> = references.iter().map(|r| 0.5 * r.min[axis] + 0.5 * r.max[axis]).collect();

@@ -1,6 +1,8 @@
 //! What a tree looks like: counts for reports, and the invariants that tests rely on.
 
-use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
+use super::MeshTree;
+use super::blocks::{BLOCK, TriangleBlock};
+use super::mesh_tree::BLOCK_COST;
 use super::nodes::{KdNode, KdNodes, Node};
 use super::wide::WideNode;
 use crate::geometry::Aabb;
@@ -40,25 +42,27 @@ impl KdTreeStats {
     pub fn references_per_primitive(&self) -> f64 {
         self.references as f64 / self.primitives.max(1) as f64
     }
-}
 
-fn prims_of(block: &TriangleBlock) -> impl Iterator<Item = u32> {
-    (0..block.len()).map(|lane| block.prim(lane))
+    /// What a line through the bounds costs on average if nothing stops it, in visits of an inner node: what the
+    /// surface area heuristic makes small.
+    pub fn sah_cost(&self) -> f64 {
+        self.expected_inner_visits + f64::from(BLOCK_COST) * self.expected_block_tests
+    }
 }
 
 impl MeshTree {
     pub fn stats(&self) -> KdTreeStats {
         let mut stats = KdTreeStats {
             primitives: self.n_triangles(),
-            blocks: self.blocks.len(),
-            references: self.blocks.iter().map(TriangleBlock::len).sum(),
-            bytes: self.nodes.nodes.len() * size_of::<KdNode>()
-                + self.wide.len() * size_of::<WideNode>()
-                + self.blocks.len() * size_of::<TriangleBlock>(),
+            blocks: self.tree.blocks.len(),
+            references: self.tree.blocks.iter().map(|block| block.prims.len()).sum(),
+            bytes: self.tree.nodes.nodes.len() * size_of::<KdNode>()
+                + self.tree.wide.len() * size_of::<WideNode>()
+                + self.tree.blocks.len() * size_of::<TriangleBlock>(),
             ..KdTreeStats::default()
         };
-        let root_area = f64::from(self.nodes.bounds.area());
-        self.nodes.visit_cells(&mut |node, cell, depth| {
+        let root_area = f64::from(self.tree.nodes.bounds.area());
+        self.tree.nodes.visit_cells(&mut |node, cell, depth| {
             let share = if root_area > 0.0 { f64::from(cell.area()) / root_area } else { 1.0 };
             stats.depth = stats.depth.max(depth);
             match node {
@@ -80,11 +84,11 @@ impl MeshTree {
     /// Panics unless every triangle with an area is in every leaf whose cell it passes through.
     pub fn check_invariants(&self) {
         let mut seen = vec![false; self.n_triangles()];
-        self.nodes.visit_cells(&mut |node, cell, _| {
+        self.tree.nodes.visit_cells(&mut |node, cell, _| {
             assert!(!cell.is_empty(), "a cell inside out: {cell:?}");
             if let Node::Leaf { first, count } = node {
-                let blocks = &self.blocks[first as usize..][..count as usize];
-                let prims: Vec<u32> = blocks.iter().flat_map(prims_of).collect();
+                let blocks = &self.tree.blocks[first as usize..][..count as usize];
+                let prims: Vec<u32> = blocks.iter().flat_map(|block| block.prims.iter()).collect();
                 assert!(prims.is_sorted_by(|a, b| a < b), "not ascending: {prims:?}");
                 assert_eq!(prims.len().div_ceil(BLOCK), blocks.len(), "blocks that could be saved");
                 for &prim in &prims {
@@ -104,10 +108,10 @@ impl MeshTree {
             assert!(seen, "triangle {prim} is in no leaf");
             for point in points {
                 assert!(
-                    self.nodes.some_leaf_at(point.to_array(), |first, count| {
-                        self.blocks[first as usize..][..count as usize]
+                    self.tree.nodes.some_leaf_at(point.to_array(), |first, count| {
+                        self.tree.blocks[first as usize..][..count as usize]
                             .iter()
-                            .flat_map(prims_of)
+                            .flat_map(|block| block.prims.iter())
                             .any(|other| other == prim)
                     }),
                     "triangle {prim} is missing at {point}"

@@ -1,4 +1,4 @@
-//! Many rays in flight through one mesh: for rays that have nothing in common.
+//! Many rays in flight through one tree: for rays that have nothing in common.
 //!
 //! A single ray waits: for its node, for its comparison, for the branch that was guessed wrong. Here a ray makes one step
 //! (a wide node or a leaf block) and goes to the back of a queue while the others make theirs, so the processor
@@ -6,8 +6,8 @@
 //!
 //! Start reading at [`run`].
 
-use super::lanes::{may_hit, resolve, shear};
-use super::mesh_tree::{BLOCK, MeshTree, TriangleBlock};
+use super::block_tree::BlockTree;
+use super::blocks::LeafBlock;
 use super::ray::{Nearest, TreeRay};
 use super::simd::Simd;
 use super::wide::{DescentRay, LEAF, Stack, WideNode};
@@ -16,18 +16,18 @@ use crate::geometry::{Ray, Shear};
 /// Rays in flight.
 const SLOTS: usize = 32;
 
-/// Where the stream gets its rays, in the mesh's own space, and leaves what they hit.
+/// Where the stream gets its rays, in the tree's own space, and leaves what they hit.
 pub(super) trait Source {
     /// The next ray, what it hit before, and a number that `finish` gets back.
     fn next(&mut self) -> Option<(Ray, Nearest, u32)>;
-    /// `nearest.found` says whether this mesh has something nearer.
+    /// `nearest.found` says whether this tree has something nearer.
     fn finish(&mut self, ray: u32, nearest: &Nearest);
 }
 
 #[derive(Clone, Copy)]
-struct Slot {
+struct Slot<R> {
     descent: DescentRay,
-    leaf: LeafRay,
+    leaf: R,
     nearest: Nearest,
     id: u32,
     is_busy: bool,
@@ -36,53 +36,6 @@ struct Slot {
     child: u32,
     t0: f32,
     t1: f32,
-}
-
-/// A ray as the test of a leaf block wants it.
-#[derive(Clone, Copy)]
-pub(super) struct LeafRay {
-    /// Axes across, across and along.
-    pub axes: [usize; 3],
-    /// The origin along these.
-    pub origin: [f32; 3],
-    pub sx: f32,
-    pub sy: f32,
-    pub sz: f32,
-}
-
-impl LeafRay {
-    fn new(ray: &Ray, shear: &Shear) -> Self {
-        let axes = [shear.kx, shear.ky, shear.kz];
-        Self { axes, origin: axes.map(|k| ray.origin[k]), sx: shear.sx, sy: shear.sy, sz: shear.sz }
-    }
-}
-
-/// Tests one ray against a block.
-#[inline(always)]
-pub(super) fn test_block<S: Simd>(s: S, block: &TriangleBlock, ray: &LeafRay, nearest: &mut Nearest) {
-    let [kx, ky, kz] = ray.axes;
-    let origin = [s.splat(ray.origin[0]), s.splat(ray.origin[1]), s.splat(ray.origin[2])];
-    let (sx, sy) = (s.splat(ray.sx), s.splat(ray.sy));
-    let [a, b, c] = &block.vertices;
-    let a = shear(s, [s.load(&a[kx]), s.load(&a[ky]), s.load(&a[kz])], origin, sx, sy);
-    let b = shear(s, [s.load(&b[kx]), s.load(&b[ky]), s.load(&b[kz])], origin, sx, sy);
-    let c = shear(s, [s.load(&c[kx]), s.load(&c[ky]), s.load(&c[kz])], origin, sx, sy);
-    let mask = may_hit(s, &a, &b, &c);
-    if mask == 0 {
-        return;
-    }
-    let hits = resolve(s, mask, &a, &b, &c, s.splat(ray.sz));
-    let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
-    if valid == 0 {
-        return;
-    }
-    let t = s.least(valid, hits.t);
-    // Primitives ascend within a block: the first lane is the lowest of those at the same `t`.
-    let lane = (valid & s.eq(hits.t, s.splat(t))).trailing_zeros() as usize;
-    let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
-    s.store(hits.u, &mut u);
-    s.store(hits.v, &mut v);
-    nearest.offer(t, u[lane % BLOCK], v[lane % BLOCK], block.prim(lane % BLOCK));
 }
 
 /// The entry below all others: the ray is through.
@@ -111,18 +64,35 @@ impl List {
     }
 }
 
+/// What waits to be visited by each ray in flight. Made once for many streams, for clearing it takes longer than tracing
+/// a few rays.
+pub(super) struct Stacks([Stack; SLOTS]);
+
+impl Stacks {
+    #[inline(always)]
+    pub fn new() -> Self {
+        let mut stacks = [Stack::NEW; SLOTS];
+        for stack in &mut stacks {
+            (stack.child[0], stack.t0[0]) = (DONE, f32::NEG_INFINITY);
+        }
+        Self(stacks)
+    }
+}
+
 /// Traces all rays of the source; with `ANY` a ray ends at its first hit.
 #[inline(always)]
-pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut impl Source) {
+pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
+    s: S,
+    tree: &BlockTree<B>,
+    source: &mut impl Source,
+    stacks: &mut Stacks,
+) {
     let (wide, blocks) = (&tree.wide[..], &tree.blocks[..]);
     let prefetch = tree.is_large();
-    let mut stacks: [Stack; SLOTS] = [Stack::NEW; SLOTS];
-    let mut slots: [Slot; SLOTS] = [Slot::IDLE; SLOTS];
+    let stacks = &mut stacks.0;
+    let mut slots: [Slot<B::Ray>; SLOTS] = [Slot::idle(B::IDLE); SLOTS];
     let (mut inner, mut leaf, mut idle) = (List::NEW, List::NEW, List::NEW);
-    for (i, stack) in (0..SLOTS as u8).zip(&mut stacks) {
-        (stack.child[0], stack.t0[0]) = (DONE, f32::NEG_INFINITY);
-        idle.push_if(true, i);
-    }
+    (0..SLOTS as u8).for_each(|i| idle.push_if(true, i));
     loop {
         let (list, len) = idle.take();
         for &i in &list[..len] {
@@ -146,21 +116,22 @@ pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut 
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
             slot.pop(&stacks[i as usize % SLOTS]);
-            fetch::<S, 2>(s, prefetch, wide, blocks, slot.child);
+            fetch::<S, B, 2>(s, prefetch, wide, blocks, slot.child);
             inner.push_if(slot.child < DONE, i);
             leaf.push_if(slot.child > DONE, i);
             idle.push_if(slot.child == DONE, i);
         }
         let (list, len) = leaf.take();
         for &i in &list[..len] {
-            fetch::<S, { size_of::<TriangleBlock>() / 64 }>(s, prefetch, wide, blocks, slots[i as usize % SLOTS].child);
+            let child = slots[i as usize % SLOTS].child;
+            fetch::<S, B, 0>(s, prefetch, wide, blocks, child);
         }
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
             let mut block = (slot.child & !LEAF) as usize;
             loop {
-                test_block(s, &blocks[block], &slot.leaf, &mut slot.nearest);
-                if !blocks[block].is_followed() {
+                B::test(s, &blocks[block], &slot.leaf, &mut slot.nearest);
+                if !blocks[block].prims().is_followed() {
                     break;
                 }
                 block += 1;
@@ -172,7 +143,7 @@ pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut 
             if ANY && slot.nearest.found {
                 slot.child = DONE;
             }
-            fetch::<S, 2>(s, prefetch, wide, blocks, slot.child);
+            fetch::<S, B, 2>(s, prefetch, wide, blocks, slot.child);
             inner.push_if(slot.child < DONE, i);
             leaf.push_if(slot.child > DONE, i);
             idle.push_if(slot.child == DONE, i);
@@ -180,14 +151,15 @@ pub(super) fn run<S: Simd, const ANY: bool>(s: S, tree: &MeshTree, source: &mut 
     }
 }
 
-/// Asks for the first `LINES` cache lines of what will be visited next, whatever it is.
+/// Asks for the first `LINES` cache lines of what will be visited next, whatever it is; 0 for all of a block.
 #[inline(always)]
-fn fetch<S: Simd, const LINES: usize>(s: S, wanted: bool, wide: &[WideNode], blocks: &[TriangleBlock], child: u32) {
+fn fetch<S: Simd, B, const LINES: usize>(s: S, wanted: bool, wide: &[WideNode], blocks: &[B], child: u32) {
     if wanted {
         let node = wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
         let block = blocks.as_ptr().wrapping_add((child & !LEAF) as usize).cast::<u8>();
         let at = if child & LEAF != 0 { block } else { node };
-        for line in 0..LINES {
+        let lines = if LINES == 0 { size_of::<B>() / 64 } else { LINES };
+        for line in 0..lines {
             s.prefetch(at.wrapping_add(64 * line));
         }
     }
@@ -195,7 +167,7 @@ fn fetch<S: Simd, const LINES: usize>(s: S, wanted: bool, wide: &[WideNode], blo
 
 /// Starts the next ray that meets the bounds; false if there are no more.
 #[inline(always)]
-fn refill(tree: &MeshTree, slot: &mut Slot, source: &mut impl Source) -> bool {
+fn refill<B: LeafBlock>(tree: &BlockTree<B>, slot: &mut Slot<B::Ray>, source: &mut impl Source) -> bool {
     while let Some((ray, nearest, id)) = source.next() {
         let shear = Shear::new(ray.dir);
         let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, tree.extent);
@@ -203,7 +175,7 @@ fn refill(tree: &MeshTree, slot: &mut Slot, source: &mut impl Source) -> bool {
         if t0 <= t1 && !tree.wide.is_empty() {
             *slot = Slot {
                 descent: DescentRay::new(tree_ray.origin, tree_ray.inv_lo, tree_ray.inv_hi, tree_ray.slack),
-                leaf: LeafRay::new(&ray, &shear),
+                leaf: B::ray(&ray, &shear),
                 nearest,
                 id,
                 is_busy: true,
@@ -219,18 +191,20 @@ fn refill(tree: &MeshTree, slot: &mut Slot, source: &mut impl Source) -> bool {
     false
 }
 
-impl Slot {
-    const IDLE: Self = Self {
-        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0 },
-        leaf: LeafRay { axes: [0, 1, 2], origin: [0.0; 3], sx: 0.0, sy: 0.0, sz: 0.0 },
-        nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
-        id: 0,
-        is_busy: false,
-        height: 1,
-        child: 0,
-        t0: 0.0,
-        t1: 0.0,
-    };
+impl<R> Slot<R> {
+    const fn idle(leaf: R) -> Self {
+        Self {
+            descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0 },
+            leaf,
+            nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
+            id: 0,
+            is_busy: false,
+            height: 1,
+            child: 0,
+            t0: 0.0,
+            t1: 0.0,
+        }
+    }
 
     /// Takes the nearest entry that can still matter; the last of all is [`DONE`].
     #[inline(always)]

@@ -1,42 +1,72 @@
 //! Batches of rays through a scene: which objects are tested by which traversal.
 //!
-//! Simple objects are tested by all rays of a packet at once. Rays that meet the box of an instance go on through its own tree, as a
-//! packet when the caller says that they belong together, otherwise in a stream. None of this changes what is found.
+//! A handful of simple objects is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
+//! box of an instance go on through its own tree, as a packet when the caller says that they belong together, otherwise
+//! in a stream. Of many instances each ray asks for the nearest first, and rays that ask for the same one go together, round
+//! after round. None of this changes what is found.
 
+use super::MeshTree;
 use super::batch::{HitBatch, RayBatch};
+use super::block_tree::BlockTree;
+use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
+use super::instance_tree::{Entry, InstanceTree, Recent};
+use super::loose::LooseTrees;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketStack};
 use super::objects::{Packet, SimpleObjects};
 use super::ray::Nearest;
 use super::scene_tree::{RayClass, SceneTree, Shape};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
-use super::stream::{self, Source};
+use super::stream::{self, Source, Stacks};
 use super::surface::Instance;
-use super::{MeshTree, SphereTree};
-use crate::geometry::{Ray, Shear};
+use crate::geometry::Ray;
 use glam::Affine3A;
 
-/// Rays that one stream takes on at a time.
+/// Rays that are taken through all objects before the next ones start.
 const CHUNK: usize = 2048;
 
-/// A scene of few objects: no tree above them.
+/// The same where there are many instances, of which each may be met by few rays.
+const LARGE_CHUNK: usize = 8192;
+
+/// The objects of a scene, by how rays get to them.
 #[derive(Debug, Default)]
-pub(super) struct FlatScene {
+pub(super) struct TopLevel {
+    /// Tested by every ray; planes are among them.
     pub simple: SimpleObjects,
-    /// Objects with a space of their own.
-    pub instances: Vec<u32>,
+    /// The numbers of `simple`.
+    pub simple_objects: Vec<u32>,
+    pub loose: LooseTrees,
+    pub instances: Instances,
 }
 
-/// More objects of a kind than this, and a tree above them pays.
-pub(super) const MAX_SIMPLE: usize = 48;
-pub(super) const MAX_INSTANCES: usize = 12;
+/// Objects with a space of their own.
+#[derive(Debug)]
+pub(super) enum Instances {
+    /// Few enough for every ray to look at each.
+    Few(Vec<u32>),
+    Many(InstanceTree),
+}
 
-impl FlatScene {
-    /// `None` if a tree over the objects will do better.
-    pub fn new(shapes: &[Shape]) -> Option<Self> {
+impl Default for Instances {
+    fn default() -> Self {
+        Self::Few(Vec::new())
+    }
+}
+
+/// With more instances than this a tree above them pays.
+const MAX_INSTANCES: usize = 12;
+
+impl TopLevel {
+    pub fn new(shapes: &[Shape]) -> Self {
+        let (loose, simple_objects) = LooseTrees::build(shapes);
         let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
-        let (instances, simple): (Vec<u32>, Vec<u32>) = (0..shapes.len() as u32).partition(is_instance);
-        (simple.len() <= MAX_SIMPLE && instances.len() <= MAX_INSTANCES)
-            .then(|| Self { simple: SimpleObjects::new(shapes, simple.into_iter()), instances })
+        let instances: Vec<u32> = (0..shapes.len() as u32).filter(is_instance).collect();
+        let instances = if instances.len() > MAX_INSTANCES {
+            Instances::Many(InstanceTree::build(shapes, instances))
+        } else {
+            Instances::Few(instances)
+        };
+        let simple = SimpleObjects::new(shapes, simple_objects.iter().copied());
+        Self { simple, simple_objects, loose, instances }
     }
 
     pub fn closest_hits(
@@ -47,8 +77,7 @@ impl FlatScene {
         class: RayClass,
         hits: &mut HitBatch,
     ) {
-        let flat = self;
-        dispatch!(set, closest(flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch));
+        trace(set, self, scene, rays, class, hits);
     }
 
     pub fn any_hits(
@@ -59,94 +88,180 @@ impl FlatScene {
         class: RayClass,
         occluded: &mut [bool],
     ) {
-        let flat = self;
-        dispatch!(set, any(flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]));
+        trace(set, self, scene, rays, class, occluded);
     }
 }
 
-#[inline(always)]
-fn closest<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
-    let mut stack = PacketStack::new(s);
-    for chunk in (0..rays.len()).step_by(CHUNK) {
-        let chunk = chunk..(chunk + CHUNK).min(rays.len());
-        for first in chunk.clone().step_by(LANES) {
-            let mut packet = Packet::load(s, rays, first);
-            packet.test_objects::<false>(s, &flat.simple);
-            if class == RayClass::Coherent {
-                for &object in &flat.instances {
-                    if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        trace_packet::<S, false>(
-                            s,
-                            tree,
-                            &scene.instances[object as usize],
-                            object,
-                            &mut packet,
-                            &mut stack,
-                        );
-                    }
-                }
-            }
-            packet.store(s, hits, first);
+/// Any of the trees that rays stream through.
+#[derive(Clone, Copy)]
+enum StreamTree<'a> {
+    Triangles(&'a BlockTree<TriangleBlock>),
+    Quads(&'a BlockTree<QuadBlock>),
+    Spheres(&'a BlockTree<SphereBlock>),
+}
+
+/// Where the answers to a batch are kept.
+trait Answers {
+    /// Distance and object of the hit so far; `None` if the ray needs no other.
+    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)>;
+
+    fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest);
+
+    /// What a packet found for the rays from `first` on.
+    fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize);
+
+    /// [`packets`] by the instructions of `set`.
+    fn packets(&mut self, set: InstructionSet, packets: &Packets);
+
+    /// [`stream`] by the instructions of `set`.
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks);
+}
+
+impl Answers for HitBatch {
+    #[inline(always)]
+    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
+        let object = self.object[ray];
+        Some(if object == Self::MISS { (t_max, None) } else { (self.t[ray], Some(object)) })
+    }
+
+    #[inline(always)]
+    fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest) {
+        (self.t[ray], self.u[ray], self.v[ray]) = (nearest.t, nearest.u, nearest.v);
+        (self.prim[ray], self.object[ray]) = (prim, object);
+    }
+
+    #[inline(always)]
+    fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize) {
+        packet.store(s, self, first);
+    }
+
+    fn packets(&mut self, set: InstructionSet, packets: &Packets) {
+        let answers = self;
+        dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
+    }
+
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks) {
+        let answers = self;
+        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, stacks: &mut Stacks));
+    }
+}
+
+/// Whether a ray is occluded.
+impl Answers for [bool] {
+    #[inline(always)]
+    fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
+        (!self[ray]).then_some((t_max, None))
+    }
+
+    #[inline(always)]
+    fn set(&mut self, ray: usize, _: u32, _: u32, _: &Nearest) {
+        self[ray] = true;
+    }
+
+    #[inline(always)]
+    fn store<S: Simd>(&mut self, _: S, packet: &Packet<S>, first: usize) {
+        for (lane, occluded) in self[first..].iter_mut().take(LANES).enumerate() {
+            *occluded = packet.found >> lane & 1 != 0;
         }
-        for &object in &flat.instances {
-            let instance = &scene.instances[object as usize];
-            let mut source = Closest { rays, hits, instance, object, queue: Queue::new() };
-            match &scene.shapes()[object as usize] {
-                Shape::Mesh { tree, .. } if class == RayClass::Incoherent => {
-                    source.queue.fill(chunk.clone());
-                    stream::run::<S, false>(s, tree, &mut source);
-                }
-                Shape::Spheres { tree, .. } => {
-                    source.queue.fill(chunk.clone());
-                    each_ray(tree, &mut source, false);
-                }
-                _ => {}
+    }
+
+    fn packets(&mut self, set: InstructionSet, packets: &Packets) {
+        let answers = self;
+        dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
+    }
+
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks) {
+        let answers = self;
+        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], stacks: &mut Stacks));
+    }
+}
+
+fn trace<A: Answers + ?Sized>(
+    set: InstructionSet,
+    top: &TopLevel,
+    scene: &SceneTree,
+    rays: &RayBatch,
+    class: RayClass,
+    answers: &mut A,
+) {
+    let mut stacks = Stacks::new();
+    let mut rounds = Rounds::default();
+    let (few, chunk) = match &top.instances {
+        Instances::Few(few) => (&few[..], CHUNK),
+        Instances::Many(_) => (&[][..], LARGE_CHUNK),
+    };
+    let in_packets: &[u32] = if class == RayClass::Coherent { few } else { &[] };
+    let all: Vec<u32> = (0..rays.len() as u32).collect();
+    for queue in all.chunks(chunk) {
+        answers.packets(set, &Packets { simple: &top.simple, meshes: in_packets, scene, rays, queue });
+        let own =
+            |instance: Option<u32>| Rays { rays, queue, instance: instance.map(|i| (i, &scene.instances[i as usize])) };
+        if let Some(tree) = &top.loose.spheres {
+            answers.stream(set, StreamTree::Spheres(tree), own(None), &mut stacks);
+        }
+        if let Some(tree) = &top.loose.quads {
+            answers.stream(set, StreamTree::Quads(tree), own(None), &mut stacks);
+        }
+        if let Some(tree) = &top.loose.triangles {
+            answers.stream(set, StreamTree::Triangles(tree), own(None), &mut stacks);
+        }
+        for &object in few {
+            match tree_of(scene, object) {
+                Some(StreamTree::Triangles(_)) if class == RayClass::Coherent => {}
+                Some(tree) => answers.stream(set, tree, own(Some(object)), &mut stacks),
+                None => {}
             }
+        }
+        if let Instances::Many(tree) = &top.instances {
+            rounds.trace(set, tree, scene, rays, answers, queue, &mut stacks);
         }
     }
 }
 
+/// `None` for an object without a tree.
+fn tree_of(scene: &SceneTree, object: u32) -> Option<StreamTree<'_>> {
+    match &scene.shapes()[object as usize] {
+        Shape::Mesh { tree, .. } => Some(StreamTree::Triangles(&tree.tree)),
+        Shape::Spheres { tree, .. } => Some(StreamTree::Spheres(&tree.tree)),
+        _ => None,
+    }
+}
+
+/// What rays are taken through sixteen at a time.
+struct Packets<'a> {
+    simple: &'a SimpleObjects,
+    /// Objects that are meshes.
+    meshes: &'a [u32],
+    scene: &'a SceneTree,
+    rays: &'a RayBatch,
+    /// Rays in a row.
+    queue: &'a [u32],
+}
+
 #[inline(always)]
-fn any<S: Simd>(s: S, flat: &FlatScene, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]) {
+fn closest_packets<S: Simd>(s: S, packets: &Packets, answers: &mut HitBatch) {
+    trace_packets::<S, HitBatch, false>(s, packets, answers);
+}
+
+#[inline(always)]
+fn any_packets<S: Simd>(s: S, packets: &Packets, answers: &mut [bool]) {
+    trace_packets::<S, [bool], true>(s, packets, answers);
+}
+
+#[inline(always)]
+fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &Packets, answers: &mut A) {
     let mut stack = PacketStack::new(s);
-    for chunk in (0..rays.len()).step_by(CHUNK) {
-        let chunk = chunk..(chunk + CHUNK).min(rays.len());
-        for first in chunk.clone().step_by(LANES) {
-            let mut packet = Packet::load(s, rays, first);
-            packet.test_objects::<true>(s, &flat.simple);
-            if class == RayClass::Coherent {
-                for &object in &flat.instances {
-                    if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        trace_packet::<S, true>(
-                            s,
-                            tree,
-                            &scene.instances[object as usize],
-                            object,
-                            &mut packet,
-                            &mut stack,
-                        );
-                    }
-                }
-            }
-            for (lane, occluded) in occluded[first..].iter_mut().take(LANES).enumerate() {
-                *occluded = packet.found >> lane & 1 != 0;
+    for sixteen in packets.queue.chunks(LANES) {
+        let first = sixteen[0] as usize;
+        let mut packet = Packet::load(s, packets.rays, first);
+        packet.test_objects::<ANY>(s, packets.simple);
+        for &object in packets.meshes {
+            if let Shape::Mesh { tree, .. } = &packets.scene.shapes()[object as usize] {
+                let instance = &packets.scene.instances[object as usize];
+                trace_packet::<S, ANY>(s, tree, instance, object, &mut packet, &mut stack);
             }
         }
-        for &object in &flat.instances {
-            let instance = &scene.instances[object as usize];
-            let mut source = Any { rays, occluded, instance, queue: Queue::new() };
-            match &scene.shapes()[object as usize] {
-                Shape::Mesh { tree, .. } if class == RayClass::Incoherent => {
-                    source.queue.fill(chunk.clone());
-                    stream::run::<S, true>(s, tree, &mut source);
-                }
-                Shape::Spheres { tree, .. } => {
-                    source.queue.fill(chunk.clone());
-                    each_ray(tree, &mut source, true);
-                }
-                _ => {}
-            }
-        }
+        answers.store(s, &packet, first);
     }
 }
 
@@ -192,7 +307,7 @@ fn trace_packet<S: Simd, const ANY: bool>(
     let wins_ties: Mask = packet.found & s.lt_u(s.splat_u(object), packet.object);
     s.store_u(s.select_u(wins_ties, s.splat_u(u32::MAX), s.splat_u(0)), &mut nearest.prim);
     let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest };
-    mesh_packet.trace::<ANY>(s, tree, stack);
+    mesh_packet.trace::<ANY>(s, &tree.tree, stack);
     let nearest = mesh_packet.nearest;
     let take = nearest.found;
     packet.t = s.select(take, s.load(&nearest.t), packet.t);
@@ -203,91 +318,155 @@ fn trace_packet<S: Simd, const ANY: bool>(
     packet.found |= take;
 }
 
-/// Rays of the batch that are still to be traced.
-struct Queue {
-    next: usize,
-    end: usize,
+#[inline(always)]
+fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, stacks: &mut Stacks) {
+    run_stream::<S, HitBatch, false>(s, tree, rays, answers, stacks);
 }
 
-impl Queue {
-    fn new() -> Self {
-        Self { next: 0, end: 0 }
-    }
+#[inline(always)]
+fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], stacks: &mut Stacks) {
+    run_stream::<S, [bool], true>(s, tree, rays, answers, stacks);
+}
 
-    fn fill(&mut self, rays: std::ops::Range<usize>) {
-        (self.next, self.end) = (rays.start, rays.end);
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<usize> {
-        (self.next < self.end).then(|| {
-            self.next += 1;
-            self.next - 1
-        })
+#[inline(always)]
+fn run_stream<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+    s: S,
+    tree: StreamTree,
+    rays: Rays,
+    answers: &mut A,
+    stacks: &mut Stacks,
+) {
+    let mut source = Queue { rays, answers };
+    match tree {
+        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
+        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
+        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
     }
 }
 
-struct Closest<'a> {
+/// Rays of a batch on their way through one tree.
+#[derive(Clone, Copy)]
+struct Rays<'a> {
     rays: &'a RayBatch,
-    hits: &'a mut HitBatch,
-    instance: &'a Instance,
-    object: u32,
-    queue: Queue,
+    queue: &'a [u32],
+    /// Whose tree it is; without one, the tree's primitives are themselves the objects.
+    instance: Option<(u32, &'a Instance)>,
 }
 
-impl Source for Closest<'_> {
+struct Queue<'a, A: ?Sized> {
+    rays: Rays<'a>,
+    answers: &'a mut A,
+}
+
+impl<A: Answers + ?Sized> Source for Queue<'_, A> {
     #[inline(always)]
     fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
-        let i = self.queue.pop()?;
-        let ray = self.rays.get(i);
-        let mut nearest = Nearest::before(ray.t_max);
-        if self.hits.object[i] != HitBatch::MISS {
-            nearest.t = self.hits.t[i];
+        loop {
+            let (&i, queue) = self.rays.queue.split_first()?;
+            self.rays.queue = queue;
+            let ray = self.rays.rays.get(i as usize);
+            let Some((t, so_far)) = self.answers.so_far(i as usize, ray.t_max) else { continue };
+            let mut nearest = Nearest::before(t);
             // At equal distance the lower object wins, whatever its primitive.
-            nearest.prim = if self.object < self.hits.object[i] { u32::MAX } else { 0 };
+            let Some((object, instance)) = self.rays.instance else {
+                nearest.prim = so_far.unwrap_or(0);
+                return Some((ray, nearest, i));
+            };
+            nearest.prim = if so_far.is_some_and(|other| object < other) { u32::MAX } else { 0 };
+            return Some((instance.ray(&ray), nearest, i));
         }
-        Some((self.instance.ray(&ray), nearest, i as u32))
     }
 
     #[inline(always)]
     fn finish(&mut self, ray: u32, nearest: &Nearest) {
         if nearest.found {
-            let (i, hits) = (ray as usize, &mut *self.hits);
-            (hits.t[i], hits.u[i], hits.v[i]) = (nearest.t, nearest.u, nearest.v);
-            (hits.prim[i], hits.object[i]) = (nearest.prim, self.object);
+            let (object, prim) = self.rays.instance.map_or((nearest.prim, 0), |(object, _)| (object, nearest.prim));
+            self.answers.set(ray as usize, object, prim, nearest);
         }
     }
 }
 
-struct Any<'a> {
-    rays: &'a RayBatch,
-    occluded: &'a mut [bool],
-    instance: &'a Instance,
-    queue: Queue,
+/// Each ray looks at the instances along its way, front to back. In every round it enters the next one, together with all
+/// other rays that want the same.
+#[derive(Default)]
+struct Rounds {
+    /// Of all rays.
+    entries: Vec<Entry>,
+    pending: Vec<Pending>,
+    /// Instance and ray of this round.
+    wishes: Vec<(u32, u32)>,
+    together: Vec<u32>,
 }
 
-impl Source for Any<'_> {
-    #[inline(always)]
-    fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
+/// A ray on its way from instance to instance.
+struct Pending {
+    ray: u32,
+    /// Entries that are left of those found.
+    left: std::ops::Range<usize>,
+    /// From where others may follow.
+    from: f32,
+    recent: Recent,
+}
+
+impl Pending {
+    /// The next instance to enter; `None` if none can matter.
+    fn next(&mut self, tree: &InstanceTree, ray: &Ray, t: f32, entries: &mut Vec<Entry>) -> Option<u32> {
         loop {
-            let i = self.queue.pop()?;
-            if !self.occluded[i] {
-                let ray = self.rays.get(i);
-                return Some((self.instance.ray(&ray), Nearest::before(ray.t_max), i as u32));
+            // Beyond one that is too far lie only others that are.
+            if let Some(entry) = self.left.next().map(|entry| entries[entry])
+                && entry.t <= t
+            {
+                return Some(entry.object);
+            }
+            if self.from > t || self.from == f32::INFINITY {
+                return None;
+            }
+            self.left.start = entries.len();
+            self.from = tree.entries(ray, self.from, t, &mut self.recent, entries);
+            self.left.end = entries.len();
+        }
+    }
+}
+
+impl Rounds {
+    #[expect(clippy::too_many_arguments, reason = "a loop body, cut out")]
+    fn trace<A: Answers + ?Sized>(
+        &mut self,
+        set: InstructionSet,
+        tree: &InstanceTree,
+        scene: &SceneTree,
+        rays: &RayBatch,
+        answers: &mut A,
+        queue: &[u32],
+        stacks: &mut Stacks,
+    ) {
+        self.entries.clear();
+        self.pending.clear();
+        let start = |&ray: &u32| Pending { ray, left: 0..0, from: 0.0, recent: Recent::default() };
+        self.pending.extend(queue.iter().map(start));
+        loop {
+            self.wishes.clear();
+            let (entries, wishes) = (&mut self.entries, &mut self.wishes);
+            self.pending.retain_mut(|pending| {
+                let ray = rays.get(pending.ray as usize);
+                let so_far = answers.so_far(pending.ray as usize, ray.t_max);
+                let next = so_far.and_then(|(t, _)| pending.next(tree, &ray, t, entries));
+                wishes.extend(next.map(|object| (object, pending.ray)));
+                next.is_some()
+            });
+            if self.wishes.is_empty() {
+                break;
+            }
+            self.wishes.sort_unstable();
+            for wish in self.wishes.chunk_by(|a, b| a.0 == b.0) {
+                self.together.clear();
+                self.together.extend(wish.iter().map(|&(_, ray)| ray));
+                let object = wish[0].0;
+                let instance = Some((object, &scene.instances[object as usize]));
+                if let Some(tree) = tree_of(scene, object) {
+                    answers.stream(set, tree, Rays { rays, queue: &self.together, instance }, stacks);
+                }
             }
         }
-    }
-
-    #[inline(always)]
-    fn finish(&mut self, ray: u32, nearest: &Nearest) {
-        self.occluded[ray as usize] |= nearest.found;
-    }
-}
-
-/// Balls have no stream.
-fn each_ray(tree: &SphereTree, source: &mut impl Source, any: bool) {
-    while let Some((ray, mut nearest, id)) = source.next() {
-        tree.offer_hits(&ray, &Shear::new(ray.dir), &mut nearest, any);
-        source.finish(id, &nearest);
     }
 }

@@ -35,9 +35,8 @@ impl Camera {
         if self.lens_radius == 0.0 {
             return Ray::new(self.eye, direction.normalize());
         }
-        let point =
-            if self.blades < 3 { uniform_disc(lens) } else { polygon_disc(lens, self.blades, self.blade_rotation) };
-        let offset = self.lens_radius * (point.x * self.right + point.y * self.up);
+        let offset = self.lens_offset(lens);
+        let offset = offset.x * self.right + offset.y * self.up;
         // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye.
         Ray::new(self.eye + offset, (direction - offset / self.focus_distance).normalize())
     }
@@ -54,6 +53,35 @@ impl Camera {
         let focus = self.focus_distance.recip();
         let far = if focus > slack { (focus - slack).recip() } else { f32::INFINITY };
         ((focus + slack).recip(), far)
+    }
+
+    /// A point of the lens by its distance from the eye along `right` and `up`, metres.
+    ///
+    /// - `u`: two numbers in `[0, 1)`.
+    #[inline]
+    pub fn lens_offset(&self, u: Vec2) -> Vec2 {
+        let point = if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) };
+        self.lens_radius * point
+    }
+
+    #[inline]
+    pub fn lens_point(&self, offset: Vec2) -> Vec3 {
+        self.eye + (offset.x * self.right + offset.y * self.up)
+    }
+
+    /// Where in the film light ends that comes to a point of the lens, and the cosine of its way with `forward`: the
+    /// inverse of [`Self::ray`]. `None` for light from behind.
+    ///
+    /// - `offset`: the point of the lens; `way`: from there to where the light comes from, any length.
+    #[inline]
+    pub fn film_point(&self, offset: Vec2, way: Vec3, size: Vec2) -> Option<(Vec2, f32)> {
+        let depth = way.dot(self.forward);
+        if depth <= 0.0 {
+            return None;
+        }
+        let ahead = Vec2::new(way.dot(self.right), way.dot(self.up)) / depth + offset / self.focus_distance;
+        let pixels = ahead / self.tan_half_vfov * size.y;
+        Some((0.5 * Vec2::new(size.x + pixels.x, size.y - pixels.y), depth / way.length()))
     }
 
     /// From the eye through a point of the film to the plane one metre ahead; not unit.
@@ -101,6 +129,25 @@ mod tests {
             let t = (target - ray.origin).dot(ray.dir);
             assert!((ray.at(t) - target).length() < 1e-5);
             assert!((ray.origin - camera.eye).length() <= 0.3 * 1.000_001);
+        }
+    }
+
+    #[test]
+    fn light_goes_back_to_where_the_ray_began() {
+        let size = Vec2::new(200.0, 100.0);
+        for (lens_radius, focus_distance) in [(0.0, 1.0), (0.3, 4.0), (0.3, f32::INFINITY)] {
+            let mut camera = camera(lens_radius, focus_distance);
+            camera.blades = 6;
+            for i in 0..64 {
+                let (lens, film) = (Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0, Vec2::new(3.1 * i as f32, 99.0));
+                let ray = camera.ray(film, size, lens);
+                let offset = camera.lens_offset(lens);
+                assert!((camera.lens_point(offset) - ray.origin).length() < 1e-6);
+                let (found, cos) = camera.film_point(offset, 7.0 * ray.dir, size).unwrap();
+                assert!((found - film).length() < 1e-3, "{found} for {film}");
+                assert!((cos - ray.dir.dot(camera.forward)).abs() < 1e-6);
+                assert_eq!(camera.film_point(offset, -ray.dir, size), None);
+            }
         }
     }
 

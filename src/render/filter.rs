@@ -60,6 +60,16 @@ impl PixelFilter {
     }
 }
 
+impl PixelFilter {
+    /// Of [`Self::weight`] along one axis.
+    pub(super) fn integral(self) -> f64 {
+        const STEPS: u32 = 1 << 12;
+        let step = 2.0 * f64::from(self.radius()) / f64::from(STEPS);
+        let at = |i: u32| (f64::from(i) + 0.5) * step - f64::from(self.radius());
+        (0..STEPS).map(|i| self.weight(at(i))).sum::<f64>() * step
+    }
+}
+
 /// Places in the film by the size of a filter's weight, made once a pass.
 #[derive(Clone, Debug)]
 pub(super) struct FilterSampler {

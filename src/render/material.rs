@@ -1,6 +1,7 @@
 //! What a surface does to light.
 
 use super::TextureId;
+use super::bsdf::SMALLEST_ALPHA;
 use glam::Vec3;
 
 /// Index into the materials of a snapshot.
@@ -73,6 +74,19 @@ impl Material {
             Self::Glass { .. } => true,
             Self::Phong { transparency, .. } => *transparency > 0.0,
             _ => false,
+        }
+    }
+
+    /// Whether it, or a part of it, is perfectly smooth everywhere: a mirror or glass.
+    pub(super) fn is_specular(&self, materials: &[Self]) -> bool {
+        match self {
+            Self::Mirror { .. } | Self::Glass { .. } => true,
+            Self::Metal { alpha, .. } => matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA),
+            Self::Phong { specular, transparency, .. } => {
+                *transparency > 0.0 || !matches!(specular, ScalarInput::Constant(share) if *share <= 0.0)
+            }
+            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].is_specular(materials)),
+            Self::Diffuse { .. } | Self::Emissive { .. } => false,
         }
     }
 

@@ -5,11 +5,14 @@
 mod ambient;
 mod bsdf;
 mod camera;
+mod caustics;
 mod develop;
 mod dielectric;
 mod environment;
 mod estimate;
+mod exact_sum;
 mod film;
+mod film_record;
 mod filter;
 mod ggx;
 mod inspect;
@@ -29,6 +32,7 @@ pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encod
 pub use environment::Environment;
 pub use estimate::ErrorEstimate;
 pub use film::Film;
+pub use film_record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
 pub use filter::PixelFilter;
 pub use inspect::{Inspected, Inspection, Legend, depths, inspect, scale_color, tint_sharp_zone};
 pub use light::LightTable;

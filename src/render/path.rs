@@ -7,6 +7,7 @@
 //! Start reading at [`PathWave::trace`].
 
 use super::bsdf::Scatter;
+use super::caustics::{Bounce, CausticPass, Guided, Track};
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::renderer::{RayCounts, RenderSettings};
@@ -55,6 +56,8 @@ struct Path {
     sampler: Sampler,
     slot: u32,
     media: MediumStack,
+    /// Against paths from the lamps.
+    track: Track,
 }
 
 /// Scratch memory of one worker: cleared between waves, never given back.
@@ -82,6 +85,7 @@ impl PathWave {
         &mut self,
         scene: &Snapshot,
         settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
         camera_paths: impl Iterator<Item = CameraPath>,
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
@@ -98,7 +102,7 @@ impl PathWave {
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
-            self.shade(scene, depth, settings, radiance);
+            self.shade(scene, depth, settings, caustics, radiance);
             scene.geometry.tree.any_hits(&self.shadow_rays, class, &mut self.occluded);
             for (&(slot, light), &occluded) in self.shadow_light.iter().zip(&self.occluded) {
                 if !occluded {
@@ -126,11 +130,19 @@ impl PathWave {
                 sampler,
                 slot,
                 media: MediumStack::default(),
+                track: Track::default(),
             });
         }
     }
 
-    fn shade(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
+    fn shade(
+        &mut self,
+        scene: &Snapshot,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        radiance: &mut [Vec3],
+    ) {
         let techniques = &settings.techniques;
         self.next_rays.clear();
         self.next_paths.clear();
@@ -153,20 +165,43 @@ impl PathWave {
             if let Some(emission) = scene.shading.emission[material as usize]
                 && vertex.front
             {
-                let weight = emission.scale * emitter_weight(scene, techniques, &path, &hit, ray.dir);
+                let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, &path.media, &hit, &vertex));
+                let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+                let weight = emission.scale * weight;
                 radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
             }
             if depth == settings.max_depth {
                 continue;
             }
-            let step = Step { scene, techniques, path: &path, vertex: &vertex, material, depth };
+            let step = Step {
+                scene,
+                techniques,
+                path: &path,
+                vertex: &vertex,
+                hit: &hit,
+                material,
+                depth,
+                caustics,
+                is_told: false,
+            };
             if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
                 if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
-                    self.scatter(step, &blend);
+                    self.scatter_told(step, &blend);
                 }
             } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
-                self.scatter(step, &lobe);
+                self.scatter_told(step, &lobe);
             }
+        }
+    }
+
+    /// With hints, where there are any, of where gathered light comes from.
+    #[inline]
+    fn scatter_told(&mut self, step: Step, bsdf: &impl Scatter) {
+        let Step { path, vertex, depth, .. } = step;
+        let hints = step.caustics.filter(|_| bsdf.is_smooth());
+        match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
+            Some(hints) => self.scatter(Step { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
+            None => self.scatter(step, bsdf),
         }
     }
 
@@ -270,10 +305,25 @@ impl PathWave {
         if sample.transmitted {
             path.media = path.media.crossed(material, vertex.front);
         }
+        if let Some(pass) = step.caustics {
+            let bounce = Bounce {
+                vertex,
+                hit: step.hit,
+                eye: (depth == 1).then_some(path.position),
+                wi: sample.wi,
+                pdf: sample.pdf,
+                transmitted: sample.transmitted,
+                blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+                before: step.path.media,
+                after: path.media,
+            };
+            let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
+            path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+        }
         if depth >= if techniques.roulette { ROULETTE_DEPTH } else { ENDLESS_DEPTH } {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
-            let most = path.throughput.abs().max_element() * ior * ior;
+            let most = path.throughput.abs().max_element() * ior * ior * path.track.gain;
             let survival = if depth >= ENDLESS_DEPTH { most.min(0.95) } else { most.min(1.0) };
             if survival < 1.0 {
                 if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -300,9 +350,13 @@ struct Step<'a> {
     techniques: &'a Techniques,
     path: &'a Path,
     vertex: &'a Vertex,
+    hit: &'a Hit,
     material: MaterialId,
     /// Segments so far.
     depth: u32,
+    caustics: Option<&'a CausticPass<'a>>,
+    /// Some directions are chosen by hints.
+    is_told: bool,
 }
 
 impl Step<'_> {

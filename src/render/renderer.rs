@@ -1,5 +1,6 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
+use super::caustics::{CausticPass, LightLayer};
 use super::film::{Film, FilmTile};
 use super::filter::{FilterSampler, PixelFilter};
 use super::path::{CameraPath, PathWave};
@@ -94,20 +95,56 @@ pub fn advance(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
     let size = UVec2::new(film.width(), film.height());
-    let pass = Pass { snapshot, settings, filter: FilterSampler::new(settings.filter), size };
+    let caustics = CausticPass::of(snapshot, settings, size);
+    let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size };
+    let Some(caustics) = &pass.caustics else {
+        return advance_tiles(&pass, film, target_spp, stop);
+    };
+    if !caustics.prepare(stop) {
+        return PassReport::default();
+    }
+    let first = film.first_sample();
+    film.light.get_or_insert_with(|| LightLayer::new(size, first));
+    let mut total = PassReport { completed: true, ..PassReport::default() };
+    // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
+    while total.completed && film.spp() < target_spp {
+        let goal = (film.spp() + 1).next_power_of_two().min(target_spp);
+        let mut layer = film.light.take().expect("made above");
+        let (tiles, light) =
+            rayon::join(|| advance_tiles(&pass, film, goal, stop), || layer.advance(caustics, goal, stop));
+        film.light = Some(layer);
+        total.completed = tiles.completed && light.completed;
+        total.add(tiles);
+        total.rays += light.rays;
+        total.n_bad += light.n_bad;
+        if total.completed {
+            film.record_convergence();
+        }
+    }
+    total
+}
+
+fn advance_tiles(pass: &Pass, film: &mut Film, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> PassReport {
     let reports: Vec<PassReport> = film
         .tiles
         .par_iter_mut()
-        .map_init(Wave::default, |wave, tile| advance_tile(&pass, tile, target_spp, stop, wave))
+        .map_init(Wave::default, |wave, tile| advance_tile(pass, tile, target_spp, stop, wave))
         .collect();
     let mut total = PassReport { completed: true, ..PassReport::default() };
     for report in reports {
         total.completed &= report.completed;
-        total.rays += report.rays;
-        total.n_bad += report.n_bad;
-        total.bad.extend(report.bad.into_iter().take(MAX_LISTED_BAD - total.bad.len()));
+        total.add(report);
     }
     total
+}
+
+impl PassReport {
+    /// Rays and bad samples of another.
+    fn add(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.n_bad += other.n_bad;
+        self.bad.extend(other.bad.into_iter().take(MAX_LISTED_BAD - self.bad.len()));
+    }
 }
 
 /// How many bad samples a report names.
@@ -129,12 +166,13 @@ impl Wave {
         &mut self,
         scene: &Snapshot,
         settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
         camera_paths: impl Iterator<Item = CameraPath>,
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
         match settings.integrator {
-            Integrator::Path => self.path.trace(scene, settings, camera_paths, radiance, stop),
+            Integrator::Path => self.path.trace(scene, settings, caustics, camera_paths, radiance, stop),
             Integrator::Phong => self.phong.trace(scene, settings.max_depth, camera_paths, radiance, stop),
         }
     }
@@ -144,6 +182,7 @@ impl Wave {
 struct Pass<'a> {
     snapshot: &'a Snapshot,
     settings: &'a RenderSettings,
+    caustics: Option<CausticPass<'a>>,
     filter: FilterSampler,
     size: UVec2,
 }
@@ -163,7 +202,7 @@ fn advance_tile(
         let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
         radiance.clear();
         radiance.resize(n_samples * n_pixels, Vec3::ZERO);
-        let first = tile.spp;
+        let first = tile.next_sample();
         let camera_paths = (0..n_samples).flat_map(|s| {
             let (tile, order) = (&*tile, &order);
             order.iter().map(move |&local| {
@@ -172,7 +211,9 @@ fn advance_tile(
                 CameraPath { ray, sampler, slot: s as u32 * n_pixels as u32 + local, weight }
             })
         });
-        let Some(rays) = wave.trace(pass.snapshot, pass.settings, camera_paths, &mut radiance, stop) else {
+        let Some(rays) =
+            wave.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), camera_paths, &mut radiance, stop)
+        else {
             report.completed = false;
             break;
         };
@@ -180,6 +221,9 @@ fn advance_tile(
         let n_bad_before = tile.bad.len();
         for (s, sample) in radiance.chunks_exact(n_pixels).enumerate() {
             tile.add_sample(first + s as u32, sample.iter().copied());
+            if pass.caustics.is_none() {
+                tile.record_convergence(None);
+            }
         }
         let new_bad = &tile.bad[n_bad_before..];
         report.n_bad += new_bad.len() as u64;
@@ -192,13 +236,19 @@ fn advance_tile(
     report
 }
 
-/// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film.
+/// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film, but for that of paths from
+/// the lamps, which belong to no pixel.
 pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
-    let pass = Pass { snapshot, settings, filter: FilterSampler::new(settings.filter), size: film_size };
+    let caustics = CausticPass::of(snapshot, settings, film_size);
+    let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size: film_size };
+    if let Some(caustics) = &pass.caustics {
+        caustics.prepare(&|| false);
+    }
     let (ray, sampler, weight) = pass.camera_ray(UVec2::new(at.x, at.y), at.sample);
     let mut radiance = [Vec3::ZERO];
     let path = CameraPath { ray, sampler, slot: 0, weight };
-    Wave::default().trace(snapshot, settings, std::iter::once(path), &mut radiance, &|| false);
+    let paths = std::iter::once(path);
+    Wave::default().trace(snapshot, settings, pass.caustics.as_ref(), paths, &mut radiance, &|| false);
     radiance[0]
 }
 
@@ -210,7 +260,9 @@ pub(super) fn mean_bounces(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Vec<f32>> {
     const SIDE: u32 = 4;
-    let pass = Pass { snapshot, settings, filter: FilterSampler::new(settings.filter), size };
+    // Paths from the eye alone; light from the lamps has no pixel to begin with.
+    let (caustics, filter) = (None, FilterSampler::new(settings.filter));
+    let pass = Pass { snapshot, settings, caustics, filter, size };
     let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
     let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
         .into_par_iter()
@@ -222,7 +274,7 @@ pub(super) fn mean_bounces(
                 let (ray, sampler, weight) = pass.camera_ray(pixel, 0);
                 CameraPath { ray, sampler, slot: 0, weight }
             });
-            let rays = wave.trace(snapshot, settings, camera_paths, &mut [Vec3::ZERO], stop)?;
+            let rays = wave.trace(snapshot, settings, None, camera_paths, &mut [Vec3::ZERO], stop)?;
             Some(rays.bounce as f32 / rays.camera.max(1) as f32)
         })
         .collect();

@@ -4,6 +4,7 @@
 //! keeps [`Geometry`] and [`Shading`], a new material keeps [`Geometry`].
 
 use super::ambient::AmbientLight;
+use super::caustics::CasterTable;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
 use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
@@ -61,6 +62,8 @@ pub struct Shading {
     pub(super) emission: Vec<Option<Emission>>,
     pub lights: LightTable,
     pub(super) environment_sampler: Option<EnvironmentSampler>,
+    /// What gathers light, where something does.
+    pub(super) casters: Option<CasterTable>,
     pub features: Features,
 }
 
@@ -75,6 +78,8 @@ pub struct Features {
     pub light_sampling: bool,
     /// The surroundings shine.
     pub environment: bool,
+    /// Something smooth gathers the light of some lamp, so paths are traced from lamps as well.
+    pub caustics: bool,
 }
 
 impl Geometry {
@@ -98,12 +103,14 @@ impl Shading {
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(&materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, &textures);
         let environment_sampler = EnvironmentSampler::build(&environment);
+        let casters = CasterTable::build(geometry, &materials, &lights);
         let glass = materials.iter().any(Material::is_clear);
         let features = Features {
             glass,
             media: glass,
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),
+            caustics: casters.is_some(),
         };
         let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
         let ambient = AmbientLight::of(&environment);
@@ -118,6 +125,7 @@ impl Shading {
             emission,
             lights,
             environment_sampler,
+            casters,
             features,
         }
     }

@@ -14,6 +14,8 @@ pub struct Techniques {
     pub solid_angle: bool,
     /// Lights are asked by what they could send or by their power; off: all alike.
     pub light_selection: bool,
+    /// Where smooth surfaces gather the light of lamps, paths are traced from the lamps as well; off: from the eye alone.
+    pub caustics: bool,
     /// Dim paths are ended early; off: only very long ones.
     pub roulette: bool,
 }
@@ -25,6 +27,7 @@ impl Techniques {
         even_samples: true,
         solid_angle: true,
         light_selection: true,
+        caustics: true,
         roulette: true,
     };
 }
@@ -37,7 +40,7 @@ impl Default for Techniques {
 
 impl Techniques {
     /// Each switched off alone, with the name of what is missing.
-    pub fn ablations() -> [(&'static str, Self); 6] {
+    pub fn ablations() -> [(&'static str, Self); 7] {
         let all = Self::default();
         [
             ("light sampling", Self { light_sampling: false, ..all }),
@@ -45,6 +48,7 @@ impl Techniques {
             ("even samples (Owen-Sobol\u{2019})", Self { even_samples: false, ..all }),
             ("lights by solid angle", Self { solid_angle: false, ..all }),
             ("choice of lights by contribution", Self { light_selection: false, ..all }),
+            ("paths from the lamps", Self { caustics: false, ..all }),
             ("Russian roulette", Self { roulette: false, ..all }),
         ]
     }

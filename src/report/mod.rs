@@ -14,6 +14,7 @@ mod picture;
 mod plot;
 mod reference;
 mod table;
+mod trees;
 
 pub use curve::{Seconds, seconds_to, slope};
 pub use flip::flip;
@@ -24,3 +25,4 @@ pub use page::{page, summary_text};
 pub use picture::LinearPicture;
 pub use reference::{Key, Made, Reference, ReferenceStore};
 pub use table::csv;
+pub use trees::{CountedVisits, MeanVisits, TreePlan, TreeRow, TreeTable, tree_plans};

@@ -50,7 +50,8 @@ impl Key {
         let plain: String =
             stem.chars().take(40).map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
         // Another version may have mended what was wrong.
-        let rest = format!("{:?} {} {}", settings.integrator, settings.max_depth, env!("CARGO_PKG_VERSION"));
+        let settings = RenderSettings { seed: 0, techniques: Default::default(), ..*settings };
+        let rest = format!("{settings:?} {}", env!("CARGO_PKG_VERSION"));
         let hash = Fingerprint::default().with(scene.0.to_le_bytes()).with(rest.bytes());
         Self { name: format!("{plain}-{}x{}-{hash}", size.0, size.1), size }
     }

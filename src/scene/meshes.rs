@@ -1,7 +1,7 @@
 //! The meshes that a scene names: from OBJ files or made by the program, shaded as asked, with their own materials.
 
 use super::error::SceneError;
-use super::file::{MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
+use super::file::{Amount, MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
 use super::obj::{ImportedMaterial, ImportedObj, ObjError, ObjNormals, ObjOptions, load_obj_with};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use glam::{DVec2, DVec3, Vec3};
@@ -202,8 +202,8 @@ fn shaded(mesh: Mesh, shading: MeshShadingPart, crease: Option<f32>) -> Mesh {
 }
 
 impl LoadedMesh {
-    /// What an MTL material means here. The exponent of its highlight is not modelled; illumination models 3 and 5
-    /// are mirrors, 4, 6, 7 and 9 are glass.
+    /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
+    /// matte, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
         let share = |color: Vec3| Paint::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
         let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);
@@ -220,7 +220,19 @@ impl LoadedMesh {
             },
             _ => {
                 let plain = share(material.diffuse.unwrap_or(Vec3::splat(0.6)));
-                MaterialPart::Diffuse { albedo: self.texture(material.diffuse_texture.as_ref()).unwrap_or(plain) }
+                let albedo = self.texture(material.diffuse_texture.as_ref()).unwrap_or(plain);
+                match highlight_of(material) {
+                    Some((share, shininess)) => MaterialPart::Phong {
+                        diffuse: albedo,
+                        ambient: 1.0,
+                        specular: Amount::Number(share),
+                        shininess,
+                        transparency: 0.0,
+                        ior: 1.5,
+                        absorption: Rgb::default(),
+                    },
+                    None => MaterialPart::Diffuse { albedo },
+                }
             }
         }
     }
@@ -241,6 +253,21 @@ impl LoadedMesh {
         }
         Some(Paint::Texture(name))
     }
+}
+
+/// The share of light that an MTL material's highlight returns, and its exponent; `None` where nobody would see it.
+///
+/// The file gives the strength of its peak: Kd cos + Ks cosⁿ. Ours are given by the light that they return in all, so
+/// that the peak is (n + 1) / 2 times that share, in the same measure.
+fn highlight_of(material: &ImportedMaterial) -> Option<(f32, f32)> {
+    const LEAST: f32 = 1.0 / 256.0;
+    if matches!(material.illumination_model, Some(0 | 1)) {
+        return None;
+    }
+    let (strength, shininess) = (material.specular?, material.shininess?);
+    let strength = strength.clamp(Vec3::ZERO, Vec3::ONE).element_sum() / 3.0;
+    let share = (2.0 * strength / (shininess + 1.0)).min(1.0);
+    (share >= LEAST).then_some((share, shininess.max(1.0)))
 }
 
 /// What went wrong with a file, in plain words.

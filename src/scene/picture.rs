@@ -1,30 +1,46 @@
 //! Picture files as textures: decoded once, linear, within limits.
 
+use super::limits::{Limits, open_file};
 use crate::render::ImageTexture;
 use glam::Vec3;
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageReader};
+use std::io::BufReader;
 use std::path::Path;
 
 /// Pixels along one side at most.
 const MAX_SIDE: u32 = 32_768;
-/// Bytes that decoding may take: a 16,384 × 8,192 picture in `f32`.
-const MAX_BYTES: u64 = 2 << 30;
+/// Bytes that the decoder may take for each pixel of the largest picture.
+const BYTES_A_PIXEL: u64 = 16;
 
 /// Reads PNG, JPEG, HDR or EXR; 8- and 16-bit pictures are taken as sRGB. Returns a warning beside the picture when
 /// some of its numbers had to be left out.
 pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), String> {
-    let mut reader = ImageReader::open(path)
-        .and_then(|reader| reader.with_guessed_format())
+    read_picture_within(path, &Limits::of_this_process())
+}
+
+/// The same within limits of the caller's choice.
+pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), String> {
+    let mut reader = open_file(path)
+        .and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format())
         .map_err(|error| format!("cannot be read: {}", super::meshes::plain_io(&error)))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_BYTES);
-    reader.limits(limits);
+    let mut of_decoder = image::Limits::default();
+    of_decoder.max_image_width = Some(MAX_SIDE);
+    of_decoder.max_image_height = Some(MAX_SIDE);
+    of_decoder.max_alloc = Some(limits.picture_pixels.saturating_mul(BYTES_A_PIXEL));
+    reader.limits(of_decoder);
     if reader.format().is_none() {
         return Err("is no picture that can be read: use PNG, JPEG, HDR or EXR".to_owned());
     }
-    let picture = reader.decode().map_err(|error| format!("cannot be decoded: {error}"))?;
+    let undecodable = |error: image::ImageError| format!("cannot be decoded: {error}");
+    // A few bytes can claim any size, so it is asked for before anything is decoded.
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > limits.picture_pixels {
+        let (limit, advice) = (limits.picture_pixels, Limits::advice());
+        return Err(format!("has {width} x {height} pixels, but the limit for pictures is {limit}: {advice}"));
+    }
+    let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?;
     let (width, height) = (picture.width(), picture.height());
     let is_float = matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let mut texels: Vec<Vec3> = if is_float {

@@ -242,9 +242,11 @@ impl App {
         // Without a first scene there is nothing to stay for, and the terminal is where the name was typed.
         if status.scene.is_empty()
             && status.loading.is_none()
-            && let Some(message) = status.messages.iter().find(|message| message.kind == MessageKind::Error)
+            && status.messages.iter().any(|message| message.kind == MessageKind::Error)
         {
-            self.failure = Some(ViewerError::Scene(message.text.clone()));
+            let errors = status.messages.iter().filter(|message| message.kind == MessageKind::Error);
+            let lines: Vec<&str> = errors.map(|message| message.text.as_str()).collect();
+            self.failure = Some(ViewerError::Scene(lines.join("\n")));
             event_loop.exit();
             return;
         }

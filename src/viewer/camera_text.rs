@@ -10,15 +10,13 @@ pub fn camera_text(rig: &Rig) -> String {
     // A millionth of the viewing distance is a thousandth of a pixel.
     let place = |point: glam::DVec3| point.map(|value| rounded(value, view.pivot_distance));
     let part = CameraPart {
-        eye: place(view.eye),
-        look_at: place(view.pivot()),
         up: view.up.map(|value| rounded(value, 1.0)),
         vfov: rounded(projection.vfov_deg, projection.vfov_deg),
         lens_radius: (radius > 0.0).then_some(rounded(radius, radius)),
-        f_stop: None,
         focus_distance: Some(rounded(lens.focus_distance, lens.focus_distance)),
         blades: lens.blades,
         blade_rotation: lens.blade_rotation_deg,
+        ..CameraPart::looking_at(place(view.eye), place(view.pivot()))
     };
     let style = ron::ser::PrettyConfig::new()
         .depth_limit(2)
@@ -56,7 +54,7 @@ mod tests {
         let camera = SceneFile::parse(&text, "printed").unwrap_or_else(|error| panic!("{error}\n{text}")).camera;
         let near = |a: DVec3, b: DVec3, scale: f64| assert!((a - b).abs().max_element() <= 1e-6 * scale, "{a} for {b}");
         near(camera.eye, view.eye, view.pivot_distance);
-        near(camera.look_at, view.pivot(), view.pivot_distance);
+        near(camera.look_at.unwrap(), view.pivot(), view.pivot_distance);
         near(camera.up, view.up, 1.0);
         assert_eq!((camera.vfov, camera.lens_radius, camera.focus_distance), (33.3, Some(0.025), Some(1.75)));
         assert_eq!((camera.blades, camera.blade_rotation), (6, 15.0));

@@ -1,6 +1,6 @@
 //! Saves pictures on threads of their own, so that the window goes on.
 
-use crate::frame::{PictureFormat, Waker, write_new_film};
+use crate::frame::{PictureFormat, Print, Waker};
 use crate::render::{Display, Film};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -45,7 +45,8 @@ impl Saver {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
             let saved = match film.recv() {
-                Ok(film) => write_new_film(&film, &display, size, &folder, &stem, format)
+                Ok(film) => Print { film: &film, display: &display, size, note: None }
+                    .write_new(&folder, &stem, format)
                     .map(|path| Kept { path, coarse: (film.width(), film.height()) != size }),
                 Err(_) => Err("there was no picture to be kept".to_owned()),
             };

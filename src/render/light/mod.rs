@@ -11,7 +11,7 @@ use crate::kdtree::Shape;
 use crate::sampling::Sampler;
 use glam::{Mat3, Vec2, Vec3};
 use selection::Selection;
-use shape::LightShape;
+pub(super) use shape::LightShape;
 pub(super) use shape::sphere_uv;
 
 /// How many sample dimensions [`LightTable::sample_each`] uses.
@@ -144,6 +144,11 @@ impl LightTable {
         self.lights.is_empty()
     }
 
+    #[inline]
+    pub(super) fn light(&self, id: u32) -> &Light {
+        &self.lights[id as usize]
+    }
+
     /// The light that a primitive is, if it is one.
     #[inline]
     pub(super) fn light_of(&self, object: u32, prim: u32) -> Option<u32> {
@@ -240,20 +245,26 @@ impl Light {
         self.shape.sample(position, techniques.solid_angle, u).map(|point| self.shining(textures, &point, pmf))
     }
 
+    /// What the point with this normal and these surface coordinates sends out, W·m⁻²·sr⁻¹.
     #[inline]
-    fn shining(&self, textures: &[Texture], point: &shape::LightPoint, pmf: f32) -> LightSample {
+    pub fn radiance(&self, textures: &[Texture], normal: Vec3, uv: Vec2) -> Vec3 {
         let radiance = match self.emission.radiance {
             ColorInput::Constant(radiance) => radiance,
             ColorInput::Texture(texture) => {
                 let uv = match (&self.shape, &self.turned) {
-                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * point.normal),
-                    (LightShape::Sphere { .. }, None) => sphere_uv(point.normal),
-                    _ => point.uv,
+                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * normal),
+                    (LightShape::Sphere { .. }, None) => sphere_uv(normal),
+                    _ => uv,
                 };
                 textures[texture as usize].eval(uv)
             }
         };
-        let radiance = self.emission.scale * radiance;
+        self.emission.scale * radiance
+    }
+
+    #[inline]
+    fn shining(&self, textures: &[Texture], point: &shape::LightPoint, pmf: f32) -> LightSample {
+        let radiance = self.radiance(textures, point.normal, point.uv);
         LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance }
     }
 }

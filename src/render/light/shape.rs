@@ -49,6 +49,17 @@ pub(super) struct LightPoint {
     pub uv: Vec2,
 }
 
+/// A point of a light, whoever looks at it.
+pub(in crate::render) struct SurfaceOfLight {
+    pub position: Vec3,
+    /// Bound on its error, metres per axis.
+    pub error: Vec3,
+    /// Unit.
+    pub normal: Vec3,
+    /// As of [`LightPoint`].
+    pub uv: Vec2,
+}
+
 /// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
 /// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
 const SMALL_SOLID_ANGLE: f32 = 1e-3;
@@ -79,6 +90,50 @@ impl LightShape {
         match self {
             Self::Sphere { radius, .. } => 4.0 * std::f32::consts::PI * radius * radius,
             Self::Quad { area, .. } | Self::Triangle { area, .. } => *area,
+        }
+    }
+
+    /// The middle of a sphere or quad, some point inside of a triangle.
+    pub fn center(&self) -> Vec3 {
+        match self {
+            Self::Sphere { center, .. } => *center,
+            Self::Quad { corner, edge_u, edge_v, .. } => *corner + 0.5 * (*edge_u + *edge_v),
+            Self::Triangle { vertices: [a, b, c], .. } => (*a + *b + *c) / 3.0,
+        }
+    }
+
+    /// A point evenly over the area of a flat light; of a sphere, that which faces as [`uniform_sphere`] says.
+    pub fn at_area(&self, u: Vec2) -> SurfaceOfLight {
+        match self {
+            Self::Sphere { .. } => self.at_normal(uniform_sphere(u)),
+            Self::Quad { corner, edge_u, edge_v, normal, .. } => SurfaceOfLight {
+                position: *corner + u.x * *edge_u + u.y * *edge_v,
+                error: robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs()),
+                normal: *normal,
+                uv: u,
+            },
+            Self::Triangle { vertices: [a, b, c], normal, .. } => {
+                let weights = uniform_triangle(u);
+                SurfaceOfLight {
+                    position: *a + weights.x * (*b - *a) + weights.y * (*c - *a),
+                    error: robust::gamma(7) * (a.abs() + b.abs() + c.abs()),
+                    normal: *normal,
+                    uv: weights,
+                }
+            }
+        }
+    }
+
+    /// The point of a sphere with this outward normal; the middle of a flat light, which has but one.
+    pub fn at_normal(&self, outwards: Vec3) -> SurfaceOfLight {
+        match self {
+            Self::Sphere { center, radius } => SurfaceOfLight {
+                position: *center + *radius * outwards,
+                error: robust::gamma(6) * (center.abs() + Vec3::splat(*radius)),
+                normal: outwards,
+                uv: Vec2::ZERO,
+            },
+            _ => self.at_area(Vec2::splat(0.5)),
         }
     }
 
@@ -234,15 +289,20 @@ pub(super) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Opti
 
 /// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
 fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
-    let z = 1.0 - 2.0 * u.x;
-    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let normal = Vec3::new(r * cos_phi, r * sin_phi, z);
+    let normal = uniform_sphere(u);
     let point = center + radius * normal;
     let (wi, distance) = direction(position, point)?;
     let pdf = area_pdf(distance, wi, normal, 4.0 * std::f32::consts::PI * radius * radius)?;
     let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
     Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: Vec2::ZERO })
+}
+
+/// Even over all directions.
+fn uniform_sphere(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.x;
+    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    Vec3::new(r * cos_phi, r * sin_phi, z)
 }
 
 /// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.

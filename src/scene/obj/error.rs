@@ -1,4 +1,5 @@
 use crate::mesh::MeshError;
+use crate::scene::Limits;
 use std::path::PathBuf;
 
 /// Why an OBJ file could not be loaded: which file, which line, what was expected.
@@ -6,14 +7,20 @@ use std::path::PathBuf;
 pub enum ObjError {
     #[error("{}: cannot be read: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    /// A whole sentence.
+    #[error("{0}")]
+    Write(String),
     #[error("{}: is not a regular file", path.display())]
     NotAFile { path: PathBuf },
-    #[error("{}: has {bytes} bytes, more than the limit of {limit}", path.display())]
+    #[error("{}: has {bytes} bytes, more than the limit of {limit}: {}", path.display(), Limits::advice())]
     TooLarge { path: PathBuf, bytes: u64, limit: u64 },
     #[error("{}: has no faces (lines that start with `f`): is it a Wavefront OBJ file?", path.display())]
     NoFaces { path: PathBuf },
+    #[error(
+        "{}: none of its {triangles} triangles has an area: the corners of each lie on one line, so there is nothing to see",
+        path.display()
+    )]
+    NoArea { path: PathBuf, triangles: usize },
     #[error("{}:{line}: {problem}", path.display())]
     Line { path: PathBuf, line: usize, problem: LineProblem },
     #[error("{}: uses more than 65536 materials", path.display())]

@@ -18,6 +18,7 @@ pub use write::{ObjExtras, save_obj};
 
 use self::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight};
+use crate::scene::Limits;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::io::{Cursor, Read};
@@ -34,6 +35,8 @@ pub struct ImportedObj {
     pub libraries: Vec<PathBuf>,
     /// Whether every corner had a usable normal in the file; otherwise they were computed.
     pub normals_from_file: bool,
+    /// Faces of more than three corners; they were cut into triangles.
+    pub polygons: usize,
     /// What was left out or replaced, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -66,7 +69,8 @@ impl Default for ObjOptions {
     /// coarse (the faces of an icosahedron meet at 42°, those of an 8-sided column at 45°).
     fn default() -> Self {
         let normals = ObjNormals::FileOrComputed { crease_angle: 60_f32.to_radians() };
-        Self { normals, max_bytes: 1 << 30, max_library_bytes: 16 << 20 }
+        let limits = Limits::of_this_process();
+        Self { normals, max_bytes: limits.model_bytes, max_library_bytes: limits.library_bytes }
     }
 }
 
@@ -119,6 +123,9 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     }
     let mesh_error = |source| ObjError::Mesh { path: path.into(), source };
     let mut mesh = Mesh::from_f64(&corners.positions, triangles).map_err(mesh_error)?;
+    if !mesh.triangles.iter().any(|triangle| has_area(&mesh, *triangle)) {
+        return Err(ObjError::NoArea { path: path.into(), triangles: mesh.triangles.len() });
+    }
     // Slot 0 is what an empty list means.
     mesh.slots = if screened.materials.len() > 1 { slots } else { Vec::new() };
     mesh.uvs = corners.uvs;
@@ -128,7 +135,14 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     };
     mesh.validate().map_err(mesh_error)?;
     let (materials, libraries) = find_materials(path, screened, options.max_library_bytes, &mut warnings);
-    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, warnings: warnings.into_list() })
+    let polygons = parsed.face_arities.iter().filter(|&&corners| corners > 3).count();
+    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, polygons, warnings: warnings.into_list() })
+}
+
+/// Differences and products of `f32` numbers are exact enough in `f64` for corners on a line to give exactly nothing.
+fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
+    let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
+    (b - a).cross(c - a) != DVec3::ZERO
 }
 
 fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {

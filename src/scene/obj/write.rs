@@ -2,8 +2,9 @@
 
 use super::ObjError;
 use crate::mesh::Mesh;
+use crate::scene::whole_file::{WholeFile, unwritable};
 use std::fmt::Display;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What stands around the mesh in its file.
@@ -22,23 +23,10 @@ pub struct ObjExtras<'a> {
 /// Appears whole or not at all: it is written beside `path` under another name first, and a file that was there
 /// stays until the new one is complete.
 pub fn save_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<(), ObjError> {
-    let failed = |source| ObjError::Write { path: path.into(), source };
+    let mut file = WholeFile::begin(path).map_err(ObjError::Write)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".firstlight-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private by default; this one becomes an ordinary file, so the user's mask decides.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
-    let mut out = BufWriter::with_capacity(1 << 16, file.as_file_mut());
-    write(&mut out, mesh, extras, folder).and_then(|()| out.flush()).map_err(failed)?;
-    drop(out);
-    file.as_file().sync_all().map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    write(&mut file, mesh, extras, folder).map_err(|error| ObjError::Write(unwritable(path, &error)))?;
+    file.finish().map_err(ObjError::Write)
 }
 
 fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -> std::io::Result<()> {

@@ -1,0 +1,309 @@
+//! What leaves are made of: sixteen primitives side by side, tested by one ray at a time.
+
+use super::lanes::{LaneHits, may_hit, quad_hits, resolve, shear, sphere_hits};
+use super::ray::Nearest;
+use super::simd::{LANES, Mask, Simd};
+use crate::geometry::{Ray, Shear};
+use glam::Vec3;
+
+/// Primitives in a leaf block: what one AVX-512 instruction tests.
+pub(super) const BLOCK: usize = LANES;
+
+/// Sixteen primitives of one kind.
+///
+/// Lanes without a primitive hold NaN, which no comparison lets through.
+pub(super) trait LeafBlock: Sized {
+    /// What the test wants to know of a ray, made once for all blocks.
+    type Ray: Copy;
+
+    const IDLE: Self::Ray;
+
+    fn ray(ray: &Ray, shear: &Shear) -> Self::Ray;
+
+    fn prims(&self) -> &Prims;
+
+    fn prims_mut(&mut self) -> &mut Prims;
+
+    /// All lanes that the ray meets, whatever the sign of `t`.
+    fn hits<S: Simd>(s: S, block: &Self, ray: &Self::Ray) -> LaneHits<S>;
+
+    /// Offers the nearest hit.
+    #[inline(always)]
+    fn test<S: Simd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
+        let hits = Self::hits(s, block, ray);
+        let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
+        if valid == 0 {
+            return;
+        }
+        let t = s.least(valid, hits.t);
+        // Primitives ascend within a block: the first lane is the lowest of those at the same `t`.
+        let lane = (valid & s.eq(hits.t, s.splat(t))).trailing_zeros() as usize % BLOCK;
+        let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
+        s.store(hits.u, &mut u);
+        s.store(hits.v, &mut v);
+        nearest.offer(t, u[lane], v[lane], block.prims().get(lane));
+    }
+}
+
+/// The numbers of a block's primitives, ascending; lanes without one come last.
+///
+/// The highest bit of the first says that the leaf goes on in the next block.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Prims([u32; BLOCK]);
+
+const FOLLOWED: u32 = 1 << 31;
+
+/// Primitives that blocks can tell apart.
+pub(super) const MAX_PRIMS: usize = FOLLOWED as usize;
+
+impl Prims {
+    fn new(prims: &[u32]) -> Self {
+        let mut all = [u32::MAX; BLOCK];
+        all[..prims.len()].copy_from_slice(prims);
+        Self(all)
+    }
+
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> u32 {
+        self.0[lane] & !FOLLOWED
+    }
+
+    /// Whether the leaf goes on in the next block.
+    #[inline(always)]
+    pub fn is_followed(&self) -> bool {
+        self.0[0] & FOLLOWED != 0
+    }
+
+    pub fn set_followed(&mut self) {
+        self.0[0] |= FOLLOWED;
+    }
+
+    /// [`Self::len`] in two instructions.
+    #[inline(always)]
+    pub fn count<S: Simd>(&self, s: S) -> usize {
+        s.lt_u(s.load_u(&self.0), s.splat_u(u32::MAX)).count_ones() as usize
+    }
+
+    /// How many lanes hold a primitive.
+    pub fn len(&self) -> usize {
+        self.0.iter().filter(|&&prim| prim != u32::MAX).count()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = u32> {
+        (0..self.len()).map(|lane| self.get(lane))
+    }
+}
+
+/// `points[k][axis][lane]`.
+type Points<const N: usize> = [[[f32; BLOCK]; 3]; N];
+
+fn gather<const N: usize>(prims: &[u32], points: impl Fn(u32) -> [Vec3; N]) -> Points<N> {
+    let mut gathered = [[[f32::NAN; BLOCK]; 3]; N];
+    for (lane, &prim) in prims.iter().enumerate() {
+        for (to, from) in gathered.iter_mut().zip(points(prim)) {
+            (0..3).for_each(|axis| to[axis][lane] = from[axis]);
+        }
+    }
+    gathered
+}
+
+/// Triangles by their vertices.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct TriangleBlock {
+    pub vertices: Points<3>,
+    pub prims: Prims,
+}
+const _: () = assert!(size_of::<TriangleBlock>() == 640);
+
+/// Bit by bit, for the empty lanes are NaN.
+impl PartialEq for TriangleBlock {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |block: &Self| block.vertices.map(|vertex| vertex.map(|axis| axis.map(f32::to_bits)));
+        self.prims == other.prims && bits(self) == bits(other)
+    }
+}
+
+impl TriangleBlock {
+    pub fn new(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        Self { vertices: gather(prims, triangle), prims: Prims::new(prims) }
+    }
+
+    pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        self.vertices.map(|vertex| Vec3::from_array(vertex.map(|axis| axis[lane])))
+    }
+}
+
+/// A ray in the sheared frame of the watertight test.
+#[derive(Clone, Copy)]
+pub(super) struct ShearedRay {
+    /// Axes across, across and along.
+    pub axes: [usize; 3],
+    /// The origin along these.
+    pub origin: [f32; 3],
+    pub sx: f32,
+    pub sy: f32,
+    pub sz: f32,
+}
+
+impl ShearedRay {
+    const IDLE: Self = Self { axes: [0, 1, 2], origin: [0.0; 3], sx: 0.0, sy: 0.0, sz: 0.0 };
+
+    #[inline(always)]
+    fn new(ray: &Ray, shear: &Shear) -> Self {
+        let axes = [shear.kx, shear.ky, shear.kz];
+        Self { axes, origin: axes.map(|k| ray.origin[k]), sx: shear.sx, sy: shear.sy, sz: shear.sz }
+    }
+
+    /// Brings sixteen points into the frame.
+    #[inline(always)]
+    fn shear<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
+        let [kx, ky, kz] = self.axes;
+        let origin = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
+        let point = [s.load(&points[kx]), s.load(&points[ky]), s.load(&points[kz])];
+        shear(s, point, origin, s.splat(self.sx), s.splat(self.sy))
+    }
+}
+
+impl LeafBlock for TriangleBlock {
+    type Ray = ShearedRay;
+    const IDLE: ShearedRay = ShearedRay::IDLE;
+
+    #[inline(always)]
+    fn ray(ray: &Ray, shear: &Shear) -> ShearedRay {
+        ShearedRay::new(ray, shear)
+    }
+
+    #[inline(always)]
+    fn prims(&self) -> &Prims {
+        &self.prims
+    }
+
+    fn prims_mut(&mut self) -> &mut Prims {
+        &mut self.prims
+    }
+
+    #[inline(always)]
+    fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
+        let [a, b, c] = &block.vertices;
+        let (a, b, c) = (ray.shear(s, a), ray.shear(s, b), ray.shear(s, c));
+        let mask = may_hit(s, &a, &b, &c);
+        if mask == 0 {
+            return LaneHits::none(s);
+        }
+        resolve(s, mask, &a, &b, &c, s.splat(ray.sz))
+    }
+}
+
+/// Parallelograms by their corners, in the order of `geometry::quad_corners`.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct QuadBlock {
+    corners: Points<4>,
+    prims: Prims,
+}
+
+impl QuadBlock {
+    pub fn new(prims: &[u32], corners: impl Fn(u32) -> [Vec3; 4]) -> Self {
+        Self { corners: gather(prims, corners), prims: Prims::new(prims) }
+    }
+}
+
+impl LeafBlock for QuadBlock {
+    type Ray = ShearedRay;
+    const IDLE: ShearedRay = ShearedRay::IDLE;
+
+    #[inline(always)]
+    fn ray(ray: &Ray, shear: &Shear) -> ShearedRay {
+        ShearedRay::new(ray, shear)
+    }
+
+    #[inline(always)]
+    fn prims(&self) -> &Prims {
+        &self.prims
+    }
+
+    fn prims_mut(&mut self) -> &mut Prims {
+        &mut self.prims
+    }
+
+    #[inline(always)]
+    fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
+        let [a, b, c, d] = &block.corners;
+        let corners = [ray.shear(s, a), ray.shear(s, b), ray.shear(s, c), ray.shear(s, d)];
+        quad_hits(s, Mask::MAX, &corners, s.splat(ray.sz))
+    }
+}
+
+/// Balls by centre and radius.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct SphereBlock {
+    /// `[axis][lane]`.
+    center: [[f32; BLOCK]; 3],
+    radius: [f32; BLOCK],
+    prims: Prims,
+}
+
+/// Bit by bit, for the empty lanes are NaN.
+impl PartialEq for SphereBlock {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |block: &Self| (block.center.map(|axis| axis.map(f32::to_bits)), block.radius.map(f32::to_bits));
+        self.prims == other.prims && bits(self) == bits(other)
+    }
+}
+
+impl SphereBlock {
+    pub fn new(prims: &[u32], sphere: impl Fn(u32) -> (Vec3, f32)) -> Self {
+        let [center] = gather(prims, |prim| [sphere(prim).0]);
+        let mut radius = [f32::NAN; BLOCK];
+        radius.iter_mut().zip(prims).for_each(|(radius, &prim)| *radius = sphere(prim).1);
+        Self { center, radius, prims: Prims::new(prims) }
+    }
+
+    pub fn sphere(&self, lane: usize) -> (Vec3, f32) {
+        (Vec3::from_array(self.center.map(|axis| axis[lane])), self.radius[lane])
+    }
+}
+
+/// A ray in `f64`.
+#[derive(Clone, Copy)]
+pub(super) struct PreciseRay {
+    origin: [f64; 3],
+    dir: [f64; 3],
+    inv_dir_squared: f64,
+}
+
+impl LeafBlock for SphereBlock {
+    type Ray = PreciseRay;
+    const IDLE: PreciseRay = PreciseRay { origin: [0.0; 3], dir: [0.0; 3], inv_dir_squared: 0.0 };
+
+    #[inline(always)]
+    fn ray(ray: &Ray, _shear: &Shear) -> PreciseRay {
+        let (origin, dir) = (ray.origin.as_dvec3().to_array(), ray.dir.as_dvec3().to_array());
+        let inv_dir_squared = 1.0 / (dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
+        PreciseRay { origin, dir, inv_dir_squared }
+    }
+
+    #[inline(always)]
+    fn prims(&self) -> &Prims {
+        &self.prims
+    }
+
+    fn prims_mut(&mut self) -> &mut Prims {
+        &mut self.prims
+    }
+
+    #[inline(always)]
+    fn hits<S: Simd>(s: S, block: &Self, ray: &PreciseRay) -> LaneHits<S> {
+        let [x, y, z] = &block.center;
+        let to_center = [
+            s.sub_d(s.widen(s.load(x)), s.splat_d(ray.origin[0])),
+            s.sub_d(s.widen(s.load(y)), s.splat_d(ray.origin[1])),
+            s.sub_d(s.widen(s.load(z)), s.splat_d(ray.origin[2])),
+        ];
+        let radius = s.widen(s.load(&block.radius));
+        let dir = [s.splat_d(ray.dir[0]), s.splat_d(ray.dir[1]), s.splat_d(ray.dir[2])];
+        sphere_hits(s, Mask::MAX, &to_center, s.mul_d(radius, radius), &dir, s.splat_d(ray.inv_dir_squared))
+    }
+}

@@ -1,0 +1,109 @@
+//! The objects with a tree of their own, when they are many: a tree over their boxes.
+
+use super::build::{BuildConfig, Primitives, build};
+use super::mesh_tree::BuildPreset;
+use super::nodes::KdNodes;
+use super::ray::TreeRay;
+use super::scene_tree::{Shape, object_bounds};
+use crate::geometry::{Aabb, Ray, Shear};
+use glam::Vec3;
+
+#[derive(Debug)]
+pub(super) struct InstanceTree {
+    pub nodes: KdNodes,
+    /// The largest side of the bounds.
+    pub extent: f32,
+    /// Places in `objects`, leaf after leaf.
+    leaf_places: Vec<u32>,
+    objects: Vec<u32>,
+    boxes: Vec<Aabb>,
+}
+
+/// A ray enters the box of an instance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    pub t: f32,
+    pub object: u32,
+}
+
+/// The objects tested last: one that spans many cells need not be tested in each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Recent {
+    /// Plus 1; 0 for none.
+    objects: [u32; 8],
+}
+
+impl Recent {
+    #[inline]
+    pub fn is_new(&mut self, object: u32) -> bool {
+        let slot = &mut self.objects[object as usize % 8];
+        std::mem::replace(slot, object + 1) != object + 1
+    }
+}
+
+/// Entries that a ray asks for at a time: most rays end before they need more.
+const ENTRIES: usize = 4;
+
+impl InstanceTree {
+    pub fn build(shapes: &[Shape], objects: Vec<u32>) -> Self {
+        let boxes: Vec<Aabb> = objects.iter().map(|&object| object_bounds(&shapes[object as usize])).collect();
+        let config = BuildConfig { exact_below: 8, block_cost: 4.0, max_growth: 2.0, ..BuildPreset::Best.config(1) };
+        let mut leaf_places = Vec::new();
+        let nodes = build(&Boxes(&boxes), &config, |leaf| {
+            leaf_places.extend_from_slice(leaf);
+            ((leaf_places.len() - leaf.len()) as u32, leaf.len() as u32)
+        });
+        Self { extent: nodes.extent(), nodes, leaf_places, objects, boxes }
+    }
+
+    /// The objects of a leaf.
+    pub fn leaf(&self, first: u32, count: u32) -> impl Iterator<Item = u32> {
+        self.leaf_places[first as usize..][..count as usize].iter().map(|&place| self.objects[place as usize])
+    }
+
+    /// Appends some boxes that the ray meets within `from..=t_max`, nearest first, and returns from where to go on;
+    /// infinity when there are no more.
+    ///
+    /// - `recent`: the objects of these are left out, and the new ones put in.
+    pub fn entries(&self, ray: &Ray, from: f32, t_max: f32, recent: &mut Recent, entries: &mut Vec<Entry>) -> f32 {
+        let first = entries.len();
+        let tree_ray = TreeRay::new(ray.origin, ray.dir, &Shear::new(ray.dir), self.extent);
+        let mut go_on = f32::INFINITY;
+        let visit = |begin, count, end| {
+            for &place in &self.leaf_places[begin as usize..][..count as usize] {
+                let object = self.objects[place as usize];
+                if recent.is_new(object) {
+                    let (t, last) = tree_ray.clip(&self.boxes[place as usize], t_max);
+                    if t <= last {
+                        entries.push(Entry { t, object });
+                    }
+                }
+            }
+            // From a cell without an extent along the ray no step forward is certain.
+            if entries.len() - first >= ENTRIES && end > from {
+                go_on = end;
+                return f32::NEG_INFINITY;
+            }
+            t_max
+        };
+        self.nodes.walk_cells(&tree_ray, from, t_max, visit, || ());
+        entries[first..].sort_unstable_by(|a, b| a.t.total_cmp(&b.t));
+        go_on
+    }
+}
+
+struct Boxes<'a>(&'a [Aabb]);
+
+impl Primitives for Boxes<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn bounds(&self, prim: u32) -> Aabb {
+        self.0[prim as usize]
+    }
+
+    fn clipped(&self, _: u32, _: usize, _: f32, _: bool, _: f32) -> Option<Aabb> {
+        Some(Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY })
+    }
+}

@@ -1,0 +1,115 @@
+//! The simple objects of a scene that are too many to be tested one after the other: a tree for each kind.
+
+use super::block_tree::BlockTree;
+use super::blocks::{BLOCK, LeafBlock, QuadBlock, SphereBlock, TriangleBlock};
+use super::build::{Primitives, clip_triangle};
+use super::mesh_tree::BuildPreset;
+use super::scene_tree::{Shape, object_bounds};
+use super::sphere_tree::clip_ball;
+use crate::geometry::{Aabb, quad_corners};
+use glam::Vec3;
+
+/// Up to this many simple objects are tested by every ray; a tree pays above.
+const MAX_SIMPLE: usize = 48;
+
+/// Trees over spheres, quads and triangles. What their leaves hold are the numbers of the objects.
+#[derive(Debug, Default)]
+pub(super) struct LooseTrees {
+    pub spheres: Option<BlockTree<SphereBlock>>,
+    pub quads: Option<BlockTree<QuadBlock>>,
+    pub triangles: Option<BlockTree<TriangleBlock>>,
+}
+
+impl LooseTrees {
+    /// Builds trees for the kinds that need one, the most frequent first, and returns the objects that are left.
+    pub fn build(shapes: &[Shape]) -> (Self, Vec<u32>) {
+        let of_kind = |is_kind: fn(&Shape) -> bool| -> Vec<u32> {
+            (0u32..).zip(shapes).filter(|(_, shape)| is_kind(shape)).map(|(object, _)| object).collect()
+        };
+        let mut simple = of_kind(|shape| matches!(shape, Shape::Plane { .. }));
+        let mut kinds = [
+            of_kind(|shape| matches!(shape, Shape::Sphere { .. })),
+            of_kind(|shape| matches!(shape, Shape::Quad { .. })),
+            of_kind(|shape| matches!(shape, Shape::Triangle { .. })),
+        ];
+        kinds.sort_by_key(Vec::len);
+        let mut trees = Self::default();
+        let mut n_simple = 0;
+        for objects in kinds {
+            n_simple += objects.len();
+            if n_simple <= MAX_SIMPLE {
+                simple.extend(objects);
+            } else {
+                trees.add(shapes, &objects);
+            }
+        }
+        simple.sort_unstable();
+        (trees, simple)
+    }
+
+    fn add(&mut self, shapes: &[Shape], objects: &[u32]) {
+        match &shapes[objects[0] as usize] {
+            Shape::Sphere { .. } => {
+                let sphere = |object: u32| match &shapes[object as usize] {
+                    Shape::Sphere { center, radius } => (*center, *radius),
+                    _ => (Vec3::NAN, f32::NAN),
+                };
+                self.spheres = Some(tree(shapes, objects, |objects| SphereBlock::new(objects, sphere)));
+            }
+            Shape::Quad { .. } => {
+                let corners = |object: u32| match &shapes[object as usize] {
+                    Shape::Quad { corner, edge_u, edge_v } => quad_corners(*corner, *edge_u, *edge_v),
+                    _ => [Vec3::NAN; 4],
+                };
+                self.quads = Some(tree(shapes, objects, |objects| QuadBlock::new(objects, corners)));
+            }
+            Shape::Triangle { .. } => {
+                let vertices = |object: u32| match &shapes[object as usize] {
+                    Shape::Triangle { vertices } => *vertices,
+                    _ => [Vec3::NAN; 3],
+                };
+                self.triangles = Some(tree(shapes, objects, |objects| TriangleBlock::new(objects, vertices)));
+            }
+            Shape::Plane { .. } | Shape::Mesh { .. } | Shape::Spheres { .. } => {}
+        }
+    }
+}
+
+fn tree<B: LeafBlock>(shapes: &[Shape], objects: &[u32], make_block: impl Fn(&[u32]) -> B) -> BlockTree<B> {
+    let of_objects = |prims: &[u32]| {
+        let mut block = [0; BLOCK];
+        block.iter_mut().zip(prims).for_each(|(object, &prim)| *object = objects[prim as usize]);
+        make_block(&block[..prims.len()])
+    };
+    BlockTree::build(&Loose { shapes, objects }, &BuildPreset::Best.config(BLOCK), of_objects)
+}
+
+/// What the builder sees of them.
+struct Loose<'a> {
+    shapes: &'a [Shape],
+    objects: &'a [u32],
+}
+
+impl Loose<'_> {
+    fn shape(&self, prim: u32) -> &Shape {
+        &self.shapes[self.objects[prim as usize] as usize]
+    }
+}
+
+impl Primitives for Loose<'_> {
+    fn len(&self) -> usize {
+        self.objects.len()
+    }
+
+    fn bounds(&self, prim: u32) -> Aabb {
+        object_bounds(self.shape(prim))
+    }
+
+    fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
+        match self.shape(prim) {
+            Shape::Triangle { vertices } => clip_triangle(vertices, axis, limit, below, padding),
+            Shape::Sphere { center, radius } => Some(clip_ball(*center, *radius, axis, limit, below, padding)),
+            _ => Some(Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY }),
+        }
+    }
+}

@@ -1,0 +1,425 @@
+//! Paths from the lamps, a wave at a time, joined to the lens wherever they meet something that scatters.
+//!
+//! The twin of [`super::super::path`], with light and eye in each other's place. Where shading normals differ from true
+//! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the eye's view is the
+//! one that counts, so surfaces are always looked at from the eye's side here.
+
+use super::aim::LINE_DIMENSIONS;
+use super::guide::Trace;
+use super::layer::Splat;
+use super::weight::{Bounce, etendue_gain, is_reversible};
+use super::{CausticPass, aim};
+use crate::geometry::Ray;
+use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
+use crate::render::bsdf::{Blend, BsdfSample, Lobe, Scatter};
+use crate::render::medium::MediumStack;
+use crate::render::surface::{Vertex, blend_at, lobe_at, material_of};
+use crate::render::{Material, MaterialId, PixelFilter, RayCounts};
+use crate::sampling::{Sampler, hash_u32};
+use glam::{Vec2, Vec3};
+
+/// Sample dimensions of a vertex.
+const VERTEX_DIMENSIONS: u32 = 4;
+const DIM_LENS: u32 = 0;
+const DIM_DIRECTION: u32 = 1;
+const DIM_LOBE: u32 = 2;
+const DIM_ROULETTE: u32 = 3;
+
+/// What a surface that scatters keeps of a path, at most: most of what can be seen of a caustic is its first light.
+const SURVIVAL: f32 = 0.5;
+
+/// Share of the scouts that glass reflects: more than of the light, so that faint reflections become known as well.
+const SCOUTED_REFLECTION: f32 = 0.25;
+
+/// Vertices before perfectly smooth surfaces end paths that they dim.
+const ROULETTE_DEPTH: u32 = 4;
+
+/// From here on even paths that lose nothing are ended now and then.
+const ENDLESS_DEPTH: u32 = 64;
+
+/// The state of one path between two vertices.
+#[derive(Clone, Copy)]
+struct LightPath {
+    /// Flux over density.
+    throughput: Vec3,
+    /// Density over that of the same path from the eye, up to the vertex to come; see [`super::weight`].
+    ratio: f32,
+    sampler: Sampler,
+    /// To be hit first; no caster any more after that.
+    aimed_at: u32,
+    media: MediumStack,
+}
+
+/// Scratch memory of one worker.
+#[derive(Default)]
+pub(super) struct LightWave {
+    rays: RayBatch,
+    paths: Vec<LightPath>,
+    next_rays: RayBatch,
+    next_paths: Vec<LightPath>,
+    hits: HitBatch,
+    shadow_rays: RayBatch,
+    /// Where in the film each shadow ray leads, and with how much light.
+    arrivals: Vec<(Vec2, Vec3)>,
+    occluded: Vec<bool>,
+}
+
+/// One of the two kinds of scattering of a surface.
+enum Surface {
+    Lobe(Lobe),
+    Blend(Box<Blend>),
+}
+
+impl LightWave {
+    /// Follows paths `first` to `first + n`; `None` when `stop` said so.
+    pub fn trace(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<(Vec<Splat>, RayCounts)> {
+        let mut splats = Vec::new();
+        let mut counts = RayCounts::default();
+        self.start(pass, first, n);
+        let mut n_vertices = 0;
+        while !self.rays.is_empty() {
+            if stop() {
+                return None;
+            }
+            n_vertices += 1;
+            counts.bounce += self.rays.len() as u64;
+            let tree = &pass.scene.geometry.tree;
+            tree.closest_hits(&self.rays, RayClass::Incoherent, &mut self.hits);
+            self.scatter(pass, n_vertices);
+            tree.any_hits(&self.shadow_rays, RayClass::Incoherent, &mut self.occluded);
+            counts.shadow += self.shadow_rays.len() as u64;
+            for (&(film, light), &occluded) in self.arrivals.iter().zip(&self.occluded) {
+                if !occluded {
+                    pass.spread(film, light, &mut splats);
+                }
+            }
+            std::mem::swap(&mut self.rays, &mut self.next_rays);
+            std::mem::swap(&mut self.paths, &mut self.next_paths);
+        }
+        Some((splats, counts))
+    }
+
+    /// Follows paths to where they first scatter, for [`super::guide`].
+    pub fn explore(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<Trace>> {
+        let mut traces = Vec::new();
+        self.start(pass, first, n);
+        let mut n_vertices = 0;
+        while !self.rays.is_empty() {
+            if stop() {
+                return None;
+            }
+            n_vertices += 1;
+            pass.scene.geometry.tree.closest_hits(&self.rays, RayClass::Incoherent, &mut self.hits);
+            self.next_rays.clear();
+            self.next_paths.clear();
+            for i in 0..self.rays.len() {
+                let path = self.paths[i];
+                let Some(hit) = self.hits.get(i) else { continue };
+                if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
+                    continue;
+                }
+                let ray = self.rays.get(i);
+                let Some((vertex, material, surface)) = surface_at(pass, &ray, &hit, &path.media) else { continue };
+                if n_vertices > 1 && surface.is_smooth() {
+                    traces.push(Trace { at: vertex.position, from: ray.origin });
+                }
+                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
+                if let Some((ray, path, true)) = step.go_on(&surface) {
+                    self.next_rays.push(&ray);
+                    self.next_paths.push(path);
+                }
+            }
+            std::mem::swap(&mut self.rays, &mut self.next_rays);
+            std::mem::swap(&mut self.paths, &mut self.next_paths);
+        }
+        Some(traces)
+    }
+
+    fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
+        self.rays.clear();
+        self.paths.clear();
+        let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
+        // One sequence for all paths: its stream is none of any pixel's.
+        let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
+        for i in first..first + u64::from(n) {
+            // A sequence has 2³² points.
+            let sampler = new_sampler(seed, u32::MAX, u32::MAX - (i >> 32) as u32, i as u32);
+            let Some(line) = pass.casters.sample(pass.scene, &sampler) else { continue };
+            let throughput = line.radiance / line.density;
+            if throughput == Vec3::ZERO {
+                continue;
+            }
+            self.rays.push(&line.ray);
+            let media = MediumStack::default();
+            self.paths.push(LightPath { throughput, ratio: line.density, sampler, aimed_at: line.caster, media });
+        }
+    }
+
+    /// - `n_vertices`: up to and with the ones that were hit now.
+    fn scatter(&mut self, pass: &CausticPass, n_vertices: u32) {
+        let scene = pass.scene;
+        self.next_rays.clear();
+        self.next_paths.clear();
+        self.shadow_rays.clear();
+        self.arrivals.clear();
+        for i in 0..self.rays.len() {
+            let mut path = self.paths[i];
+            let Some(hit) = self.hits.get(i) else { continue };
+            if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
+                continue;
+            }
+            if scene.shading.features.media {
+                path.throughput *= path.media.transmittance(scene, hit.t);
+            }
+            let found = surface_at(pass, &self.rays.get(i), &hit, &path.media);
+            let Some((vertex, material, surface)) = found else { continue };
+            let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
+            if n_vertices > 1
+                && surface.is_smooth()
+                && path.media == MediumStack::default()
+                && let Some((ray, film, light)) = step.join(&surface)
+            {
+                self.shadow_rays.push(&ray);
+                self.arrivals.push((film, light));
+            }
+            // One more vertex, and the way to the eye: two more segments.
+            if n_vertices + 2 <= pass.max_depth
+                && let Some((ray, path, _)) = step.go_on(&surface)
+            {
+                self.next_rays.push(&ray);
+                self.next_paths.push(path);
+            }
+        }
+    }
+}
+
+/// `None` where the surface is black.
+fn surface_at(pass: &CausticPass, ray: &Ray, hit: &Hit, media: &MediumStack) -> Option<(Vertex, MaterialId, Surface)> {
+    let scene = pass.scene;
+    let material = material_of(scene, hit);
+    let vertex = Vertex::new(scene, ray, hit, material);
+    let is_blend =
+        matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
+    let surface = if is_blend {
+        Surface::Blend(Box::new(blend_at(scene, material, &vertex, media)?))
+    } else {
+        Surface::Lobe(lobe_at(scene, material, &vertex, media)?)
+    };
+    Some((vertex, material, surface))
+}
+
+/// One vertex of one path.
+struct Step<'a> {
+    pass: &'a CausticPass<'a>,
+    path: &'a LightPath,
+    /// As seen from the lamp's side.
+    vertex: &'a Vertex,
+    hit: &'a Hit,
+    material: MaterialId,
+    n_vertices: u32,
+    /// Of [`LightWave::explore`], whose paths carry nothing.
+    is_scout: bool,
+}
+
+impl Step<'_> {
+    fn dimension(&self) -> u32 {
+        LINE_DIMENSIONS + (self.n_vertices - 1) * VERTEX_DIMENSIONS
+    }
+
+    /// The same point as a path that comes from `origin` would meet it.
+    fn seen_from(&self, origin: Vec3) -> Vertex {
+        let way = self.vertex.position - origin;
+        let distance = way.length();
+        let hit = Hit { t: distance, ..*self.hit };
+        Vertex::new(self.pass.scene, &Ray::new(origin, way / distance), &hit, self.material)
+    }
+
+    /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
+    fn join(&self, surface: &Surface) -> Option<(Ray, Vec2, Vec3)> {
+        let &Self { pass, path, .. } = self;
+        let (scene, camera) = (pass.scene, &pass.scene.camera);
+        let lens = if camera.lens_radius > 0.0 {
+            camera.lens_offset(path.sampler.pair(self.dimension() + DIM_LENS))
+        } else {
+            Vec2::ZERO
+        };
+        let origin = camera.lens_point(lens);
+        let (film, cos_lens) = camera.film_point(lens, self.vertex.position - origin, pass.size)?;
+        if !pass.reaches_film(film) {
+            return None;
+        }
+        let vertex = self.seen_from(origin);
+        let to_lamp = self.vertex.wo;
+        // Lamp and eye on the same side of the true surface.
+        if vertex.front != self.vertex.front || !vertex.is_reached_from(to_lamp) {
+            return None;
+        }
+        let (value, pdf) = surface.eval(vertex.wo, to_lamp, vertex.normal);
+        if pdf <= 0.0 {
+            return None;
+        }
+        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), to_lamp.dot(vertex.geometric_normal));
+        if cos_o <= 0.0 || cos_i <= 0.0 {
+            return None;
+        }
+        let distance2 = vertex.position.distance_squared(origin);
+        let weight = pass.lamp_weight(path.ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
+        let importance = cos_o / (distance2 * cos_lens.powi(3) * pass.pixel_area);
+        let mut light = path.throughput * value * (weight * importance / cos_i);
+        if light == Vec3::ZERO {
+            return None;
+        }
+        if scene.shading.features.media {
+            light *= path.media.transmittance(scene, distance2.sqrt());
+        }
+        let start = vertex.leaving(vertex.wo);
+        Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
+    }
+
+    /// Chooses how the path goes on, and whether; and tells whether it does so off something perfectly smooth.
+    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath, bool)> {
+        let &Self { pass, vertex, material, n_vertices, .. } = self;
+        let scene = pass.scene;
+        let mut path = *self.path;
+        let (sampler, dimension) = (path.sampler, self.dimension());
+        let u_lobe = || {
+            let u = sampler.single(dimension + DIM_LOBE);
+            match scene.shading.materials[material as usize] {
+                // Reflected or not, whatever the shares of the light.
+                Material::Glass { .. } if self.is_scout => f32::from(u >= SCOUTED_REFLECTION) * 1.0f32.next_down(),
+                _ => u,
+            }
+        };
+        let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
+        let is_smooth = sample.pdf.is_infinite();
+        // A path that scatters before anything smooth is left to the eye's side.
+        if n_vertices == 1 && !is_smooth {
+            return None;
+        }
+        let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
+        if if sample.transmitted { !beyond } else { !vertex.is_reached_from(sample.wi) } {
+            return None;
+        }
+        let before = path.media;
+        if sample.transmitted {
+            path.media = before.crossed(material, vertex.front);
+        }
+        let bounce = Bounce {
+            vertex,
+            hit: self.hit,
+            eye: None,
+            wi: sample.wi,
+            pdf: sample.pdf,
+            transmitted: sample.transmitted,
+            blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+            before,
+            after: path.media,
+        };
+        if !is_reversible(&bounce) {
+            return None;
+        }
+        let factor = if is_smooth {
+            let gain = etendue_gain(vertex, vertex.wo, sample.wi);
+            path.ratio /= gain;
+            // Radiance is squeezed on its way into glass, flux is not.
+            let eta = if sample.transmitted { before.eta(scene, material, vertex.front) } else { 1.0 };
+            sample.weight * (gain / (eta * eta))
+        } else {
+            let seen = self.seen_from(vertex.position + sample.wi);
+            let (value, pdf) = surface.eval(sample.wi, vertex.wo, seen.normal);
+            let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal), vertex.wo.dot(vertex.geometric_normal));
+            if pdf <= 0.0 || cos_i <= 0.0 || !seen.is_reached_from(vertex.wo) {
+                return None;
+            }
+            path.ratio *= sample.pdf * cos_i / (cos_o * pdf);
+            value * (cos_o / (cos_i * sample.pdf))
+        };
+        let kept = factor.abs().max_element();
+        let survival = match n_vertices {
+            ENDLESS_DEPTH.. => kept.min(0.95),
+            _ if !is_smooth => kept.min(SURVIVAL),
+            ROULETTE_DEPTH.. => kept.min(1.0),
+            _ => 1.0,
+        };
+        path.throughput *= factor;
+        if survival < 1.0 {
+            if sampler.single(dimension + DIM_ROULETTE) >= survival {
+                return None;
+            }
+            path.throughput /= survival;
+        }
+        if path.throughput == Vec3::ZERO {
+            return None;
+        }
+        path.aimed_at = aim::NO_CASTER;
+        let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        Some((Ray::new(origin, sample.wi), path, is_smooth))
+    }
+}
+
+impl Surface {
+    fn is_smooth(&self) -> bool {
+        match self {
+            Self::Lobe(lobe) => lobe.is_smooth(),
+            Self::Blend(blend) => blend.is_smooth(),
+        }
+    }
+
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        match self {
+            Self::Lobe(lobe) => lobe.eval(wo, wi, normal),
+            Self::Blend(blend) => blend.eval(wo, wi, normal),
+        }
+    }
+
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        match self {
+            Self::Lobe(lobe) => lobe.sample(wo, normal, u_lobe, u),
+            Self::Blend(blend) => blend.sample(wo, normal, u_lobe, u),
+        }
+    }
+}
+
+impl CausticPass<'_> {
+    /// Whether any pixel takes notice of a point of the film.
+    fn reaches_film(&self, film: Vec2) -> bool {
+        let radius = self.filter.radius();
+        film.cmpge(Vec2::splat(0.5 - radius)).all() && film.cmplt(self.size + (radius - 0.5)).all()
+    }
+
+    /// Gives light to all pixels whose filter reaches a point of the film.
+    fn spread(&self, film: Vec2, light: Vec3, splats: &mut Vec<Splat>) {
+        let radius = self.filter.radius();
+        let low = (film - radius + 0.5).floor().max(Vec2::ZERO);
+        let high = (film + radius - 0.5).floor().min(self.size - 1.0);
+        let (low, high) = (low.as_uvec2(), high.as_ivec2());
+        let weight = |pixel: u32, at: f32| match self.filter {
+            // Its rim counts on one side, so that no point of the film is lost between two pixels.
+            PixelFilter::Box => 1.0,
+            _ => self.filter.weight(f64::from(at) - f64::from(pixel) - 0.5) / self.filter_norm,
+        };
+        for y in low.y as i32..=high.y {
+            let weight_y = weight(y as u32, film.y);
+            for x in low.x as i32..=high.x {
+                let weight = (weight(x as u32, film.x) * weight_y) as f32;
+                if weight != 0.0 {
+                    splats.push(Splat { pixel: y as u32 * self.size.x as u32 + x as u32, light: weight * light });
+                }
+            }
+        }
+    }
+}
+
+const _: () = assert!(size_of::<LightPath>() <= 48);

@@ -1,0 +1,388 @@
+//! One mesh under many trees: what each costs to build, and what its rays cost then.
+//!
+//! The views are those of the 2013 program's tree test: the model over a reflecting checkered floor under two point
+//! lights in the classic light model, at 500 × 500 pixels and one sample each, then four times nearer by a factor of
+//! 1.2. Every row shows the very same pictures, for the tree decides how long an answer takes and never which.
+//!
+//! Start reading at [`TreeTable::measure`].
+
+use crate::geometry::{Ray, robust::offset_ray_origin};
+use crate::kdtree::{BuildPreset, KdTreeStats, MeshTree, SceneTree, Shape, Visits};
+use crate::mesh::Mesh;
+use crate::render::{
+    Camera, ColorInput, Environment, Film, Geometry, Integrator, Material, Object, RayCounts, RenderSettings,
+    ScalarInput, Shading, Snapshot, Texture, TexturePattern, advance,
+};
+use crate::sampling::{Sampler, cosine_hemisphere, uniform_disc};
+use glam::{Affine3A, Mat2, Vec2, Vec3};
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How many views, and pixels along a side of each.
+pub const VIEWS: usize = 5;
+pub const SIDE: u32 = 500;
+
+/// How a tree is split, and which leaves are not split any further.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TreePlan {
+    pub preset: BuildPreset,
+    /// Triangles; `None` leaves it to the preset.
+    pub leaf_limit: Option<usize>,
+}
+
+/// All rows of the table.
+pub fn tree_plans() -> Vec<TreePlan> {
+    let with = |preset, limits: &'static [Option<usize>]| {
+        limits.iter().map(move |&leaf_limit| TreePlan { preset, leaf_limit })
+    };
+    with(BuildPreset::Median, &[Some(64), Some(32), Some(16), Some(8)])
+        .chain(with(BuildPreset::Quick, &[Some(64), Some(32), Some(16), Some(8), None]))
+        .chain(with(BuildPreset::Best, &[Some(64), Some(32), Some(16), Some(8), None]))
+        .collect()
+}
+
+/// What rays of one kind looked at, on average.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeanVisits {
+    pub inner: f64,
+    /// Leaves with something in them.
+    pub leaves: f64,
+    /// Blocks of 16 triangles.
+    pub blocks: f64,
+}
+
+/// Visits a ray, of rays that meet the box of the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CountedVisits {
+    /// Lines in all directions, which nothing stops: what the expected figures speak of.
+    pub lines: MeanVisits,
+    /// From the eye of view 1 to the first hit.
+    pub camera: MeanVisits,
+    /// From these hits into the hemisphere above, by the cosine, to the next.
+    pub bounce: MeanVisits,
+}
+
+/// One tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TreeRow {
+    pub plan: TreePlan,
+    /// Wall time on the current rayon pool, the least of two.
+    pub build_seconds: f64,
+    /// The same of the pictures.
+    pub view_seconds: [f64; VIEWS],
+    pub stats: KdTreeStats,
+    pub visits: CountedVisits,
+}
+
+impl TreeRow {
+    /// What the area of the cells says of a line that nothing stops.
+    pub fn expected(&self) -> MeanVisits {
+        let KdTreeStats { expected_inner_visits, expected_leaf_visits, expected_block_tests, .. } = self.stats;
+        MeanVisits { inner: expected_inner_visits, leaves: expected_leaf_visits, blocks: expected_block_tests }
+    }
+}
+
+/// All trees over one mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TreeTable {
+    pub triangles: usize,
+    pub threads: usize,
+    pub rows: Vec<TreeRow>,
+    /// Rays of view 1.
+    pub rays: RayCounts,
+    /// Seconds in which one thread tries every triangle for one ray.
+    pub no_tree_seconds_per_ray: f64,
+}
+
+impl TreeTable {
+    /// Builds and tries every plan of `plans`, one after the other, on the current rayon pool.
+    ///
+    /// - `mesh`: of at least one triangle with an area.
+    /// - `world_from_mesh`: how it stands; Y is up in the views.
+    /// - `before`: is told the plan that comes next.
+    pub fn measure(
+        mesh: &Arc<Mesh>,
+        world_from_mesh: Affine3A,
+        plans: &[TreePlan],
+        mut before: impl FnMut(TreePlan),
+    ) -> Self {
+        let mut table = Self {
+            triangles: mesh.triangles.len(),
+            threads: rayon::current_num_threads(),
+            rows: Vec::new(),
+            rays: RayCounts::default(),
+            no_tree_seconds_per_ray: 0.0,
+        };
+        for &plan in plans {
+            before(plan);
+            let build = || match plan.leaf_limit {
+                Some(limit) => MeshTree::build_limited(&mesh.positions, &mesh.triangles, plan.preset, limit),
+                None => MeshTree::build(&mesh.positions, &mesh.triangles, plan.preset),
+            };
+            let (tree, build_seconds) = least_seconds(build);
+            let tree = Arc::new(tree);
+            let stage = Stage::new(&tree, mesh, world_from_mesh);
+            let mut view_seconds = [0.0; VIEWS];
+            for (view, seconds) in view_seconds.iter_mut().enumerate() {
+                let snapshot = stage.seen_from(view);
+                let (rays, least) = least_seconds(|| picture(&snapshot).1);
+                *seconds = least;
+                if view == 0 {
+                    table.rays = rays;
+                }
+            }
+            let rays = SampleRays::of(&tree, &stage, world_from_mesh);
+            if table.rows.is_empty() {
+                table.no_tree_seconds_per_ray = no_tree_seconds(&rays);
+            }
+            let (stats, visits) = (tree.stats(), rays.visits(&tree));
+            table.rows.push(TreeRow { plan, build_seconds, view_seconds, stats, visits });
+        }
+        table
+    }
+
+    /// What view 1 would take if every ray tried every triangle, on as many threads as the rest.
+    pub fn no_tree_seconds(&self) -> f64 {
+        self.no_tree_seconds_per_ray * self.rays.total() as f64 / self.threads as f64
+    }
+}
+
+/// The result and the least wall time of two runs, which is nearest to that of an idle machine.
+fn least_seconds<T>(mut work: impl FnMut() -> T) -> (T, f64) {
+    let mut timed = || {
+        let start = Instant::now();
+        let result = work();
+        (result, start.elapsed().as_secs_f64())
+    };
+    let (_, first) = timed();
+    let (result, second) = timed();
+    (result, first.min(second))
+}
+
+/// One sample a pixel in the classic light model.
+fn picture(snapshot: &Snapshot) -> (Film, RayCounts) {
+    let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
+    let mut film = Film::new(SIDE, SIDE);
+    let report = advance(snapshot, &settings, &mut film, 1, &|| false);
+    (film, report.rays)
+}
+
+/// The model, the floor, the lights.
+struct Stage {
+    snapshot: Snapshot,
+    center: Vec3,
+    /// Longest side of the model.
+    size: f32,
+}
+
+const MODEL: u32 = 0;
+const FLOOR: u32 = 1;
+const LIGHT: u32 = 2;
+
+impl Stage {
+    fn new(tree: &Arc<MeshTree>, mesh: &Arc<Mesh>, world_from_mesh: Affine3A) -> Self {
+        let bounds = SceneTree::build(vec![placed(tree, world_from_mesh)]).bounds();
+        let center = 0.5 * (bounds.min + bounds.max);
+        let size = bounds.size().max_element().max(f32::MIN_POSITIVE);
+        let light = |offset: Vec3| Shape::Sphere { center: center + size * offset, radius: 0.01 * size };
+        let floor = Shape::Plane { point: Vec3::new(center.x, bounds.min.y, center.z), normal: Vec3::Y };
+        let n_slots = mesh.slots.iter().max().map_or(1, |&last| usize::from(last) + 1);
+        let model = Object { mesh: Some(mesh.clone()), ..Object::plain(MODEL) };
+        let lamp = Object { is_point_light: true, ..Object::plain(LIGHT) };
+        let shapes = vec![
+            placed(tree, world_from_mesh),
+            floor,
+            light(Vec3::new(0.0, 2.0, 2.0)),
+            light(Vec3::new(0.0, 1.2, -2.0)),
+        ];
+        let objects =
+            vec![Object { materials: vec![MODEL; n_slots], ..model }, Object::plain(FLOOR), lamp.clone(), lamp];
+        let geometry = Geometry::build(shapes, objects);
+        // Five squares along the model. At two sizes away the lights bring an irradiance of about 3.
+        let squares = Texture {
+            pattern: TexturePattern::Checker { a: Vec3::splat(0.8), b: Vec3::splat(0.02) },
+            uv_matrix: Mat2::from_diagonal(Vec2::splat(5.0 / size)),
+            uv_offset: Vec2::ZERO,
+        };
+        let radiance = 24.0 / (PI * 0.01 * 0.01);
+        let materials = vec![
+            phong(ColorInput::Constant(Vec3::new(0.05, 0.6, 0.6)), 0.0),
+            phong(ColorInput::Texture(0), 0.4),
+            Material::Emissive { radiance: ColorInput::Constant(Vec3::splat(radiance)) },
+        ];
+        let shading = Shading::build(&geometry, materials, vec![squares], Environment::Black);
+        let (geometry, shading) = (Arc::new(geometry), Arc::new(shading));
+        let camera = camera(center, size, 0);
+        Self { snapshot: Snapshot { geometry, shading, camera }, center, size }
+    }
+
+    fn seen_from(&self, view: usize) -> Snapshot {
+        Snapshot { camera: camera(self.center, self.size, view), ..self.snapshot.clone() }
+    }
+}
+
+fn placed(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
+    Shape::Mesh { tree: tree.clone(), world_from_object }
+}
+
+fn phong(diffuse: ColorInput, specular: f32) -> Material {
+    let specular = ScalarInput::Constant(specular);
+    Material::Phong {
+        diffuse,
+        ambient: 0.5,
+        specular,
+        shininess: 20.0,
+        transparency: 0.0,
+        ior: 1.5,
+        absorption: Vec3::ZERO,
+    }
+}
+
+/// Two sizes away, with the model over a third of the picture; each view 1.2 times nearer than the one before.
+fn camera(center: Vec3, size: f32, view: usize) -> Camera {
+    let distance = 2.0 * size / 1.2_f32.powi(view as i32);
+    let forward = -Vec3::new(0.35, 0.55, 1.0).normalize();
+    let right = forward.cross(Vec3::Y).normalize();
+    Camera {
+        eye: center - distance * forward,
+        right,
+        up: right.cross(forward),
+        forward,
+        tan_half_vfov: 0.75,
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+        blades: 0,
+        blade_rotation: 0.0,
+    }
+}
+
+/// Rays in the space of the mesh, of three kinds.
+struct SampleRays {
+    scene: SceneTree,
+    lines: Vec<Ray>,
+    camera: Vec<Ray>,
+    bounce: Vec<Ray>,
+}
+
+/// How many of each kind are tried; those that miss the box do not count.
+const SAMPLES: u32 = 1 << 14;
+
+impl SampleRays {
+    fn of(tree: &Arc<MeshTree>, stage: &Stage, world_from_mesh: Affine3A) -> Self {
+        let scene = SceneTree::build(vec![placed(tree, Affine3A::IDENTITY)]);
+        let mesh_from_world = world_from_mesh.inverse();
+        let camera: Vec<Ray> = (0..SAMPLES)
+            .map(|i| {
+                let film = Sampler::new(1, 0, 0, i).pair(0) * SIDE as f32;
+                let ray = stage.snapshot.camera.ray(film, Vec2::splat(SIDE as f32), Vec2::ZERO);
+                let origin = mesh_from_world.transform_point3(ray.origin);
+                Ray::new(origin, mesh_from_world.transform_vector3(ray.dir).normalize())
+            })
+            .collect();
+        let bounce = camera.iter().zip(0..).filter_map(|(ray, i)| bounce(&scene, ray, i)).collect();
+        let bounds = tree.bounds();
+        let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.size().length());
+        let lines = (0..SAMPLES).map(|i| line(middle, reach, &Sampler::new(2, 0, 0, i))).collect();
+        Self { scene, lines, camera, bounce }
+    }
+
+    fn visits(&self, tree: &MeshTree) -> CountedVisits {
+        CountedVisits {
+            lines: mean_visits(&self.lines, |ray| tree.count_visits_through(ray)),
+            camera: mean_visits(&self.camera, |ray| tree.count_visits(ray)),
+            bounce: mean_visits(&self.bounce, |ray| tree.count_visits(ray)),
+        }
+    }
+}
+
+/// A line of the uniform density through a ball: all directions alike, all places across them alike.
+fn line(middle: Vec3, radius: f32, sampler: &Sampler) -> Ray {
+    let (u, v) = (sampler.pair(0), sampler.pair(1));
+    let z = 1.0 - 2.0 * u.x;
+    let (sin, cos) = (TAU * u.y).sin_cos();
+    let across = (1.0 - z * z).max(0.0).sqrt();
+    let dir = Vec3::new(across * cos, across * sin, z).normalize();
+    let (right, up) = dir.any_orthonormal_pair();
+    let place = uniform_disc(v);
+    Ray::new(middle + radius * (place.x * right + place.y * up - 2.0 * dir), dir)
+}
+
+fn bounce(scene: &SceneTree, ray: &Ray, number: u32) -> Option<Ray> {
+    let hit = scene.closest_hit(ray)?;
+    let point = scene.surface_point(ray, &hit);
+    let normal = if point.geometric_normal.dot(ray.dir) < 0.0 { 1.0 } else { -1.0 } * point.geometric_normal;
+    let local = cosine_hemisphere(Sampler::new(3, 0, 0, number).pair(0));
+    let (right, up) = normal.any_orthonormal_pair();
+    let dir = (local.x * right + local.y * up + local.z * normal).normalize();
+    Some(Ray::new(offset_ray_origin(point.position, point.error, point.geometric_normal, dir), dir))
+}
+
+fn mean_visits(rays: &[Ray], count: impl Fn(&Ray) -> Visits) -> MeanVisits {
+    let counted: Vec<Visits> = rays.iter().map(count).filter(|visits| visits.inner + visits.leaves > 0).collect();
+    let mean = |of: fn(&Visits) -> usize| counted.iter().map(of).sum::<usize>() as f64 / counted.len().max(1) as f64;
+    MeanVisits { inner: mean(|v| v.inner), leaves: mean(|v| v.leaves), blocks: mean(|v| v.blocks) }
+}
+
+/// Tries every triangle for as many camera rays as fit into a fifth of a second, at least four.
+fn no_tree_seconds(rays: &SampleRays) -> f64 {
+    let start = Instant::now();
+    let mut tried = 0;
+    for ray in &rays.camera {
+        std::hint::black_box(rays.scene.closest_hit_naive(ray));
+        tried += 1;
+        if tried >= 4 && start.elapsed().as_secs_f64() > 0.2 {
+            break;
+        }
+    }
+    start.elapsed().as_secs_f64() / f64::from(tried)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::procedural::{DisplacedSphere, displaced_sphere};
+
+    fn stone() -> Arc<Mesh> {
+        Arc::new(displaced_sphere(&DisplacedSphere { frequency: 24, ..DisplacedSphere::default() }))
+    }
+
+    #[test]
+    fn all_trees_show_the_same_pictures() {
+        let mesh = stone();
+        let turned = Affine3A::from_rotation_x(0.4);
+        let shown = |plan: TreePlan| {
+            let limit = plan.leaf_limit.unwrap_or(1);
+            let tree = MeshTree::build_limited(&mesh.positions, &mesh.triangles, plan.preset, limit);
+            picture(&Stage::new(&Arc::new(tree), &mesh, turned).seen_from(2)).0.means()
+        };
+        let plans = tree_plans();
+        let first = shown(plans[0]);
+        assert!(first.iter().any(|light| light.y > 0.1) && first.iter().any(|light| light.y == 0.0));
+        for &plan in &plans[1..] {
+            assert!(shown(plan) == first, "{plan:?}");
+        }
+    }
+
+    #[test]
+    fn the_expected_visits_are_those_of_lines_that_nothing_stops() {
+        let mesh = stone();
+        let plans = [BuildPreset::Median, BuildPreset::Best].map(|preset| TreePlan { preset, leaf_limit: Some(32) });
+        let table = TreeTable::measure(&mesh, Affine3A::IDENTITY, &plans, |_| ());
+        let [median, best] = table.rows[..] else { panic!("a row a plan") };
+        for row in [median, best] {
+            let (expected, counted) = (row.expected(), row.visits.lines);
+            for (expected, counted) in
+                [(expected.inner, counted.inner), (expected.leaves, counted.leaves), (expected.blocks, counted.blocks)]
+            {
+                assert!((counted / expected - 1.0).abs() < 0.03, "{counted} for {expected}");
+            }
+            // A ray that is stopped sees less.
+            assert!(row.visits.camera.leaves < counted.leaves && row.visits.camera.leaves >= 1.0);
+            assert!(row.stats.references >= mesh.triangles.len() && row.stats.bytes > 0);
+        }
+        assert!(best.stats.sah_cost() < median.stats.sah_cost());
+        assert_eq!(table.rays.camera, u64::from(SIDE * SIDE));
+        assert!(table.no_tree_seconds() > 0.0);
+    }
+}

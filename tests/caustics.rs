@@ -1,0 +1,183 @@
+//! Light that smooth surfaces gather, found by paths from the lamps and from the eye together.
+
+mod common;
+
+use common::*;
+use firstlight::kdtree::Shape;
+use firstlight::render::{
+    Camera, ColorInput, Environment, Film, Material, PixelFilter, RenderSettings, ScalarInput, Snapshot, Techniques,
+    advance,
+};
+use glam::{DVec3, Vec3};
+
+const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+
+fn mirror(reflectance: f32) -> Material {
+    Material::Mirror { reflectance: ColorInput::Constant(Vec3::splat(reflectance)) }
+}
+
+fn blend(a: u32, b: u32, weight: f32) -> Material {
+    Material::Blend { weight: ScalarInput::Constant(weight), a, b }
+}
+
+fn settings(seed: u32, caustics: bool) -> RenderSettings {
+    RenderSettings { seed, techniques: Techniques { caustics, ..Techniques::ALL }, ..RenderSettings::default() }
+}
+
+/// Mean of all pixels and channels over renders with seeds of their own, and its standard error.
+fn mean_of_renders(scene: &Snapshot, settings: RenderSettings, size: (u32, u32), spp: u32, renders: u32) -> (f64, f64) {
+    let means: Vec<f64> = (0..renders)
+        .map(|k| {
+            let settings = RenderSettings { seed: settings.seed + k, ..settings };
+            let (film, _) = render(scene, &settings, size.0, size.1, spp);
+            film.means().iter().map(|mean| mean.as_dvec3().element_sum() / 3.0).sum::<f64>()
+                / f64::from(size.0 * size.1)
+        })
+        .collect();
+    let n = f64::from(renders);
+    let mean = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// A room with a lamp, a floor and something smooth.
+fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Snapshot {
+    let mut shapes = vec![
+        (plane(Vec3::ZERO, Vec3::Y), 0),
+        (quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 3.0), 0),
+        (lamp, 1),
+    ];
+    shapes.extend(smooth);
+    let materials = vec![diffuse(0.6), emissive(20.0), GLASS, mirror(0.9), blend(0, 3, 0.4)];
+    scene(shapes, materials, Environment::Black, camera)
+}
+
+fn eye() -> Camera {
+    camera(Vec3::new(0.3, 1.6, 4.0), Vec3::new(0.0, 0.4, 0.0), 40.0)
+}
+
+fn quad_lamp() -> Shape {
+    quad(Vec3::new(-0.3, 2.6, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6)
+}
+
+#[test]
+fn the_mean_is_that_of_paths_from_the_eye_alone() {
+    let mut lens = eye();
+    (lens.lens_radius, lens.focus_distance, lens.blades) = (0.2, 4.0, 5);
+    let mirror_quad = quad(Vec3::new(-1.8, 0.0, 1.0), Vec3::new(0.2, 0.0, -2.0), Vec3::new(-0.3, 1.5, 0.0));
+    let cases = [
+        ("a glass ball", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), eye())),
+        ("through a lens", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), lens)),
+        (
+            "a mirror ball under a ball lamp",
+            room(vec![(sphere(Vec3::new(0.4, 0.5, 0.0), 0.5), 3)], sphere(Vec3::new(-1.0, 2.0, 0.5), 0.3), eye()),
+        ),
+        (
+            "a flat mirror, a coat, glass in glass",
+            room(
+                vec![
+                    (mirror_quad, 3),
+                    (sphere(Vec3::new(-0.7, 0.4, 0.3), 0.4), 4),
+                    (sphere(Vec3::new(0.7, 0.5, 0.0), 0.5), 2),
+                    (sphere(Vec3::new(0.7, 0.5, 0.0), 0.2), 2),
+                ],
+                quad_lamp(),
+                eye(),
+            ),
+        ),
+    ];
+    for (name, scene) in &cases {
+        assert!(scene.shading.features.caustics);
+        let (expected, error) = mean_of_renders(scene, settings(100, false), (24, 18), 1024, 10);
+        let (found, other) = mean_of_renders(scene, settings(1, true), (24, 18), 128, 10);
+        println!("{name}: {found:.5} ± {other:.5} for {expected:.5} ± {error:.5}");
+        let t = (found - expected) / error.hypot(other);
+        assert!(t.abs() < 4.5, "{name}: {found} ± {other} for {expected} ± {error}");
+    }
+}
+
+/// Every filter gives light that falls onto the film to the same pixels, with the same weight, as light that is looked
+/// for.
+#[test]
+fn every_filter_sees_the_same_light() {
+    let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), eye());
+    for filter in [PixelFilter::Tent, PixelFilter::BlackmanHarris, PixelFilter::Mitchell] {
+        let mean = |settings: RenderSettings, spp| {
+            mean_of_renders(&scene, RenderSettings { filter, ..settings }, (12, 9), spp, 12)
+        };
+        let (expected, error) = mean(settings(100, false), 1024);
+        let (found, other) = mean(settings(1, true), 256);
+        let t = (found - expected) / error.hypot(other);
+        assert!(t.abs() < 4.5, "{filter:?}: {found} ± {other} for {expected} ± {error}");
+    }
+}
+
+/// Root of relMSE of a film against the truth.
+fn error(film: &Film, truth: &Film) -> f64 {
+    let pairs = film.means().into_iter().zip(truth.means());
+    let terms = pairs.map(|(found, truth)| {
+        let (found, truth) = (found.as_dvec3(), truth.as_dvec3());
+        ((found - truth) * (found - truth) / (truth * truth + DVec3::splat(0.01))).element_sum() / 3.0
+    });
+    (terms.sum::<f64>() / f64::from(film.width() * film.height())).sqrt()
+}
+
+#[test]
+fn a_caustic_comes_many_times_sooner() {
+    // The floor behind the ball, where the light of the lamp is gathered; the ball itself is out of sight.
+    let view = camera(Vec3::new(0.0, 0.4, -1.95), Vec3::new(0.0, 0.0, -1.0), 30.0);
+    let lamp = quad(Vec3::new(-0.15, 1.5, 2.0), Vec3::new(0.0, 0.2, 0.2), Vec3::X * 0.3);
+    let ball = (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2);
+    let scene = room(vec![ball], lamp, view);
+    let (truth, _) = render(&scene, &settings(50, true), 32, 24, 8192);
+    let (with, _) = render(&scene, &settings(1, true), 32, 24, 64);
+    let (without, _) = render(&scene, &settings(1, false), 32, 24, 64);
+    let (with, without) = (error(&with, &truth), error(&without, &truth));
+    println!("error with {with:.4}, without {without:.4}");
+    // Twenty times fewer samples for the same error, at less than twice the time each.
+    assert!(without * without > 20.0 * with * with, "with {with}, without {without}");
+}
+
+#[test]
+fn scenes_without_smooth_surfaces_or_lamps_take_no_notice() {
+    let matte = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 0)], quad_lamp(), eye());
+    // Light from everywhere: bounces find it as well as anything could.
+    let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::Y * 0.5, 0.5), 1)];
+    let dark = scene(shapes, vec![diffuse(0.6), GLASS], Environment::Constant(Vec3::ONE), eye());
+    for scene in [matte, dark] {
+        assert!(!scene.shading.features.caustics);
+        let (with, report) = render(&scene, &settings(1, true), 24, 18, 8);
+        let (without, plain) = render(&scene, &settings(1, false), 24, 18, 8);
+        assert_eq!((with.means(), report.rays), (without.means(), plain.rays));
+    }
+}
+
+#[test]
+fn any_number_of_threads_and_any_portions_give_the_same_bits() {
+    let mut lens = eye();
+    (lens.lens_radius, lens.focus_distance) = (0.2, 4.0);
+    let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), lens);
+    let settings = RenderSettings { filter: PixelFilter::Gaussian, ..settings(3, true) };
+    let picture = |threads, tile_size, portions: &[u32]| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut film = Film::with_tile_size(150, 100, tile_size);
+            for &target in portions {
+                // Stopped in the middle, and taken up again.
+                let asked = std::sync::atomic::AtomicU32::new(0);
+                let stop = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) > 5 * target;
+                advance(&scene, &settings, &mut film, target, &stop);
+                assert!(advance(&scene, &settings, &mut film, target, &|| false).completed);
+            }
+            let estimate = film.error_estimate().map(|estimate| estimate.relative.to_bits());
+            (film.means(), estimate)
+        })
+    };
+    let reference = picture(1, 32, &[5]);
+    assert!(reference.1.is_some());
+    for (threads, tile_size, portions) in [(2, 32, &[1, 2, 5][..]), (5, 32, &[3, 5]), (3, 32, &[4, 5])] {
+        assert!(picture(threads, tile_size, portions) == reference, "{threads} threads, portions {portions:?}");
+    }
+    // The estimate sums tile by tile; the picture does not.
+    assert!(picture(3, 13, &[5]).0 == reference.0);
+}
