@@ -1,21 +1,26 @@
 //! One scene, its picture, and everything between: what a window or a script holds on to.
 
 use super::beside::Beside;
+use super::edit::{EditQueue, edit_scene};
+use super::focus::{Focus, hold_focus};
+use super::history::{History, notice, remember};
 use super::input::{CommandQueue, ModelUp, input};
 use super::navigation::{Rig, Turning};
 use super::recording::{Recorder, record};
 use super::reload::{HotReload, reload};
 use super::saving::{SavedAs, Saving, save};
+use super::selection::{OwnBox, Selection};
 use super::status::{Picture, Status};
 use super::systems::{
-    Adopted, Around, Clock, CurrentScene, Found, Paused, PictureSize, Renderer, Shown, StopAt, Threads, accumulate,
-    adopt, develop, edit, present, rebuild, reset,
+    Adopted, Around, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt,
+    Threads, accumulate, adopt, develop, edit, present, rebuild, reset,
 };
+use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, Target};
 use crate::render::{Film, RenderSettings};
-use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneSource, ShotDraft, UpAxis};
-use bevy_ecs::prelude::{IntoScheduleConfigs, World};
+use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis};
+use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
 use bevy_ecs::system::ScheduleSystem;
 use std::path::PathBuf;
@@ -84,7 +89,13 @@ impl Session {
         world.insert_resource(StopAt(options.target));
         world.insert_resource(Threads(threads));
         world.insert_resource(ModelUp(options.up));
-        let around = Around { extent: Extent::default(), home: Rig::default(), turning: Turning::default() };
+        let around = Around {
+            extent: Extent::default(),
+            corners: Vec::new(),
+            home: Rig::default(),
+            turning: Turning::default(),
+            pace: None,
+        };
         world.insert_resource(around);
         world.init_resource::<Clock>();
         world.init_resource::<Paused>();
@@ -99,6 +110,14 @@ impl Session {
         world.init_resource::<Recorder>();
         world.insert_resource(Saving::new(waker.clone()));
         world.insert_resource(HotReload::new(waker));
+        world.init_resource::<EditQueue>();
+        world.init_resource::<Selection>();
+        world.init_resource::<History>();
+        world.init_resource::<Focus>();
+        world.init_resource::<Bookmarks>();
+        world.init_resource::<ViewTrail>();
+        world.init_resource::<Hidden>();
+        world.init_resource::<Looking>();
 
         let mut frame = Schedule::new(Frame);
         frame.configure_sets(
@@ -115,7 +134,9 @@ impl Session {
         );
         frame.add_systems((
             (record, input).chain().in_set(Stage::Input),
-            (edit, save, reload).chain().in_set(Stage::Edit),
+            (edit, edit_scene, hold_focus, save, reload).chain().in_set(Stage::Edit),
+            // After a user's own systems, so that what they change can be undone too.
+            (notice, remember).chain().after(Stage::Edit).before(Stage::Rebuild),
             rebuild.in_set(Stage::Rebuild),
             reset.in_set(Stage::Reset),
             accumulate.in_set(Stage::Accumulate),
@@ -204,6 +225,21 @@ impl Session {
     /// The workers' threads.
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {
         self.world.resource::<Renderer>().0.pool()
+    }
+
+    /// The scene as the picture shows it.
+    pub fn inputs(&self) -> &SceneInputs {
+        &self.world.resource::<Shown>().inputs
+    }
+
+    /// The box around an object or a light, along its own axes.
+    pub fn box_of(&mut self, entity: Entity) -> Option<OwnBox> {
+        super::selection::box_of(&mut self.world, entity)
+    }
+
+    /// Memory of all trees, bytes.
+    pub fn tree_bytes(&self) -> usize {
+        self.world.resource::<Shown>().trees.bytes()
     }
 
     /// Nothing will come unless something is changed: the workers sleep and nothing is being read.

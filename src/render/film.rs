@@ -186,6 +186,13 @@ impl Film {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
     }
 
+    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
+    /// mean over many pixels is the variance that is left. 0 before the second sample.
+    pub fn doubling_step(&self, x: u32, y: u32) -> f32 {
+        let (tile, local) = self.locate(x, y);
+        tile.convergence.last_step(local)
+    }
+
     /// Tells every tile's part of the error estimate how far the picture is.
     pub(super) fn record_convergence(&mut self) {
         let (light, width) = (self.light.as_ref(), self.width);

@@ -2,7 +2,7 @@
 
 use super::error::SceneError;
 use super::file::{Amount, MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
-use super::obj::{ImportedMaterial, ObjError, ObjNormals, ObjOptions, load_obj_with};
+use super::obj::{ImportedMaterial, ImportedObj, ObjError, ObjNormals, ObjOptions, load_obj_with};
 use super::stamp::{Stamp, stamp};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use glam::{DVec2, DVec3, Vec3};
@@ -63,11 +63,9 @@ pub fn load_mesh(
     folder: &Path,
 ) -> Result<LoadedMesh, SceneError> {
     match source {
-        MeshSourcePart::Obj(file) => read_obj(&folder.join(file), shading, simplify),
-        MeshSourcePart::Builtin(name) => {
-            let (mesh, crease) =
-                builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?;
-            let mesh = shaded(simplified(mesh, simplify)?, shading, crease);
+        MeshSourcePart::Obj(file) => read_obj(source, &folder.join(file), shading, simplify),
+        MeshSourcePart::Builtin(_) => {
+            let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
             Ok(LoadedMesh {
                 mesh: Arc::new(mesh),
                 slots: Vec::new(),
@@ -79,34 +77,85 @@ pub fn load_mesh(
     }
 }
 
-fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Result<LoadedMesh, SceneError> {
+/// A mesh before it is simplified and shaded, for making it anew in another way without reading it again.
+#[derive(Clone, Debug)]
+pub struct MeshBase {
+    source: MeshSourcePart,
+    /// Of the file, normals are kept or not.
+    shading: MeshShadingPart,
+    simplified: bool,
+    folder: PathBuf,
+    mesh: Mesh,
+    /// Radians beyond which an edge is hard in automatic shading.
+    crease: Option<f32>,
+}
+
+impl MeshBase {
+    /// Reads or makes what [`load_mesh`] would begin with.
+    pub fn read(
+        source: &MeshSourcePart,
+        shading: MeshShadingPart,
+        simplify: Option<f64>,
+        folder: &Path,
+    ) -> Result<Self, SceneError> {
+        let (mesh, crease) = match source {
+            MeshSourcePart::Obj(file) => {
+                let (imported, crease) = read_obj_base(&folder.join(file), shading, simplify.is_some())?;
+                (imported.mesh, crease)
+            }
+            MeshSourcePart::Builtin(name) => {
+                builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?
+            }
+        };
+        let (source, folder) = (source.clone(), folder.to_owned());
+        Ok(Self { source, shading, simplified: simplify.is_some(), folder, mesh, crease })
+    }
+
+    /// Whether this is what would be read.
+    pub fn serves(
+        &self,
+        source: &MeshSourcePart,
+        shading: MeshShadingPart,
+        simplify: Option<f64>,
+        folder: &Path,
+    ) -> bool {
+        (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
+    }
+
+    /// Simplified and shaded, as [`load_mesh`] ends.
+    pub fn finish(&self, shading: MeshShadingPart, simplify: Option<f64>) -> Result<Mesh, SceneError> {
+        finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
+    }
+
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+}
+
+fn finish(
+    mesh: Mesh,
+    source: &MeshSourcePart,
+    shading: MeshShadingPart,
+    simplify: Option<f64>,
+    crease: Option<f32>,
+) -> Result<Mesh, SceneError> {
+    let mesh = simplified(mesh, simplify)?;
+    // Normals that a file gave are what automatic shading shows.
+    let keeps =
+        shading == MeshShadingPart::Auto && matches!(source, MeshSourcePart::Obj(_)) && !mesh.normals.is_empty();
+    Ok(if keeps { mesh } else { shaded(mesh, shading, crease) })
+}
+
+fn read_obj(
+    source: &MeshSourcePart,
+    path: &Path,
+    shading: MeshShadingPart,
+    simplify: Option<f64>,
+) -> Result<LoadedMesh, SceneError> {
     // Before it is read: what changes in the meantime is read again.
     let before = stamp(path);
-    let read = |normals| {
-        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
-            // The reader's own words for a missing file speak of an error number.
-            ObjError::Read { path, source } => {
-                SceneError::in_file(path, format!("cannot be read: {}", plain_io(&source)))
-            }
-            other => SceneError::new(other.to_string()),
-        })
-    };
-    let computed = ObjOptions::default().normals;
-    let mut imported = read(if shading == MeshShadingPart::Auto { computed } else { ObjNormals::Ignore })?;
-    if shading == MeshShadingPart::Auto {
-        // Normals that were computed would hold simplification back at every crease; they are computed after it.
-        if simplify.is_some() && !imported.normals_from_file {
-            imported.mesh = read(ObjNormals::Ignore)?.mesh;
-        }
-        imported.mesh = simplified(imported.mesh, simplify)?;
-        if imported.mesh.normals.is_empty()
-            && let ObjNormals::FileOrComputed { crease_angle } = computed
-        {
-            imported.mesh = shaded(imported.mesh, shading, Some(crease_angle));
-        }
-    } else {
-        imported.mesh = shaded(simplified(imported.mesh, simplify)?, shading, None);
-    }
+    let (mut imported, crease) = read_obj_base(path, shading, simplify.is_some())?;
+    imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
     let mesh = Arc::new(imported.mesh);
     let files = std::iter::once((path.to_owned(), before))
         .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
@@ -121,6 +170,31 @@ fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Res
         }
     }
     Ok(loaded)
+}
+
+/// The file as simplification wants it, and the crease angle of normals that are still to be computed.
+fn read_obj_base(
+    path: &Path,
+    shading: MeshShadingPart,
+    simplify: bool,
+) -> Result<(ImportedObj, Option<f32>), SceneError> {
+    let read = |normals| {
+        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
+            // The reader's own words for a missing file speak of an error number.
+            ObjError::Read { path, source } => {
+                SceneError::in_file(path, format!("cannot be read: {}", plain_io(&source)))
+            }
+            other => SceneError::new(other.to_string()),
+        })
+    };
+    let computed = ObjOptions::default().normals;
+    let ObjNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
+    let mut imported = read(if shading == MeshShadingPart::Auto { computed } else { ObjNormals::Ignore })?;
+    // Normals that were computed would hold simplification back at every crease; they are computed after it.
+    if shading == MeshShadingPart::Auto && simplify && !imported.normals_from_file {
+        imported.mesh = read(ObjNormals::Ignore)?.mesh;
+    }
+    Ok((imported, Some(crease_angle)))
 }
 
 fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {

@@ -42,7 +42,7 @@ pub use fingerprint::{Fingerprint, SceneContent};
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use limits::Limits;
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
-pub use meshes::plain_io;
+pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase, plain_io};
 pub use picture::{read_picture, read_picture_within};
 pub use placement::{Linear, Placement};
 pub use relative::{absolute, relative_path};
