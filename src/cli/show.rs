@@ -16,8 +16,8 @@ pub struct ShowArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Another number, another noise.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 0)]
-    seed: u32,
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    seed: Option<u32>,
     /// Where the pictures go that are kept from the window.
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FOLDER", default_value = ".")]
@@ -39,7 +39,8 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     let (width, height) = args.size.unwrap_or((1280, 720));
     let threads = args.threads.map(usize::from);
     let folder = args.save_to.clone();
-    let options = ViewerOptions { source, width, height, threads, seed: args.seed, up: args.scene.up(), folder };
+    let options =
+        ViewerOptions { source, width, height, threads, seed: args.seed.unwrap_or(0), up: args.scene.up(), folder };
     run(options).map_err(|error| Failure::Failed(error.to_string()))
 }
 
@@ -51,6 +52,10 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         scene: args.scene.clone(),
         output,
         size: args.size,
+        scale: None,
+        samples: None,
+        film: None,
+        resume: false,
         spp: None,
         time: None,
         error: None,

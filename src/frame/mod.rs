@@ -14,6 +14,7 @@
 
 mod beside;
 mod command;
+mod film_file;
 mod input;
 pub mod navigation;
 mod offline;
@@ -26,7 +27,8 @@ mod systems;
 mod worker;
 
 pub use command::Command;
-pub use offline::{OfflineReport, Progress, Target, render_offline};
+pub use film_file::{FilmFile, read_film_file, write_film_file};
+pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until};
 pub use picture_file::{PictureFormat, Print, write_film};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use scheduler::{Scheduler, Step, StepReport};

@@ -8,7 +8,7 @@
 use super::MeshTree;
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
-use super::blocks::LeafBlock;
+use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
 use super::instance_tree::{Entry, InstanceTree, Recent};
 use super::loose::LooseTrees;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketStack};
@@ -77,8 +77,7 @@ impl TopLevel {
         class: RayClass,
         hits: &mut HitBatch,
     ) {
-        let top = self;
-        dispatch!(set, closest(top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch));
+        trace(set, self, scene, rays, class, hits);
     }
 
     pub fn any_hits(
@@ -89,19 +88,16 @@ impl TopLevel {
         class: RayClass,
         occluded: &mut [bool],
     ) {
-        let top = self;
-        dispatch!(set, any(top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]));
+        trace(set, self, scene, rays, class, occluded);
     }
 }
 
-#[inline(always)]
-fn closest<S: Simd>(s: S, top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
-    trace::<S, HitBatch, false>(s, top, scene, rays, class, hits);
-}
-
-#[inline(always)]
-fn any<S: Simd>(s: S, top: &TopLevel, scene: &SceneTree, rays: &RayBatch, class: RayClass, occluded: &mut [bool]) {
-    trace::<S, [bool], true>(s, top, scene, rays, class, occluded);
+/// Any of the trees that rays stream through.
+#[derive(Clone, Copy)]
+enum StreamTree<'a> {
+    Triangles(&'a BlockTree<TriangleBlock>),
+    Quads(&'a BlockTree<QuadBlock>),
+    Spheres(&'a BlockTree<SphereBlock>),
 }
 
 /// Where the answers to a batch are kept.
@@ -113,6 +109,12 @@ trait Answers {
 
     /// What a packet found for the rays from `first` on.
     fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize);
+
+    /// [`packets`] by the instructions of `set`.
+    fn packets(&mut self, set: InstructionSet, packets: &Packets);
+
+    /// [`stream`] by the instructions of `set`.
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks);
 }
 
 impl Answers for HitBatch {
@@ -131,6 +133,16 @@ impl Answers for HitBatch {
     #[inline(always)]
     fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize) {
         packet.store(s, self, first);
+    }
+
+    fn packets(&mut self, set: InstructionSet, packets: &Packets) {
+        let answers = self;
+        dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
+    }
+
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks) {
+        let answers = self;
+        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, stacks: &mut Stacks));
     }
 }
 
@@ -152,52 +164,104 @@ impl Answers for [bool] {
             *occluded = packet.found >> lane & 1 != 0;
         }
     }
+
+    fn packets(&mut self, set: InstructionSet, packets: &Packets) {
+        let answers = self;
+        dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
+    }
+
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks) {
+        let answers = self;
+        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], stacks: &mut Stacks));
+    }
 }
 
-#[inline(always)]
-fn trace<S: Simd, A: Answers + ?Sized, const ANY: bool>(
-    s: S,
+fn trace<A: Answers + ?Sized>(
+    set: InstructionSet,
     top: &TopLevel,
     scene: &SceneTree,
     rays: &RayBatch,
     class: RayClass,
     answers: &mut A,
 ) {
-    let mut packet_stack = PacketStack::new(s);
     let mut stacks = Stacks::new();
     let mut rounds = Rounds::default();
     let (few, chunk) = match &top.instances {
         Instances::Few(few) => (&few[..], CHUNK),
         Instances::Many(_) => (&[][..], LARGE_CHUNK),
     };
+    let in_packets: &[u32] = if class == RayClass::Coherent { few } else { &[] };
     let all: Vec<u32> = (0..rays.len() as u32).collect();
     for queue in all.chunks(chunk) {
-        for sixteen in queue.chunks(LANES) {
-            let first = sixteen[0] as usize;
-            let mut packet = Packet::load(s, rays, first);
-            packet.test_objects::<ANY>(s, &top.simple);
-            if class == RayClass::Coherent {
-                for &object in few {
-                    if let Shape::Mesh { tree, .. } = &scene.shapes()[object as usize] {
-                        let instance = &scene.instances[object as usize];
-                        trace_packet::<S, ANY>(s, tree, instance, object, &mut packet, &mut packet_stack);
-                    }
-                }
-            }
-            answers.store(s, &packet, first);
+        answers.packets(set, &Packets { simple: &top.simple, meshes: in_packets, scene, rays, queue });
+        let own =
+            |instance: Option<u32>| Rays { rays, queue, instance: instance.map(|i| (i, &scene.instances[i as usize])) };
+        if let Some(tree) = &top.loose.spheres {
+            answers.stream(set, StreamTree::Spheres(tree), own(None), &mut stacks);
         }
-        stream_loose::<S, _, A, ANY>(s, top.loose.spheres.as_ref(), rays, answers, queue, &mut stacks);
-        stream_loose::<S, _, A, ANY>(s, top.loose.quads.as_ref(), rays, answers, queue, &mut stacks);
-        stream_loose::<S, _, A, ANY>(s, top.loose.triangles.as_ref(), rays, answers, queue, &mut stacks);
+        if let Some(tree) = &top.loose.quads {
+            answers.stream(set, StreamTree::Quads(tree), own(None), &mut stacks);
+        }
+        if let Some(tree) = &top.loose.triangles {
+            answers.stream(set, StreamTree::Triangles(tree), own(None), &mut stacks);
+        }
         for &object in few {
-            let is_done = class == RayClass::Coherent && matches!(scene.shapes()[object as usize], Shape::Mesh { .. });
-            if !is_done {
-                stream_instance::<S, A, ANY>(s, scene, object, rays, answers, queue, &mut stacks);
+            match tree_of(scene, object) {
+                Some(StreamTree::Triangles(_)) if class == RayClass::Coherent => {}
+                Some(tree) => answers.stream(set, tree, own(Some(object)), &mut stacks),
+                None => {}
             }
         }
         if let Instances::Many(tree) = &top.instances {
-            rounds.trace::<S, A, ANY>(s, tree, scene, rays, answers, queue, &mut stacks);
+            rounds.trace(set, tree, scene, rays, answers, queue, &mut stacks);
         }
+    }
+}
+
+/// `None` for an object without a tree.
+fn tree_of(scene: &SceneTree, object: u32) -> Option<StreamTree<'_>> {
+    match &scene.shapes()[object as usize] {
+        Shape::Mesh { tree, .. } => Some(StreamTree::Triangles(&tree.tree)),
+        Shape::Spheres { tree, .. } => Some(StreamTree::Spheres(&tree.tree)),
+        _ => None,
+    }
+}
+
+/// What rays are taken through sixteen at a time.
+struct Packets<'a> {
+    simple: &'a SimpleObjects,
+    /// Objects that are meshes.
+    meshes: &'a [u32],
+    scene: &'a SceneTree,
+    rays: &'a RayBatch,
+    /// Rays in a row.
+    queue: &'a [u32],
+}
+
+#[inline(always)]
+fn closest_packets<S: Simd>(s: S, packets: &Packets, answers: &mut HitBatch) {
+    trace_packets::<S, HitBatch, false>(s, packets, answers);
+}
+
+#[inline(always)]
+fn any_packets<S: Simd>(s: S, packets: &Packets, answers: &mut [bool]) {
+    trace_packets::<S, [bool], true>(s, packets, answers);
+}
+
+#[inline(always)]
+fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &Packets, answers: &mut A) {
+    let mut stack = PacketStack::new(s);
+    for sixteen in packets.queue.chunks(LANES) {
+        let first = sixteen[0] as usize;
+        let mut packet = Packet::load(s, packets.rays, first);
+        packet.test_objects::<ANY>(s, packets.simple);
+        for &object in packets.meshes {
+            if let Shape::Mesh { tree, .. } = &packets.scene.shapes()[object as usize] {
+                let instance = &packets.scene.instances[object as usize];
+                trace_packet::<S, ANY>(s, tree, instance, object, &mut packet, &mut stack);
+            }
+        }
+        answers.store(s, &packet, first);
     }
 }
 
@@ -254,99 +318,70 @@ fn trace_packet<S: Simd, const ANY: bool>(
     packet.found |= take;
 }
 
-/// Streams rays through the tree of one instance.
 #[inline(always)]
-fn stream_instance<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, stacks: &mut Stacks) {
+    run_stream::<S, HitBatch, false>(s, tree, rays, answers, stacks);
+}
+
+#[inline(always)]
+fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], stacks: &mut Stacks) {
+    run_stream::<S, [bool], true>(s, tree, rays, answers, stacks);
+}
+
+#[inline(always)]
+fn run_stream<S: Simd, A: Answers + ?Sized, const ANY: bool>(
     s: S,
-    scene: &SceneTree,
-    object: u32,
-    rays: &RayBatch,
+    tree: StreamTree,
+    rays: Rays,
     answers: &mut A,
-    queue: &[u32],
     stacks: &mut Stacks,
 ) {
-    let mut source = InstanceRays { rays, answers, instance: &scene.instances[object as usize], object, queue };
-    match &scene.shapes()[object as usize] {
-        Shape::Mesh { tree, .. } => stream::run::<S, _, ANY>(s, &tree.tree, &mut source, stacks),
-        Shape::Spheres { tree, .. } => stream::run::<S, _, ANY>(s, &tree.tree, &mut source, stacks),
-        _ => {}
+    let mut source = Queue { rays, answers };
+    match tree {
+        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
+        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
+        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
     }
 }
 
-/// Streams rays through a tree over simple objects, if there is one.
-#[inline(always)]
-fn stream_loose<S: Simd, B: LeafBlock, A: Answers + ?Sized, const ANY: bool>(
-    s: S,
-    tree: Option<&BlockTree<B>>,
-    rays: &RayBatch,
-    answers: &mut A,
-    queue: &[u32],
-    stacks: &mut Stacks,
-) {
-    if let Some(tree) = tree {
-        stream::run::<S, B, ANY>(s, tree, &mut LooseRays { rays, answers, queue }, stacks);
-    }
-}
-
-/// The rays of a batch on their way into one instance.
-struct InstanceRays<'a, A: ?Sized> {
+/// Rays of a batch on their way through one tree.
+#[derive(Clone, Copy)]
+struct Rays<'a> {
     rays: &'a RayBatch,
-    answers: &'a mut A,
-    instance: &'a Instance,
-    object: u32,
     queue: &'a [u32],
+    /// Whose tree it is; without one, the tree's primitives are themselves the objects.
+    instance: Option<(u32, &'a Instance)>,
 }
 
-impl<A: Answers + ?Sized> Source for InstanceRays<'_, A> {
+struct Queue<'a, A: ?Sized> {
+    rays: Rays<'a>,
+    answers: &'a mut A,
+}
+
+impl<A: Answers + ?Sized> Source for Queue<'_, A> {
     #[inline(always)]
     fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
         loop {
-            let (&i, queue) = self.queue.split_first()?;
-            self.queue = queue;
-            let ray = self.rays.get(i as usize);
-            if let Some((t, object)) = self.answers.so_far(i as usize, ray.t_max) {
-                let mut nearest = Nearest::before(t);
-                // At equal distance the lower object wins, whatever its primitive.
-                nearest.prim = if object.is_some_and(|object| self.object < object) { u32::MAX } else { 0 };
-                return Some((self.instance.ray(&ray), nearest, i));
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn finish(&mut self, ray: u32, nearest: &Nearest) {
-        if nearest.found {
-            self.answers.set(ray as usize, self.object, nearest.prim, nearest);
-        }
-    }
-}
-
-/// The rays of a batch on their way through a tree over objects.
-struct LooseRays<'a, A: ?Sized> {
-    rays: &'a RayBatch,
-    answers: &'a mut A,
-    queue: &'a [u32],
-}
-
-impl<A: Answers + ?Sized> Source for LooseRays<'_, A> {
-    #[inline(always)]
-    fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
-        loop {
-            let (&i, queue) = self.queue.split_first()?;
-            self.queue = queue;
-            let ray = self.rays.get(i as usize);
-            if let Some((t, object)) = self.answers.so_far(i as usize, ray.t_max) {
-                let mut nearest = Nearest::before(t);
-                nearest.prim = object.unwrap_or(0);
+            let (&i, queue) = self.rays.queue.split_first()?;
+            self.rays.queue = queue;
+            let ray = self.rays.rays.get(i as usize);
+            let Some((t, so_far)) = self.answers.so_far(i as usize, ray.t_max) else { continue };
+            let mut nearest = Nearest::before(t);
+            // At equal distance the lower object wins, whatever its primitive.
+            let Some((object, instance)) = self.rays.instance else {
+                nearest.prim = so_far.unwrap_or(0);
                 return Some((ray, nearest, i));
-            }
+            };
+            nearest.prim = if so_far.is_some_and(|other| object < other) { u32::MAX } else { 0 };
+            return Some((instance.ray(&ray), nearest, i));
         }
     }
 
     #[inline(always)]
     fn finish(&mut self, ray: u32, nearest: &Nearest) {
         if nearest.found {
-            self.answers.set(ray as usize, nearest.prim, 0, nearest);
+            let (object, prim) = self.rays.instance.map_or((nearest.prim, 0), |(object, _)| (object, nearest.prim));
+            self.answers.set(ray as usize, object, prim, nearest);
         }
     }
 }
@@ -375,7 +410,6 @@ struct Pending {
 
 impl Pending {
     /// The next instance to enter; `None` if none can matter.
-    #[inline(always)]
     fn next(&mut self, tree: &InstanceTree, ray: &Ray, t: f32, entries: &mut Vec<Entry>) -> Option<u32> {
         loop {
             // Beyond one that is too far lie only others that are.
@@ -396,10 +430,9 @@ impl Pending {
 
 impl Rounds {
     #[expect(clippy::too_many_arguments, reason = "a loop body, cut out")]
-    #[inline(always)]
-    fn trace<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+    fn trace<A: Answers + ?Sized>(
         &mut self,
-        s: S,
+        set: InstructionSet,
         tree: &InstanceTree,
         scene: &SceneTree,
         rays: &RayBatch,
@@ -428,7 +461,11 @@ impl Rounds {
             for wish in self.wishes.chunk_by(|a, b| a.0 == b.0) {
                 self.together.clear();
                 self.together.extend(wish.iter().map(|&(_, ray)| ray));
-                stream_instance::<S, A, ANY>(s, scene, wish[0].0, rays, answers, &self.together, stacks);
+                let object = wish[0].0;
+                let instance = Some((object, &scene.instances[object as usize]));
+                if let Some(tree) = tree_of(scene, object) {
+                    answers.stream(set, tree, Rays { rays, queue: &self.together, instance }, stacks);
+                }
             }
         }
     }

@@ -10,6 +10,7 @@ use super::file::{
 use super::limits::{Limits, open_file};
 use super::meshes::{LoadedMesh, load_mesh, plain_io};
 use super::picture::read_picture;
+use super::shot::Shot;
 use super::showcase;
 use crate::render::ImageTexture;
 use std::collections::HashMap;
@@ -27,6 +28,8 @@ pub enum SceneSource {
     Scene(PathBuf),
     /// A model (OBJ), to be framed.
     Model(PathBuf),
+    /// A picture that was made by this program (PNG, EXR), for the scene that it shows, as it shows it.
+    Picture(PathBuf),
 }
 
 /// Which axis of a model points up.
@@ -70,6 +73,10 @@ pub struct LoadedScene {
     pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
     pub trees: Trees,
     pub warnings: Vec<String>,
+    /// Which axis of a model was asked to point up.
+    pub up: Option<UpAxis>,
+    /// What the picture said that this was opened by.
+    pub shot: Option<Shot>,
     /// Reading and parsing.
     pub load_seconds: f64,
     /// Building trees.
@@ -90,7 +97,11 @@ impl SceneSource {
         match extension.as_deref() {
             Some("ron") => Ok(Self::Scene(path.to_path_buf())),
             Some("obj") => Ok(Self::Model(path.to_path_buf())),
-            _ if path.is_dir() => Err(SceneError::in_file(path, "is a folder: name a scene (.ron) or a model (.obj)")),
+            Some("png" | "exr") => Ok(Self::Picture(path.to_path_buf())),
+            _ if path.is_dir() => Err(SceneError::in_file(
+                path,
+                "is a folder: name a scene (.ron), a model (.obj) or a picture (.png, .exr)",
+            )),
             _ if path.exists() => {
                 Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)"))
             }
@@ -105,13 +116,16 @@ impl SceneSource {
     pub fn title(&self) -> String {
         match self {
             Self::Builtin(name) => name.clone(),
-            Self::Scene(path) | Self::Model(path) => path.display().to_string(),
+            Self::Scene(path) | Self::Model(path) | Self::Picture(path) => path.display().to_string(),
         }
     }
 }
 
 /// Reads a scene and all it points at, and builds its trees.
 pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
+    if let SceneSource::Picture(path) = source {
+        return load_picture(path, options);
+    }
     options.say(&format!("reading {}", source.title()));
     let start = Instant::now();
     let mut scene = match source {
@@ -140,13 +154,53 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
             scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
             scene.add_mesh_pictures(options);
+            scene.up = options.up;
             scene
         }
+        SceneSource::Picture(_) => unreachable!("has been opened as what it shows"),
     };
     scene.load_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     scene.build_trees(options)?;
     scene.build_seconds = start.elapsed().as_secs_f64();
+    Ok(scene)
+}
+
+/// The scene that a picture shows, seen as the picture shows it.
+fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
+    let failed = |reason: String| SceneError::in_file(path, reason);
+    let shot = Shot::read(path).map_err(failed)?;
+    let source = shot.source(path).map_err(failed)?;
+    let options = LoadOptions { up: options.up.or(shot.up()), ..*options };
+    let mut scene = match (&shot.text, source) {
+        (Some(text), source) => {
+            let start = Instant::now();
+            // Its paths count from where the scene lies.
+            let source = source.unwrap_or_else(|| SceneSource::Picture(path.to_path_buf()));
+            let folder = match &source {
+                SceneSource::Builtin(_) => PathBuf::new(),
+                SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
+                    path.parent().map(Path::to_path_buf).unwrap_or_default()
+                }
+            };
+            let mut scene = resolve(&source, SceneFile::parse(text, path)?, text, folder, &options)?;
+            scene.load_seconds = start.elapsed().as_secs_f64();
+            let start = Instant::now();
+            scene.build_trees(&options)?;
+            scene.build_seconds = start.elapsed().as_secs_f64();
+            scene
+        }
+        (None, Some(source)) => load(&source, &options)?,
+        (None, None) => return Err(failed("its note names no scene".to_owned())),
+    };
+    if scene.content_fingerprint().to_string() != shot.fingerprint {
+        let (picture, title) = (path.display(), scene.source.title());
+        scene
+            .warnings
+            .push(format!("{picture}: {title} has changed since the picture was taken, so it looks different"));
+    }
+    shot.apply(&mut scene.file);
+    scene.shot = Some(shot);
     Ok(scene)
 }
 
@@ -233,6 +287,8 @@ impl LoadedScene {
             pictures: HashMap::new(),
             trees: Trees::default(),
             warnings: Vec::new(),
+            up: None,
+            shot: None,
             load_seconds: 0.0,
             build_seconds: 0.0,
         }

@@ -8,15 +8,13 @@ pub fn camera_text(rig: &Rig) -> String {
     let Rig { view, projection, lens } = rig;
     let radius = lens.effective_radius();
     let part = CameraPart {
-        eye: view.eye,
-        look_at: view.pivot(),
         up: view.up,
         vfov: projection.vfov_deg,
         lens_radius: (radius > 0.0).then_some(radius),
-        f_stop: None,
         focus_distance: Some(lens.focus_distance),
         blades: lens.blades,
         blade_rotation: lens.blade_rotation_deg,
+        ..CameraPart::looking_at(view.eye, view.pivot())
     };
     let style = ron::ser::PrettyConfig::new()
         .depth_limit(2)
@@ -43,7 +41,7 @@ mod tests {
         let rig = Rig { view, projection: Projection { vfov_deg: 33.3 }, lens };
         let text = format!("(\n{}\n)", camera_text(&rig));
         let camera = SceneFile::parse(&text, "printed").unwrap_or_else(|error| panic!("{error}\n{text}")).camera;
-        assert_eq!((camera.eye, camera.look_at, camera.up), (view.eye, view.pivot(), view.up));
+        assert_eq!((camera.eye, camera.look_at, camera.up), (view.eye, Some(view.pivot()), view.up));
         assert_eq!((camera.vfov, camera.lens_radius, camera.focus_distance), (33.3, Some(0.025), Some(1.75)));
         assert_eq!((camera.blades, camera.blade_rotation), (6, 15.0));
 

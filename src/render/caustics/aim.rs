@@ -7,6 +7,7 @@
 //!
 //! Densities are per unit of étendue, cos θ · area · solid angle, which is the same at both ends of a line.
 
+use super::guide::Guide;
 use crate::geometry::{Frame, Ray, robust};
 use crate::kdtree::{Hit, Shape};
 use crate::render::light::{LightShape, LightTable};
@@ -14,6 +15,7 @@ use crate::render::{Geometry, Material, Snapshot};
 use crate::sampling::{AliasTable, Sampler, cosine_hemisphere, one_minus_cos_from_sin2, uniform_cone};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::OnceLock;
 
 /// No caster.
 pub(in crate::render) const NO_CASTER: u32 = u32::MAX;
@@ -34,6 +36,8 @@ pub(in crate::render) struct CasterTable {
     /// For each object the first of its casters, and whether each of its primitives is one.
     by_object: Vec<(u32, bool)>,
     pairs: Pairs,
+    /// Made when it is first needed.
+    pub(super) guide: OnceLock<Guide>,
 }
 
 /// A ball around something smooth; without end for a plane.
@@ -98,7 +102,7 @@ impl CasterTable {
             return None;
         }
         let pairs = Pairs::new(&casters, lights)?;
-        Some(Self { casters, by_object, pairs })
+        Some(Self { casters, by_object, pairs, guide: OnceLock::new() })
     }
 
     /// The caster that a hit lies on, [`NO_CASTER`] if none.

@@ -6,27 +6,29 @@
 //! their light is added to the pixels that see it ([`trace`], [`layer`]). Both ways find the same light: all paths whose
 //! first vertex from the eye scatters in all directions and whose last before the lamp is perfectly smooth. Each is
 //! weighted by the power heuristic ([`weight`]), so the mean of the picture stays as it is. What is seen in a mirror or
-//! through glass cannot be joined to the lens, and is left to the paths from the eye.
+//! through glass cannot be joined to the lens: there, paths from the eye are told the way ([`guide`]).
 //!
 //! Scenes without smooth surfaces or without finite lights have no [`CasterTable`], and pay nothing.
 //! Start reading at [`CausticPass`].
 
 mod aim;
+mod guide;
 mod layer;
 mod trace;
 mod weight;
 
 pub(super) use aim::CasterTable;
+pub(super) use guide::{Guided, Hints};
+use layer::Batches;
 pub(super) use layer::LightLayer;
 pub(super) use weight::{Bounce, Track};
 
 use super::filter::PixelFilter;
 use super::{Camera, Integrator, RenderSettings, Snapshot, Techniques};
-use glam::{UVec2, Vec2};
-
-/// Paths from the lamps for each path from the eye. They cost about half as much, and all of them carry light that the
-/// others hardly find.
-const LIGHT_PATHS_PER_PIXEL: f32 = 0.5;
+use glam::{UVec2, Vec2, Vec3};
+use guide::Guide;
+use rayon::prelude::*;
+use trace::LightWave;
 
 /// What tracing from the lamps and weighting against it need to know of a picture.
 pub(super) struct CausticPass<'a> {
@@ -65,8 +67,45 @@ impl<'a> CausticPass<'a> {
             size: size.as_vec2(),
             filter: settings.filter,
             filter_norm: settings.filter.integral(),
-            paths_per_sample: f64::from(LIGHT_PATHS_PER_PIXEL) * f64::from(size.x) * f64::from(size.y),
+            paths_per_sample: Batches::of_film((size.x * size.y) as usize).paths_per_sample(),
             pixel_area: pixel * pixel,
         })
+    }
+}
+
+/// Paths from the lamps that show the others the way.
+const SCOUTS: u32 = 1 << 15;
+
+/// Scouts that one worker sends at once.
+const SCOUT_BATCH: u32 = 2048;
+
+impl CausticPass<'_> {
+    /// Sees to it that hints are there; false if `stop` said so before they were.
+    ///
+    /// They belong to the lamps and surfaces of the scene, so they outlive cameras, seeds and settings.
+    pub fn prepare(&self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
+        if self.casters.guide.get().is_some() {
+            return true;
+        }
+        let scouts = Self { seed: 0, techniques: Techniques::ALL, max_depth: u32::MAX, ..*self };
+        let traces: Vec<Option<Vec<_>>> = (0..SCOUTS / SCOUT_BATCH)
+            .into_par_iter()
+            .map_init(LightWave::default, |wave, batch| {
+                wave.explore(&scouts, u64::from(batch * SCOUT_BATCH), SCOUT_BATCH, stop)
+            })
+            .collect();
+        let Some(traces) = traces.into_iter().collect::<Option<Vec<_>>>() else { return false };
+        // Somebody else may have been faster, with the same.
+        let _ = self.casters.guide.set(Guide::build(traces.concat()));
+        true
+    }
+
+    /// Hints for a vertex, where paths from lamps are of no use to the path so far.
+    ///
+    /// - `n_vertices`: up to and with this one.
+    #[inline]
+    pub fn hints(&self, track: &Track, n_vertices: u32, position: Vec3) -> Option<Hints<'_>> {
+        let needs_them = n_vertices > 1 && track.is_lost();
+        needs_them.then(|| self.casters.guide.get()?.at(position)).flatten()
     }
 }

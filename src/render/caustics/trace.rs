@@ -5,6 +5,7 @@
 //! one that counts, so surfaces are always looked at from the eye's side here.
 
 use super::aim::LINE_DIMENSIONS;
+use super::guide::Trace;
 use super::layer::Splat;
 use super::weight::{Bounce, etendue_gain, is_reversible};
 use super::{CausticPass, aim};
@@ -26,6 +27,9 @@ const DIM_ROULETTE: u32 = 3;
 
 /// What a surface that scatters keeps of a path, at most: most of what can be seen of a caustic is its first light.
 const SURVIVAL: f32 = 0.5;
+
+/// Share of the scouts that glass reflects: more than of the light, so that faint reflections become known as well.
+const SCOUTED_REFLECTION: f32 = 0.25;
 
 /// Vertices before perfectly smooth surfaces end paths that they dim.
 const ROULETTE_DEPTH: u32 = 4;
@@ -71,7 +75,7 @@ impl LightWave {
     pub fn trace(
         &mut self,
         pass: &CausticPass,
-        first: u32,
+        first: u64,
         n: u32,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Vec<Splat>, RayCounts)> {
@@ -101,14 +105,57 @@ impl LightWave {
         Some((splats, counts))
     }
 
-    fn start(&mut self, pass: &CausticPass, first: u32, n: u32) {
+    /// Follows paths to where they first scatter, for [`super::guide`].
+    pub fn explore(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<Trace>> {
+        let mut traces = Vec::new();
+        self.start(pass, first, n);
+        let mut n_vertices = 0;
+        while !self.rays.is_empty() {
+            if stop() {
+                return None;
+            }
+            n_vertices += 1;
+            pass.scene.geometry.tree.closest_hits(&self.rays, RayClass::Incoherent, &mut self.hits);
+            self.next_rays.clear();
+            self.next_paths.clear();
+            for i in 0..self.rays.len() {
+                let path = self.paths[i];
+                let Some(hit) = self.hits.get(i) else { continue };
+                if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
+                    continue;
+                }
+                let ray = self.rays.get(i);
+                let Some((vertex, material, surface)) = surface_at(pass, &ray, &hit, &path.media) else { continue };
+                if n_vertices > 1 && surface.is_smooth() {
+                    traces.push(Trace { at: vertex.position, from: ray.origin });
+                }
+                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
+                if let Some((ray, path, true)) = step.go_on(&surface) {
+                    self.next_rays.push(&ray);
+                    self.next_paths.push(path);
+                }
+            }
+            std::mem::swap(&mut self.rays, &mut self.next_rays);
+            std::mem::swap(&mut self.paths, &mut self.next_paths);
+        }
+        Some(traces)
+    }
+
+    fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
         self.rays.clear();
         self.paths.clear();
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
         // One sequence for all paths: its stream is none of any pixel's.
         let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
-        for i in first..first + n {
-            let sampler = new_sampler(seed, u32::MAX, u32::MAX, i);
+        for i in first..first + u64::from(n) {
+            // A sequence has 2³² points.
+            let sampler = new_sampler(seed, u32::MAX, u32::MAX - (i >> 32) as u32, i as u32);
             let Some(line) = pass.casters.sample(pass.scene, &sampler) else { continue };
             let throughput = line.radiance / line.density;
             if throughput == Vec3::ZERO {
@@ -136,17 +183,9 @@ impl LightWave {
             if scene.shading.features.media {
                 path.throughput *= path.media.transmittance(scene, hit.t);
             }
-            let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &self.rays.get(i), &hit, material);
-            let is_blend =
-                matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
-            let surface = if is_blend {
-                blend_at(scene, material, &vertex, &path.media).map(|blend| Surface::Blend(Box::new(blend)))
-            } else {
-                lobe_at(scene, material, &vertex, &path.media).map(Surface::Lobe)
-            };
-            let Some(surface) = surface else { continue };
-            let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices };
+            let found = surface_at(pass, &self.rays.get(i), &hit, &path.media);
+            let Some((vertex, material, surface)) = found else { continue };
+            let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
             if n_vertices > 1
                 && surface.is_smooth()
                 && path.media == MediumStack::default()
@@ -157,13 +196,28 @@ impl LightWave {
             }
             // One more vertex, and the way to the eye: two more segments.
             if n_vertices + 2 <= pass.max_depth
-                && let Some((ray, path)) = step.go_on(&surface)
+                && let Some((ray, path, _)) = step.go_on(&surface)
             {
                 self.next_rays.push(&ray);
                 self.next_paths.push(path);
             }
         }
     }
+}
+
+/// `None` where the surface is black.
+fn surface_at(pass: &CausticPass, ray: &Ray, hit: &Hit, media: &MediumStack) -> Option<(Vertex, MaterialId, Surface)> {
+    let scene = pass.scene;
+    let material = material_of(scene, hit);
+    let vertex = Vertex::new(scene, ray, hit, material);
+    let is_blend =
+        matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
+    let surface = if is_blend {
+        Surface::Blend(Box::new(blend_at(scene, material, &vertex, media)?))
+    } else {
+        Surface::Lobe(lobe_at(scene, material, &vertex, media)?)
+    };
+    Some((vertex, material, surface))
 }
 
 /// One vertex of one path.
@@ -175,6 +229,8 @@ struct Step<'a> {
     hit: &'a Hit,
     material: MaterialId,
     n_vertices: u32,
+    /// Of [`LightWave::explore`], whose paths carry nothing.
+    is_scout: bool,
 }
 
 impl Step<'_> {
@@ -232,13 +288,20 @@ impl Step<'_> {
         Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
     }
 
-    /// Chooses how the path goes on, and whether.
-    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath)> {
+    /// Chooses how the path goes on, and whether; and tells whether it does so off something perfectly smooth.
+    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath, bool)> {
         let &Self { pass, vertex, material, n_vertices, .. } = self;
         let scene = pass.scene;
         let mut path = *self.path;
         let (sampler, dimension) = (path.sampler, self.dimension());
-        let u_lobe = || sampler.single(dimension + DIM_LOBE);
+        let u_lobe = || {
+            let u = sampler.single(dimension + DIM_LOBE);
+            match scene.shading.materials[material as usize] {
+                // Reflected or not, whatever the shares of the light.
+                Material::Glass { .. } if self.is_scout => f32::from(u >= SCOUTED_REFLECTION) * 1.0f32.next_down(),
+                _ => u,
+            }
+        };
         let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
         let is_smooth = sample.pdf.is_infinite();
         // A path that scatters before anything smooth is left to the eye's side.
@@ -302,7 +365,7 @@ impl Step<'_> {
         }
         path.aimed_at = aim::NO_CASTER;
         let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
-        Some((Ray::new(origin, sample.wi), path))
+        Some((Ray::new(origin, sample.wi), path, is_smooth))
     }
 }
 

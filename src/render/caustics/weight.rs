@@ -29,11 +29,26 @@ pub(in crate::render) struct Track {
     ratio: f32,
     /// That the last vertex lies on, if it was perfectly smooth.
     caster: u32,
+    /// By how much hints have raised the densities of directions so far, about: roulette must not take the small
+    /// throughput that goes with it for a loss.
+    pub gain: f32,
 }
 
 impl Default for Track {
     fn default() -> Self {
-        Self { ratio: f32::NAN, caster: NO_CASTER }
+        Self { ratio: f32::NAN, caster: NO_CASTER, gain: 1.0 }
+    }
+}
+
+impl Track {
+    /// Whether no path from a lamp can be the path so far and what follows.
+    pub fn is_lost(&self) -> bool {
+        self.ratio.is_nan()
+    }
+
+    pub fn guided(mut self, weight: Vec3) -> Self {
+        self.gain /= weight.abs().max_element().clamp(f32::MIN_POSITIVE, 1.0);
+        self
     }
 }
 
@@ -60,7 +75,7 @@ impl CausticPass<'_> {
         let Bounce { vertex, wi, .. } = *bounce;
         let is_smooth = bounce.pdf.is_infinite();
         if track.ratio.is_nan() && bounce.eye.is_none() || !is_reversible(bounce) {
-            return Track::default();
+            return Track { gain: track.gain, ..Track::default() };
         }
         let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), wi.dot(vertex.geometric_normal).abs());
         match (bounce.eye, is_smooth) {
@@ -68,15 +83,15 @@ impl CausticPass<'_> {
             (Some(eye), false) => {
                 let cos_lens = -vertex.wo.dot(self.scene.camera.forward);
                 let ratio = self.join_ratio(vertex.position.distance_squared(eye), cos_lens, cos_o, cos_i, bounce.pdf);
-                Track { ratio, caster: NO_CASTER }
+                Track { ratio, caster: NO_CASTER, ..track }
             }
             (None, false) => {
                 let ratio = track.ratio * reverse_pdf() * cos_i / (cos_o * bounce.pdf);
-                Track { ratio, caster: NO_CASTER }
+                Track { ratio, caster: NO_CASTER, ..track }
             }
             (None, true) => {
                 let ratio = track.ratio / etendue_gain(vertex, wi, vertex.wo);
-                Track { ratio, caster: self.casters.of_hit(bounce.hit) }
+                Track { ratio, caster: self.casters.of_hit(bounce.hit), ..track }
             }
         }
     }
