@@ -1,26 +1,30 @@
-//! Time and error of simplification: `cargo bench --bench simplify -- [MODEL.obj]... [--ratio R]`.
+//! Time and error of simplification: `cargo bench --no-default-features --bench simplify -- [MODEL.obj]... [--ratio R]`.
 //!
-//! Without a model, the serpent knot. Each figure is the median of several runs with their range; the error is
-//! measured on the result of the last run.
+//! Without a model, the serpent knot. Our two methods and meshoptimizer (by the crate `meshopt`) take turns; each
+//! figure is the median of several runs with their range, and the error is that of the last run's result.
+//!
+//! `--other NAME RESULT.obj SECONDS` adds a row for another program's result of the first model: its error is measured
+//! here, its time is what it says. `scripts/compare_simplify.sh` does so for `fast-simplification`.
 
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::mesh::simplify::{Method, Target, simplify};
 use firstlight::mesh::{Deviation, Mesh, Topology};
 use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
+use glam::Vec3;
+use meshopt::{SimplifyOptions, VertexDataAdapter};
 use std::path::Path;
 use std::time::Instant;
 
 fn main() {
     // Cargo itself adds `--bench`.
     let mut args = std::env::args().skip(1).filter(|arg| arg != "--bench");
-    let (mut meshes, mut ratio) = (Vec::new(), 0.2);
+    let (mut meshes, mut others, mut ratio) = (Vec::new(), Vec::new(), 0.2);
     while let Some(arg) = args.next() {
-        if arg == "--ratio" {
-            ratio = args.next().and_then(|text| text.parse().ok()).expect("--ratio needs a number");
-        } else {
-            let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
-            let model = load_obj_with(Path::new(&arg), &options).unwrap_or_else(|error| panic!("{error}"));
-            meshes.push((arg, model.mesh));
+        let mut next = || args.next().unwrap_or_else(|| panic!("{arg} needs more words behind it"));
+        match arg.as_str() {
+            "--ratio" => ratio = next().parse().expect("--ratio needs a number"),
+            "--other" => others.push((next(), load(&next()), next())),
+            _ => meshes.push((arg.clone(), load(&arg))),
         }
     }
     if meshes.is_empty() {
@@ -30,33 +34,63 @@ fn main() {
     println!("| mesh | method | triangles | kept | seconds (range) | mean | RMS | Hausdorff | closed |");
     println!("|---|---|---:|---:|---:|---:|---:|---:|---|");
     for (name, mesh) in &meshes {
-        for (method, runs) in [(Method::Quadric, 15), (Method::Melax, 3)] {
-            row(name, mesh, method, ratio, runs);
+        let ways: [(&str, usize, fn(&Mesh, f64) -> Mesh); 3] = [
+            ("firstlight, quadric", 15, |mesh, ratio| ours(mesh, Method::Quadric, ratio)),
+            ("firstlight, melax", 3, |mesh, ratio| ours(mesh, Method::Melax, ratio)),
+            ("meshoptimizer", 15, meshoptimizer),
+        ];
+        let mut seconds: [Vec<f64>; 3] = Default::default();
+        let mut results = [const { None }; 3];
+        for run in 0..15 {
+            for (k, (_, _, way)) in ways.iter().enumerate().filter(|(_, way)| run < way.1) {
+                let start = Instant::now();
+                let result = way(mesh, ratio);
+                seconds[k].push(start.elapsed().as_secs_f64());
+                results[k] = Some(result);
+            }
         }
+        for ((way, ..), (mut seconds, result)) in ways.iter().zip(seconds.into_iter().zip(results)) {
+            seconds.sort_unstable_by(f64::total_cmp);
+            let (median, least, most) = (seconds[seconds.len() / 2], seconds[0], seconds[seconds.len() - 1]);
+            row(name, way, mesh, &result.expect("every way has a run"), &format!("{median:.3} ({least:.3}–{most:.3})"));
+        }
+    }
+    let (name, mesh) = &meshes[0];
+    for (way, result, seconds) in &others {
+        row(name, way, mesh, result, seconds);
     }
 }
 
-fn row(name: &str, mesh: &Mesh, method: Method, ratio: f64, runs: usize) {
-    let mut seconds = Vec::new();
-    let mut result = Mesh::default();
-    for _ in 0..runs {
-        let start = Instant::now();
-        result = simplify(mesh, method, Target::Ratio(ratio)).expect("a sound mesh and ratio");
-        seconds.push(start.elapsed().as_secs_f64());
-    }
-    seconds.sort_unstable_by(f64::total_cmp);
-    let deviation = Deviation::between(mesh, &result, 200_000);
+fn load(path: &str) -> Mesh {
+    let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
+    load_obj_with(Path::new(path), &options).unwrap_or_else(|error| panic!("{error}")).mesh
+}
+
+fn ours(mesh: &Mesh, method: Method, ratio: f64) -> Mesh {
+    simplify(mesh, method, Target::Ratio(ratio)).expect("a sound mesh and ratio")
+}
+
+/// With no limit on its error, as `fast-simplification` and we have none.
+fn meshoptimizer(mesh: &Mesh, ratio: f64) -> Mesh {
+    let bytes: &[u8] = bytemuck::cast_slice::<Vec3, u8>(&mesh.positions);
+    let vertices = VertexDataAdapter::new(bytes, size_of::<Vec3>(), 0).expect("positions of twelve bytes");
+    let wanted = (mesh.triangles.len() as f64 * ratio) as usize * 3;
+    let indices = mesh.triangles.as_flattened();
+    let left = meshopt::simplify(indices, &vertices, wanted, f32::MAX, SimplifyOptions::None, None);
+    let triangles: Vec<[u32; 3]> = left.as_chunks::<3>().0.to_vec();
+    Mesh { triangles, positions: mesh.positions.clone(), center: mesh.center, ..Mesh::default() }
+}
+
+fn row(name: &str, way: &str, mesh: &Mesh, result: &Mesh, seconds: &str) {
+    let deviation = Deviation::between(mesh, result, 200_000);
     let percent = 100.0 / mesh.bounds().size().as_dvec3().length();
     println!(
-        "| {name} | {method:?} | {} | {} | {:.3} ({:.3}–{:.3}) | {:.4} % | {:.4} % | {:.3} % | {} |",
+        "| {name} | {way} | {} | {} | {seconds} | {:.4} % | {:.4} % | {:.3} % | {} |",
         mesh.triangles.len(),
         result.triangles.len(),
-        seconds[runs / 2],
-        seconds[0],
-        seconds[runs - 1],
         deviation.mean() * percent,
         deviation.rms() * percent,
         deviation.max() * percent,
-        if Topology::of(&result).is_closed() { "yes" } else { "no" }
+        if Topology::of(result).is_closed() { "yes" } else { "no" }
     );
 }

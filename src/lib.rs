@@ -4,7 +4,7 @@
 //!
 //! | row | room | what lives there |
 //! |---|---|---|
-//! | 0 | [`geometry`], [`sampling`] | rays, boxes, robust arithmetic; sequences, warps, distributions |
+//! | 0 | [`geometry`], [`sampling`], `lanes` | rays, boxes, robust arithmetic; sequences, warps, distributions; sixteen numbers at a time |
 //! | 1 | [`kdtree`], [`mesh`] | build and traversal; mesh data, normals, simplification |
 //! | 2 | [`render`] | snapshot, camera, film, integrators, lights, materials, textures |
 //! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
@@ -16,6 +16,7 @@
 pub mod frame;
 pub mod geometry;
 pub mod kdtree;
+pub(crate) mod lanes;
 pub mod mesh;
 pub mod render;
 pub mod report;

@@ -18,6 +18,7 @@ const PHONG: RenderSettings = RenderSettings {
     seed: 0,
     filter: PixelFilter::Box,
     techniques: Techniques::ALL,
+    lanes: None,
 };
 
 /// Without ambient light, to compare with what can be worked out.

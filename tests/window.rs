@@ -25,6 +25,10 @@ fn camera(program: &Program) -> CameraPart {
 
 /// Asks for the view until it is as it should be and has come to rest: a movement waits for the picture of the one
 /// before it, so the end of a drag may take effect some frames later.
+fn target(camera: &CameraPart) -> glam::DVec3 {
+    camera.look_at.expect("V prints what the camera looks at")
+}
+
 fn camera_when(program: &Program, what: &str, is_right: impl Fn(&CameraPart) -> bool) -> CameraPart {
     until(what, || {
         let now = camera(program);
@@ -80,24 +84,24 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     // Fly: the eye goes where it looks, and looks where it looked.
     program.hold("w", 300);
     let flown = camera_when(&program, "the eye to move", |now| now.eye != home.eye);
-    let (step, ahead) = (flown.eye - home.eye, (home.look_at - home.eye).normalize());
-    assert!(step.dot(ahead) > 0.1 * (home.look_at - home.eye).length(), "{step}");
+    let (step, ahead) = (flown.eye - home.eye, (target(&home) - home.eye).normalize());
+    assert!(step.dot(ahead) > 0.1 * (target(&home) - home.eye).length(), "{step}");
     assert!(step.normalize().dot(ahead) > 1.0 - 1e-9, "{step}");
-    assert!((flown.look_at - flown.eye).normalize().dot(ahead) > 1.0 - 1e-9);
+    assert!((target(&flown) - flown.eye).normalize().dot(ahead) > 1.0 - 1e-9);
 
     // Look about: the eye stays.
     program.drag(1, (300, 200), (60, 0));
-    let looked = camera_when(&program, "the view to turn", |now| now.look_at != flown.look_at);
+    let looked = camera_when(&program, "the view to turn", |now| target(now) != target(&flown));
     assert_eq!(looked.eye, flown.eye);
 
     // Orbit by mouse and by key: the pivot and its distance stay.
     program.key("Home");
     let home_again = camera_when(&program, "the view home", |now| now.eye == home.eye);
     assert_eq!(home_again, home, "home is home, bit for bit");
-    let distance = |camera: &CameraPart| (camera.look_at - camera.eye).length();
+    let distance = |camera: &CameraPart| (target(camera) - camera.eye).length();
     let same_pivot = |now: &CameraPart| {
-        assert!((now.look_at - home.look_at).length() < 1e-9, "the pivot stays: {now:?}");
-        assert!((distance(now) - distance(&home)).abs() < 1e-9, "so does its distance: {now:?}");
+        assert!((target(now) - target(&home)).length() < 1e-4, "the pivot stays: {now:?}");
+        assert!((distance(now) - distance(&home)).abs() < 1e-4, "so does its distance: {now:?}");
     };
     program.drag(2, (300, 200), (80, 30));
     let orbited = camera_when(&program, "the eye to orbit", |now| now.eye != home.eye);
@@ -116,16 +120,16 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     let focus = home.focus_distance.expect("it is always printed");
     program.key("bracketright bracketright bracketright");
     camera_when(&program, "the focal plane to move", |now| {
-        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(3)).abs() < 1e-9)
+        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(3)).abs() < 1e-5)
     });
     program.key("bracketleft");
     camera_when(&program, "the focal plane to come back", |now| {
-        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(2)).abs() < 1e-9)
+        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(2)).abs() < 1e-5)
     });
     let radius = home.lens_radius.expect("the gallery has a lens");
     program.key("braceright braceright");
     camera_when(&program, "the aperture to open", |now| {
-        now.lens_radius.is_some_and(|wide| (wide / radius - 1.05f64.powi(2)).abs() < 1e-9)
+        now.lens_radius.is_some_and(|wide| (wide / radius - 1.05f64.powi(2)).abs() < 1e-5)
     });
     program.key("o");
     camera_when(&program, "the depth of field to go", |now| now.lens_radius.is_none());
@@ -220,6 +224,64 @@ fn a_paused_window_sleeps() {
     let used = program.cpu_seconds() - before;
     assert!(used <= 0.1, "{used} CPU seconds in 2 s of doing nothing");
     program.key("Escape");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn a_person_edits_inspects_and_takes_it_back() {
+    let Some(desktop) = Desktop::start() else { return };
+    let program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    program.key("p");
+    let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 150, 60, 200, 220).to_image();
+    let steady = |program: &Program| {
+        until("the picture to stand still", || {
+            let before = middle(program);
+            std::thread::sleep(Duration::from_millis(500));
+            (difference(&before, &middle(program)) == 0.0).then_some(before)
+        })
+    };
+    let picture = steady(&program);
+    // Normals in its place, and back again without a sample lost.
+    program.key("1");
+    until("normals", || (difference(&picture, &middle(&program)) > 15.0).then_some(()));
+    program.key("1");
+    until("the picture again", || (difference(&picture, &middle(&program)) == 0.0).then_some(()));
+    // The panel comes and goes, and the bare picture remains.
+    let right = |program: &Program| image::imageops::crop_imm(&program.pixels(), 400, 0, 230, 330).to_image();
+    let bare = right(&program);
+    program.key("n");
+    until("the panel", || (difference(&bare, &right(&program)) > 10.0).then_some(()));
+    program.key("n");
+    until("the panel to go", || (difference(&bare, &right(&program)) == 0.0).then_some(()));
+    // A click selects: the corners of a box are drawn. Delete changes the picture, and Ctrl+Z gives it back.
+    program.drag(1, (250, 250), (0, 0));
+    until("what is selected to be marked", || (difference(&picture, &middle(&program)) > 0.05).then_some(()));
+    let marked = middle(&program);
+    program.key("Delete");
+    until("it to go", || (difference(&marked, &middle(&program)) > 1.0).then_some(()));
+    let gone = steady(&program);
+    program.key("ctrl+z");
+    until("it to come back", || (difference(&gone, &middle(&program)) > 1.0).then_some(()));
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn a_hidden_window_rests() {
+    let Some(desktop) = Desktop::start() else { return };
+    let program = desktop.open(&["cornell", "--size", "320x240"], &[]);
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    program.minimise();
+    std::thread::sleep(Duration::from_secs(2));
+    let before = program.cpu_seconds();
+    std::thread::sleep(Duration::from_secs(2));
+    let used = program.cpu_seconds() - before;
+    assert!(used <= 0.1, "{used} CPU seconds in 2 s of not being seen");
+    program.focus();
+    let before = program.cpu_seconds();
+    until("it to go on", || (program.cpu_seconds() - before > 0.1).then_some(()));
+    program.key("ctrl+q");
     assert!(program.ended().success());
 }
 

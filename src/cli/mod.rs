@@ -1,12 +1,17 @@
-//! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not understood.
+//! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
+//! understood; 130: stopped by Ctrl+C, what there was is saved.
 
+mod animate;
 mod console;
 mod info;
+mod merge;
 mod render;
 mod report;
+mod save;
 mod show;
 mod simplify;
 mod stability;
+mod stop;
 mod trees;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -32,6 +37,10 @@ enum Command {
     Render(render::RenderArgs),
     /// Measure speed against error: how fast scenes get right, and what each technique is worth.
     Report(report::ReportArgs),
+    /// Add up films of one picture that have different samples.
+    Merge(merge::MergeArgs),
+    /// Write a scene file of a model, a built-in scene, or of what a picture shows.
+    Save(save::SaveArgs),
     /// Count failures on hard cases: leaks, self-hits, missed hits, wrong depths, bad samples, lost light.
     Stability(stability::StabilityArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
@@ -43,8 +52,8 @@ enum Command {
 /// What to open, and how.
 #[derive(Args, Clone, Debug)]
 struct SceneArgs {
-    /// A built-in scene, a scene file (.ron) or a model (.obj).
-    #[arg(value_name = "SCENE|MODEL", default_value = "gallery")]
+    /// A built-in scene, a scene file (.ron), a model (.obj), or a picture (.png, .exr) that this program made.
+    #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     scene: String,
     /// Which axis of a model points up; guessed from how it would stand when not given.
     #[arg(long, value_enum)]
@@ -106,7 +115,7 @@ impl SceneArgs {
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
-        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
+        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), known: None };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
             remark(format_args!("warning: {warning}"));
@@ -129,6 +138,8 @@ enum Failure {
     /// The command itself cannot be right.
     Usage(String),
     Failed(String),
+    /// Somebody pressed Ctrl+C; says what was saved.
+    Stopped(String),
 }
 
 /// Runs what the command line asks for.
@@ -139,6 +150,8 @@ pub fn main() -> ExitCode {
     let result = match line.command {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Report(args)) => report::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
+        Some(Command::Save(args)) => save::run(&args),
         Some(Command::Stability(args)) => stability::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
@@ -148,6 +161,10 @@ pub fn main() -> ExitCode {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Usage(message)) => (message, 2),
         Err(Failure::Failed(message)) => (message, 1),
+        Err(Failure::Stopped(message)) => {
+            remark(message);
+            return ExitCode::from(stop::STOPPED);
+        }
     };
     for line in message.lines() {
         remark(format_args!("error: {line}"));

@@ -1,16 +1,26 @@
-//! `firstlight render SCENE -o out.png`: a picture without a window.
+//! `firstlight render SCENE -o out.png`: a picture without a window, and the film that it can go on from.
 
+use super::animate::animate;
 use super::console::{print, remark};
+use super::stop::Stop;
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
+use bevy_ecs::prelude::World;
 use clap::Args;
-use firstlight::frame::{OfflineReport, PictureFormat, Target, render_offline, write_film};
-use firstlight::render::{Film, RenderSettings};
+use firstlight::frame::navigation::Rig;
+use firstlight::frame::{
+    FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, write_film_file,
+};
+use firstlight::render::{Display, Film, RenderSettings};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::check_writable;
-use firstlight::scene::{Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
+use firstlight::scene::{
+    Developing, Extraction, FilmSize, LoadedScene, Part, Rendering, SceneInputs, SceneSource, Shot, ShotDraft,
+    ShotSamples,
+};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Samples per pixel when neither a number, a time nor an error is given.
@@ -26,9 +36,30 @@ pub struct RenderArgs {
     /// Width and height in pixels; the scene's own when not given.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
+    /// So many times as wide and as high.
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
+    pub scale: Option<f64>,
     /// Samples per pixel; 256 unless a time or an error is given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
+    /// Samples A to B-1 of each pixel: ranges that do not overlap can be added up with `firstlight merge`.
+    #[arg(long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
+    pub samples: Option<Range<u32>>,
+    /// Keep the film as well, an .exr to go on from.
+    #[arg(long, value_name = "FILE.exr")]
+    pub film: Option<PathBuf>,
+    /// Once around what the camera looks at, in so many pictures: FILE-0001.png and so on.
+    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
+    pub turntable: Option<u32>,
+    /// From bookmark to bookmark of the scene, by their numbers: 1,2,3.
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
+    pub bookmarks: Option<Vec<u8>>,
+    /// In how many pictures.
+    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "bookmarks")]
+    pub frames: Option<u32>,
+    /// Go on with the film that is there: with --film, or with the film that is named as the scene.
+    #[arg(long)]
+    pub resume: bool,
     /// Stop after so many seconds of rendering.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     pub time: Option<f64>,
@@ -38,9 +69,9 @@ pub struct RenderArgs {
     /// Worker threads; all cores when not given. The picture does not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Another seed gives other noise.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 0)]
-    pub seed: u32,
+    /// Another seed gives other noise; 0 when not given.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub seed: Option<u32>,
     /// The light model; the scene's own when not given.
     #[arg(long, value_enum)]
     pub integrator: Option<IntegratorArg>,
@@ -66,40 +97,179 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         return Err(Failure::Usage("--exposure must be a finite number of stops".to_owned()));
     }
     PictureFormat::of(&args.output).map_err(Failure::Usage)?;
+    let film_path = film_path(args)?;
     // A picture that cannot be written is not worth the wait.
     check_writable(&args.output).map_err(Failure::Failed)?;
+    if let Some(path) = &film_path {
+        check_writable(path).map_err(Failure::Failed)?;
+        if path.exists() && !args.resume {
+            let message = "is there already: go on with it by --resume, or name another file";
+            return Err(Failure::Failed(format!("{}: {message}", path.display())));
+        }
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
-    pool.install(|| render(args))
+    let stop = Stop::on_interrupt();
+    pool.install(|| render(args, film_path.as_deref(), &stop))
 }
 
-fn render(args: &RenderArgs) -> Result<(), Failure> {
+/// Where the film is kept, if it is.
+fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
+    let is_exr = |path: &Path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
+    match &args.film {
+        Some(path) if !is_exr(path) => {
+            Err(Failure::Usage(format!("{}: films are OpenEXR pictures: end the name in .exr", path.display())))
+        }
+        Some(path) if path == &args.output => {
+            Err(Failure::Usage("the picture and the film cannot be one file: name another for --film".to_owned()))
+        }
+        Some(path) => Ok(Some(path.clone())),
+        None if !args.resume => Ok(None),
+        None => match args.scene.source()? {
+            SceneSource::Picture(path) if is_exr(&path) => Ok(Some(path)),
+            _ => Err(Failure::Usage("--resume goes on with a film: name it with --film FILE.exr".to_owned())),
+        },
+    }
+}
+
+/// A scene and how it is to be rendered.
+pub(super) struct Job {
+    pub scene: LoadedScene,
+    world: World,
+    extraction: Extraction,
+    settings: RenderSettings,
+    display: Display,
+    size: (u32, u32),
+    build_seconds: f64,
+    draft: ShotDraft,
+}
+
+impl Job {
+    fn new(args: &RenderArgs, kept: Option<&Shot>, bar: &ProgressBar) -> Result<Self, Failure> {
+        let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
+        let scene = args.scene.load(aspect, &|text| bar.set_message(text.to_owned()))?;
+        if let Some(announcement) = &args.announcement {
+            bar.suspend(|| remark(announcement));
+        }
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let start = Instant::now();
+        let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
+        let build_seconds = scene.build_seconds + start.elapsed().as_secs_f64();
+        for problem in &extraction.problems {
+            remark(format_args!("warning: {problem}"));
+        }
+        // What is not asked for is as the film has it that is gone on with, then as the scene has it.
+        let Rendering(of_scene) = *world.resource();
+        let settings = RenderSettings {
+            integrator: (args.integrator.map(Into::into))
+                .or(kept.map(|kept| kept.integrator.into()))
+                .unwrap_or(of_scene.integrator),
+            max_depth: (args.max_depth)
+                .or(kept.map(|kept| kept.max_depth.unwrap_or(u32::MAX)))
+                .unwrap_or(of_scene.max_depth),
+            seed: args.seed.or(kept.map(|kept| kept.seed)).unwrap_or(of_scene.seed),
+            filter: (args.filter.map(Into::into))
+                .or(kept.map(|kept| kept.film.filter.into()))
+                .unwrap_or(of_scene.filter),
+            ..of_scene
+        };
+        let FilmSize { width, height } = *world.resource();
+        let size = args.size.or(kept.map(|kept| (kept.film.width, kept.film.height))).unwrap_or((width, height));
+        let size = scaled(size, args.scale)?;
+        let mut display = world.resource::<Developing>().0;
+        display.exposure_stops += args.exposure;
+        world.insert_resource(Rendering(settings));
+        let draft = ShotDraft::of(&mut world, Some(&scene));
+        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
+    }
+
+    /// The camera, as it is.
+    pub fn rig(&mut self) -> Option<Rig> {
+        let camera = SceneInputs::of(&mut self.world).camera?;
+        Some(Rig { view: camera.view, projection: camera.projection, lens: camera.lens })
+    }
+
+    /// Looks from there from now on.
+    pub fn set_rig(&mut self, rig: &Rig) {
+        if let Some(camera) = SceneInputs::of(&mut self.world).camera {
+            self.world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
+        }
+        let inputs = SceneInputs::of(&mut self.world);
+        self.extraction.update(Part::Camera, &inputs, &self.scene.trees);
+        self.draft = ShotDraft::of(&mut self.world, Some(&self.scene));
+    }
+
+    /// Renders a whole picture.
+    pub fn picture(&self, target: Target, stop: &Stop) -> Film {
+        let mut film = Film::new(self.size.0, self.size.1);
+        let asked = || stop.is_asked();
+        render_offline_until(&self.extraction.snapshot, &self.settings, &mut film, target, &asked, |_| true);
+        film
+    }
+
+    /// Writes a picture with its note.
+    pub fn write(&self, film: &Film, path: &Path) -> Result<(), Failure> {
+        let note = self.note(film, path);
+        let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
+        picture.write(path).map_err(Failure::Failed)
+    }
+
+    /// The note of a picture of this film at `path`.
+    fn note(&self, film: &Film, path: &Path) -> String {
+        let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven: film.max_spp() > film.spp() };
+        self.draft.note(path, self.size, samples, self.display.into())
+    }
+
+    /// An empty film, or the one that is gone on with.
+    fn film(&self, args: &RenderArgs, kept: Option<(FilmFile, &Path)>) -> Result<Film, Failure> {
+        let shot = self.scene.shot.as_ref();
+        let first = args.samples.as_ref().map(|samples| samples.start).or(shot.map(|shot| shot.first_sample));
+        let Some((FilmFile { film, shot }, path)) = kept else {
+            return Ok(Film::new(self.size.0, self.size.1).starting_at(first.unwrap_or(0)));
+        };
+        let ours = Shot::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
+        match ours.differs_from(&shot) {
+            None => Ok(film),
+            Some(what) => Err(Failure::Failed(format!(
+                "{}: is a film of another {what}: go on with it as it was begun, or keep a new film",
+                path.display()
+            ))),
+        }
+    }
+
+    /// When it is good enough.
+    pub fn target(&self, args: &RenderArgs) -> Target {
+        let open_ended = args.time.is_none() && args.error.is_none();
+        let of_picture = self.scene.shot.as_ref().filter(|_| !args.resume).map(|shot| shot.spp.max(1));
+        let default = open_ended.then(|| of_picture.unwrap_or(DEFAULT_SPP));
+        let of_range = args.samples.as_ref().map(|samples| samples.end - samples.start);
+        Target { spp: args.spp.or(of_range).or(default), seconds: args.time, error: args.error }
+    }
+}
+
+fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<(), Failure> {
     let bar = progress_bar();
-    let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
-    let scene = args.scene.load(aspect, &|text| bar.set_message(text.to_owned()))?;
-    if let Some(announcement) = &args.announcement {
-        bar.suspend(|| remark(announcement));
+    let kept = match film_path.filter(|_| args.resume) {
+        Some(path) => Some((read_film_file(path).map_err(Failure::Failed)?, path)),
+        None => None,
+    };
+    let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), &bar)?;
+    if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
+        let message = format!("the picture was stopped in the middle of a pass; the new one has {} samples", shot.spp);
+        bar.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
-
-    let mut world = bevy_ecs::world::World::new();
-    scene.spawn(&mut world);
-    let start = Instant::now();
-    let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
-    let build_seconds = scene.build_seconds + start.elapsed().as_secs_f64();
-    for problem in &extraction.problems {
-        remark(format_args!("warning: {problem}"));
+    if args.turntable.is_some() || args.bookmarks.is_some() {
+        return animate(args, job, &bar, stop);
     }
-
-    let settings = settings(args, world.resource::<Rendering>().0);
-    let FilmSize { width, height } = *world.resource();
-    let (width, height) = args.size.unwrap_or((width, height));
-    let mut film = Film::new(width, height);
-    let open_ended = args.time.is_none() && args.error.is_none();
-    let target = Target { spp: args.spp.or(open_ended.then_some(DEFAULT_SPP)), seconds: args.time, error: args.error };
+    let mut film = job.film(args, kept)?;
+    let target = job.target(args);
+    let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
-    let report = render_offline(&extraction.snapshot, &settings, &mut film, target, |now| {
+    let asked = || stop.is_asked();
+    let report = render_offline_until(&job.extraction.snapshot, &job.settings, &mut film, target, &asked, |now| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
         let by_error = target
@@ -113,54 +283,85 @@ fn render(args: &RenderArgs) -> Result<(), Failure> {
     });
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     bar.finish_and_clear();
+    let reached = target.reached(film.spp(), report.seconds, film.error_estimate().map(|error| error.relative));
+    let stopped = stop.is_asked() && !reached;
+    if film.spp() == 0 {
+        let message = "stopped before every pixel had a sample: there is nothing to save";
+        return Err(Failure::Stopped(message.to_owned()));
+    }
 
-    let mut display = world.resource::<Developing>().0;
-    display.exposure_stops += args.exposure;
-    write_film(&film, &display, &args.output).map_err(Failure::Failed)?;
-    if report.n_bad > 0 {
-        let total = u64::from(film.spp()) * u64::from(width) * u64::from(height);
-        remark(format_args!("warning: {} of {total} samples were not finite and were left out", report.n_bad));
+    // The film first: a picture can be made of it.
+    if let Some(path) = film_path {
+        write_film_file(&film, &job.note(&film, path), path).map_err(Failure::Failed)?;
+    }
+    job.write(&film, &args.output)?;
+    if film.n_bad() > bad_before {
+        let total = report.rays.camera;
+        let n_bad = film.n_bad() - bad_before;
+        remark(format_args!("warning: {n_bad} of {total} samples were not finite and were left out"));
     }
     if args.json {
-        print(json(&scene, build_seconds, &report, cpu_seconds, &film))?;
+        print(json(&job, &report, cpu_seconds, &film, stopped))?;
     } else if std::io::stderr().is_terminal() {
-        remark(format_args!(
-            "{}: {width} x {height}, {} samples per pixel in {:.1} s",
-            args.output.display(),
-            film.spp(),
-            report.seconds
-        ));
+        let (output, (width, height)) = (args.output.display(), job.size);
+        let (spp, seconds) = (film.spp(), report.seconds);
+        remark(format_args!("{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s"));
     }
-    Ok(())
+    match (stopped, film_path) {
+        (false, _) => Ok(()),
+        (true, Some(path)) => Err(Failure::Stopped(format!(
+            "stopped after {} samples per pixel; {} and the film {} are saved: go on with --resume --film {}",
+            film.spp(),
+            args.output.display(),
+            path.display(),
+            path.display()
+        ))),
+        (true, None) => Err(Failure::Stopped(format!(
+            "stopped after {} samples per pixel; {} is saved (keep a film with --film to be able to go on)",
+            film.spp(),
+            args.output.display()
+        ))),
+    }
 }
 
-fn settings(args: &RenderArgs, of_scene: RenderSettings) -> RenderSettings {
-    RenderSettings {
-        integrator: args.integrator.map_or(of_scene.integrator, Into::into),
-        max_depth: args.max_depth.unwrap_or(of_scene.max_depth),
-        seed: args.seed,
-        filter: args.filter.map_or(of_scene.filter, Into::into),
-        ..of_scene
+/// `size` times `scale`, if that is a film that can be had.
+fn scaled((width, height): (u32, u32), scale: Option<f64>) -> Result<(u32, u32), Failure> {
+    let Some(scale) = scale else { return Ok((width, height)) };
+    // Numbers out of range become the largest one, which is too large.
+    let side = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+    let (width, height) = (side(width), side(height));
+    firstlight::scene::file::check_film_size(width, height)
+        .map_err(|error| Failure::Usage(format!("--scale: {error}")))?;
+    Ok((width, height))
+}
+
+/// `64..128` as sample numbers.
+fn parse_range(text: &str) -> Result<Range<u32>, String> {
+    let (start, end) =
+        text.split_once("..").ok_or("write it as A..B, such as 64..128: from A up to, not including, B")?;
+    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not the number of a sample"));
+    let range = number(start)?..number(end)?;
+    if range.is_empty() {
+        Err(format!("there is no sample from {} up to {}", range.start, range.end))
+    } else {
+        Ok(range)
     }
 }
 
 /// One line for machines.
-fn json(
-    scene: &LoadedScene,
-    build_seconds: f64,
-    report: &OfflineReport,
-    cpu_seconds: Option<f64>,
-    film: &Film,
-) -> serde_json::Value {
+fn json(job: &Job, report: &OfflineReport, cpu_seconds: Option<f64>, film: &Film, stopped: bool) -> serde_json::Value {
     let error = film.error_estimate();
     let bad: Vec<_> = report.bad.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect();
     serde_json::json!({
-        "scene": scene.source.title(),
+        "scene": job.scene.source.title(),
         "width": film.width(),
         "height": film.height(),
         "spp": film.spp(),
-        "load_s": scene.load_seconds,
-        "build_s": build_seconds,
+        "first_sample": film.first_sample(),
+        "seed": job.settings.seed,
+        "stopped": stopped,
+        "load_s": job.scene.load_seconds,
+        "build_s": job.build_seconds,
         "render_s": report.seconds,
         "cpu_s": cpu_seconds,
         "threads": rayon::current_num_threads(),

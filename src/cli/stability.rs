@@ -1,6 +1,7 @@
 //! `firstlight stability`: the hard cases, counted, as a table or for machines. Fails if there is a finding.
 
 use super::Failure;
+use super::console::print;
 use clap::Args;
 use firstlight::report::cpu_seconds;
 use firstlight::stability::{CASES, Case, Tally};
@@ -33,8 +34,7 @@ pub struct StabilityArgs {
 pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
     if args.list {
         let width = CASES.iter().map(|case| case.name.len()).max().unwrap_or(0);
-        CASES.iter().for_each(|case| println!("{:width$}  {}", case.name, case.about));
-        return Ok(());
+        return CASES.iter().try_for_each(|case| print(format_args!("{:width$}  {}", case.name, case.about)));
     }
     let cases = chosen(args)?;
     if let Some((stage, ray)) = args.replay {
@@ -44,8 +44,7 @@ pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
         let told = case.replay(stage, ray);
         let told =
             told.ok_or_else(|| Failure::Failed(format!("{}: there is no stage {stage} to replay", case.name)))?;
-        print!("{told}");
-        return Ok(());
+        return print(told.trim_end());
     }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
@@ -73,7 +72,7 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
         .expect("the template is well formed");
     let bar = ProgressBar::with_draw_target(Some(total.max(1)), target).with_style(style);
     if !args.json {
-        println!("{}", HEAD.trim_end());
+        print(HEAD.trim_end())?;
     }
     let (start, cpu_before) = (Instant::now(), cpu_seconds());
     let mut rows = Vec::new();
@@ -85,7 +84,7 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
         let tally = case.run(args.rays, &|rays| bar.inc(rays));
         before += case.rays(args.rays);
         if !args.json {
-            bar.suspend(|| print!("{}", row(case, &tally)));
+            bar.suspend(|| print(row(case, &tally).trim_end()))?;
         }
         rows.push((case, tally, clock.elapsed().as_secs_f64()));
     }
@@ -96,17 +95,17 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
     if args.json {
         let cases: Vec<_> = rows.iter().map(|(case, tally, seconds)| json(case, tally, *seconds)).collect();
         let seconds = start.elapsed().as_secs_f64();
-        println!(
-            "{}",
-            serde_json::json!({ "cases": cases, "rays": rays, "findings": findings, "seconds": seconds, "cpu_s": cpu })
-        );
+        print(
+            serde_json::json!({ "cases": cases, "rays": rays, "findings": findings, "seconds": seconds, "cpu_s": cpu }),
+        )?;
     } else {
-        println!("\n{rays} rays, {findings} findings, {:.0} s", start.elapsed().as_secs_f64());
+        print(format_args!("\n{rays} rays, {findings} findings, {:.0} s", start.elapsed().as_secs_f64()))?;
         for (case, tally, _) in rows.iter().filter(|(_, tally, _)| tally.findings() > 0) {
             let Some(worst) = &tally.worst else { continue };
-            println!("\nworst of {}: {}", case.name, worst.what);
+            print(format_args!("\nworst of {}: {}", case.name, worst.what))?;
             if case.can_replay() {
-                println!("  firstlight stability --case {} --replay {}:{}", case.name, worst.stage, worst.ray);
+                let (stage, ray) = (worst.stage, worst.ray);
+                print(format_args!("  firstlight stability --case {} --replay {stage}:{ray}", case.name))?;
             }
         }
     }

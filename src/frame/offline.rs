@@ -1,10 +1,11 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
 use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
+use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
 /// When a picture is good enough; the first that is reached ends it. Without any, it goes on for ever.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Samples per pixel.
     pub spp: Option<u32>,
@@ -52,6 +53,19 @@ pub fn render_offline(
     settings: &RenderSettings,
     film: &mut Film,
     target: Target,
+    progress: impl FnMut(Progress) -> bool,
+) -> OfflineReport {
+    render_offline_until(snapshot, settings, film, target, &|| false, progress)
+}
+
+/// The same, ended within milliseconds by `stop`, which is asked often and by all workers; the film then may have a
+/// part of a pass, and even pixels without a sample.
+pub fn render_offline_until(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film: &mut Film,
+    target: Target,
+    stop: &(dyn Fn() -> bool + Sync),
     mut progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
     /// Seconds between reports, about.
@@ -65,7 +79,7 @@ pub fn render_offline(
     while film.spp() < goal {
         let slice_start = Instant::now();
         let before = film.spp();
-        let late = || before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        let late = || stop() || (before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline));
         let at_most = before.saturating_add(step).min(goal);
         let next = target.error.map_or(at_most, |error| first_worth_a_look(film, error, at_most));
         let pass = advance(snapshot, settings, film, next, &late);
@@ -75,7 +89,7 @@ pub fn render_offline(
         report.seconds = start.elapsed().as_secs_f64();
         let (spp, seconds, error) = (film.spp(), report.seconds, film.error_estimate());
         let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
-        if !go_on || target.reached(spp, seconds, error.map(|error| error.relative)) {
+        if !go_on || stop() || target.reached(spp, seconds, error.map(|error| error.relative)) {
             break;
         }
         // Whole passes as long as a slice, growing gently while the rate is still unknown.

@@ -2,9 +2,10 @@
 
 use super::Hit;
 use crate::geometry::Ray;
+use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
-/// Many rays, one array per coordinate.
+/// Many rays, one array per coordinate. The arrays may be longer than there are rays.
 #[derive(Clone, Debug, Default)]
 pub struct RayBatch {
     pub origin_x: Vec<f32>,
@@ -15,33 +16,37 @@ pub struct RayBatch {
     pub dir_z: Vec<f32>,
     /// Lengths of `dir`, excluded.
     pub t_max: Vec<f32>,
+    len: usize,
 }
 
 impl RayBatch {
     pub fn len(&self) -> usize {
-        self.t_max.len()
+        self.len
     }
 
     pub fn is_empty(&self) -> bool {
-        self.t_max.is_empty()
+        self.len == 0
     }
 
     /// Forgets the rays and keeps the memory.
     pub fn clear(&mut self) {
-        for array in self.arrays() {
-            array.clear();
-        }
+        self.len = 0;
     }
 
     #[inline]
     pub fn push(&mut self, ray: &Ray) {
-        self.origin_x.push(ray.origin.x);
-        self.origin_y.push(ray.origin.y);
-        self.origin_z.push(ray.origin.z);
-        self.dir_x.push(ray.dir.x);
-        self.dir_y.push(ray.dir.y);
-        self.dir_z.push(ray.dir.z);
-        self.t_max.push(ray.t_max);
+        if self.len == self.t_max.len() {
+            self.make_room(self.len.max(64));
+        }
+        let i = self.len;
+        self.origin_x[i] = ray.origin.x;
+        self.origin_y[i] = ray.origin.y;
+        self.origin_z[i] = ray.origin.z;
+        self.dir_x[i] = ray.dir.x;
+        self.dir_y[i] = ray.dir.y;
+        self.dir_z[i] = ray.dir.z;
+        self.t_max[i] = ray.t_max;
+        self.len += 1;
     }
 
     #[inline(always)]
@@ -53,10 +58,48 @@ impl RayBatch {
         }
     }
 
+    /// So that `n` more rays can be appended.
+    pub(crate) fn make_room(&mut self, n: usize) {
+        let least = self.len + n + LANES;
+        if self.t_max.len() < least {
+            for array in self.arrays() {
+                array.resize(least, 0.0);
+            }
+        }
+    }
+
+    /// Appends the rays of the lanes in `mask`; there must be room.
+    #[inline(always)]
+    pub(crate) fn append<S: Simd>(&mut self, mask: Mask, origin: Vector<S>, dir: Vector<S>, t_max: Float<S>) {
+        let at = self.len;
+        let [ox, oy, oz, dx, dy, dz, t] = self.arrays();
+        append(ox, at, mask, origin.x);
+        append(oy, at, mask, origin.y);
+        append(oz, at, mask, origin.z);
+        append(dx, at, mask, dir.x);
+        append(dy, at, mask, dir.y);
+        append(dz, at, mask, dir.z);
+        append(t, at, mask, t_max);
+        self.len += mask.count_ones() as usize;
+    }
+
+    #[inline(always)]
     fn arrays(&mut self) -> [&mut Vec<f32>; 7] {
-        let Self { origin_x, origin_y, origin_z, dir_x, dir_y, dir_z, t_max } = self;
+        let Self { origin_x, origin_y, origin_z, dir_x, dir_y, dir_z, t_max, len: _ } = self;
         [origin_x, origin_y, origin_z, dir_x, dir_y, dir_z, t_max]
     }
+}
+
+/// Writes the lanes in `mask` to `to[at..]`, and anything to the rest of the sixteen numbers there.
+#[inline(always)]
+pub(crate) fn append<S: Simd>(to: &mut [f32], at: usize, mask: Mask, lanes: Float<S>) {
+    lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
+}
+
+/// The same of integers.
+#[inline(always)]
+pub(crate) fn append_bits<S: Simd>(to: &mut [u32], at: usize, mask: Mask, lanes: Bits<S>) {
+    lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
 }
 
 impl<'a> FromIterator<&'a Ray> for RayBatch {

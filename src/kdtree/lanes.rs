@@ -6,7 +6,7 @@ use super::simd::{LANES, Mask, Simd};
 use crate::geometry::{TINY_EDGE, tiny_edges};
 
 /// Vertices in the ray's sheared frame: across, across, along.
-pub(super) type Sheared<S> = [<S as Simd>::F; 3];
+pub(super) type Sheared<S> = [<S as crate::lanes::Simd>::F; 3];
 
 /// Lanes that hit, with their `t`, `u`, `v`; other lanes hold anything.
 pub(super) struct LaneHits<S: Simd> {

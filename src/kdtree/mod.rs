@@ -26,10 +26,11 @@ mod surface;
 mod trace;
 mod wide;
 
+pub use crate::lanes::InstructionSet;
 pub use batch::{HitBatch, RayBatch};
+pub(crate) use batch::{append, append_bits};
 pub use mesh_tree::{BuildPreset, MeshTree};
 pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
-pub use simd::InstructionSet;
 pub use sphere_tree::SphereTree;
 pub use stats::{KdTreeStats, Visits};
 pub use surface::SurfacePoint;

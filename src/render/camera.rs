@@ -44,6 +44,20 @@ impl Camera {
         Ray::new(self.eye + offset, (towards / towards.abs().max_element()).normalize())
     }
 
+    /// Nearest and farthest depth, metres along `forward`, at which the circle of confusion is at most one pixel of a
+    /// picture so many pixels high; the farthest may be infinite, and for a pinhole everything is sharp.
+    ///
+    /// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane
+    /// a metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|.
+    pub fn sharp_zone(&self, height: u32) -> (f32, f32) {
+        let pixel = 2.0 * self.tan_half_vfov / height.max(1) as f32;
+        // For a pinhole infinite, and then nothing is subtracted from it.
+        let slack = pixel / (2.0 * self.lens_radius);
+        let focus = self.focus_distance.recip();
+        let far = if focus > slack { (focus - slack).recip() } else { f32::INFINITY };
+        ((focus + slack).recip(), far)
+    }
+
     /// A point of the lens by its distance from the eye along `right` and `up`, metres.
     ///
     /// - `u`: two numbers in `[0, 1)`.

@@ -7,7 +7,7 @@
 //! var I₂ₙ is the difference over 2ᵃ − 1. Independent batches would tell the same, and cost the evenness between them.
 //!
 //! What a difference is relative to must not come from the pixel alone: one bright sample that few pixels have drawn
-//! yet (a caustic) would raise the very value that its own error is divided by, and hide itself: see [`level`].
+//! yet (a caustic) would raise the very value that its own error is divided by, and hide itself: see [`local_level`].
 
 use glam::DVec3;
 
@@ -44,9 +44,10 @@ impl ErrorEstimate {
     }
 
     pub(super) fn from_tiles<'a>(tiles: impl Iterator<Item = &'a TileConvergence> + Clone, spp: u32) -> Option<Self> {
-        // The last doubling that every tile has seen.
+        // The last doubling that every tile has seen. Films that were added up may have missed some.
         let n_levels = tiles.clone().map(|tile| tile.steps.len()).min()?;
-        let level = n_levels.checked_sub(1)?;
+        let is_known = |level: &usize| tiles.clone().all(|tile| !tile.steps[*level].is_nan());
+        let level = (0..n_levels).rev().find(is_known)?;
         let n_values: f64 = tiles.clone().map(|tile| tile.n_values).sum();
         let step = |k: usize| tiles.clone().map(|tile| tile.steps[k]).sum::<f64>() / n_values;
         let last = step(level);
@@ -61,17 +62,18 @@ impl ErrorEstimate {
             (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * mean)
         };
         // The first steps say little of how fast later ones fall; independent samples where there is only one.
-        let first = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
-        let exponent = if first < level && last > 0.0 {
-            let span = (level - first) as f64;
-            let seen = (step(first) / last).log2() / span;
-            // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
-            // much as it is uncertain, where slopes of pictures lie about half around it.
-            let uncertainty = sigma(first).hypot(sigma(level)) / (span * std::f64::consts::LN_2);
-            let trust = 0.25 / (0.25 + uncertainty * uncertainty);
-            (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
-        } else {
-            MIN_EXPONENT
+        let earliest = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
+        let exponent = match (earliest..level).find(is_known) {
+            Some(first) if last > 0.0 => {
+                let span = (level - first) as f64;
+                let seen = (step(first) / last).log2() / span;
+                // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
+                // much as it is uncertain, where slopes of pictures lie about half around it.
+                let uncertainty = sigma(first).hypot(sigma(level)) / (span * std::f64::consts::LN_2);
+                let trust = 0.25 / (0.25 + uncertainty * uncertainty);
+                (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
+            }
+            _ => MIN_EXPONENT,
         };
         let spp_at_level = f64::from(2u32 << level);
         let variance_of_one = last / (exponent.exp2() - 1.0) * spp_at_level.powf(exponent);
@@ -92,11 +94,15 @@ const MAX_EXPONENT: f64 = 3.0;
 #[derive(Clone, Debug, Default)]
 pub(super) struct TileConvergence {
     /// Means at the last power of two.
-    checkpoint: Vec<DVec3>,
-    /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (level² + 0.01), n = 2ᵏ.
-    steps: Vec<f64>,
+    pub checkpoint: Vec<DVec3>,
+    /// That power of two; 0 before the first.
+    pub checkpoint_spp: u32,
+    /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (level² + 0.01), n = 2ᵏ; NaN where it is not known.
+    pub steps: Vec<f64>,
+    /// Each pixel's share of the last step, mean over channels.
+    pub last: Vec<f32>,
     /// Pixels times channels.
-    n_values: f64,
+    pub n_values: f64,
 }
 
 impl TileConvergence {
@@ -104,15 +110,29 @@ impl TileConvergence {
     pub fn record(&mut self, spp: u32, width: usize, means: impl Iterator<Item = DVec3>) {
         let before = std::mem::replace(&mut self.checkpoint, means.collect());
         self.n_values = 3.0 * self.checkpoint.len() as f64;
-        if spp > 1 {
+        let spp_before = std::mem::replace(&mut self.checkpoint_spp, spp);
+        let level = spp.ilog2() as usize;
+        if spp > 1 && spp_before == spp / 2 {
             let pairs = before.iter().zip(&self.checkpoint).enumerate();
             let relative = pairs.map(|(i, (a, b))| {
-                let (difference, level) = (*a - *b, level(&self.checkpoint, *a, width, i));
+                let (difference, level) = (*a - *b, local_level(&self.checkpoint, *a, width, i));
                 (difference * difference / (level * level + 0.01)).element_sum()
             });
-            let sum = relative.sum();
+            let mut last = std::mem::take(&mut self.last);
+            last.clear();
+            let sum = relative.inspect(|step| last.push((step / 3.0) as f32)).sum();
+            self.last = last;
+            self.steps.resize(level - 1, f64::NAN);
             self.steps.push(sum);
+        } else {
+            // Samples came in too large a lump to tell.
+            self.steps.resize(level, f64::NAN);
         }
+    }
+
+    /// Of one pixel, relative and squared; 0 before the second sample.
+    pub fn last_step(&self, pixel: usize) -> f32 {
+        self.last.get(pixel).copied().unwrap_or(0.0)
     }
 }
 
@@ -121,7 +141,7 @@ impl TileConvergence {
 ///
 /// A bright sample that came once raises one half alone, and few of the neighbours. A lamp of a single pixel, which
 /// its neighbours know nothing of, is bright in both halves.
-fn level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
+fn local_level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
     let (x, y, height) = (i % width, i / width, means.len() / width);
     // At the border pixels repeat.
     let around = |k: usize, n: usize| [k.saturating_sub(1), k, (k + 1).min(n - 1)];
@@ -193,13 +213,13 @@ mod tests {
             means
         };
         // A lamp of one pixel: 19 in the first half, 21 in the second.
-        assert_eq!(level(&around(20.0), DVec3::splat(19.0), width, 4), DVec3::splat(19.0));
+        assert_eq!(local_level(&around(20.0), DVec3::splat(19.0), width, 4), DVec3::splat(19.0));
         // A firefly in the second half, or in the first.
-        assert!((level(&around(10.05), dark, width, 4) - dark).length() < 1e-12);
-        assert!((level(&around(10.05), DVec3::splat(20.0), width, 4) - dark).length() < 1e-12);
+        assert!((local_level(&around(10.05), dark, width, 4) - dark).length() < 1e-12);
+        assert!((local_level(&around(10.05), DVec3::splat(20.0), width, 4) - dark).length() < 1e-12);
         // Its neighbours count a ninth of it at most, and a tile of one pixel has itself alone.
-        assert_eq!(level(&around(10.05), dark, width, 0), dark);
-        assert_eq!(level(&[dark], dark, 1, 0), dark);
+        assert_eq!(local_level(&around(10.05), dark, width, 0), dark);
+        assert_eq!(local_level(&[dark], dark, 1, 0), dark);
     }
 
     #[test]

@@ -1,9 +1,14 @@
 //! Where light is summed up: linear, unclamped, in tiles that workers own one at a time.
+//!
+//! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
+//! ([`Film::merge`]) to the very film that has all of them.
 
 use super::caustics::LightLayer;
 use super::estimate::{ErrorEstimate, TileConvergence};
+use super::exact_sum::ExactSum;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Sums and counts of one picture.
 ///
@@ -28,8 +33,10 @@ pub(super) struct FilmTile {
     pub size: UVec2,
     /// Samples taken of each pixel of this tile so far, bad ones included.
     pub spp: u32,
+    /// The numbers of those samples, ascending, with gaps between the ranges; new samples lengthen the last one.
+    pub ranges: Vec<Range<u32>>,
     /// Sum of radiance a pixel, W·m⁻²·sr⁻¹.
-    pub sums: Vec<DVec3>,
+    pub sums: Vec<ExactSum>,
     /// Pixel (index in this tile) and number of each sample that was left out because it was not finite.
     pub bad: Vec<(u32, u32)>,
     /// What the error estimate needs.
@@ -41,7 +48,7 @@ impl Film {
     pub const TILE_SIZE: u32 = 32;
 
     /// Memory that a pixel takes: its sums, and its mean at the last power of two.
-    pub const BYTES_A_PIXEL: usize = 2 * size_of::<DVec3>();
+    pub const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
 
     /// Width and height in pixels, at least 1 each.
     pub fn new(width: u32, height: u32) -> Self {
@@ -62,6 +69,16 @@ impl Film {
         Self { width, height, tiles, tiles_x, tile_size, light: None }
     }
 
+    /// The same without samples, to begin with sample number `first`.
+    pub fn starting_at(mut self, first: u32) -> Self {
+        self.light = None;
+        for tile in &mut self.tiles {
+            *tile = FilmTile::new(tile.origin, tile.size);
+            tile.ranges = std::iter::once(first..first).collect();
+        }
+        self
+    }
+
     pub fn width(&self) -> u32 {
         self.width
     }
@@ -70,10 +87,66 @@ impl Film {
         self.height
     }
 
+    /// Pixels along the side of a tile.
+    pub fn tile_size(&self) -> u32 {
+        self.tile_size
+    }
+
     /// Samples that every pixel has at least.
     pub fn spp(&self) -> u32 {
-        let from_lamps = self.light.as_ref().map(LightLayer::spp);
+        let from_lamps = self.light.as_ref().map(|light| light.spp);
         self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
+    }
+
+    /// Samples that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
+    pub fn max_spp(&self) -> u32 {
+        let from_lamps = self.light.as_ref().map(LightLayer::begun);
+        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).max().unwrap_or(0)
+    }
+
+    /// The number of the first sample.
+    pub fn first_sample(&self) -> u32 {
+        self.tiles.iter().filter_map(|tile| tile.ranges.first()).map(|range| range.start).min().unwrap_or(0)
+    }
+
+    /// Samples that were left out because they were not finite.
+    pub fn n_bad(&self) -> u64 {
+        self.tiles.iter().map(|tile| tile.bad.len() as u64).sum()
+    }
+
+    /// Adds the samples of another film of the same picture: the film is then the one that has the samples of both,
+    /// bit for bit.
+    ///
+    /// # Errors
+    /// When the films differ in size, or have a sample in common. Then nothing has been added.
+    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+        if (self.width, self.height) != (other.width, other.height) {
+            let size = |film: &Self| format!("{} x {}", film.width, film.height);
+            return Err(format!("one film has {} pixels, the other {}", size(self), size(other)));
+        }
+        if self.tile_size != other.tile_size {
+            return Err(format!("one film has tiles of {}, the other of {}", self.tile_size, other.tile_size));
+        }
+        for (tile, other) in self.tiles.iter().zip(&other.tiles) {
+            if let Some(shared) = tile.shares_with(other) {
+                return Err(format!(
+                    "both films have the samples {} to {}: render ranges that do not overlap, such as --samples 0..64 and \
+                     --samples 64..128",
+                    shared.start,
+                    shared.end - 1
+                ));
+            }
+        }
+        for (tile, other) in self.tiles.iter_mut().zip(&other.tiles) {
+            tile.merge(other);
+        }
+        match (&mut self.light, &other.light) {
+            (Some(light), Some(other)) => light.merge(other),
+            (light, Some(other)) => *light = Some(other.clone()),
+            (_, None) => {}
+        }
+        self.record_convergence();
+        Ok(())
     }
 
     /// Mean radiance of a pixel, row 0 at the top; black where there is no sample yet.
@@ -113,7 +186,14 @@ impl Film {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
     }
 
-    /// Tells every tile's part of the error estimate how far the picture is; all tiles have as many samples.
+    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
+    /// mean over many pixels is the variance that is left. 0 before the second sample.
+    pub fn doubling_step(&self, x: u32, y: u32) -> f32 {
+        let (tile, local) = self.locate(x, y);
+        tile.convergence.last_step(local)
+    }
+
+    /// Tells every tile's part of the error estimate how far the picture is.
     pub(super) fn record_convergence(&mut self) {
         let (light, width) = (self.light.as_ref(), self.width);
         self.tiles.par_iter_mut().for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
@@ -129,8 +209,8 @@ impl Film {
 impl FilmTile {
     fn new(origin: UVec2, size: UVec2) -> Self {
         let n = (size.x * size.y) as usize;
-        let sums = vec![DVec3::ZERO; n];
-        Self { origin, size, spp: 0, sums, bad: Vec::new(), convergence: TileConvergence::default() }
+        let (sums, ranges) = (vec![ExactSum::default(); n], std::iter::once(0..0).collect());
+        Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence: TileConvergence::default() }
     }
 
     pub fn n_pixels(&self) -> usize {
@@ -141,21 +221,29 @@ impl FilmTile {
         let n_bad = self.bad.iter().filter(|(pixel, _)| *pixel as usize == local).count() as u32;
         match self.spp - n_bad {
             0 => DVec3::ZERO,
-            n => self.sums[local] / f64::from(n),
+            n => self.sums[local].sum / f64::from(n),
         }
     }
 
-    /// Adds one sample of every pixel, in the order of `sums`; `sample` is its number.
+    /// The number of the next sample.
+    pub fn next_sample(&self) -> u32 {
+        self.ranges.last().map_or(0, |range| range.end)
+    }
+
+    /// Adds one sample of every pixel, in the order of `sums`; `sample` is its number, the next one.
     pub fn add_sample(&mut self, sample: u32, radiance: impl Iterator<Item = Vec3>) {
-        debug_assert_eq!(sample, self.spp, "samples come in order, so that sums do not depend on threads");
+        debug_assert_eq!(sample, self.next_sample(), "samples come in order");
         for (local, (sum, radiance)) in self.sums.iter_mut().zip(radiance).enumerate() {
             if radiance.is_finite() {
-                *sum += radiance.as_dvec3();
+                sum.add(radiance);
             } else {
                 self.bad.push((local as u32, sample));
             }
         }
         self.spp += 1;
+        if let Some(last) = self.ranges.last_mut() {
+            last.end += 1;
+        }
     }
 
     /// At powers of two, tells the error estimate of the picture so far; `light`: from the lamps, and the width of the film.
@@ -173,5 +261,41 @@ impl FilmTile {
         };
         convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(mean));
         self.convergence = convergence;
+    }
+
+    /// Samples that both have.
+    fn shares_with(&self, other: &Self) -> Option<Range<u32>> {
+        let pairs = self.ranges.iter().flat_map(|a| other.ranges.iter().map(move |b| (a, b)));
+        pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).find(|shared| !shared.is_empty())
+    }
+
+    /// Adds the samples of another tile, which has none of these.
+    fn merge(&mut self, other: &Self) {
+        for (sum, other) in self.sums.iter_mut().zip(&other.sums) {
+            sum.merge(other);
+        }
+        // What rendering in one go would have measured is known where the second half doubles the first.
+        let start = |tile: &Self| tile.ranges.first().map_or(0, |range| range.start);
+        let other_knows_more =
+            (other.spp, std::cmp::Reverse(start(other))) > (self.spp, std::cmp::Reverse(start(self)));
+        if other_knows_more {
+            self.convergence = other.convergence.clone();
+        }
+        self.spp += other.spp;
+        self.bad.extend(&other.bad);
+        self.bad.sort_unstable_by_key(|&(pixel, sample)| (sample, pixel));
+        let mut ranges: Vec<Range<u32>> = self.ranges.iter().chain(&other.ranges).cloned().collect();
+        ranges.retain(|range| !range.is_empty());
+        if ranges.is_empty() {
+            ranges.push(self.next_sample()..self.next_sample());
+        }
+        ranges.sort_by_key(|range| range.start);
+        self.ranges = ranges.into_iter().fold(Vec::new(), |mut joined: Vec<Range<u32>>, range| {
+            match joined.last_mut() {
+                Some(last) if last.end == range.start => last.end = range.end,
+                _ => joined.push(range),
+            }
+            joined
+        });
     }
 }

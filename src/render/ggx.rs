@@ -2,8 +2,9 @@
 //!
 //! All vectors are unit and in the shading frame, the normal being +z.
 
+use crate::sampling::uniform_disc;
 use glam::{Vec2, Vec3};
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 use std::sync::OnceLock;
 
 /// Distribution of normals D, per steradian (Walter et al. 2007, equation 33).
@@ -55,11 +56,15 @@ pub fn reflection_weight(wo: Vec3, wi: Vec3, alpha: f32) -> f32 {
 pub fn sample_visible_normal(wo: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let stretch = Vec3::new(alpha, alpha, 1.0);
     let wo_std = (wo * stretch).normalize();
-    let z = (1.0 - u.y) * (1.0 + wo_std.z) - wo_std.z;
+    // The place on the cap by a disc, which keeps neighbours together: the square of its radius is uniform, and so is
+    // the height on the cap.
+    let disc = uniform_disc(u);
+    let r2 = disc.length_squared().min(1.0);
+    let z = (1.0 - r2) * (1.0 + wo_std.z) - wo_std.z;
     // Rounding can push z² past 1, and the root of a negative number would be NaN.
     let sin_theta = (1.0 - z * z).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (TAU * u.x).sin_cos();
-    let wi_std = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z);
+    let across = if r2 > 0.0 { disc * (sin_theta / r2.sqrt()) } else { Vec2::new(sin_theta, 0.0) };
+    let wi_std = across.extend(z);
     let h = (wo_std + wi_std) * stretch;
     // Opposite vectors: the visible hemisphere's rim, where any normal will do.
     h.try_normalize().unwrap_or(Vec3::Z)
@@ -112,6 +117,7 @@ fn integrate_albedo(cos_theta: f32, alpha: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
+    use std::f32::consts::TAU;
 
     #[test]
     fn projected_normals_cover_the_surface_once() {

@@ -77,6 +77,16 @@ impl Material {
         }
     }
 
+    /// Whether the inside of it takes light away.
+    pub(super) fn absorbs(&self) -> bool {
+        match self {
+            Self::Glass { absorption, .. } | Self::Phong { absorption, .. } => {
+                self.is_clear() && *absorption != Vec3::ZERO
+            }
+            _ => false,
+        }
+    }
+
     /// Whether it, or a part of it, is perfectly smooth everywhere: a mirror or glass.
     pub(super) fn is_specular(&self, materials: &[Self]) -> bool {
         match self {

@@ -23,7 +23,7 @@ impl MediumStack {
         self.0.iter().rev().copied().find(|&id| id != NONE)
     }
 
-    #[cfg(test)]
+    #[inline]
     pub fn is_empty(&self) -> bool {
         self.0[0] == NONE
     }

@@ -4,22 +4,28 @@
 //! shadow rays follows, and what survives is the next batch. Light is collected by next-event estimation and by
 //! bounces, combined with the power heuristic (Veach 1997, chapter 9); smooth skies are left to bounces alone, which
 //! find them as well as anything could. Paths end by Russian roulette, never by a limit unless one is asked for.
-//! Start reading at [`PathWave::trace`].
+//! Materials of one lobe are shaded sixteen hits at a time (`wide/`); what is here shades all others, and whatever is
+//! asked of it as the reference. Start reading at [`PathWave::trace`].
 
 use super::bsdf::Scatter;
 use super::caustics::{Bounce, CausticPass, Guided, Track};
 use super::light::LightSample;
 use super::medium::MediumStack;
+use super::paths::{Path, PathBatch, ShadowBatch};
 use super::renderer::{RayCounts, RenderSettings};
-use super::surface::{Vertex, blend_at, lobe_at, material_of};
+use super::surface::{Vertex, blend_at, lobe_at};
+use super::wide::{self, Group, KINDS, SortedHits};
 use super::{Material, MaterialId, Snapshot, Techniques};
 use crate::geometry::Ray;
-use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
+use crate::kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use crate::sampling::Sampler;
 use glam::Vec3;
 
 /// Segments before Russian roulette begins: the first bounces carry most of the light.
-const ROULETTE_DEPTH: u32 = 5;
+const ROULETTE_DEPTH: u32 = 4;
+
+/// Paths that keep a quarter of their light and more are not ended: what they would still find is worth their cost.
+pub(super) const ROULETTE_GRACE: f32 = 4.0;
 
 /// From here on even paths that lose nothing are ended now and then: between perfect mirrors they would go on for
 /// ever.
@@ -28,11 +34,26 @@ const ENDLESS_DEPTH: u32 = 64;
 /// Sample dimensions of the camera, and then of each vertex.
 pub(super) const CAMERA_DIMENSIONS: u32 = 2;
 const VERTEX_DIMENSIONS: u32 = 5;
-const DIM_LIGHT_POINT: u32 = 0;
-const DIM_DIRECTION: u32 = 1;
-const DIM_LIGHT: u32 = 2;
-const DIM_LOBE: u32 = 3;
-const DIM_ROULETTE: u32 = 4;
+pub(super) const DIM_LIGHT_POINT: u32 = 0;
+pub(super) const DIM_DIRECTION: u32 = 1;
+pub(super) const DIM_LIGHT: u32 = 2;
+pub(super) const DIM_LOBE: u32 = 3;
+pub(super) const DIM_ROULETTE: u32 = 4;
+
+impl From<CameraPath> for Path {
+    fn from(CameraPath { ray, sampler, slot, weight }: CameraPath) -> Self {
+        Self {
+            throughput: Vec3::splat(weight),
+            pdf: f32::INFINITY,
+            position: ray.origin,
+            normal: ray.dir,
+            sampler,
+            slot,
+            media: MediumStack::default(),
+            track: Track::default(),
+        }
+    }
+}
 
 /// A camera ray and where its light goes.
 pub(super) struct CameraPath {
@@ -43,42 +64,44 @@ pub(super) struct CameraPath {
     pub weight: f32,
 }
 
-/// The state of one path between two bounces.
+/// Whether, and how, paths end by chance at a depth.
 #[derive(Clone, Copy)]
-struct Path {
-    throughput: Vec3,
-    /// Density per steradian with which the last vertex chose this direction; infinite if light sampling could not
-    /// have.
-    pdf: f32,
-    /// The last vertex, for the density of light sampling there.
-    position: Vec3,
-    normal: Vec3,
-    sampler: Sampler,
-    slot: u32,
-    media: MediumStack,
-    /// Against paths from the lamps.
-    track: Track,
+pub(super) struct Survival {
+    /// The most that may be kept; `None` while all paths go on.
+    pub share: Option<f32>,
+}
+
+impl Survival {
+    fn at(depth: u32, techniques: &Techniques) -> Self {
+        let share = match depth {
+            ENDLESS_DEPTH.. => Some(0.95),
+            ROULETTE_DEPTH.. if techniques.roulette => Some(1.0),
+            _ => None,
+        };
+        Self { share }
+    }
 }
 
 /// Scratch memory of one worker: cleared between waves, never given back.
 #[derive(Default)]
 pub(super) struct PathWave {
-    rays: RayBatch,
-    paths: Vec<Path>,
-    next_rays: RayBatch,
-    next_paths: Vec<Path>,
+    paths: PathBatch,
+    next: PathBatch,
     hits: HitBatch,
-    /// Hits in the order in which they are shaded: by kind of material.
-    order: Vec<u32>,
-    kinds: Vec<u8>,
-    shadow_rays: RayBatch,
-    /// Slot and light of each shadow ray, if nothing is in its way.
-    shadow_light: Vec<(u32, Vec3)>,
-    occluded: Vec<bool>,
+    sorted: SortedHits,
+    /// Of the hits of one kind, those with hints of where gathered light comes from, and the others.
+    told: Vec<u32>,
+    untold: Vec<u32>,
+    shadows: ShadowBatch,
 }
 
+/// Of hits, see [`SortedHits::of_kind`]; the others are one more than [`Material::kind`].
+const MISSES: usize = 0;
+const EMITTERS: usize = 1;
+
 impl PathWave {
-    /// Follows `camera_paths` to their ends and adds what they find to `radiance`, indexed by slot.
+    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// slot.
     ///
     /// `None` when `stop` said so; what is in `radiance` then is of no use.
     pub fn trace(
@@ -86,14 +109,16 @@ impl PathWave {
         scene: &Snapshot,
         settings: &RenderSettings,
         caustics: Option<&CausticPass>,
-        camera_paths: impl Iterator<Item = CameraPath>,
+        start: impl FnOnce(&mut PathBatch),
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        self.start(camera_paths);
-        let mut counts = RayCounts { camera: self.rays.len() as u64, ..RayCounts::default() };
+        self.paths.start(radiance.len(), scene.shading.features.glass, caustics.is_some());
+        start(&mut self.paths);
+        let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
+        let tree = &scene.geometry.tree;
         for depth in 1..=settings.max_depth {
-            if self.rays.is_empty() {
+            if self.paths.is_empty() {
                 break;
             }
             if stop() {
@@ -101,38 +126,14 @@ impl PathWave {
             }
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
-            scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
+            tree.closest_hits(&self.paths.rays, class, &mut self.hits);
             self.shade(scene, depth, settings, caustics, radiance);
-            scene.geometry.tree.any_hits(&self.shadow_rays, class, &mut self.occluded);
-            for (&(slot, light), &occluded) in self.shadow_light.iter().zip(&self.occluded) {
-                if !occluded {
-                    radiance[slot as usize] += light;
-                }
-            }
-            counts.shadow += self.shadow_rays.len() as u64;
-            counts.bounce += self.next_rays.len() as u64;
-            std::mem::swap(&mut self.rays, &mut self.next_rays);
-            std::mem::swap(&mut self.paths, &mut self.next_paths);
+            self.shadows.settle(radiance, |rays, occluded| tree.any_hits(rays, class, occluded));
+            counts.shadow += self.shadows.rays.len() as u64;
+            counts.bounce += self.next.len() as u64;
+            std::mem::swap(&mut self.paths, &mut self.next);
         }
         Some(counts)
-    }
-
-    fn start(&mut self, camera_paths: impl Iterator<Item = CameraPath>) {
-        self.rays.clear();
-        self.paths.clear();
-        for CameraPath { ray, sampler, slot, weight } in camera_paths {
-            self.rays.push(&ray);
-            self.paths.push(Path {
-                throughput: Vec3::splat(weight),
-                pdf: f32::INFINITY,
-                position: ray.origin,
-                normal: ray.dir,
-                sampler,
-                slot,
-                media: MediumStack::default(),
-                track: Track::default(),
-            });
-        }
     }
 
     fn shade(
@@ -143,54 +144,139 @@ impl PathWave {
         caustics: Option<&CausticPass>,
         radiance: &mut [Vec3],
     ) {
-        let techniques = &settings.techniques;
-        self.next_rays.clear();
-        self.next_paths.clear();
-        self.shadow_rays.clear();
-        self.shadow_light.clear();
-        self.sort_by_material(scene);
-        for k in 0..self.order.len() {
-            let i = self.order[k] as usize;
-            let mut path = self.paths[i];
-            let ray = self.rays.get(i);
-            let Some(hit) = self.hits.get(i) else {
-                radiance[path.slot as usize] += path.throughput * environment_light(scene, techniques, &path, ray.dir);
+        self.next.start(self.paths.len(), scene.shading.features.glass, caustics.is_some());
+        self.shadows.start(self.paths.len());
+        let set = settings.lanes.unwrap_or(InstructionSet::Portable);
+        self.sorted.sort(set, scene, &self.hits, self.paths.len());
+        let is_last = depth == settings.max_depth;
+        let features = &scene.shading.features;
+        let emitters_have_lanes = caustics.is_none()
+            && scene.shading.lights.has_lanes()
+            && !features.textures
+            && scene.shading.environment_sampler.is_none();
+        for kind in 0..KINDS {
+            let mut order = self.sorted.of_kind(kind);
+            if order.is_empty() {
                 continue;
-            };
-            if scene.shading.features.media {
-                path.throughput *= path.media.transmittance(scene, hit.t);
             }
-            let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &ray, &hit, material);
-            if let Some(emission) = scene.shading.emission[material as usize]
-                && vertex.front
+            // Where there are hints, they are followed one path at a time.
+            self.told.clear();
+            if let Some(pass) = caustics
+                && kind > MISSES
+                && wide::scatters(kind - 1)
+                && settings.lanes.is_some()
             {
-                let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, &path.media, &hit, &vertex));
-                let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
-                let weight = emission.scale * weight;
-                radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
+                let (paths, hits) = (&self.paths, &self.hits);
+                let is_told = |i: &u32| {
+                    let i = *i as usize;
+                    pass.hints(&paths.track_of(i), depth, paths.rays.get(i).at(hits.t[i])).is_some()
+                };
+                self.told.extend(order.iter().copied().filter(is_told));
+                if !self.told.is_empty() {
+                    self.untold.clear();
+                    self.untold.extend(order.iter().copied().filter(|i| !is_told(i)));
+                    order = &self.untold;
+                }
             }
-            if depth == settings.max_depth {
+            let group = Group {
+                scene,
+                techniques: &settings.techniques,
+                caustics,
+                depth,
+                dimension: first_dimension(depth),
+                survival: Survival::at(depth, &settings.techniques),
+                paths: &self.paths,
+                hits: &self.hits,
+                materials: &self.sorted.materials,
+                order,
+                next: &mut self.next,
+                shadows: &mut self.shadows,
+            };
+            match (settings.lanes, kind) {
+                (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
+                (Some(set), EMITTERS) if emitters_have_lanes => wide::shade_emitters(set, group, radiance),
+                // What emits no light and is the end of its path adds nothing.
+                (Some(_), _) if wide::knows(kind - 1) && is_last => {}
+                (Some(set), _) if wide::knows(kind - 1) => wide::shade(set, kind - 1, group),
+                _ => {
+                    for k in 0..order.len() {
+                        let i = self.sorted.of_kind(kind)[k] as usize;
+                        self.shade_one(scene, depth, settings, caustics, i, radiance);
+                    }
+                }
+            }
+            for k in 0..self.told.len() {
+                self.shade_one(scene, depth, settings, caustics, self.told[k] as usize, radiance);
+            }
+        }
+    }
+
+    fn shade_misses(&mut self, scene: &Snapshot, techniques: &Techniques, radiance: &mut [Vec3]) {
+        if !scene.shading.features.environment {
+            return;
+        }
+        let always = scene.shading.environment_sampler.is_none();
+        for &i in self.sorted.of_kind(MISSES) {
+            let i = i as usize;
+            let dir = self.paths.rays.get(i).dir;
+            if always {
+                // Bounces alone find it.
+                radiance[self.paths.slot[i] as usize] +=
+                    self.paths.throughput_of(i) * scene.shading.environment.radiance(dir);
                 continue;
             }
-            let step = Step {
-                scene,
-                techniques,
-                path: &path,
-                vertex: &vertex,
-                hit: &hit,
-                material,
-                depth,
-                caustics,
-                is_told: false,
-            };
-            if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
-                if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
-                    self.scatter_told(step, &blend);
-                }
-            } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
-                self.scatter_told(step, &lobe);
+            let path = self.paths.get(i);
+            radiance[path.slot as usize] += path.throughput * environment_light(scene, techniques, &path, dir);
+        }
+    }
+
+    /// Shades one hit: the light that it emits, a light sample and a bounce.
+    fn shade_one(
+        &mut self,
+        scene: &Snapshot,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        i: usize,
+        radiance: &mut [Vec3],
+    ) {
+        let techniques = &settings.techniques;
+        let mut path = self.paths.get(i);
+        let ray = self.paths.rays.get(i);
+        let Some(hit) = self.hits.get(i) else { return };
+        if scene.shading.features.media {
+            path.throughput *= path.media.transmittance(scene, hit.t);
+        }
+        let material = self.sorted.materials[i];
+        let vertex = Vertex::new(scene, &ray, &hit, material);
+        if let Some(emission) = scene.shading.emission[material as usize]
+            && vertex.front
+        {
+            let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, &path.media, &hit, &vertex));
+            let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+            let weight = emission.scale * weight;
+            radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
+        }
+        if depth == settings.max_depth {
+            return;
+        }
+        let step = Step {
+            scene,
+            techniques,
+            path: &path,
+            vertex: &vertex,
+            hit: &hit,
+            material,
+            depth,
+            caustics,
+            is_told: false,
+        };
+        if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
+            if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
+                self.scatter_told(step, &blend);
             }
+        } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
+            self.scatter_told(step, &lobe);
         }
     }
 
@@ -213,56 +299,14 @@ impl PathWave {
         self.bounce(&step, bsdf);
     }
 
-    /// Hits of one kind of material follow each other, so that the processor finds them all alike.
-    fn sort_by_material(&mut self, scene: &Snapshot) {
-        let kind = |i: usize| match self.hits.get(i) {
-            None => 0,
-            Some(hit) => 1 + scene.shading.materials[material_of(scene, &hit) as usize].kind(),
-        };
-        let n = self.rays.len();
-        let mut starts = [0u32; Material::KINDS + 2];
-        let mut kinds = std::mem::take(&mut self.kinds);
-        kinds.clear();
-        kinds.extend((0..n).map(|i| kind(i) as u8));
-        for &kind in &kinds {
-            starts[usize::from(kind) + 1] += 1;
-        }
-        for k in 1..starts.len() {
-            starts[k] += starts[k - 1];
-        }
-        self.order.clear();
-        self.order.resize(n, 0);
-        for (i, &kind) in kinds.iter().enumerate() {
-            let at = &mut starts[usize::from(kind)];
-            self.order[*at as usize] = i as u32;
-            *at += 1;
-        }
-        self.kinds = kinds;
-    }
-
     /// Next-event estimation: one point on one light, and a shadow ray to it.
     #[inline]
     fn sample_light(&mut self, step: &Step, bsdf: &impl Scatter) {
         let &Step { scene, techniques, path, vertex, .. } = step;
         let (sampler, dimension) = (&path.sampler, step.dimension());
-        let u = sampler.pair(dimension + DIM_LIGHT_POINT);
         let shading = &*scene.shading;
-        let share = environment_share(scene);
-        let mut u_select = None;
-        let mut select = || *u_select.get_or_insert_with(|| sampler.single(dimension + DIM_LIGHT));
-        let (target, sample) = if share > 0.0 && (share >= 1.0 || select() < share) {
-            let environment = shading.environment_sampler.as_ref().expect("a share without a sampler");
-            let Some((wi, pdf)) = environment.sample(u) else { return };
-            let radiance = shading.environment.radiance(wi);
-            (None, LightSample { target: wi, wi, pdf: pdf * share, radiance })
-        } else {
-            let u_light = || ((select() - share) / (1.0 - share)).clamp(0.0, 1.0f32.next_down());
-            let found =
-                shading.lights.sample(&shading.textures, techniques, vertex.position, vertex.normal, u_light, u);
-            let Some(mut sample) = found else { return };
-            sample.pdf *= 1.0 - share;
-            (Some(sample.target), sample)
-        };
+        let found = choose_light_point(scene, techniques, vertex.position, vertex.normal, sampler, dimension);
+        let Some((target, sample)) = found else { return };
         let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
         if pdf <= 0.0 || !vertex.is_reached_from(sample.wi) {
             return;
@@ -283,8 +327,7 @@ impl PathWave {
             Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
             None => Ray::new(origin, sample.wi),
         };
-        self.shadow_rays.push(&shadow_ray);
-        self.shadow_light.push((path.slot, light));
+        self.shadows.push(&shadow_ray, path.slot, light);
     }
 
     /// Chooses how the path goes on, and whether.
@@ -320,11 +363,11 @@ impl PathWave {
             let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
             path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
         }
-        if depth >= if techniques.roulette { ROULETTE_DEPTH } else { ENDLESS_DEPTH } {
+        if let Some(most_kept) = Survival::at(depth, techniques).share {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
             let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
-            let most = path.throughput.abs().max_element() * ior * ior * path.track.gain;
-            let survival = if depth >= ENDLESS_DEPTH { most.min(0.95) } else { most.min(1.0) };
+            let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior * path.track.gain;
+            let survival = most.min(most_kept);
             if survival < 1.0 {
                 if sampler.single(dimension + DIM_ROULETTE) >= survival {
                     return;
@@ -339,8 +382,7 @@ impl PathWave {
         path.position = vertex.position;
         path.normal = vertex.normal;
         let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
-        self.next_rays.push(&Ray::new(origin, sample.wi));
-        self.next_paths.push(path);
+        self.next.push(&Ray::new(origin, sample.wi), &path);
     }
 }
 
@@ -362,8 +404,39 @@ struct Step<'a> {
 impl Step<'_> {
     /// The first sample dimension of this vertex.
     fn dimension(&self) -> u32 {
-        CAMERA_DIMENSIONS + (self.depth - 1) * VERTEX_DIMENSIONS
+        first_dimension(self.depth)
     }
+}
+
+fn first_dimension(depth: u32) -> u32 {
+    CAMERA_DIMENSIONS + (depth - 1) * VERTEX_DIMENSIONS
+}
+
+/// A point on a light, or a direction to the surroundings: then there is no target. Takes two pairs of dimensions.
+#[inline]
+pub(super) fn choose_light_point(
+    scene: &Snapshot,
+    techniques: &Techniques,
+    position: Vec3,
+    normal: Vec3,
+    sampler: &Sampler,
+    dimension: u32,
+) -> Option<(Option<Vec3>, LightSample)> {
+    let u = sampler.pair(dimension + DIM_LIGHT_POINT);
+    let shading = &*scene.shading;
+    let share = environment_share(scene);
+    let mut u_select = None;
+    let mut select = || *u_select.get_or_insert_with(|| sampler.single(dimension + DIM_LIGHT));
+    if share > 0.0 && (share >= 1.0 || select() < share) {
+        let environment = shading.environment_sampler.as_ref().expect("a share without a sampler");
+        let (wi, pdf) = environment.sample(u)?;
+        let radiance = shading.environment.radiance(wi);
+        return Some((None, LightSample { target: wi, wi, pdf: pdf * share, radiance }));
+    }
+    let u_light = || ((select() - share) / (1.0 - share)).clamp(0.0, 1.0f32.next_down());
+    let mut sample = shading.lights.sample(&shading.textures, techniques, position, normal, u_light, u)?;
+    sample.pdf *= 1.0 - share;
+    Some((Some(sample.target), sample))
 }
 
 /// Probability with which light sampling asks the environment rather than the finite lights.

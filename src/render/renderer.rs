@@ -4,14 +4,17 @@ use super::caustics::{CausticPass, LightLayer};
 use super::film::{Film, FilmTile};
 use super::filter::{FilterSampler, PixelFilter};
 use super::path::{CameraPath, PathWave};
+use super::paths::PathBatch;
 use super::phong::PhongWave;
+use super::wide::{Lens, Pixels};
 use super::{Snapshot, Techniques};
 use crate::geometry::Ray;
+use crate::kdtree::InstructionSet;
 use crate::sampling::Sampler;
 use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::ops::AddAssign;
+use std::ops::{AddAssign, Range};
 
 /// The light model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,12 +35,23 @@ pub struct RenderSettings {
     pub seed: u32,
     pub filter: PixelFilter,
     pub techniques: Techniques,
+    /// With which instructions sixteen paths are shaded at a time; `None` shades one after the other, which is what
+    /// tests compare with. All sets give the same bits.
+    #[doc(hidden)]
+    pub lanes: Option<InstructionSet>,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
         let (filter, techniques) = (PixelFilter::Box, Techniques::default());
-        Self { integrator: Integrator::Path, max_depth: u32::MAX, seed: 0, filter, techniques }
+        Self {
+            integrator: Integrator::Path,
+            max_depth: u32::MAX,
+            seed: 0,
+            filter,
+            techniques,
+            lanes: Some(InstructionSet::detect()),
+        }
     }
 }
 
@@ -103,7 +117,8 @@ pub fn advance(
     if !caustics.prepare(stop) {
         return PassReport::default();
     }
-    film.light.get_or_insert_with(|| LightLayer::new(size));
+    let first = film.first_sample();
+    film.light.get_or_insert_with(|| LightLayer::new(size, first));
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp() < target_spp {
@@ -157,22 +172,46 @@ const WAVE_SIZE: usize = 4096;
 struct Wave {
     path: PathWave,
     phong: PhongWave,
+    pixels: Pixels,
 }
 
 impl Wave {
-    /// See [`PathWave::trace`].
+    /// Takes one sample of each of the pixels for each number in `samples`, and adds what they see to `radiance`: those
+    /// of one sample follow each other, `stride` apart from those of the next.
     fn trace(
         &mut self,
-        scene: &Snapshot,
-        settings: &RenderSettings,
-        caustics: Option<&CausticPass>,
-        camera_paths: impl Iterator<Item = CameraPath>,
+        pass: &Pass,
+        samples: Range<u32>,
+        stride: u32,
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        match settings.integrator {
-            Integrator::Path => self.path.trace(scene, settings, caustics, camera_paths, radiance, stop),
-            Integrator::Phong => self.phong.trace(scene, settings.max_depth, camera_paths, radiance, stop),
+        let Self { path, phong, pixels } = self;
+        let pixels = &*pixels;
+        let slot = |sample: u32| (sample - samples.start) * stride;
+        let camera_paths = samples.clone().flat_map(|sample| {
+            (0..pixels.local.len()).map(move |i| {
+                let (ray, sampler, weight) = pass.camera_ray(UVec2::new(pixels.x[i], pixels.y[i]), sample);
+                CameraPath { ray, sampler, slot: slot(sample) + pixels.local[i], weight }
+            })
+        });
+        match pass.settings.integrator {
+            Integrator::Phong => phong.trace(pass.snapshot, pass.settings.max_depth, camera_paths, radiance, stop),
+            Integrator::Path => {
+                let lens = pass.lens();
+                let start = |paths: &mut PathBatch| {
+                    if let Some(set) = pass.settings.lanes
+                        && lens.is_plain()
+                    {
+                        for sample in samples.clone() {
+                            lens.start_paths(set, pixels, sample, slot(sample), paths);
+                        }
+                    } else {
+                        camera_paths.for_each(|camera| paths.push(&{ camera.ray }, &camera.into()));
+                    }
+                };
+                path.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), start, radiance, stop)
+            }
         }
     }
 }
@@ -195,24 +234,15 @@ fn advance_tile(
 ) -> PassReport {
     let mut report = PassReport { completed: true, ..PassReport::default() };
     let n_pixels = tile.n_pixels();
-    let order = pixels_in_blocks(tile.size);
+    wave.pixels = pixels_in_blocks(tile.origin, tile.size);
     let mut radiance = Vec::new();
     while tile.spp < target_spp {
         let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
         radiance.clear();
         radiance.resize(n_samples * n_pixels, Vec3::ZERO);
-        let first = tile.spp;
-        let camera_paths = (0..n_samples).flat_map(|s| {
-            let (tile, order) = (&*tile, &order);
-            order.iter().map(move |&local| {
-                let pixel = tile.origin + UVec2::new(local % tile.size.x, local / tile.size.x);
-                let (ray, sampler, weight) = pass.camera_ray(pixel, first + s as u32);
-                CameraPath { ray, sampler, slot: s as u32 * n_pixels as u32 + local, weight }
-            })
-        });
-        let Some(rays) =
-            wave.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), camera_paths, &mut radiance, stop)
-        else {
+        let first = tile.next_sample();
+        let samples = first..first + n_samples as u32;
+        let Some(rays) = wave.trace(pass, samples, n_pixels as u32, &mut radiance, stop) else {
             report.completed = false;
             break;
         };
@@ -243,15 +273,50 @@ pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: 
     if let Some(caustics) = &pass.caustics {
         caustics.prepare(&|| false);
     }
-    let (ray, sampler, weight) = pass.camera_ray(UVec2::new(at.x, at.y), at.sample);
     let mut radiance = [Vec3::ZERO];
-    let path = CameraPath { ray, sampler, slot: 0, weight };
-    let paths = std::iter::once(path);
-    Wave::default().trace(snapshot, settings, pass.caustics.as_ref(), paths, &mut radiance, &|| false);
+    let mut wave = Wave { pixels: Pixels { x: vec![at.x], y: vec![at.y], local: vec![0] }, ..Wave::default() };
+    wave.trace(&pass, at.sample..at.sample + 1, 1, &mut radiance, &|| false);
     radiance[0]
 }
 
+/// Bounces of the first sample of each pixel, the mean over blocks of 4 × 4; `None` when `stop` said so.
+pub(super) fn mean_bounces(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    size: UVec2,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<f32>> {
+    const SIDE: u32 = 4;
+    // Paths from the eye alone; light from the lamps has no pixel to begin with.
+    let (caustics, filter) = (None, FilterSampler::new(settings.filter));
+    let pass = Pass { snapshot, settings, caustics, filter, size };
+    let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
+    let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
+        .into_par_iter()
+        .map_init(Wave::default, |wave, block| {
+            let first = UVec2::new(block % blocks.x, block / blocks.x) * SIDE;
+            let end = (first + SIDE).min(size);
+            wave.pixels = Pixels::default();
+            for (y, x) in (first.y..end.y).flat_map(|y| (first.x..end.x).map(move |x| (y, x))) {
+                wave.pixels.x.push(x);
+                wave.pixels.y.push(y);
+                wave.pixels.local.push(0);
+            }
+            let rays = wave.trace(&pass, 0..1, 1, &mut [Vec3::ZERO], stop)?;
+            Some(rays.bounce as f32 / rays.camera.max(1) as f32)
+        })
+        .collect();
+    let means = means?;
+    let block_of = |i: u32| i % size.x / SIDE + i / size.x / SIDE * blocks.x;
+    Some((0..size.x * size.y).map(|i| means[block_of(i) as usize]).collect())
+}
+
 impl Pass<'_> {
+    fn lens(&self) -> Lens<'_> {
+        let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
+        Lens { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
+    }
+
     /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
     #[inline]
     fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
@@ -267,15 +332,19 @@ impl Pass<'_> {
 }
 
 /// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.
-fn pixels_in_blocks(size: UVec2) -> Vec<u32> {
+fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
     const SIDE: u32 = 4;
-    let mut order = Vec::with_capacity((size.x * size.y) as usize);
+    let mut pixels = Pixels::default();
     for top in (0..size.y).step_by(SIDE as usize) {
         for left in (0..size.x).step_by(SIDE as usize) {
             for y in top..size.y.min(top + SIDE) {
-                order.extend((left..size.x.min(left + SIDE)).map(|x| y * size.x + x));
+                for x in left..size.x.min(left + SIDE) {
+                    pixels.x.push(origin.x + x);
+                    pixels.y.push(origin.y + y);
+                    pixels.local.push(y * size.x + x);
+                }
             }
         }
     }
-    order
+    pixels
 }

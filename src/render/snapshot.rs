@@ -7,6 +7,7 @@ use super::ambient::AmbientLight;
 use super::caustics::CasterTable;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
+use super::wide::{MaterialTable, SurfaceTable};
 use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
 use crate::kdtree::{SceneTree, Shape};
 use crate::mesh::Mesh;
@@ -25,6 +26,7 @@ pub struct Snapshot {
 pub struct Geometry {
     pub objects: Vec<Object>,
     pub tree: SceneTree,
+    pub(super) surfaces: SurfaceTable,
 }
 
 /// What an object needs beyond its shape.
@@ -62,6 +64,7 @@ pub struct Shading {
     pub(super) emission: Vec<Option<Emission>>,
     pub lights: LightTable,
     pub(super) environment_sampler: Option<EnvironmentSampler>,
+    pub(super) material_table: MaterialTable,
     /// What gathers light, where something does.
     pub(super) casters: Option<CasterTable>,
     pub features: Features,
@@ -78,6 +81,8 @@ pub struct Features {
     pub light_sampling: bool,
     /// The surroundings shine.
     pub environment: bool,
+    /// Some material looks up a texture.
+    pub textures: bool,
     /// Something smooth gathers the light of some lamp, so paths are traced from lamps as well.
     pub caustics: bool,
 }
@@ -86,7 +91,9 @@ impl Geometry {
     /// The two lists run in parallel.
     pub fn build(shapes: Vec<Shape>, objects: Vec<Object>) -> Self {
         assert_eq!(shapes.len(), objects.len(), "each shape needs its object");
-        Self { objects, tree: SceneTree::build(shapes) }
+        let tree = SceneTree::build(shapes);
+        let surfaces = SurfaceTable::build(&tree);
+        Self { objects, tree, surfaces }
     }
 }
 
@@ -107,11 +114,13 @@ impl Shading {
         let glass = materials.iter().any(Material::is_clear);
         let features = Features {
             glass,
-            media: glass,
+            media: materials.iter().any(Material::absorbs),
             light_sampling: !lights.is_empty() || environment_sampler.is_some(),
             environment: !matches!(environment, Environment::Black),
+            textures: materials.iter().any(|material| material.is_textured(&materials)),
             caustics: casters.is_some(),
         };
+        let material_table = MaterialTable::build(geometry, &materials);
         let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
         let ambient = AmbientLight::of(&environment);
         let air = Vec3::ZERO;
@@ -125,6 +134,7 @@ impl Shading {
             emission,
             lights,
             environment_sampler,
+            material_table,
             casters,
             features,
         }

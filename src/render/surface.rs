@@ -219,6 +219,24 @@ fn collect(
     }
 }
 
+/// Albedo or reflectance of a material of one lobe.
+pub(super) fn color_at(scene: &Snapshot, id: MaterialId, uv: Vec2) -> Vec3 {
+    match &scene.shading.materials[id as usize] {
+        Material::Diffuse { albedo: color }
+        | Material::Mirror { reflectance: color }
+        | Material::Metal { reflectance: color, .. } => color.eval(scene, uv),
+        _ => Vec3::ONE,
+    }
+}
+
+/// The alpha of metal, otherwise 0.
+pub(super) fn scalar_at(scene: &Snapshot, id: MaterialId, uv: Vec2) -> f32 {
+    match &scene.shading.materials[id as usize] {
+        Material::Metal { alpha, .. } => alpha.eval(scene, uv).clamp(0.0, 1.0),
+        _ => 0.0,
+    }
+}
+
 /// The one lobe of a plain material; `None` where the surface is black.
 #[inline]
 pub(super) fn lobe_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Lobe> {

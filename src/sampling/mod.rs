@@ -6,6 +6,7 @@ mod alias;
 mod distribution;
 mod hash;
 mod sobol;
+mod sobol_lanes;
 mod spherical_quad;
 mod spherical_triangle;
 mod warp;
@@ -14,6 +15,7 @@ pub use alias::AliasTable;
 pub use distribution::PictureDistribution;
 pub use hash::{hash_combine, hash_u32};
 pub use sobol::Sampler;
+pub(crate) use sobol_lanes::SamplerLanes;
 pub use spherical_quad::SphericalQuad;
 pub use spherical_triangle::SphericalTriangle;
 pub use warp::{

@@ -30,6 +30,18 @@ impl Sampler {
         Self { stream: hash_combine(stream, sample), reversed_index: 0 }
     }
 
+    /// Stream and index, see [`Self::from_parts`].
+    #[inline]
+    pub(crate) fn parts(&self) -> [u32; 2] {
+        [self.stream, self.reversed_index]
+    }
+
+    /// The sampler that [`Self::parts`] were taken from.
+    #[inline]
+    pub(crate) fn from_parts([stream, reversed_index]: [u32; 2]) -> Self {
+        Self { stream, reversed_index }
+    }
+
     /// Two numbers in `[0, 1)`, well spread together over the samples of a pixel.
     #[inline]
     pub fn pair(&self, dimension: u32) -> Vec2 {

@@ -136,6 +136,28 @@ pub const PHONG_LOBES: usize = 3;
 impl Material {
     /// The one of surfaces that have none.
     pub const GREY: Self = Self::Diffuse { albedo: Paint::Rgb(Vec3::splat(0.5)) };
+
+    /// What it looks up.
+    pub fn textures(&self) -> impl Iterator<Item = &Arc<SurfaceTexture>> {
+        let (amount, paint) = match self {
+            Self::Diffuse { albedo: paint }
+            | Self::Mirror { reflectance: paint }
+            | Self::Emissive { radiance: paint } => (None, Some(paint)),
+            Self::Metal { alpha, reflectance, .. } => (Some(alpha), Some(reflectance)),
+            Self::Phong { specular, diffuse, .. } => (Some(specular), Some(diffuse)),
+            Self::Blend { weight, .. } => (Some(weight), None),
+            Self::Glass { .. } => (None, None),
+        };
+        let of_amount = amount.and_then(|amount| match amount {
+            Amount::Texture(texture) => Some(texture),
+            Amount::Number(_) => None,
+        });
+        let of_paint = paint.and_then(|paint| match paint {
+            Paint::Texture(texture) => Some(texture),
+            Paint::Rgb(_) => None,
+        });
+        of_amount.into_iter().chain(of_paint)
+    }
 }
 
 /// A colour, linear Rec. 709, or a texture.

@@ -1,8 +1,20 @@
 //! A number that tells whether two loaded scenes show the same thing.
 
-use super::LoadedScene;
+use super::components::{Shape, SurfaceTexture};
+use super::describe::Description;
+use super::file::{
+    CameraPart, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MeshSourcePart, ObjectPart, SceneFile,
+    TexturePart,
+};
+use super::inputs::SceneInputs;
+use super::load::LoadedScene;
 use crate::mesh::Mesh;
+use crate::render::{Environment, ImageTexture, TexturePattern};
+use bevy_ecs::prelude::World;
+use glam::DVec3;
+use std::collections::HashMap;
 use std::fmt;
+use std::sync::Arc;
 
 /// 128 bits over everything that a scene's picture depends on: the scene itself, its meshes and its pictures.
 ///
@@ -50,6 +62,11 @@ impl Fingerprint {
             .with_floats(mesh.uvs.iter().flat_map(|uv| uv.to_array()))
             .with(mesh.slots.iter().flat_map(|slot| slot.to_le_bytes()))
     }
+
+    fn with_picture(self, picture: &ImageTexture) -> Self {
+        self.with([picture.width, picture.height].into_iter().flat_map(u32::to_le_bytes))
+            .with_floats(picture.texels.iter().flat_map(|texel| texel.to_array()))
+    }
 }
 
 impl LoadedScene {
@@ -62,10 +79,86 @@ impl LoadedScene {
         let mut pictures: Vec<_> = self.pictures.iter().collect();
         pictures.sort_by_key(|(name, _)| *name);
         for (name, picture) in pictures {
-            print = print
-                .with(name.bytes())
-                .with([picture.width, picture.height].into_iter().flat_map(u32::to_le_bytes))
-                .with_floats(picture.texels.iter().flat_map(|texel| texel.to_array()));
+            print = print.with(name.bytes()).with_picture(picture);
+        }
+        print
+    }
+
+    /// Of what it shows, whatever it is seen from: see [`SceneContent`].
+    pub fn content_fingerprint(&self) -> Fingerprint {
+        let mut world = World::new();
+        self.spawn(&mut world);
+        let description = Description::of(&mut world, Some(self));
+        SceneContent::of(&mut world, &description).fingerprint()
+    }
+}
+
+/// What a scene shows, whatever it is seen from and however it is shown: for telling whether it has changed.
+#[derive(Clone, Debug)]
+pub struct SceneContent {
+    /// Without camera, film, display, and without the names of files: what is in them counts.
+    file: SceneFile,
+    meshes: Vec<Arc<Mesh>>,
+    pictures: Vec<Arc<ImageTexture>>,
+}
+
+impl SceneContent {
+    /// Of what `world` holds, which `description` describes.
+    pub fn of(world: &mut World, description: &Description) -> Self {
+        let mut file = description.file.clone();
+        file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
+        (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
+        (file.integrator, file.max_depth) = (IntegratorPart::default(), None);
+        for object in &mut file.objects {
+            if let ObjectPart::Mesh { source: MeshSourcePart::Obj(path), .. } = object {
+                path.clear();
+            }
+        }
+        for (_, texture) in &mut file.textures.0 {
+            if let TexturePart::Image { file, .. } = texture {
+                file.clear();
+            }
+        }
+        if let EnvironmentPart::Image { file, .. } = &mut file.environment {
+            file.clear();
+        }
+        let inputs = SceneInputs::of(world);
+        let mut meshes: Vec<Arc<Mesh>> = Vec::new();
+        for object in &inputs.objects {
+            if let Shape::Mesh(mesh) = &object.shape {
+                meshes.push(mesh.clone());
+            }
+        }
+        let mut pictures = Vec::new();
+        let mut add = |texture: &SurfaceTexture| {
+            if let TexturePattern::Image { image, .. } = &texture.texture.pattern {
+                pictures.push(image.clone());
+            }
+        };
+        for material in &inputs.materials {
+            for texture in material.material.textures() {
+                add(texture);
+            }
+        }
+        if let Environment::Image { image, .. } = &inputs.environment.light {
+            pictures.push(image.clone());
+        }
+        Self { file, meshes, pictures }
+    }
+
+    /// Looks at every vertex and every texel once, however often they are used: some milliseconds for a large mesh.
+    pub fn fingerprint(&self) -> Fingerprint {
+        let mut print = Fingerprint::default().with(self.file.to_ron().bytes());
+        let mut meshes: HashMap<*const Mesh, Fingerprint> = HashMap::new();
+        for mesh in &self.meshes {
+            let known = *meshes.entry(Arc::as_ptr(mesh)).or_insert_with(|| Fingerprint::default().with_mesh(mesh));
+            print = print.with(known.0.to_le_bytes());
+        }
+        let mut pictures: HashMap<*const ImageTexture, Fingerprint> = HashMap::new();
+        for picture in &self.pictures {
+            let known =
+                *pictures.entry(Arc::as_ptr(picture)).or_insert_with(|| Fingerprint::default().with_picture(picture));
+            print = print.with(known.0.to_le_bytes());
         }
         print
     }

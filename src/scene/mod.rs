@@ -6,6 +6,7 @@
 
 mod builtin;
 mod components;
+mod describe;
 mod error;
 mod extent;
 mod extract;
@@ -18,9 +19,12 @@ mod meshes;
 pub mod obj;
 mod picture;
 mod placement;
+mod relative;
+mod save;
 pub mod shot;
 mod showcase;
 mod spawn;
+mod stamp;
 mod upright;
 mod view;
 pub mod whole_file;
@@ -30,13 +34,19 @@ pub use components::{
     Amount, Balls, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
     SceneEnvironment, Shape, SurfaceTexture,
 };
+pub use describe::{Description, camera_part};
 pub use error::{Problem, SceneError, suggestion};
 pub use extent::{Extent, ExtentCache};
 pub use extract::{Extraction, Part, Trees, origin_for};
-pub use fingerprint::Fingerprint;
+pub use fingerprint::{Fingerprint, SceneContent};
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use limits::Limits;
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase, plain_io};
 pub use picture::{read_picture, read_picture_within};
 pub use placement::{Linear, Placement};
+pub use relative::{absolute, relative_path};
+pub use save::{SavedScene, save_scene};
+pub use shot::{Shot, ShotDraft, ShotSamples, ShotScene};
+pub use stamp::{Stamp, stamp};
 pub use view::{Lens, Projection, View, ViewError};

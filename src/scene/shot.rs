@@ -1,4 +1,285 @@
-//! What a picture says about itself, so that it can be opened again.
+//! What a picture says about itself, so that it can be opened again: which scene, seen from where, through which
+//! lens, developed how, from which samples.
+//!
+//! The note is RON text: in a PNG the text chunk [`NOTE_KEY`] (iTXt), in an EXR the attribute of that name. Paths in it
+//! count from the picture. It also holds a fingerprint of the scene, so that a scene that has changed since is noticed;
+//! a scene with changes that were never saved is written into the note as a whole.
+
+use super::describe::Description;
+use super::file::{CameraPart, DisplayPart, FilmPart, IntegratorPart, SceneFile};
+use super::load::{LoadedScene, SceneSource, UpAxis};
+use super::relative::{absolute, relative_path};
+use super::spawn::camera;
+use super::{Fingerprint, SceneContent};
+use bevy_ecs::prelude::World;
+use ron::extensions::Extensions;
+use serde::{Deserialize, Serialize};
+use std::io::{BufReader, Read};
+use std::path::Path;
 
 /// The name of the note in a picture: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
+
+/// A newer program that writes something else counts this up.
+const FORMAT: u32 = 1;
+
+/// What is in a picture's note.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shot {
+    pub format: u32,
+    /// Name and version.
+    pub program: String,
+    pub scene: ShotScene,
+    /// Of the scene, without camera, film and display.
+    pub fingerprint: String,
+    pub camera: CameraPart,
+    pub film: FilmPart,
+    pub integrator: IntegratorPart,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_depth: Option<u32>,
+    pub display: DisplayPart,
+    pub seed: u32,
+    /// The number of each pixel's first sample.
+    pub first_sample: u32,
+    /// Samples of each pixel.
+    pub spp: u32,
+    /// Some pixels have more samples: it was stopped in the middle of a pass, and cannot be made again to the last bit.
+    #[serde(default)]
+    pub uneven: bool,
+    /// The scene itself, where it had changes that its file has not; paths as in that file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
+}
+
+/// Which scene a picture shows. Paths count from the picture, with `/` between their parts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShotScene {
+    Builtin(String),
+    Scene(String),
+    Model {
+        path: String,
+        /// `y` or `z`, where it was asked for.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        up: Option<char>,
+    },
+    /// Nothing that was opened: see `text`.
+    None,
+}
+
+/// All that a note needs of a world; made at once, finished later, when the film is there.
+#[derive(Clone, Debug)]
+pub struct ShotDraft {
+    source: Option<SceneSource>,
+    up: Option<UpAxis>,
+    description: Description,
+    content: SceneContent,
+    /// The scene as it was opened.
+    loaded: Option<LoadedScene>,
+    seed: u32,
+}
+
+impl ShotDraft {
+    /// Of what `world` shows; `loaded` is the scene that was opened into it.
+    pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
+        let description = Description::of(world, loaded);
+        let seed = world.get_resource::<super::Rendering>().map_or(0, |rendering| rendering.0.seed);
+        Self {
+            source: loaded.map(|loaded| loaded.source.clone()),
+            up: loaded.and_then(|loaded| loaded.up),
+            content: SceneContent::of(world, &description),
+            loaded: loaded.cloned(),
+            description,
+            seed,
+        }
+    }
+
+    /// The note of a picture that will lie at `path`, of a film of this size and so many samples.
+    pub fn note(&self, path: &Path, size: (u32, u32), samples: ShotSamples, display: DisplayPart) -> String {
+        let folder = absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
+        let relative = |path: &Path| relative_path(&folder, path);
+        let scene = match &self.source {
+            Some(SceneSource::Builtin(name)) => ShotScene::Builtin(name.clone()),
+            Some(SceneSource::Scene(path)) => ShotScene::Scene(relative(path)),
+            Some(SceneSource::Model(path)) => {
+                let up = self.up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' });
+                ShotScene::Model { path: relative(path), up }
+            }
+            Some(SceneSource::Picture(_)) | None => ShotScene::None,
+        };
+        let file = &self.description.file;
+        let fingerprint = self.content.fingerprint();
+        let shot = Shot {
+            format: FORMAT,
+            program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
+            scene,
+            fingerprint: fingerprint.to_string(),
+            camera: file.camera.clone(),
+            film: FilmPart { width: size.0, height: size.1, filter: file.film.filter },
+            integrator: file.integrator,
+            max_depth: file.max_depth,
+            display,
+            seed: self.seed,
+            first_sample: samples.first,
+            spp: samples.spp,
+            uneven: samples.uneven,
+            text: self.has_changed(fingerprint).then(|| file.to_ron()),
+        };
+        shot.to_note()
+    }
+}
+
+impl ShotDraft {
+    /// Whether the scene is another than the one that was opened, and can be said in words.
+    fn has_changed(&self, now: Fingerprint) -> bool {
+        let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
+        opened != Some(now) && self.description.loose_meshes.is_empty()
+    }
+}
+
+/// Which samples are in a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShotSamples {
+    /// The number of each pixel's first sample.
+    pub first: u32,
+    /// Samples that each pixel has at least.
+    pub spp: u32,
+    /// Some pixels have more.
+    pub uneven: bool,
+}
+
+impl Shot {
+    /// Reads the note of a PNG or EXR picture.
+    ///
+    /// # Errors
+    /// When the picture cannot be read or has no note.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        Self::from_note(&note_of(path)?)
+    }
+
+    /// The text of the note.
+    pub fn to_note(&self) -> String {
+        let pretty = ron::ser::PrettyConfig::new().depth_limit(2).indentor("  ").extensions(Extensions::IMPLICIT_SOME);
+        // Plain structs, numbers and strings can always be written.
+        options().to_string_pretty(self, pretty).expect("a note is plain data")
+    }
+
+    /// The note of the same picture when it is not at `from` but at `to`.
+    pub fn moved(mut self, from: &Path, to: &Path) -> Self {
+        let folder = |path: &Path| absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
+        let moved = |path: &str| relative_path(&folder(to), &folder(from).join(path));
+        match &mut self.scene {
+            ShotScene::Scene(path) | ShotScene::Model { path, .. } => *path = moved(path),
+            ShotScene::Builtin(_) | ShotScene::None => {}
+        }
+        self
+    }
+
+    /// # Errors
+    /// When the text is no note that this program knows.
+    pub fn from_note(text: &str) -> Result<Self, String> {
+        let shot: Self = options()
+            .from_str(text)
+            .map_err(|error| format!("its note on how it was made cannot be understood: {error}"))?;
+        if shot.format > FORMAT {
+            return Err(format!("it was made by {}, which writes notes that this program does not know", shot.program));
+        }
+        Ok(shot)
+    }
+
+    /// The scene that the picture at `path` shows, if it is there.
+    ///
+    /// # Errors
+    /// When its file is not there.
+    pub fn source(&self, path: &Path) -> Result<Option<SceneSource>, String> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let find = |relative: &str| {
+            let beside = Path::new(relative).file_name().map(|name| folder.join(name));
+            let found = [Some(folder.join(relative)), beside].into_iter().flatten().find(|path| path.is_file());
+            found.ok_or_else(|| format!("the scene that it shows, {relative}, is not there: put it beside the picture"))
+        };
+        Ok(match &self.scene {
+            ShotScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
+            ShotScene::Scene(path) => Some(SceneSource::Scene(find(path)?)),
+            ShotScene::Model { path, .. } => Some(SceneSource::Model(find(path)?)),
+            ShotScene::None => None,
+        })
+    }
+
+    pub fn up(&self) -> Option<UpAxis> {
+        match self.scene {
+            ShotScene::Model { up: Some('z'), .. } => Some(UpAxis::Z),
+            ShotScene::Model { up: Some(_), .. } => Some(UpAxis::Y),
+            _ => None,
+        }
+    }
+
+    /// What makes samples of the other picture useless for this one, if anything; in words that follow "another".
+    pub fn differs_from(&self, other: &Self) -> Option<&'static str> {
+        let seen = |shot: &Self| {
+            let (view, projection, lens) = camera(&shot.camera);
+            let lens = (lens.effective_radius() > 0.0).then_some((
+                lens.radius,
+                lens.focus_distance,
+                lens.blades,
+                lens.blade_rotation_deg,
+            ));
+            (view.eye, view.forward, view.up, projection, lens)
+        };
+        let checks = [
+            (self.program != other.program, "version of firstlight"),
+            (self.fingerprint != other.fingerprint, "scene, or of this one before it was changed"),
+            ((self.film.width, self.film.height) != (other.film.width, other.film.height), "size"),
+            (seen(self) != seen(other), "view"),
+            (self.integrator != other.integrator, "light model"),
+            (self.max_depth != other.max_depth, "maximum depth"),
+            (self.film.filter != other.film.filter, "pixel filter"),
+            (self.seed != other.seed, "seed"),
+        ];
+        checks.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what)
+    }
+
+    /// Sets view, film and display of a scene file to those of the picture.
+    pub fn apply(&self, file: &mut SceneFile) {
+        file.camera = self.camera.clone();
+        file.film = self.film;
+        file.integrator = self.integrator;
+        file.max_depth = self.max_depth;
+        file.display = self.display;
+    }
+}
+
+fn options() -> ron::Options {
+    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
+}
+
+/// The text of the note.
+fn note_of(path: &Path) -> Result<String, String> {
+    let file = std::fs::File::open(path).map_err(|error| format!("cannot be read: {}", super::plain_io(&error)))?;
+    let mut reader = BufReader::new(file);
+    let mut start = [0; 8];
+    let n = reader.read(&mut start).map_err(|error| format!("cannot be read: {error}"))?;
+    let none = "it has no note on how it was made, so it cannot be opened as a scene: only pictures by firstlight can";
+    if start[..n] == *b"\x89PNG\r\n\x1a\n" {
+        reader.seek_relative(-(n as i64)).map_err(|error| format!("cannot be read: {error}"))?;
+        let unreadable = |error: png::DecodingError| format!("cannot be read: {error}");
+        let decoder = png::Decoder::new(reader).read_info().map_err(unreadable)?;
+        let info = decoder.info();
+        let chunk = info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(none)?;
+        return chunk.get_text().map_err(unreadable);
+    }
+    if start[..n.min(4)] == [0x76, 0x2f, 0x31, 0x01] {
+        let meta =
+            exr::meta::MetaData::read_from_file(path, false).map_err(|error| format!("cannot be read: {error}"))?;
+        let notes = meta
+            .headers
+            .iter()
+            .flat_map(|header| header.shared_attributes.other.iter().chain(&header.own_attributes.other));
+        let mut texts = notes.filter(|(key, _)| **key == *NOTE_KEY);
+        return match texts.next() {
+            Some((_, exr::meta::attribute::AttributeValue::Text(text))) => Ok(text.to_string()),
+            _ => Err(none.to_owned()),
+        };
+    }
+    Err("is neither a PNG nor an OpenEXR picture".to_owned())
+}

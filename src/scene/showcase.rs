@@ -56,6 +56,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
                 shading: MeshShadingPart::Auto,
                 simplify: None,
                 material: loaded.slots.is_empty().then(|| CLAY.to_owned()),
+                materials: None,
                 transform,
             },
             ObjectPart::Plane {
@@ -99,17 +100,7 @@ fn camera(min: DVec3, max: DVec3, aspect: f64) -> CameraPart {
             corner.dot(back) + (corner.dot(right).abs() / tan_h).max(corner.dot(up).abs() / tan_v)
         })
         .fold(SceneFile::MIN_SIZE, f64::max);
-    CameraPart {
-        eye: center + distance * back,
-        look_at: center,
-        up: DVec3::Y,
-        vfov: VFOV_DEG,
-        lens_radius: None,
-        f_stop: None,
-        focus_distance: None,
-        blades: 0,
-        blade_rotation: 0.0,
-    }
+    CameraPart { vfov: VFOV_DEG, ..CameraPart::looking_at(center + distance * back, center) }
 }
 
 /// The box of the model once `up` points along +Y, metres.

@@ -16,7 +16,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 impl LoadedScene {
-    /// Puts this scene in the place of whatever scene `world` holds. The seed of [`Rendering`] stays.
+    /// Puts this scene in the place of whatever scene `world` holds. The seed of [`Rendering`] stays, unless a picture
+    /// that was opened brings its own.
     pub fn spawn(&self, world: &mut World) {
         clear(world);
         let mut ordinals = (0..).map(Ordinal);
@@ -43,6 +44,9 @@ impl LoadedScene {
         let mut own_materials: HashMap<usize, Vec<Entity>> = HashMap::new();
         for (i, object) in self.file.objects.iter().enumerate() {
             let slots = match (object.material(), &self.meshes[i]) {
+                _ if object.slot_materials().is_some() => {
+                    object.slot_materials().into_iter().flatten().map(|name| materials[name.as_str()]).collect()
+                }
                 (Some(name), _) => vec![materials[name]],
                 (None, Some(mesh)) => own_materials
                     .entry(Arc::as_ptr(&mesh.mesh) as usize)
@@ -61,12 +65,12 @@ impl LoadedScene {
             if let Some(name) = object.name() {
                 entity.insert(Name::new(name.to_owned()));
             }
-            if let ObjectPart::Mesh { source, shading, simplify, material, .. } = object {
+            if let ObjectPart::Mesh { source, shading, simplify, material, materials, .. } = object {
                 entity.insert(MeshOrigin {
                     source: source.clone(),
                     shading: *shading,
                     simplify: *simplify,
-                    own_materials: material.is_none(),
+                    own_materials: material.is_none() && materials.is_none(),
                 });
             }
         }
@@ -90,7 +94,8 @@ impl LoadedScene {
             air: file.air.0,
         });
         world.insert_resource(FilmSize { width: file.film.width, height: file.film.height });
-        let seed = world.get_resource::<Rendering>().map_or(0, |rendering| rendering.0.seed);
+        let of_world = world.get_resource::<Rendering>().map_or(0, |rendering| rendering.0.seed);
+        let seed = self.shot.as_ref().map_or(of_world, |shot| shot.seed);
         world.insert_resource(Rendering(RenderSettings {
             integrator: file.integrator.into(),
             max_depth: file.max_depth.unwrap_or(u32::MAX),
@@ -139,7 +144,7 @@ impl LoadedScene {
         let at = |point: DVec3| Placement { translation: placement.affine().transform_point3(point), ..placement };
         match object {
             ObjectPart::Sphere { center, radius, .. } => (Shape::Sphere { radius: *radius }, at(*center)),
-            ObjectPart::Plane { point, normal, .. } => (Shape::Plane { normal: normal.normalize() }, at(*point)),
+            ObjectPart::Plane { point, normal, .. } => (Shape::Plane { normal: unit(*normal) }, at(*point)),
             ObjectPart::Quad { corner, edge_u, edge_v, .. } => {
                 (Shape::Quad { edge_u: *edge_u, edge_v: *edge_v }, at(*corner))
             }
@@ -167,7 +172,7 @@ fn clear(world: &mut World) {
     }
 }
 
-fn material(
+pub(super) fn material(
     part: &MaterialPart,
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
     materials: &HashMap<&str, Entity>,
@@ -215,21 +220,44 @@ fn material(
 
 /// The camera that a scene file describes.
 pub fn camera(part: &CameraPart) -> (View, Projection, Lens) {
-    let offset = part.look_at - part.eye;
-    let forward = offset.normalize();
-    let up = part.up.reject_from_normalized(forward).normalize();
-    let view = View { eye: part.eye, forward, up, pivot_distance: offset.length() };
+    let level = |forward: DVec3| part.up.reject_from_normalized(forward).normalize();
+    let view = match (part.forward, part.look_at) {
+        // A saved view comes back to the last bit: nothing is normalised that is unit and square already.
+        (Some(forward), _) => {
+            let forward = unit(forward);
+            let square = is_unit(part.up) && forward.dot(part.up).abs() <= ROUNDING;
+            let up = if square { part.up } else { level(forward) };
+            View { eye: part.eye, forward, up, pivot_distance: part.pivot_distance.unwrap_or(1.0) }
+        }
+        (None, look_at) => {
+            let offset = look_at.unwrap_or(part.eye + DVec3::NEG_Z) - part.eye;
+            let forward = offset.normalize();
+            View { eye: part.eye, forward, up: level(forward), pivot_distance: offset.length() }
+        }
+    };
     // A film 24 mm high sees this angle through a lens of focal length 12 mm / tan(vfov / 2).
     let focal_length = 0.012 / (0.5 * part.vfov).to_radians().tan();
     let radius = part.f_stop.map(|stop| 0.5 * focal_length / stop).or(part.lens_radius).unwrap_or(0.0);
     let lens = Lens {
         radius,
-        focus_distance: part.focus_distance.unwrap_or(offset.length()),
-        enabled: radius > 0.0,
+        focus_distance: part.focus_distance.unwrap_or(view.pivot_distance),
+        enabled: part.depth_of_field.unwrap_or(radius > 0.0),
         blades: part.blades,
         blade_rotation_deg: part.blade_rotation,
     };
     (view, Projection { vfov_deg: part.vfov }, lens)
+}
+
+/// What rounding leaves of a length of 1 or a right angle.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+fn is_unit(vector: DVec3) -> bool {
+    (vector.length_squared() - 1.0).abs() <= ROUNDING
+}
+
+/// Of length 1; one that is so already keeps its bits.
+fn unit(vector: DVec3) -> DVec3 {
+    if is_unit(vector) { vector } else { vector.normalize() }
 }
 
 fn as_vec2(value: DVec2) -> Vec2 {

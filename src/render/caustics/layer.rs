@@ -1,16 +1,46 @@
 //! Where light from the lamps is summed up: over the whole picture, because it may fall into any pixel.
 //!
-//! Paths come in batches of fixed size that are traced by any worker and added in their order, so that no sum depends
-//! on threads or on the portions in which it was made.
+//! Each sample of the picture has its own paths, in batches that are traced by any worker. Sums do not depend on their order, so neither
+//! threads nor portions change them, and layers of different samples add up like films do.
 
 use super::CausticPass;
 use super::trace::LightWave;
 use crate::render::RayCounts;
+use crate::render::exact_sum::ExactSum;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Paths in a batch.
-const BATCH: u32 = 4096;
+/// Paths from the lamps for each path from the eye: they cost less, and all of them carry light that the others hardly
+/// find.
+const LIGHT_PATHS_PER_PIXEL: f64 = 0.25;
+
+/// Paths in a batch, at most.
+const MAX_BATCH: u32 = 4096;
+
+/// How the paths of one sample of the whole picture are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Batches {
+    per_sample: u32,
+    /// Paths in each.
+    size: u32,
+}
+
+impl Batches {
+    pub fn of_film(n_pixels: usize) -> Self {
+        let n_paths = (n_pixels as f64 * LIGHT_PATHS_PER_PIXEL).ceil();
+        let per_sample = (n_paths / f64::from(MAX_BATCH)).ceil();
+        Self { per_sample: per_sample as u32, size: (n_paths / per_sample).ceil() as u32 }
+    }
+
+    pub fn paths_per_sample(&self) -> f64 {
+        f64::from(self.per_sample) * f64::from(self.size)
+    }
+
+    fn of_sample(&self, sample: u32) -> u64 {
+        u64::from(sample) * u64::from(self.per_sample)
+    }
+}
 
 /// Light that arrives in one pixel.
 #[derive(Clone, Copy, Debug)]
@@ -23,10 +53,12 @@ pub(super) struct Splat {
 #[derive(Clone, Debug)]
 pub(in crate::render) struct LightLayer {
     /// Row by row from the top.
-    sums: Vec<DVec3>,
-    n_batches: u32,
+    pub sums: Vec<ExactSum>,
+    batches: Batches,
+    /// Numbers of the batches that were traced, ascending, with gaps between the ranges; new ones lengthen the last.
+    pub done: Vec<Range<u64>>,
     /// Samples of the whole picture that are complete.
-    spp: u32,
+    pub spp: u32,
 }
 
 /// What [`LightLayer::advance`] did.
@@ -39,55 +71,84 @@ pub(in crate::render) struct LayerReport {
 }
 
 impl LightLayer {
-    pub fn new(size: UVec2) -> Self {
-        Self { sums: vec![DVec3::ZERO; (size.x * size.y) as usize], n_batches: 0, spp: 0 }
+    /// - `first_sample`: number of the sample to begin with.
+    pub fn new(size: UVec2, first_sample: u32) -> Self {
+        let sums = vec![ExactSum::default(); (size.x * size.y) as usize];
+        let batches = Batches::of_film(sums.len());
+        let first = batches.of_sample(first_sample);
+        Self { sums, batches, done: std::iter::once(first..first).collect(), spp: 0 }
     }
 
-    pub fn spp(&self) -> u32 {
-        self.spp
+    /// Samples of the picture that some of the paths belong to, more than are complete when it was stopped.
+    pub fn begun(&self) -> u32 {
+        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
+        n_done.div_ceil(u64::from(self.batches.per_sample)) as u32
     }
 
     /// Mean over the paths so far.
     pub fn mean(&self, pixel: usize) -> DVec3 {
-        match self.n_batches {
+        match self.done.iter().map(|range| range.end - range.start).sum::<u64>() {
             0 => DVec3::ZERO,
-            n => self.sums[pixel] / (f64::from(n) * f64::from(BATCH)),
+            n => self.sums[pixel].sum / (n as f64 * f64::from(self.batches.size)),
+        }
+    }
+
+    /// Adds the paths of a layer of the same picture that has none of these.
+    pub fn merge(&mut self, other: &Self) {
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
+        self.spp += other.spp;
+        let last = self.done.last().map_or(0, |range| range.end);
+        let mut done: Vec<Range<u64>> = self.done.iter().chain(&other.done).cloned().collect();
+        done.retain(|range| !range.is_empty());
+        done.sort_by_key(|range| range.start);
+        self.done = done.into_iter().fold(Vec::new(), |mut joined: Vec<Range<u64>>, range| {
+            match joined.last_mut() {
+                Some(last) if last.end == range.start => last.end = range.end,
+                _ => joined.push(range),
+            }
+            joined
+        });
+        if self.done.is_empty() {
+            self.done.push(last..last);
         }
     }
 
     /// Traces paths until they are enough for `target_spp` samples of the picture, or until `stop` says so; what a
     /// batch had not finished is dropped.
     pub fn advance(&mut self, pass: &CausticPass, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> LayerReport {
-        let batches = |spp: u32| (f64::from(spp) * pass.paths_per_sample / f64::from(BATCH)).ceil() as u32;
-        let goal = batches(target_spp);
         let mut report = LayerReport { completed: true, ..LayerReport::default() };
-        // Enough at once to keep all workers busy, few enough to have little to add in the end.
-        let at_once = 4 * rayon::current_num_threads() as u32;
-        'all: while self.n_batches < goal {
-            let first = self.n_batches;
-            let done: Vec<Option<(Vec<Splat>, RayCounts)>> = (first..goal.min(first + at_once))
+        let Batches { per_sample, size } = self.batches;
+        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
+        let mut left = self.batches.of_sample(target_spp).saturating_sub(n_done);
+        let mut next = self.done.last().map_or(0, |range| range.end);
+        // Enough at once to keep all workers busy, few enough for a stop to lose little.
+        let at_once = 4 * rayon::current_num_threads() as u64;
+        'all: while left > 0 {
+            let traced: Vec<Option<(Vec<Splat>, RayCounts)>> = (next..next + left.min(at_once))
                 .into_par_iter()
-                .map_init(LightWave::default, |wave, batch| wave.trace(pass, batch * BATCH, BATCH, stop))
+                .map_init(LightWave::default, |wave, batch| wave.trace(pass, batch * u64::from(size), size, stop))
                 .collect();
-            for batch in done {
+            for batch in traced {
                 let Some((splats, rays)) = batch else {
                     report.completed = false;
                     break 'all;
                 };
                 for Splat { pixel, light } in splats {
                     if light.is_finite() {
-                        self.sums[pixel as usize] += light.as_dvec3();
+                        self.sums[pixel as usize].add(light);
                     } else {
                         report.n_bad += 1;
                     }
                 }
                 report.rays += rays;
-                self.n_batches += 1;
+                (next, left) = (next + 1, left - 1);
             }
         }
-        if report.completed {
-            self.spp = self.spp.max(target_spp);
+        if let Some(last) = self.done.last_mut() {
+            last.end = next;
         }
+        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
+        self.spp = (n_done / u64::from(per_sample)) as u32;
         report
     }
 }

@@ -19,6 +19,7 @@ mod weight;
 
 pub(super) use aim::CasterTable;
 pub(super) use guide::{Guided, Hints};
+use layer::Batches;
 pub(super) use layer::LightLayer;
 pub(super) use weight::{Bounce, Track};
 
@@ -28,10 +29,6 @@ use glam::{UVec2, Vec2, Vec3};
 use guide::Guide;
 use rayon::prelude::*;
 use trace::LightWave;
-
-/// Paths from the lamps for each path from the eye. They cost about half as much, and all of them carry light that the
-/// others hardly find.
-const LIGHT_PATHS_PER_PIXEL: f32 = 0.5;
 
 /// What tracing from the lamps and weighting against it need to know of a picture.
 pub(super) struct CausticPass<'a> {
@@ -70,7 +67,7 @@ impl<'a> CausticPass<'a> {
             size: size.as_vec2(),
             filter: settings.filter,
             filter_norm: settings.filter.integral(),
-            paths_per_sample: f64::from(LIGHT_PATHS_PER_PIXEL) * f64::from(size.x) * f64::from(size.y),
+            paths_per_sample: Batches::of_film((size.x * size.y) as usize).paths_per_sample(),
             pixel_area: pixel * pixel,
         })
     }
@@ -93,7 +90,9 @@ impl CausticPass<'_> {
         let scouts = Self { seed: 0, techniques: Techniques::ALL, max_depth: u32::MAX, ..*self };
         let traces: Vec<Option<Vec<_>>> = (0..SCOUTS / SCOUT_BATCH)
             .into_par_iter()
-            .map_init(LightWave::default, |wave, batch| wave.explore(&scouts, batch * SCOUT_BATCH, SCOUT_BATCH, stop))
+            .map_init(LightWave::default, |wave, batch| {
+                wave.explore(&scouts, u64::from(batch * SCOUT_BATCH), SCOUT_BATCH, stop)
+            })
             .collect();
         let Some(traces) = traces.into_iter().collect::<Option<Vec<_>>>() else { return false };
         // Somebody else may have been faster, with the same.

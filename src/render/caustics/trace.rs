@@ -28,6 +28,9 @@ const DIM_ROULETTE: u32 = 3;
 /// What a surface that scatters keeps of a path, at most: most of what can be seen of a caustic is its first light.
 const SURVIVAL: f32 = 0.5;
 
+/// Share of the scouts that glass reflects: more than of the light, so that faint reflections become known as well.
+const SCOUTED_REFLECTION: f32 = 0.25;
+
 /// Vertices before perfectly smooth surfaces end paths that they dim.
 const ROULETTE_DEPTH: u32 = 4;
 
@@ -72,7 +75,7 @@ impl LightWave {
     pub fn trace(
         &mut self,
         pass: &CausticPass,
-        first: u32,
+        first: u64,
         n: u32,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Vec<Splat>, RayCounts)> {
@@ -106,7 +109,7 @@ impl LightWave {
     pub fn explore(
         &mut self,
         pass: &CausticPass,
-        first: u32,
+        first: u64,
         n: u32,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<Vec<Trace>> {
@@ -132,7 +135,7 @@ impl LightWave {
                 if n_vertices > 1 && surface.is_smooth() {
                     traces.push(Trace { at: vertex.position, from: ray.origin });
                 }
-                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices };
+                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
                 if let Some((ray, path, true)) = step.go_on(&surface) {
                     self.next_rays.push(&ray);
                     self.next_paths.push(path);
@@ -144,14 +147,15 @@ impl LightWave {
         Some(traces)
     }
 
-    fn start(&mut self, pass: &CausticPass, first: u32, n: u32) {
+    fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
         self.rays.clear();
         self.paths.clear();
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
         // One sequence for all paths: its stream is none of any pixel's.
         let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
-        for i in first..first + n {
-            let sampler = new_sampler(seed, u32::MAX, u32::MAX, i);
+        for i in first..first + u64::from(n) {
+            // A sequence has 2³² points.
+            let sampler = new_sampler(seed, u32::MAX, u32::MAX - (i >> 32) as u32, i as u32);
             let Some(line) = pass.casters.sample(pass.scene, &sampler) else { continue };
             let throughput = line.radiance / line.density;
             if throughput == Vec3::ZERO {
@@ -181,7 +185,7 @@ impl LightWave {
             }
             let found = surface_at(pass, &self.rays.get(i), &hit, &path.media);
             let Some((vertex, material, surface)) = found else { continue };
-            let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices };
+            let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
             if n_vertices > 1
                 && surface.is_smooth()
                 && path.media == MediumStack::default()
@@ -225,6 +229,8 @@ struct Step<'a> {
     hit: &'a Hit,
     material: MaterialId,
     n_vertices: u32,
+    /// Of [`LightWave::explore`], whose paths carry nothing.
+    is_scout: bool,
 }
 
 impl Step<'_> {
@@ -288,7 +294,14 @@ impl Step<'_> {
         let scene = pass.scene;
         let mut path = *self.path;
         let (sampler, dimension) = (path.sampler, self.dimension());
-        let u_lobe = || sampler.single(dimension + DIM_LOBE);
+        let u_lobe = || {
+            let u = sampler.single(dimension + DIM_LOBE);
+            match scene.shading.materials[material as usize] {
+                // Reflected or not, whatever the shares of the light.
+                Material::Glass { .. } if self.is_scout => f32::from(u >= SCOUTED_REFLECTION) * 1.0f32.next_down(),
+                _ => u,
+            }
+        };
         let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
         let is_smooth = sample.pdf.is_infinite();
         // A path that scatters before anything smooth is left to the eye's side.

@@ -5,6 +5,8 @@
 
 mod selection;
 mod shape;
+mod tree;
+mod wide;
 
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;
@@ -13,6 +15,8 @@ use glam::{Mat3, Vec2, Vec3};
 use selection::Selection;
 pub(super) use shape::LightShape;
 pub(super) use shape::sphere_uv;
+pub(super) use wide::LightLanes;
+use wide::WideLights;
 
 /// How many sample dimensions [`LightTable::sample_each`] uses.
 pub(super) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
@@ -37,6 +41,7 @@ pub struct LightTable {
     /// For each object: where its primitives stand among the lights.
     by_object: Vec<ObjectLights>,
     selection: Selection,
+    wide: Option<WideLights>,
 }
 
 /// Which lights the primitives of an object are.
@@ -133,7 +138,8 @@ impl LightTable {
             })
             .collect();
         let selection = Selection::build(&lights);
-        Self { lights, by_object, selection }
+        let wide = WideLights::build(&lights);
+        Self { lights, by_object, selection, wide }
     }
 
     pub fn len(&self) -> usize {
@@ -162,7 +168,7 @@ impl LightTable {
     /// A point on some light, or `None` when the choice fell on one that cannot be seen from `position`.
     ///
     /// - `normal`: unit; only light from its side matters.
-    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`.
+    /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`; `u_select` is asked for where there are many lights.
     #[inline]
     pub(super) fn sample(
         &self,
@@ -171,9 +177,9 @@ impl LightTable {
         position: Vec3,
         normal: Vec3,
         u_select: impl FnOnce() -> f32,
-        u: Vec2,
+        mut u: Vec2,
     ) -> Option<LightSample> {
-        let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select)?;
+        let (id, pmf) = self.selection.sample(&self.lights, techniques, position, normal, u_select, &mut u.x)?;
         self.lights[id as usize].sample(textures, techniques, position, u, pmf)
     }
 

@@ -1,6 +1,8 @@
-//! Which light to ask: a few lights by what each could send to the point, many by their power.
+//! Which light to ask: a few lights by what each could send to the point, many by a tree over them.
 
+use super::tree::LightTree;
 use super::{Light, LightShape, Techniques};
+use crate::lanes::{Float, Simd, Vector, select};
 use crate::sampling::AliasTable;
 use glam::Vec3;
 
@@ -11,12 +13,14 @@ pub const MAX_ESTIMATED: usize = 16;
 pub(super) struct Selection {
     /// Bounds for the estimate; empty when there are too many lights.
     bounds: Vec<LightBounds>,
-    /// By power, when there are many.
+    /// When there are many.
+    tree: LightTree,
+    /// The same by power alone, for what has no point to ask from.
     alias: AliasTable,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct LightBounds {
+pub(super) struct LightBounds {
     center: Vec3,
     radius: f32,
     /// Of a flat light; zero for a sphere.
@@ -28,14 +32,17 @@ struct LightBounds {
 impl Selection {
     pub fn build(lights: &[Light]) -> Self {
         if lights.len() <= MAX_ESTIMATED {
-            return Self { bounds: lights.iter().map(LightBounds::new).collect(), alias: AliasTable::default() };
+            return Self { bounds: lights.iter().map(LightBounds::new).collect(), ..Self::default() };
         }
         let powers: Vec<f64> =
             lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
-        Self { bounds: Vec::new(), alias: AliasTable::new(&powers) }
+        Self { bounds: Vec::new(), tree: LightTree::build(lights), alias: AliasTable::new(&powers) }
     }
 
     /// A light and the probability of the choice; `None` when no light can reach the point.
+    ///
+    /// Few lights are chosen by `u`, which is left as a uniform number again: then the points on each light are spread
+    /// as evenly as the choices.
     #[inline]
     pub fn sample(
         &self,
@@ -43,27 +50,33 @@ impl Selection {
         techniques: &Techniques,
         position: Vec3,
         normal: Vec3,
-        u: impl FnOnce() -> f32,
+        u_select: impl FnOnce() -> f32,
+        u: &mut f32,
     ) -> Option<(u32, f32)> {
         match lights.len() {
             0 => None,
             1 => Some((0, 1.0)),
-            n if !techniques.light_selection => Some(((u() * n as f32) as u32, 1.0 / n as f32)),
+            n if !techniques.light_selection => {
+                let scaled = *u * n as f32;
+                *u = scaled.fract();
+                Some((scaled as u32, 1.0 / n as f32))
+            }
             n if n <= MAX_ESTIMATED => {
                 let (estimates, sum) = self.estimates(position, normal);
-                let mut rest = u() * sum;
+                let mut rest = *u * sum;
                 let chosen = (0..n).find(|&i| {
                     rest -= estimates[i];
                     rest < 0.0
                 });
                 // Rounding may leave a rest after the last light that counts.
                 let chosen = chosen.or_else(|| (0..n).rev().find(|&i| estimates[i] > 0.0))?;
+                if rest < 0.0 {
+                    rest += estimates[chosen];
+                }
+                *u = (rest / estimates[chosen]).clamp(0.0, 1.0f32.next_down());
                 (estimates[chosen] > 0.0).then(|| (chosen as u32, estimates[chosen] / sum))
             }
-            _ => {
-                let (id, pmf, _) = self.alias.sample(u());
-                Some((id, pmf))
-            }
+            _ => self.tree.sample(position, normal, u_select()),
         }
     }
 
@@ -85,8 +98,14 @@ impl Selection {
                 let (estimates, sum) = self.estimates(position, normal);
                 if sum > 0.0 { estimates[id as usize] / sum } else { 0.0 }
             }
-            _ => self.alias.pmf(id),
+            _ => self.tree.pmf(id, position, normal),
         }
+    }
+
+    /// Of few lights.
+    #[inline]
+    pub fn bounds(&self) -> &[LightBounds] {
+        &self.bounds
     }
 
     #[inline]
@@ -145,4 +164,32 @@ impl LightBounds {
         let emitter = if self.normal == Vec3::ZERO { 1.0 } else { bound(-wi.dot(self.normal)) };
         self.intensity * receiver * emitter / distance2
     }
+
+    /// The same for sixteen points.
+    #[inline(always)]
+    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+        let s = position.x.s;
+        let (r2, one) = (self.radius * self.radius, Float::splat(s, 1.0));
+        let offset = Vector::splat(s, self.center) - position;
+        let distance2 = offset.length_squared();
+        let distance = distance2.sqrt();
+        let wi = offset * (one / distance);
+        let sin_u = one.all(self.radius) / distance;
+        let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
+        let mut estimate = largest_cosine(wi.dot(normal), cos_u, sin_u) * self.intensity;
+        if self.normal != Vec3::ZERO {
+            estimate = estimate * largest_cosine(-wi.dot(Vector::splat(s, self.normal)), cos_u, sin_u);
+        }
+        let within = one.all(self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE));
+        select(distance2.le(one.all(r2)), within, estimate / distance2)
+    }
+}
+
+/// The largest cosine to any direction within the cone, a little more so that rounding hides none.
+#[inline(always)]
+fn largest_cosine<S: Simd>(cos: Float<S>, cos_u: Float<S>, sin_u: Float<S>) -> Float<S> {
+    let one = cos.all(1.0);
+    let sin = (one - cos * cos).at_least(0.0).sqrt();
+    let bound = (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).at_least(0.0).at_most(1.0);
+    select(cos_u.le(cos), one, bound)
 }

@@ -62,7 +62,7 @@ pub(in crate::render) struct SurfaceOfLight {
 
 /// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
 /// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
-const SMALL_SOLID_ANGLE: f32 = 1e-3;
+pub(super) const SMALL_SOLID_ANGLE: f32 = 1e-3;
 
 /// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
 const LARGE_SOLID_ANGLE: f32 = 6.0;

@@ -5,6 +5,7 @@ use super::parts::{
     TexturePart, TransformPart,
 };
 use super::value::{Amount, Paint, Rgb};
+use crate::render::Film;
 use crate::scene::components::{MAX_LOBES, PHONG_LOBES};
 use crate::scene::error::suggestion;
 use crate::scene::meshes::BUILTIN_NAMES;
@@ -50,10 +51,32 @@ impl Check<'_> {
 
     fn camera(&mut self, camera: &CameraPart) {
         self.point("camera/eye", camera.eye);
-        self.point("camera/look_at", camera.look_at);
         self.vector("camera/up", "`up`", camera.up);
-        let view = camera.look_at - camera.eye;
-        if view.is_finite() && view.length() < SceneFile::MIN_SIZE {
+        let view = match (camera.look_at, camera.forward) {
+            (Some(look_at), None) => {
+                self.point("camera/look_at", look_at);
+                look_at - camera.eye
+            }
+            (None, Some(forward)) => {
+                self.vector("camera/forward", "`forward`", forward);
+                forward
+            }
+            (None, None) => {
+                return self
+                    .wrong("camera", "the camera looks nowhere: give `look_at`, a point, or `forward`, a direction");
+            }
+            (Some(_), Some(_)) => {
+                return self.wrong("camera/forward", "`look_at` and `forward` say the same thing: give one of them");
+            }
+        };
+        if let Some(distance) = camera.pivot_distance {
+            if camera.forward.is_none() {
+                self.wrong("camera/pivot_distance", "`pivot_distance` goes with `forward`: here `look_at` says it");
+            } else {
+                self.size("camera/pivot_distance", "`pivot_distance`", distance);
+            }
+        }
+        if camera.look_at.is_some() && view.is_finite() && view.length() < SceneFile::MIN_SIZE {
             self.wrong("camera/look_at", "`eye` and `look_at` are the same point: move one of them");
         } else if view.is_finite() && camera.up.is_finite() {
             let sine = view.normalize().cross(camera.up.normalize_or_zero()).length();
@@ -265,7 +288,13 @@ impl Check<'_> {
                 }
                 self.area(path, "triangle", b - a, c - a);
             }
-            ObjectPart::Mesh { source, simplify, .. } => {
+            ObjectPart::Mesh { source, simplify, material, materials, .. } => {
+                if material.is_some() && materials.is_some() {
+                    self.wrong(&format!("{path}/materials"), "`material` and `materials` say the same thing: give one");
+                }
+                for (i, name) in materials.iter().flatten().enumerate() {
+                    self.material_name(&format!("{path}/materials/{i}"), name);
+                }
                 if let MeshSourcePart::Builtin(name) = source
                     && !BUILTIN_NAMES.contains(&name.as_str())
                 {
@@ -438,7 +467,7 @@ pub fn check_film_size(width: u32, height: u32) -> Result<(), String> {
         || height > SceneFile::MAX_FILM_SIDE
         || pixels > SceneFile::MAX_FILM_PIXELS
     {
-        let gib = pixels as f64 * 24.0 / f64::from(1 << 30);
+        let gib = pixels as f64 * Film::BYTES_A_PIXEL as f64 / f64::from(1 << 30);
         Err(format!(
             "a film of {width} x {height} would take {gib:.1} GiB: use at most {} pixels, {} a side",
             SceneFile::MAX_FILM_PIXELS,

@@ -28,7 +28,7 @@ impl SceneFile {
     pub const MAX_GRID_BALLS: u64 = 4_000_000;
     /// Pixels along one side of a film at most.
     pub const MAX_FILM_SIDE: u32 = 65_536;
-    /// Pixels of a film at most: its sums take 24 bytes each, 6 GiB in all.
+    /// Pixels of a film at most: they take 72 bytes each, 18 GiB in all.
     pub const MAX_FILM_PIXELS: u64 = 1 << 28;
     /// Problems that are told with their places; nobody reads more, and each place is looked for in the whole text.
     const MAX_TOLD: usize = 20;

@@ -1,7 +1,7 @@
 //! The parts of a scene file, as written. Meaning and limits are checked in `check`.
 
 use super::value::{Amount, Named, Paint, Rgb};
-use crate::render::{Fresnel, Integrator, PixelFilter, ToneCurve, Wrap};
+use crate::render::{Display, Fresnel, Integrator, PixelFilter, ToneCurve, Wrap};
 use glam::{DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -38,7 +38,15 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 pub struct CameraPart {
     pub eye: DVec3,
-    pub look_at: DVec3,
+    /// What is in the middle of the picture, and what orbiting turns about.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_at: Option<DVec3>,
+    /// In place of `look_at`: the direction of the view. A unit vector is taken as it is, to the last bit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forward: Option<DVec3>,
+    /// With `forward`: metres from the eye to what orbiting turns about; 1 when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pivot_distance: Option<f64>,
     #[serde(default = "default_up")]
     pub up: DVec3,
     /// Vertical field of view, degrees.
@@ -53,12 +61,35 @@ pub struct CameraPart {
     /// Metres from the eye to the focal plane along the view axis; the distance of `look_at` when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_distance: Option<f64>,
+    /// Whether the lens blurs; when not given, it does if it has a radius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_of_field: Option<bool>,
     /// Straight edges of the aperture; below 3 it is round.
     #[serde(default, skip_serializing_if = "is_default")]
     pub blades: u32,
     /// Degrees.
     #[serde(default, skip_serializing_if = "is_default")]
     pub blade_rotation: f64,
+}
+
+impl CameraPart {
+    /// A pinhole that looks at a point, with defaults for all the rest.
+    pub fn looking_at(eye: DVec3, look_at: DVec3) -> Self {
+        Self {
+            eye,
+            look_at: Some(look_at),
+            forward: None,
+            pivot_distance: None,
+            up: default_up(),
+            vfov: default_vfov(),
+            lens_radius: None,
+            f_stop: None,
+            focus_distance: None,
+            depth_of_field: None,
+            blades: 0,
+            blade_rotation: 0.0,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -100,6 +131,18 @@ impl From<FilterPart> for PixelFilter {
     }
 }
 
+impl From<PixelFilter> for FilterPart {
+    fn from(value: PixelFilter) -> Self {
+        match value {
+            PixelFilter::Box => Self::Box,
+            PixelFilter::Tent => Self::Tent,
+            PixelFilter::Gaussian => Self::Gaussian,
+            PixelFilter::BlackmanHarris => Self::BlackmanHarris,
+            PixelFilter::Mitchell => Self::Mitchell,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IntegratorPart {
@@ -117,6 +160,15 @@ impl From<IntegratorPart> for Integrator {
     }
 }
 
+impl From<Integrator> for IntegratorPart {
+    fn from(value: Integrator) -> Self {
+        match value {
+            Integrator::Path => Self::Path,
+            Integrator::Phong => Self::Phong,
+        }
+    }
+}
+
 /// How the picture is shown; no sample depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -124,6 +176,18 @@ pub struct DisplayPart {
     /// Factors of two.
     pub exposure: f32,
     pub tone_curve: ToneCurvePart,
+}
+
+impl From<DisplayPart> for Display {
+    fn from(part: DisplayPart) -> Self {
+        Self { exposure_stops: part.exposure, tone_curve: part.tone_curve.into() }
+    }
+}
+
+impl From<Display> for DisplayPart {
+    fn from(display: Display) -> Self {
+        Self { exposure: display.exposure_stops, tone_curve: display.tone_curve.into() }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -141,6 +205,16 @@ impl From<ToneCurvePart> for ToneCurve {
             ToneCurvePart::Linear => Self::Linear,
             ToneCurvePart::Neutral => Self::Neutral,
             ToneCurvePart::Filmic => Self::Filmic,
+        }
+    }
+}
+
+impl From<ToneCurve> for ToneCurvePart {
+    fn from(value: ToneCurve) -> Self {
+        match value {
+            ToneCurve::Linear => Self::Linear,
+            ToneCurve::Neutral => Self::Neutral,
+            ToneCurve::Filmic => Self::Filmic,
         }
     }
 }
@@ -294,6 +368,15 @@ impl From<FresnelPart> for Fresnel {
     }
 }
 
+impl From<Fresnel> for FresnelPart {
+    fn from(value: Fresnel) -> Self {
+        match value {
+            Fresnel::Constant => Self::Constant,
+            Fresnel::Schlick => Self::Schlick,
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ObjectPart {
@@ -352,6 +435,9 @@ pub enum ObjectPart {
         /// For every slot; without it the materials of the file (MTL) are used.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         material: Option<String>,
+        /// One for each slot, in place of `material`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        materials: Option<Vec<String>>,
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
@@ -402,6 +488,14 @@ impl ObjectPart {
             | Self::BallGrid { material, .. }
             | Self::Spheres { material, .. } => Some(material),
             Self::Mesh { material, .. } => material.as_deref(),
+        }
+    }
+
+    /// Of a mesh that names one material for each slot.
+    pub fn slot_materials(&self) -> Option<&[String]> {
+        match self {
+            Self::Mesh { materials, .. } => materials.as_deref(),
+            _ => None,
         }
     }
 

@@ -1,0 +1,32 @@
+//! `firstlight save SCENE -o out.ron`: a model, a built-in scene or what a picture shows, as a scene file.
+
+use super::console::remark;
+use super::{Failure, SceneArgs};
+use clap::Args;
+use firstlight::scene::save_scene;
+use firstlight::scene::whole_file::check_writable;
+use std::path::PathBuf;
+
+#[derive(Args, Clone, Debug)]
+pub struct SaveArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The scene file; meshes and pictures are named by their paths from it.
+    #[arg(short, long, value_name = "OUT.ron")]
+    output: PathBuf,
+}
+
+pub fn run(args: &SaveArgs) -> Result<(), Failure> {
+    if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")) {
+        return Err(Failure::Usage(format!("{}: scene files end in .ron", args.output.display())));
+    }
+    check_writable(&args.output).map_err(Failure::Failed)?;
+    let scene = args.scene.load(None, &|_| ())?;
+    let mut world = bevy_ecs::world::World::new();
+    scene.spawn(&mut world);
+    let saved = save_scene(&mut world, Some(&scene), &args.output).map_err(Failure::Failed)?;
+    for note in &saved.notes {
+        remark(format_args!("note: {note}"));
+    }
+    Ok(())
+}

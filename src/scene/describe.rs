@@ -1,0 +1,437 @@
+//! From entities back to a scene file: the way of `spawn`, backwards.
+//!
+//! What comes out says what the world holds, to the last bit: spawning it gives equal components in the same order.
+//! Three things have no words in a scene file and get some: meshes that came from no file are listed, to be written
+//! beside it; many balls that were made by a program are listed one by one; surfaces without a material get a grey
+//! one. Comments and the spelling of a file that was read are not kept.
+
+use super::components::{
+    Amount, Balls, Developing, FilmSize, Material, MeshOrigin, Ordinal, Paint, Rendering, SceneEnvironment, Shape,
+    SurfaceTexture,
+};
+use super::file::{
+    self, CameraPart, DisplayPart, EnvironmentPart, FilmPart, LightPart, MaterialPart, MeshShadingPart, MeshSourcePart,
+    Named, ObjectPart, RadiiPart, Rgb, SceneFile, TexturePart, TransformPart,
+};
+use super::inputs::SceneInputs;
+use super::load::LoadedScene;
+use super::placement::Placement;
+use super::spawn::camera;
+use super::view::{Lens, Projection, View};
+use crate::mesh::Mesh;
+use crate::render::{Environment, Fresnel};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, World};
+use glam::{DVec3, Vec3};
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A scene in words, and what the words point at.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// Paths count from [`folder`](Self::folder).
+    pub file: SceneFile,
+    pub folder: PathBuf,
+    /// Meshes that came from no file: index of the object whose `source` has an empty name, and the mesh.
+    pub loose_meshes: Vec<(usize, Arc<Mesh>)>,
+    /// What could not be said.
+    pub losses: Vec<String>,
+}
+
+impl Description {
+    /// Of what `world` holds; `loaded` is the scene that was opened into it, if one was.
+    pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
+        let inputs = SceneInputs::of(world);
+        let mut writer = Writer { loaded, ..Writer::default() };
+        let objects = writer.objects(world, &inputs);
+        writer.name_materials(world, &objects);
+        let parts = objects.iter().map(|object| writer.object(object)).collect();
+        let materials = writer.materials();
+        let environment = writer.environment(&inputs.environment);
+        let rendering = world.get_resource::<Rendering>().copied().unwrap_or_default().0;
+        let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
+        let display = world.get_resource::<Developing>().copied().unwrap_or_default().0;
+        let lights = inputs.lights.iter().map(|light| LightPart::Point {
+            name: light.name.clone(),
+            position: light.placement.translation,
+            intensity: Rgb(light.light.intensity),
+            radius: light.light.radius,
+        });
+        let (view, projection, lens) =
+            inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
+        let file = SceneFile {
+            camera: camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
+            film: FilmPart { width, height, filter: rendering.filter.into() },
+            integrator: rendering.integrator.into(),
+            max_depth: (rendering.max_depth < u32::MAX).then_some(rendering.max_depth),
+            display: DisplayPart { exposure: display.exposure_stops, tone_curve: display.tone_curve.into() },
+            environment,
+            air: Rgb(inputs.environment.air),
+            textures: writer.textures(),
+            materials,
+            objects: parts,
+            lights: lights.collect(),
+        };
+        let folder = loaded.map(|loaded| loaded.folder.clone()).unwrap_or_default();
+        Self { file, folder, loose_meshes: writer.loose_meshes, losses: writer.losses }
+    }
+}
+
+/// The camera of a scene file that gives exactly these components: as it was written, if that is still true, else by
+/// the point it looks at, if that gives the same bits, else by its direction.
+pub fn camera_part(view: &View, projection: &Projection, lens: &Lens, written: Option<&CameraPart>) -> CameraPart {
+    let same = |part: &CameraPart| camera(part) == (*view, *projection, *lens);
+    if let Some(part) = written.filter(|part| same(part)) {
+        return part.clone();
+    }
+    let at = CameraPart {
+        up: view.up,
+        vfov: projection.vfov_deg,
+        lens_radius: (lens.radius != 0.0).then_some(lens.radius),
+        focus_distance: Some(lens.focus_distance),
+        depth_of_field: (lens.enabled != (lens.radius > 0.0)).then_some(lens.enabled),
+        blades: lens.blades,
+        blade_rotation: lens.blade_rotation_deg,
+        ..CameraPart::looking_at(view.eye, view.pivot())
+    };
+    let upright = CameraPart { up: DVec3::Y, ..at.clone() };
+    let directed = CameraPart {
+        look_at: None,
+        forward: Some(view.forward),
+        pivot_distance: Some(view.pivot_distance),
+        ..at.clone()
+    };
+    [upright, at].into_iter().find(same).unwrap_or(directed)
+}
+
+/// An object and what is known of it.
+struct Item {
+    name: Option<String>,
+    shape: Shape,
+    placement: Placement,
+    slots: Vec<Entity>,
+    origin: Option<MeshOrigin>,
+    /// Its materials are those that the file of its mesh gives.
+    own: bool,
+}
+
+#[derive(Default)]
+struct Writer<'a> {
+    loaded: Option<&'a LoadedScene>,
+    /// Every material that gets a name, in order.
+    named: Vec<(Entity, String, Material)>,
+    names: HashMap<Entity, String>,
+    /// The name of the grey material, once something needs it.
+    grey: Option<String>,
+    /// Textures in use, in the order in which they are met.
+    textures: Vec<(Arc<SurfaceTexture>, String)>,
+    loose_meshes: Vec<(usize, Arc<Mesh>)>,
+    n_objects: usize,
+    losses: Vec<String>,
+}
+
+impl Writer<'_> {
+    fn objects(&self, world: &mut World, inputs: &SceneInputs) -> Vec<Item> {
+        let item = |object: &super::inputs::ObjectInput| {
+            let origin = world.get::<MeshOrigin>(object.entity).cloned();
+            let own = origin.as_ref().is_some_and(|origin| origin.own_materials)
+                && self.has_own_materials(world, &object.shape, &object.slots);
+            Item {
+                name: object.name.clone().filter(|name| !name.is_empty()),
+                shape: object.shape.clone(),
+                placement: object.placement,
+                slots: object.slots.clone(),
+                origin,
+                own,
+            }
+        };
+        inputs.objects.iter().map(item).collect()
+    }
+
+    /// Whether the slots of a mesh still hold what its file gave them.
+    fn has_own_materials(&self, world: &World, shape: &Shape, slots: &[Entity]) -> bool {
+        let Shape::Mesh(mesh) = shape else { return false };
+        let Some(loaded) = self.loaded else { return false };
+        let Some(known) = loaded.meshes.iter().flatten().find(|known| Arc::ptr_eq(&known.mesh, mesh)) else {
+            return false;
+        };
+        let paint = |written: &file::Paint, now: &Paint| match (written, now) {
+            (file::Paint::Rgb(a), Paint::Rgb(b)) => a == b,
+            (file::Paint::Texture(name), Paint::Texture(texture)) => *name == texture.name,
+            // Its picture could not be had.
+            (file::Paint::Texture(name), Paint::Rgb(rgb)) => {
+                !loaded.pictures.contains_key(name) && *rgb == Vec3::splat(0.5)
+            }
+            (file::Paint::Rgb(_), Paint::Texture(_)) => false,
+        };
+        let same = |written: &MaterialPart, now: &Material| match (written, now) {
+            (MaterialPart::Diffuse { albedo: a }, Material::Diffuse { albedo: b }) => paint(a, b),
+            (MaterialPart::Mirror { reflectance: a }, Material::Mirror { reflectance: b }) => paint(a, b),
+            (MaterialPart::Emissive { radiance: a }, Material::Emissive { radiance: b }) => paint(a, b),
+            (MaterialPart::Glass { ior: a, absorption: b }, Material::Glass { ior, absorption }) => {
+                a == ior && b.0 == *absorption
+            }
+            // An MTL file gives no others.
+            _ => false,
+        };
+        known.slots.len() == slots.len()
+            && known.slots.iter().zip(slots).all(|((name, part), slot)| {
+                world.get::<Material>(*slot).is_some_and(|now| same(part, now))
+                    && world.get::<Name>(*slot).is_some_and(|now| now.as_str() == name)
+            })
+    }
+
+    /// Gives every material a name of its own, but for those that come with the file of a mesh.
+    fn name_materials(&mut self, world: &mut World, objects: &[Item]) {
+        let own: HashSet<Entity> = objects.iter().filter(|item| item.own).flat_map(|item| item.slots.clone()).collect();
+        let mut needed: HashSet<Entity> =
+            objects.iter().filter(|item| !item.own).flat_map(|item| item.slots.clone()).collect();
+        let mut all: Vec<_> = world
+            .query::<(Entity, Option<&Ordinal>, Option<&Name>, &Material)>()
+            .iter(world)
+            .map(|(entity, rank, name, material)| {
+                let name = name.map_or_else(String::new, |name| name.as_str().to_owned());
+                (rank.map_or(u32::MAX, |rank| rank.0), entity, name, material.clone())
+            })
+            .collect();
+        all.sort_by_key(|(rank, entity, ..)| (*rank, *entity));
+        for (.., material) in &all {
+            if let Material::Blend { a, b, .. } = material {
+                needed.extend([*a, *b]);
+            }
+        }
+        let mut taken = HashSet::new();
+        for (_, entity, name, material) in all {
+            if own.contains(&entity) && !needed.contains(&entity) {
+                continue;
+            }
+            let name = free_name(if name.is_empty() { "material" } else { &name }, &mut taken);
+            self.names.insert(entity, name.clone());
+            self.named.push((entity, name, material));
+        }
+    }
+
+    /// The name of a material; that of a grey one where there is none.
+    fn material_name(&mut self, entity: Option<Entity>) -> String {
+        if let Some(name) = entity.and_then(|entity| self.names.get(&entity)) {
+            return name.clone();
+        }
+        let mut taken: HashSet<String> = self.names.values().cloned().collect();
+        self.grey.get_or_insert_with(|| free_name("grey", &mut taken)).clone()
+    }
+
+    fn materials(&mut self) -> Named<MaterialPart> {
+        let named = std::mem::take(&mut self.named);
+        let mut parts: Vec<(String, MaterialPart)> =
+            named.into_iter().map(|(_, name, material)| (name, self.material(&material))).collect();
+        if let Some(grey) = self.grey.clone() {
+            parts.push((grey, self.material(&Material::GREY)));
+        }
+        Named(parts)
+    }
+
+    fn material(&mut self, material: &Material) -> MaterialPart {
+        match material {
+            Material::Diffuse { albedo } => MaterialPart::Diffuse { albedo: self.paint(albedo) },
+            Material::Mirror { reflectance } => MaterialPart::Mirror { reflectance: self.paint(reflectance) },
+            Material::Metal { alpha, reflectance, fresnel, compensate } => MaterialPart::Metal {
+                alpha: self.amount(alpha),
+                reflectance: self.paint(reflectance),
+                fresnel: Fresnel::into(*fresnel),
+                compensate: *compensate,
+            },
+            Material::Glass { ior, absorption } => MaterialPart::Glass { ior: *ior, absorption: Rgb(*absorption) },
+            Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
+                MaterialPart::Phong {
+                    diffuse: self.paint(diffuse),
+                    ambient: *ambient,
+                    specular: self.amount(specular),
+                    shininess: *shininess,
+                    transparency: *transparency,
+                    ior: *ior,
+                    absorption: Rgb(*absorption),
+                }
+            }
+            Material::Blend { weight, a, b } => MaterialPart::Blend {
+                weight: self.amount(weight),
+                a: self.material_name(Some(*a)),
+                b: self.material_name(Some(*b)),
+            },
+            Material::Emissive { radiance } => MaterialPart::Emissive { radiance: self.paint(radiance) },
+        }
+    }
+
+    fn paint(&mut self, paint: &Paint) -> file::Paint {
+        match paint {
+            Paint::Rgb(rgb) => file::Paint::Rgb(*rgb),
+            Paint::Texture(texture) => file::Paint::Texture(self.texture_name(texture)),
+        }
+    }
+
+    fn amount(&mut self, amount: &Amount) -> file::Amount {
+        match amount {
+            Amount::Number(value) => file::Amount::Number(*value),
+            Amount::Texture(texture) => file::Amount::Texture(self.texture_name(texture)),
+        }
+    }
+
+    fn texture_name(&mut self, texture: &Arc<SurfaceTexture>) -> String {
+        if let Some((_, name)) = self.textures.iter().find(|(known, _)| Arc::ptr_eq(known, texture)) {
+            return name.clone();
+        }
+        let mut taken: HashSet<String> = self.textures.iter().map(|(_, name)| name.clone()).collect();
+        // Names of the file that nothing uses any more stay taken: they are written as well.
+        let of_file = |name: &str| self.loaded.is_some_and(|loaded| loaded.file.textures.get(name).is_some());
+        if of_file(&texture.name) && self.loaded.and_then(|l| l.file.textures.get(&texture.name)) != Some(&texture.part)
+        {
+            taken.insert(texture.name.clone());
+        }
+        let name = free_name(if texture.name.is_empty() { "texture" } else { &texture.name }, &mut taken);
+        self.textures.push((texture.clone(), name.clone()));
+        name
+    }
+
+    /// Those of the file in its order, whether used or not, then all others.
+    fn textures(&self) -> Named<TexturePart> {
+        let of_file = self.loaded.map(|loaded| loaded.file.textures.0.clone()).unwrap_or_default();
+        let mut textures = of_file;
+        for (texture, name) in &self.textures {
+            if !textures.iter().any(|(known, _)| known == name) {
+                textures.push((name.clone(), self.with_path_from_folder(texture)));
+            }
+        }
+        Named(textures)
+    }
+
+    /// Pictures that materials of a mesh name are found from the folder that the program runs in.
+    fn with_path_from_folder(&self, texture: &SurfaceTexture) -> TexturePart {
+        let mut part = texture.part.clone();
+        if let TexturePart::Image { file, .. } = &mut part {
+            let from_mesh = self.loaded.and_then(|loaded| {
+                let textures = loaded.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
+                textures.clone().find(|(name, ..)| name == file).map(|(.., path)| path.clone())
+            });
+            if let Some(path) = from_mesh.and_then(|path| std::path::absolute(path).ok()) {
+                *file = path.to_string_lossy().into_owned();
+            }
+        }
+        part
+    }
+
+    fn environment(&mut self, environment: &SceneEnvironment) -> EnvironmentPart {
+        match (&environment.light, &environment.part) {
+            (Environment::Black, part @ EnvironmentPart::Image { .. }) => part.clone(),
+            (Environment::Black, _) => EnvironmentPart::Black,
+            (Environment::Constant(radiance), _) => EnvironmentPart::Constant(Rgb(*radiance)),
+            (Environment::Gradient { zenith, horizon, ground }, _) => {
+                EnvironmentPart::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
+            }
+            (Environment::Image { scale, rotation, .. }, EnvironmentPart::Image { file, rotate, .. }) => {
+                let kept = rotate.to_radians() as f32 == *rotation;
+                let rotate = if kept { *rotate } else { f64::from(*rotation).to_degrees() };
+                EnvironmentPart::Image { file: file.clone(), scale: Rgb(*scale), rotate }
+            }
+            (Environment::Image { .. }, _) => {
+                self.losses.push("the picture around the scene came from no file and is left out".to_owned());
+                EnvironmentPart::Black
+            }
+        }
+    }
+
+    fn object(&mut self, item: &Item) -> ObjectPart {
+        let index = self.n_objects;
+        self.n_objects += 1;
+        let name = item.name.clone();
+        // A point of its own says where an object is that is neither turned nor scaled.
+        let plain = item.placement == Placement::at(item.placement.translation);
+        let (point, transform) = match plain {
+            true => (item.placement.translation, TransformPart::default()),
+            false => (DVec3::ZERO, item.placement.to_part()),
+        };
+        let whole = item.placement.to_part();
+        match &item.shape {
+            Shape::Sphere { radius } => {
+                let material = self.material_name(item.slots.first().copied());
+                ObjectPart::Sphere { name, center: point, radius: *radius, material, transform }
+            }
+            Shape::Plane { normal } => {
+                let material = self.material_name(item.slots.first().copied());
+                ObjectPart::Plane { name, point, normal: *normal, material, transform }
+            }
+            Shape::Quad { edge_u, edge_v } => {
+                let material = self.material_name(item.slots.first().copied());
+                ObjectPart::Quad { name, corner: point, edge_u: *edge_u, edge_v: *edge_v, material, transform }
+            }
+            // Its corners count from the first, so a transform moves it without rounding.
+            Shape::Triangle { vertices } => {
+                let material = self.material_name(item.slots.first().copied());
+                ObjectPart::Triangle { name, vertices: *vertices, material, transform: whole }
+            }
+            Shape::Spheres(balls) => {
+                let material = self.material_name(item.slots.first().copied());
+                self.cloud(name, balls, material, whole)
+            }
+            Shape::Mesh(mesh) => self.mesh(index, item, mesh),
+        }
+    }
+
+    fn cloud(
+        &self,
+        name: Option<String>,
+        balls: &Arc<Balls>,
+        material: String,
+        transform: TransformPart,
+    ) -> ObjectPart {
+        let written = self.loaded.and_then(|loaded| {
+            let known = |known: &Option<Arc<Balls>>| known.as_ref().is_some_and(|known| Arc::ptr_eq(known, balls));
+            loaded.balls.iter().position(known).map(|i| &loaded.file.objects[i])
+        });
+        match written {
+            Some(ObjectPart::BallGrid { first, steps, radius, .. }) => {
+                let (first, steps, radius) = (*first, steps.clone(), *radius);
+                ObjectPart::BallGrid { name, first, steps, radius, material, transform }
+            }
+            Some(ObjectPart::Spheres { centers, radii, .. }) => {
+                let (centers, radii) = (centers.clone(), radii.clone());
+                ObjectPart::Spheres { name, centers, radii, material, transform }
+            }
+            _ => {
+                let centers = balls.centers.iter().map(|center| center.as_dvec3() + balls.center).collect();
+                let radii = RadiiPart::Each(balls.radii.iter().map(|&radius| f64::from(radius)).collect());
+                ObjectPart::Spheres { name, centers, radii, material, transform }
+            }
+        }
+    }
+
+    fn mesh(&mut self, index: usize, item: &Item, mesh: &Arc<Mesh>) -> ObjectPart {
+        let file_has_materials = self.loaded.is_some_and(|loaded| {
+            loaded.meshes.iter().flatten().any(|known| Arc::ptr_eq(&known.mesh, mesh) && !known.slots.is_empty())
+        });
+        let (material, materials) = match &item.slots[..] {
+            _ if item.own => (None, None),
+            [] if !file_has_materials => (None, None),
+            [] => (Some(self.material_name(None)), None),
+            [slot] => (Some(self.material_name(Some(*slot))), None),
+            slots => (None, Some(slots.iter().map(|slot| self.material_name(Some(*slot))).collect())),
+        };
+        let (source, shading, simplify) = match &item.origin {
+            Some(origin) => (origin.source.clone(), origin.shading, origin.simplify),
+            None => {
+                self.loose_meshes.push((index, mesh.clone()));
+                (MeshSourcePart::Obj(String::new()), MeshShadingPart::Auto, None)
+            }
+        };
+        let (name, transform) = (item.name.clone(), item.placement.to_part());
+        ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform }
+    }
+}
+
+/// `wanted`, or with the first number that makes it new.
+fn free_name(wanted: &str, taken: &mut HashSet<String>) -> String {
+    let numbered = (2_u64..).map(|number| format!("{wanted} {number}"));
+    let name = std::iter::once(wanted.to_owned()).chain(numbered).find(|name| !taken.contains(name));
+    let name = name.expect("there are more numbers than names");
+    taken.insert(name.clone());
+    name
+}

@@ -1,0 +1,119 @@
+//! Scenes to disk: the world as a scene file that reads back as exactly this world.
+
+use super::describe::Description;
+use super::file::{EnvironmentPart, MeshSourcePart, ObjectPart, SceneFile, TexturePart};
+use super::load::LoadedScene;
+use super::obj::{ObjExtras, save_obj};
+use super::relative::{absolute, relative_path};
+use super::whole_file::write_whole;
+use bevy_ecs::prelude::World;
+use std::path::Path;
+
+/// What was written, and what a person should know about it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SavedScene {
+    /// The text of the file.
+    pub text: String,
+    /// One sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Writes what `world` holds as a scene file; `loaded` is the scene that was opened into it, if one was.
+///
+/// Appears whole or not at all. Meshes and pictures are named by their paths from the new file; meshes that came from
+/// no file are written beside it. The text is read back and compared before it takes the place of an older file.
+///
+/// # Errors
+/// When the world holds what no scene file may say, or the file cannot be written.
+pub fn save_scene(world: &mut World, loaded: Option<&LoadedScene>, path: &Path) -> Result<SavedScene, String> {
+    Description::of(world, loaded).save(path)
+}
+
+impl Description {
+    /// See [`save_scene`].
+    pub fn save(self, path: &Path) -> Result<SavedScene, String> {
+        save(self, path)
+    }
+}
+
+fn save(mut description: Description, path: &Path) -> Result<SavedScene, String> {
+    let failed = |reason: &dyn std::fmt::Display| format!("{}: cannot be saved: {reason}", path.display());
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    move_paths(&mut description.file, &description.folder, &folder);
+    let mut notes = std::mem::take(&mut description.losses);
+    let stem = path.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    for (number, (object, mesh)) in description.loose_meshes.iter().enumerate() {
+        let name = format!("{stem}-mesh-{}.obj", number + 1);
+        let comment = format!("a mesh of {}", path.display());
+        save_obj(&folder.join(&name), mesh, &ObjExtras { comment: &comment, ..ObjExtras::default() })
+            .map_err(|error| error.to_string())?;
+        notes.push(format!("a mesh that came from no file was saved as {name}"));
+        if let Some(ObjectPart::Mesh { source, .. }) = description.file.objects.get_mut(*object) {
+            *source = MeshSourcePart::Obj(name);
+        }
+    }
+    description.file.check().map_err(|error| failed(&error))?;
+    let text = description.file.to_ron();
+    let again = SceneFile::parse(&text, path).map_err(|error| failed(&error))?;
+    if again != description.file {
+        return Err(failed(&"it would not read back as the same scene; this is a bug in firstlight"));
+    }
+    if std::fs::read_to_string(path).is_ok_and(|old| has_comments(&old)) {
+        notes.push("the comments of the old file are not kept".to_owned());
+    }
+    write_whole(path, text.as_bytes())?;
+    Ok(SavedScene { text, notes })
+}
+
+/// Rewrites every path in `file` that counts from the folder `from` so that it counts from `to`.
+fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
+    let here = Path::new(".");
+    let or_here = |folder: &Path| if folder.as_os_str().is_empty() { here.to_path_buf() } else { folder.to_path_buf() };
+    let (from, to) = (or_here(from), or_here(to));
+    let same = absolute(&from) == absolute(&to);
+    let moved = |path: &mut String| {
+        // What was written relative to the same folder stays as it was written.
+        if !(path.is_empty() || same && Path::new(path.as_str()).is_relative()) {
+            *path = relative_path(&to, &from.join(path.as_str()));
+        }
+    };
+    for object in &mut file.objects {
+        if let ObjectPart::Mesh { source: MeshSourcePart::Obj(path), .. } = object {
+            moved(path);
+        }
+    }
+    for (_, texture) in &mut file.textures.0 {
+        if let TexturePart::Image { file, .. } = texture {
+            moved(file);
+        }
+    }
+    if let EnvironmentPart::Image { file, .. } = &mut file.environment {
+        moved(file);
+    }
+}
+
+/// Whether a scene file has comments outside of its strings.
+fn has_comments(text: &str) -> bool {
+    let mut in_string = false;
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '\\' if in_string => drop(chars.next()),
+            '"' => in_string = !in_string,
+            '/' if !in_string && matches!(chars.peek(), Some('/' | '*')) => return true,
+            _ => {}
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_are_found_and_strings_are_not_comments() {
+        assert!(has_comments("(a: 1, // one\n)") && has_comments("/* one */ ()"));
+        assert!(!has_comments(r#"(a: "http://x", b: "\"//")"#));
+    }
+}
