@@ -106,8 +106,9 @@ impl Judge {
     pub fn check_hit(&self, ray: &Ray, hit: &Hit) -> Verdict {
         let item = self.item(hit);
         let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-        let point = origin + f64::from(hit.t) * dir;
-        let ratio = item.distance(point) / item.bound(origin, (point - origin).length());
+        // About the origin of the ray: differences of `f32` numbers are exact in `f64`, sums far from zero are not.
+        let way = f64::from(hit.t) * dir;
+        let ratio = item.seen_from(origin).distance(way) / item.bound(origin, way.length());
         // NaN is wrong as well.
         if hit.t > 0.0 && hit.t < ray.t_max && ratio <= 1.0 { Verdict::Right(ratio) } else { Verdict::WrongT(ratio) }
     }
@@ -155,6 +156,16 @@ impl Judge {
 }
 
 impl Item {
+    fn seen_from(&self, origin: DVec3) -> Self {
+        let solid = match self.solid {
+            Solid::Triangle(corners) => Solid::Triangle(corners.map(|p| p - origin)),
+            Solid::Quad(corners) => Solid::Quad(corners.map(|p| p - origin)),
+            Solid::Sphere { center, radius } => Solid::Sphere { center: center - origin, radius },
+            Solid::Plane { point, normal } => Solid::Plane { point: point - origin, normal },
+        };
+        Self { solid, ..*self }
+    }
+
     /// From the surface.
     fn distance(&self, point: DVec3) -> f64 {
         match self.solid {
@@ -218,16 +229,16 @@ impl Item {
     }
 
     fn sure_triangle(&self, origin: DVec3, dir: DVec3, corners: &[DVec3; 3]) -> Option<(f64, f64)> {
-        let [a, b, c] = *corners;
+        let [a, b, c] = corners.map(|p| p - origin);
         let length = dir.length();
         let normal = (b - a).cross(c - a).try_normalize()?;
         let cos = normal.dot(dir) / length;
-        let t = (a - origin).dot(normal) / (cos * length);
+        let t = a.dot(normal) / (cos * length);
         let margin = self.bound(origin, t.abs() * length) / cos.abs();
         if !(t.is_finite() && t * length > margin) {
             return None;
         }
-        let point = origin + t * dir;
+        let point = t * dir;
         let inside = [(a, b), (b, c), (c, a)].into_iter().all(|(p, q)| {
             let inwards = normal.cross(q - p).normalize_or_zero();
             (point - p).dot(inwards) > margin

@@ -74,7 +74,8 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
     let mut out = String::with_capacity(text.len());
     let mut named = false;
     for (number, line) in text.lines().enumerate() {
-        let line = line.trim().trim_start_matches('\u{feff}');
+        // Marks and spaces in any order: the keyword must come first.
+        let line = line.trim_end().trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
         let Some(keyword) = line.split_whitespace().next() else { continue };
         let value = line[keyword.len()..].trim();
         let numbers = || -> Vec<f64> {
