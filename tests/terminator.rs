@@ -84,6 +84,22 @@ fn plain(mesh: &Mesh) -> Vec<f32> {
     (0..SIDE * SIDE).map(|i| shade(i).unwrap_or(0.0)).collect()
 }
 
+/// The true ball on paper, through the middles of the pixels as [`plain`] looks.
+fn true_at_centers() -> Vec<f32> {
+    let shade = |i: u32| {
+        let film = Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5);
+        let dir = eye().ray(film, Vec2::splat(SIDE as f32), Vec2::ZERO).dir.as_dvec3();
+        let origin = EYE.as_dvec3();
+        let half = origin.dot(dir);
+        let under_root = half * half - (origin.length_squared() - 1.0);
+        let point = (origin + (-half - under_root.max(0.0).sqrt()) * dir).as_vec3();
+        let way = LIGHT - point;
+        let cos = point.normalize().dot(way.normalize()).max(0.0);
+        if under_root > 0.0 { ALBEDO * FRAC_1_PI * cos * intensity() / way.length_squared() } else { 0.0 }
+    };
+    (0..SIDE * SIDE).map(shade).collect()
+}
+
 /// RMS and largest difference, percent of the brightest pixel, over the inner part of the disc, where rays meet
 /// ball and mesh alike.
 fn difference(picture: &[f32], truth: &[f32]) -> (f64, f64) {
@@ -109,12 +125,13 @@ fn coarse_balls_are_shaded_like_true_ones() {
         let mesh = ball(frequency);
         let shape = Shape::Mesh { tree: tree(&mesh), world_from_object: Affine3A::IDENTITY };
         let (rms, largest) = difference(&rendered(shape, Some(mesh.clone())), &truth);
-        let (plain_rms, plain_largest) = difference(&plain(&mesh), &truth);
+        let (plain_rms, plain_largest) = difference(&plain(&mesh), &true_at_centers());
         println!(
             "| {} | {plain_rms:.2} % | {plain_largest:.1} % | {rms:.2} % | {largest:.1} % |",
             mesh.triangles.len()
         );
-        assert!(rms < 0.5 * plain_rms, "{frequency}: {rms} against {plain_rms}");
+        // What is left in the mean is what flat places and blended normals cost anywhere on the ball, teeth or not.
+        assert!(rms < plain_rms, "{frequency}: {rms} against {plain_rms}");
         // Nothing left of the teeth: no pixel is wrong by more than a grazing facet may turn.
         assert!(largest < 0.5 * plain_largest, "{frequency}: {largest} against {plain_largest}");
     }
