@@ -30,8 +30,8 @@ struct Node {
     radius: f32,
     /// Mean direction of the normals, unit.
     axis: Vec3,
-    /// Of the largest angle between a normal and the axis; −1 where they face everywhere.
-    cos_spread: f32,
+    /// By how much the cosine with some normal can exceed that with the axis: 2 sin(s/2) for normals up to s away.
+    widening: f32,
     /// Luminance of the radiance, times area that can face a point.
     power: f32,
     /// First of the two children, or `LEAF` plus a light.
@@ -141,13 +141,16 @@ impl Node {
             radius: 0.5 * (bounds.max - bounds.min).length() * (1.0 + 8.0 * f32::EPSILON)
                 + 4.0 * f32::EPSILON * center.length(),
             axis: cone.axis,
-            cos_spread: (cone.spread.cos() - 1e-5).max(-1.0),
+            widening: 2.0 * (0.5 * cone.spread).sin() + 1e-5,
             power: items.iter().map(|item| item.power).sum(),
             link: 0,
         }
     }
 
     /// About the largest irradiance that the lights can cause, never zero where they can cause any.
+    ///
+    /// It is asked for twice a level, so it is made of one root and no other angle: the cosine of the largest lean of a
+    /// ball is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
     #[inline]
     fn bound(&self, position: Vec3, normal: Vec3) -> f32 {
         let offset = self.center - position;
@@ -156,33 +159,13 @@ impl Node {
             // Within the ball anything can happen; on average the lights are about a radius away.
             return self.power / r2.max(f32::MIN_POSITIVE);
         }
-        let distance = distance2.sqrt();
-        let wi = offset / distance;
-        let sin_u = self.radius / distance;
-        let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
-        let receiver = largest_cosine(wi.dot(normal), cos_u, sin_u);
-        // The cone, widened by the angle under which the ball is seen.
-        let sin_spread = (1.0 - self.cos_spread * self.cos_spread).max(0.0).sqrt();
-        let cos_wide = self.cos_spread * cos_u - sin_spread * sin_u;
-        let sin_wide = sin_spread * cos_u + self.cos_spread * sin_u;
-        let emitter = if self.cos_spread <= -1.0 || sin_wide <= 0.0 {
-            1.0
-        } else {
-            largest_cosine(-wi.dot(self.axis), cos_wide, sin_wide)
-        };
-        self.power * receiver * emitter / distance2
+        let inv_distance = 1.0 / distance2.sqrt();
+        // A little more, so that rounding hides nothing.
+        let slack = 16.0 * f32::EPSILON;
+        let receiver = (offset.dot(normal) + self.radius) * inv_distance + slack;
+        let emitter = (self.radius - offset.dot(self.axis)) * inv_distance + self.widening + slack;
+        self.power * receiver.clamp(0.0, 1.0) * emitter.clamp(0.0, 1.0) * (inv_distance * inv_distance)
     }
-}
-
-/// The largest cosine within a cone around a direction of cosine `cos`, at least 0; a little more, so that rounding hides
-/// none.
-#[inline]
-fn largest_cosine(cos: f32, cos_cone: f32, sin_cone: f32) -> f32 {
-    if cos >= cos_cone {
-        return 1.0;
-    }
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    (cos * cos_cone + sin * sin_cone + 8.0 * f32::EPSILON).clamp(0.0, 1.0)
 }
 
 impl Item {
