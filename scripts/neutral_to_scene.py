@@ -44,6 +44,18 @@ def vector(where, value, n=3):
     return "(" + ", ".join(number(where, x) for x in value) + ")"
 
 
+def whole(where, value):
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise Refused(f"{where}: expected a whole number from 1 on, found {value!r}")
+    return repr(value)
+
+
+def kind_of(where, value):
+    if not isinstance(value, dict):
+        raise Refused(f"{where}: expected an object, found {value!r}")
+    return value.get("type")
+
+
 def text(value):
     return json.dumps(value, ensure_ascii=False)
 
@@ -75,11 +87,12 @@ class Converter:
         out += self.camera(scene["camera"])
         depth = scene.get("max_depth")
         if depth is not None:
-            if isinstance(depth, bool) or not isinstance(depth, int) or depth < 1:
-                raise Refused(f"max_depth: expected a whole number from 1 on, found {depth!r}")
-            out.append(f"    max_depth: {depth},")
+            out.append(f"    max_depth: {whole('max_depth', depth)},")
         if scene.get("environment") is not None:
             out.append(f"    environment: constant({vector('environment', scene['environment'])}),")
+        for field, kind in (("textures", dict), ("materials", dict), ("objects", list)):
+            if not isinstance(scene.get(field) or kind(), kind):
+                raise Refused(f"{field}: expected {'an object' if kind is dict else 'a list'}, found {scene[field]!r}")
         textures = [self.texture(name, value) for name, value in (scene.get("textures") or {}).items()]
         out += ["    textures: {", *textures, "    },"] if textures else []
         out += ["    materials: {"]
@@ -103,11 +116,12 @@ class Converter:
                 raise Refused("camera: an aperture needs a `focus_distance`")
             lines.append(f"        lens_radius: {number('camera.aperture_radius', camera['aperture_radius'])},")
             lines.append(f"        focus_distance: {number('camera.focus_distance', camera['focus_distance'])},")
-        return [*lines, "    ),", f"    film: (width: {camera['width']}, height: {camera['height']}),"]
+        width, height = whole("camera.width", camera["width"]), whole("camera.height", camera["height"])
+        return [*lines, "    ),", f"    film: (width: {width}, height: {height}),"]
 
     def texture(self, name, value):
         where = f"textures.{name}"
-        kind = value.get("type")
+        kind = kind_of(where, value)
         if kind == "checker":
             checker = fields(where, value, ("type", "a", "b", "squares"))
             colors = ", ".join(f"{c}: {vector(f'{where}.{c}', checker[c])}" for c in "ab")
@@ -130,7 +144,7 @@ class Converter:
 
     def material(self, name, value):
         where = f"materials.{name}"
-        kind = value.get("type")
+        kind = kind_of(where, value)
         if kind in ("diffuse", "mirror", "emissive"):
             color = {"diffuse": "albedo", "mirror": "reflectance", "emissive": "radiance"}[kind]
             given = fields(where, value, ("type", color))[color]
@@ -159,7 +173,7 @@ class Converter:
         return name in self.textured or any(self.uses_texture(part) for part in parts)
 
     def object(self, where, value):
-        kind = value.get("type")
+        kind = kind_of(where, value)
         names = {
             "sphere": ("type", "center", "radius", "material"),
             "spheres": ("type", "centers", "radii", "material"),

@@ -10,6 +10,7 @@
 //! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
 //! | 4 | [`frame`] | the ECS schedule in the order in which a frame runs |
 //! | 5 | [`report`] | speed against error: ladders, metrics, tables and plots |
+//! | 5 | [`stability`] | the hard cases, counted |
 //! | 5 | `viewer` (feature) | the window: input, overlays, presenting |
 
 pub mod frame;
@@ -21,5 +22,6 @@ pub mod render;
 pub mod report;
 pub mod sampling;
 pub mod scene;
+pub mod stability;
 #[cfg(feature = "viewer")]
 pub mod viewer;

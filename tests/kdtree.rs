@@ -437,7 +437,8 @@ fn error_of_a_surface_point_is_a_bound() {
                 let bound = f64::from(point.geometric_normal.abs().dot(point.error));
                 assert!(distance.abs() <= bound, "{name} at {scale}, {far}: {distance} > {bound}, {hit:?}");
                 let on_ray = (ray.at(hit.t) - point.position).length();
-                assert!(on_ray <= 1e-3 * scale + 1e-6 * far, "{name}: {on_ray} off the ray");
+                // Points are kept clear of the rim of their triangle by four times their error.
+                assert!(on_ray <= 1e-3 * scale + 8e-6 * far, "{name}: {on_ray} off the ray");
             }
         }
     }

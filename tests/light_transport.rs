@@ -213,3 +213,37 @@ fn one_sample_can_be_replayed_alone() {
         assert_eq!((sum / 4.0 + film.light_from_lamps(x, y)).as_vec3(), film.mean(x, y), "pixel {x}, {y}");
     }
 }
+
+/// Many small lamps side by side are one large lamp, whichever of them is asked.
+#[test]
+fn a_lamp_in_pieces_shines_like_the_whole() {
+    let room = |side: u32| {
+        let (corner, edge) = (Vec3::new(-1.0, 2.0, -0.5), Vec3::new(2.0, 0.4, 0.0));
+        let (u, v) = (edge / side as f32, Vec3::Z / side as f32);
+        let mut shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::new(0.4, 0.4, 0.2), 0.4), 2)];
+        shapes
+            .extend((0..side * side).map(|i| (quad(corner + (i % side) as f32 * u + (i / side) as f32 * v, u, v), 1)));
+        let metal = Material::Metal {
+            alpha: ScalarInput::Constant(0.15),
+            reflectance: ColorInput::Constant(Vec3::splat(0.8)),
+            fresnel: Fresnel::Constant,
+            compensate: false,
+        };
+        let materials = vec![diffuse(0.5), emissive(5.0), metal];
+        scene(shapes, materials, Environment::Black, camera(Vec3::new(0.0, 1.5, 4.0), Vec3::Y * 0.3, 50.0))
+    };
+    let mean = |side, seed: u32| {
+        let means: Vec<f64> =
+            (0..8).map(|k| picture_mean(&render(&room(side), &settings(seed + k), 20, 16, 64).0).0).collect();
+        let mean = means.iter().sum::<f64>() / 8.0;
+        (mean, (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt())
+    };
+    let (whole, error) = mean(1, 20);
+    // One too few for the tree, and many.
+    for (side, seed) in [(4, 30), (20, 40)] {
+        let (found, other) = mean(side, seed);
+        let t = (found - whole) / error.hypot(other);
+        assert!(t.abs() < 4.5, "{} pieces: {found} ± {other} for {whole} ± {error}", side * side);
+        assert!(other < 0.01 * whole, "with noise like this nothing is seen: {other}");
+    }
+}

@@ -260,7 +260,7 @@ fn ctrl_c_saves_what_is_there_and_it_can_be_gone_on_with() {
     assert!(spp > 0 && json["stopped"] == true, "{json}");
     // Gone on with, it is as if nothing had happened.
     // Some pixels have a few samples more than others.
-    let goal = spp + 40;
+    let goal = 2 * (spp + 1).next_power_of_two();
     does(path, &format!("render a.exr -o a.png --resume --spp {goal}"));
     does(path, &format!("render cornell-balls -o b.png --film b.exr --size 64x64 --spp {goal}"));
     assert_equal(path, "a.exr", "b.exr");

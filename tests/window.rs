@@ -100,8 +100,8 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     assert_eq!(home_again, home, "home is home, bit for bit");
     let distance = |camera: &CameraPart| (target(camera) - camera.eye).length();
     let same_pivot = |now: &CameraPart| {
-        assert!((target(now) - target(&home)).length() < 1e-9, "the pivot stays: {now:?}");
-        assert!((distance(now) - distance(&home)).abs() < 1e-9, "so does its distance: {now:?}");
+        assert!((target(now) - target(&home)).length() < 1e-4, "the pivot stays: {now:?}");
+        assert!((distance(now) - distance(&home)).abs() < 1e-4, "so does its distance: {now:?}");
     };
     program.drag(2, (300, 200), (80, 30));
     let orbited = camera_when(&program, "the eye to orbit", |now| now.eye != home.eye);
@@ -120,16 +120,16 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     let focus = home.focus_distance.expect("it is always printed");
     program.key("bracketright bracketright bracketright");
     camera_when(&program, "the focal plane to move", |now| {
-        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(3)).abs() < 1e-9)
+        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(3)).abs() < 1e-5)
     });
     program.key("bracketleft");
     camera_when(&program, "the focal plane to come back", |now| {
-        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(2)).abs() < 1e-9)
+        now.focus_distance.is_some_and(|distance| (distance / focus - 1.05f64.powi(2)).abs() < 1e-5)
     });
     let radius = home.lens_radius.expect("the gallery has a lens");
     program.key("braceright braceright");
     camera_when(&program, "the aperture to open", |now| {
-        now.lens_radius.is_some_and(|wide| (wide / radius - 1.05f64.powi(2)).abs() < 1e-9)
+        now.lens_radius.is_some_and(|wide| (wide / radius - 1.05f64.powi(2)).abs() < 1e-5)
     });
     program.key("o");
     camera_when(&program, "the depth of field to go", |now| now.lens_radius.is_none());
@@ -224,6 +224,64 @@ fn a_paused_window_sleeps() {
     let used = program.cpu_seconds() - before;
     assert!(used <= 0.1, "{used} CPU seconds in 2 s of doing nothing");
     program.key("Escape");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn a_person_edits_inspects_and_takes_it_back() {
+    let Some(desktop) = Desktop::start() else { return };
+    let program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    program.key("p");
+    let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 150, 60, 200, 220).to_image();
+    let steady = |program: &Program| {
+        until("the picture to stand still", || {
+            let before = middle(program);
+            std::thread::sleep(Duration::from_millis(500));
+            (difference(&before, &middle(program)) == 0.0).then_some(before)
+        })
+    };
+    let picture = steady(&program);
+    // Normals in its place, and back again without a sample lost.
+    program.key("1");
+    until("normals", || (difference(&picture, &middle(&program)) > 15.0).then_some(()));
+    program.key("1");
+    until("the picture again", || (difference(&picture, &middle(&program)) == 0.0).then_some(()));
+    // The panel comes and goes, and the bare picture remains.
+    let right = |program: &Program| image::imageops::crop_imm(&program.pixels(), 400, 0, 230, 330).to_image();
+    let bare = right(&program);
+    program.key("n");
+    until("the panel", || (difference(&bare, &right(&program)) > 10.0).then_some(()));
+    program.key("n");
+    until("the panel to go", || (difference(&bare, &right(&program)) == 0.0).then_some(()));
+    // A click selects: the corners of a box are drawn. Delete changes the picture, and Ctrl+Z gives it back.
+    program.drag(1, (250, 250), (0, 0));
+    until("what is selected to be marked", || (difference(&picture, &middle(&program)) > 0.05).then_some(()));
+    let marked = middle(&program);
+    program.key("Delete");
+    until("it to go", || (difference(&marked, &middle(&program)) > 1.0).then_some(()));
+    let gone = steady(&program);
+    program.key("ctrl+z");
+    until("it to come back", || (difference(&gone, &middle(&program)) > 1.0).then_some(()));
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+#[test]
+fn a_hidden_window_rests() {
+    let Some(desktop) = Desktop::start() else { return };
+    let program = desktop.open(&["cornell", "--size", "320x240"], &[]);
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    program.minimise();
+    std::thread::sleep(Duration::from_secs(2));
+    let before = program.cpu_seconds();
+    std::thread::sleep(Duration::from_secs(2));
+    let used = program.cpu_seconds() - before;
+    assert!(used <= 0.1, "{used} CPU seconds in 2 s of not being seen");
+    program.focus();
+    let before = program.cpu_seconds();
+    until("it to go on", || (program.cpu_seconds() - before > 0.1).then_some(()));
+    program.key("ctrl+q");
     assert!(program.ended().success());
 }
 

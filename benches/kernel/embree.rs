@@ -5,7 +5,9 @@
 use crate::clock::cpu_seconds;
 use crate::rays::RaySet;
 use crate::{WAVE, all_rays};
-use firstlight::kdtree::{HitBatch, SceneTree};
+use firstlight::geometry::Ray;
+use firstlight::kdtree::{Hit, HitBatch, SceneTree};
+use firstlight::stability::{Judge, Verdict};
 use glam::Vec3;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
@@ -266,8 +268,12 @@ impl Scene<'_> {
         (cpu_seconds() - start) * prepared.single.len() as f64 / (16 * prepared.packets.len().max(1)) as f64
     }
 
-    /// Rays for which Embree does not find the same distance within a ten thousandth.
-    pub fn differences(&self, prepared: &Prepared, scene: &SceneTree, set: &RaySet) -> usize {
+    /// Rays for which Embree does not find the same distance within a ten thousandth, and what the `f64` judge, which
+    /// tries every triangle, says of either answer to them.
+    pub fn differences(&self, prepared: &Prepared, scene: &SceneTree, set: &RaySet) -> String {
+        let judge = std::cell::LazyCell::new(|| Judge::of(scene));
+        let is_right = |ray: &Ray, hit: Option<Hit>| matches!(judge.check(ray, hit.as_ref()), Verdict::Right(_));
+        let (mut own_wrong, mut their_wrong) = (0, 0);
         let arguments = Self::arguments(prepared.flags);
         let mut rays = prepared.single.iter();
         let mut hits = HitBatch::default();
@@ -280,10 +286,16 @@ impl Scene<'_> {
                     Some(hit) => theirs.geometry != INVALID && (theirs.t_far - hit.t).abs() <= 1e-4 * hit.t.abs(),
                     None => theirs.geometry == INVALID,
                 };
-                differ += usize::from(!same);
+                if !same {
+                    differ += 1;
+                    let found = Hit { t: theirs.t_far, u: theirs.u, v: theirs.v, prim: theirs.prim, object: 0 };
+                    let found = (theirs.geometry != INVALID).then_some(found);
+                    own_wrong += usize::from(!is_right(&wave.get(i), hits.get(i)));
+                    their_wrong += usize::from(!is_right(&wave.get(i), found));
+                }
             }
         }
-        differ
+        if differ == 0 { "none".to_owned() } else { format!("{differ} (wrong: {own_wrong} here, {their_wrong} there)") }
     }
 }
 

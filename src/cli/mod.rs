@@ -1,6 +1,7 @@
 //! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
 //! understood; 130: stopped by Ctrl+C, what there was is saved.
 
+mod animate;
 mod console;
 mod info;
 mod merge;
@@ -9,6 +10,7 @@ mod report;
 mod save;
 mod show;
 mod simplify;
+mod stability;
 mod stop;
 mod trees;
 
@@ -39,6 +41,8 @@ enum Command {
     Merge(merge::MergeArgs),
     /// Write a scene file of a model, a built-in scene, or of what a picture shows.
     Save(save::SaveArgs),
+    /// Count failures on hard cases: leaks, self-hits, missed hits, wrong depths, bad samples, lost light.
+    Stability(stability::StabilityArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
     /// Write a model with fewer triangles, and measure how far it is from the original.
@@ -111,7 +115,7 @@ impl SceneArgs {
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
-        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress) };
+        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), known: None };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
             remark(format_args!("warning: {warning}"));
@@ -148,6 +152,7 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Save(args)) => save::run(&args),
+        Some(Command::Stability(args)) => stability::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),

@@ -1,17 +1,21 @@
 //! `firstlight render SCENE -o out.png`: a picture without a window, and the film that it can go on from.
 
+use super::animate::animate;
 use super::console::{print, remark};
 use super::stop::Stop;
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
+use bevy_ecs::prelude::World;
 use clap::Args;
+use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
     FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, write_film_file,
 };
-use firstlight::render::{Display, Film, RenderSettings, Snapshot};
+use firstlight::render::{Display, Film, RenderSettings};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::check_writable;
 use firstlight::scene::{
-    Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs, SceneSource, Shot, ShotDraft, ShotSamples,
+    Developing, Extraction, FilmSize, LoadedScene, Part, Rendering, SceneInputs, SceneSource, Shot, ShotDraft,
+    ShotSamples,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -44,6 +48,15 @@ pub struct RenderArgs {
     /// Keep the film as well, an .exr to go on from.
     #[arg(long, value_name = "FILE.exr")]
     pub film: Option<PathBuf>,
+    /// Once around what the camera looks at, in so many pictures: FILE-0001.png and so on.
+    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
+    pub turntable: Option<u32>,
+    /// From bookmark to bookmark of the scene, by their numbers: 1,2,3.
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
+    pub bookmarks: Option<Vec<u8>>,
+    /// In how many pictures.
+    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "bookmarks")]
+    pub frames: Option<u32>,
     /// Go on with the film that is there: with --film, or with the film that is named as the scene.
     #[arg(long)]
     pub resume: bool,
@@ -122,9 +135,10 @@ fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
 }
 
 /// A scene and how it is to be rendered.
-struct Job {
-    scene: LoadedScene,
-    snapshot: Snapshot,
+pub(super) struct Job {
+    pub scene: LoadedScene,
+    world: World,
+    extraction: Extraction,
     settings: RenderSettings,
     display: Display,
     size: (u32, u32),
@@ -169,7 +183,38 @@ impl Job {
         display.exposure_stops += args.exposure;
         world.insert_resource(Rendering(settings));
         let draft = ShotDraft::of(&mut world, Some(&scene));
-        Ok(Self { snapshot: extraction.snapshot, scene, settings, display, size, build_seconds, draft })
+        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
+    }
+
+    /// The camera, as it is.
+    pub fn rig(&mut self) -> Option<Rig> {
+        let camera = SceneInputs::of(&mut self.world).camera?;
+        Some(Rig { view: camera.view, projection: camera.projection, lens: camera.lens })
+    }
+
+    /// Looks from there from now on.
+    pub fn set_rig(&mut self, rig: &Rig) {
+        if let Some(camera) = SceneInputs::of(&mut self.world).camera {
+            self.world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
+        }
+        let inputs = SceneInputs::of(&mut self.world);
+        self.extraction.update(Part::Camera, &inputs, &self.scene.trees);
+        self.draft = ShotDraft::of(&mut self.world, Some(&self.scene));
+    }
+
+    /// Renders a whole picture.
+    pub fn picture(&self, target: Target, stop: &Stop) -> Film {
+        let mut film = Film::new(self.size.0, self.size.1);
+        let asked = || stop.is_asked();
+        render_offline_until(&self.extraction.snapshot, &self.settings, &mut film, target, &asked, |_| true);
+        film
+    }
+
+    /// Writes a picture with its note.
+    pub fn write(&self, film: &Film, path: &Path) -> Result<(), Failure> {
+        let note = self.note(film, path);
+        let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
+        picture.write(path).map_err(Failure::Failed)
     }
 
     /// The note of a picture of this film at `path`.
@@ -196,7 +241,7 @@ impl Job {
     }
 
     /// When it is good enough.
-    fn target(&self, args: &RenderArgs) -> Target {
+    pub fn target(&self, args: &RenderArgs) -> Target {
         let open_ended = args.time.is_none() && args.error.is_none();
         let of_picture = self.scene.shot.as_ref().filter(|_| !args.resume).map(|shot| shot.spp.max(1));
         let default = open_ended.then(|| of_picture.unwrap_or(DEFAULT_SPP));
@@ -216,12 +261,15 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
         let message = format!("the picture was stopped in the middle of a pass; the new one has {} samples", shot.spp);
         bar.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
+    if args.turntable.is_some() || args.bookmarks.is_some() {
+        return animate(args, job, &bar, stop);
+    }
     let mut film = job.film(args, kept)?;
     let target = job.target(args);
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
     let asked = || stop.is_asked();
-    let report = render_offline_until(&job.snapshot, &job.settings, &mut film, target, &asked, |now| {
+    let report = render_offline_until(&job.extraction.snapshot, &job.settings, &mut film, target, &asked, |now| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
         let by_error = target
@@ -246,9 +294,7 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     if let Some(path) = film_path {
         write_film_file(&film, &job.note(&film, path), path).map_err(Failure::Failed)?;
     }
-    let note = job.note(&film, &args.output);
-    let picture = Print { film: &film, display: &job.display, size: job.size, note: Some(&note) };
-    picture.write(&args.output).map_err(Failure::Failed)?;
+    job.write(&film, &args.output)?;
     if film.n_bad() > bad_before {
         let total = report.rays.camera;
         let n_bad = film.n_bad() - bad_before;

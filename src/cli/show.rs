@@ -1,9 +1,14 @@
 //! `firstlight [SCENE|MODEL]`: a window, or a picture where there is no display.
 
+use super::console::remark;
 use super::render::{self, RenderArgs};
+use super::stop::Stop;
 use super::{Failure, SceneArgs};
 use clap::Args;
-use std::path::PathBuf;
+use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
+use firstlight::scene::ShotSamples;
+use firstlight::scene::whole_file::check_writable;
+use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
 pub struct ShowArgs {
@@ -18,6 +23,18 @@ pub struct ShowArgs {
     /// Another number, another noise.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u32>,
+    /// Write down what is done in the window, for --replay.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Play a recording without a window, and render the picture at its end.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["record", "scene", "size", "seed"])]
+    replay: Option<PathBuf>,
+    /// The picture of --replay.
+    #[arg(short, long, value_name = "FILE", default_value = "replay.png", requires = "replay")]
+    output: PathBuf,
+    /// Samples per pixel of that picture; as many as when it was recorded when not given.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..), requires = "replay")]
+    spp: Option<u32>,
     /// Where the pictures go that are kept from the window.
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FOLDER", default_value = ".")]
@@ -25,6 +42,9 @@ pub struct ShowArgs {
 }
 
 pub fn run(args: &ShowArgs) -> Result<(), Failure> {
+    if let Some(path) = &args.replay {
+        return play(args, path);
+    }
     #[cfg(feature = "viewer")]
     if firstlight::viewer::display::find() != firstlight::viewer::display::Display::None {
         return open_window(args);
@@ -34,17 +54,61 @@ pub fn run(args: &ShowArgs) -> Result<(), Failure> {
 
 #[cfg(feature = "viewer")]
 fn open_window(args: &ShowArgs) -> Result<(), Failure> {
+    use firstlight::frame::SettingsStore;
     use firstlight::viewer::{ViewerOptions, run};
     let source = args.scene.source()?;
-    let (width, height) = args.size.unwrap_or((1280, 720));
+    let store = SettingsStore::of_platform();
+    let (mut settings, trouble) = store.settings();
+    if let Some(trouble) = trouble {
+        remark(format_args!("warning: {trouble}"));
+    }
+    settings.remember(&source);
+    let (width, height) = args.size.or(settings.window).unwrap_or((1280, 720));
+    // Whatever is wrong with that folder, the picture is what the person is here for.
+    if let Err(error) = store.keep_settings(&settings) {
+        remark(format_args!("warning: {error}"));
+    }
     let threads = args.threads.map(usize::from);
     let folder = args.save_to.clone();
-    let options =
-        ViewerOptions { source, width, height, threads, seed: args.seed.unwrap_or(0), up: args.scene.up(), folder };
+    let options = ViewerOptions {
+        source,
+        width,
+        height,
+        threads,
+        seed: args.seed.unwrap_or(0),
+        up: args.scene.up(),
+        folder,
+        record: args.record.clone(),
+    };
     run(options).map_err(|error| Failure::Failed(error.to_string()))
 }
 
+/// Plays a recording, and keeps the picture at its end.
+fn play(args: &ShowArgs, path: &Path) -> Result<(), Failure> {
+    PictureFormat::of(&args.output).map_err(Failure::Usage)?;
+    check_writable(&args.output).map_err(Failure::Failed)?;
+    let stop = Stop::on_interrupt();
+    let options = ReplayOptions { threads: args.threads.map(usize::from), spp: args.spp };
+    let mut played = replay(path, options, &|| stop.is_asked()).map_err(Failure::Failed)?;
+    if stop.is_asked() {
+        return Err(Failure::Stopped("stopped: nothing was saved".to_owned()));
+    }
+    for warning in &played.warnings {
+        remark(format_args!("warning: {warning}"));
+    }
+    let (film, display) = (&played.film, played.display());
+    let size = (film.width(), film.height());
+    let samples = ShotSamples { first: 0, spp: film.spp(), uneven: false };
+    let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
+    let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
+    print.write(&args.output).map_err(Failure::Failed)
+}
+
 fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
+    if args.record.is_some() {
+        let message = "there is no display, so there is no window whose use could be recorded";
+        return Err(Failure::Failed(message.to_owned()));
+    }
     let output = free_name(&args.scene.scene);
     let announcement = Some(format!("no display: rendering to {} instead", output.display()));
     render::run(&RenderArgs {
@@ -55,6 +119,9 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         scale: None,
         samples: None,
         film: None,
+        turntable: None,
+        bookmarks: None,
+        frames: None,
         resume: false,
         spp: None,
         time: None,

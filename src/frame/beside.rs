@@ -1,7 +1,8 @@
 //! Work beside the picture: reading scenes and building trees on threads of their own, while the old picture stays.
 
 use super::Waker;
-use crate::scene::{LoadOptions, LoadedScene, SceneError, SceneSource, Shape, Trees, UpAxis, load};
+use super::remesh::{ForWhom, Remade, Remake};
+use crate::scene::{LoadOptions, LoadedScene, MeshBase, SceneError, SceneSource, Shape, Trees, UpAxis, load};
 use bevy_ecs::prelude::Resource;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub enum Finished {
     Scene { source: SceneSource, result: Result<Box<LoadedScene>, SceneError> },
     Trees(Trees),
+    Mesh(Box<Remade>),
 }
 
 #[derive(Default)]
@@ -19,6 +21,11 @@ struct Board {
     /// The number of the newest load; an older one is dropped when it comes in.
     newest_load: u64,
     building: usize,
+    /// Meshes that are being made: what for, and their numbers. A newer one for the same takes the place of an older.
+    remaking: Vec<(ForWhom, u64, String)>,
+    newest_remake: u64,
+    /// What the last mesh was made from.
+    base: Option<MeshBase>,
 }
 
 /// Starts such work and collects what comes of it.
@@ -50,7 +57,7 @@ impl Beside {
                 });
                 this.wake();
             };
-            let options = LoadOptions { up, aspect: Some(aspect), progress: Some(&say) };
+            let options = LoadOptions { up, aspect: Some(aspect), progress: Some(&say), known: None };
             let result = guarded(|| pool.install(|| load(&source, &options)))
                 .unwrap_or_else(|panic| Err(SceneError::in_file(source.title(), panic)));
             this.with(|board| {
@@ -91,6 +98,38 @@ impl Beside {
         self.spawn("firstlight trees", work, |board, _| board.building -= 1);
     }
 
+    /// Makes a mesh anew; an earlier one for the same object is forgotten.
+    pub fn remake(&self, job: Remake, pool: Arc<rayon::ThreadPool>) {
+        let for_whom = job.for_whom;
+        let number = self.with(|board| {
+            board.newest_remake += 1;
+            board.remaking.retain(|(other, ..)| *other != for_whom);
+            board.remaking.push((for_whom, board.newest_remake, job.title()));
+            board.newest_remake
+        });
+        let this = self.clone();
+        let work = move || {
+            let is_wanted = |board: &mut Board| board.remaking.iter().any(|(_, other, _)| *other == number);
+            // A slider asks faster than meshes are made: what is outdated before it began is not begun.
+            std::thread::sleep(std::time::Duration::from_millis(30));
+            if !this.with(|board| is_wanted(board)) {
+                return;
+            }
+            let mut base = this.with(|board| board.base.take());
+            let result =
+                guarded(|| pool.install(|| job.run(&mut base))).unwrap_or_else(|panic| Err(SceneError::new(panic)));
+            this.with(|board| {
+                board.base = base;
+                if is_wanted(board) {
+                    board.remaking.retain(|(_, other, _)| *other != number);
+                    board.finished.push(Finished::Mesh(Box::new(Remade { job, result })));
+                }
+            });
+            this.wake();
+        };
+        self.spawn("firstlight mesh", work, move |board, _| board.remaking.retain(|(_, other, _)| *other != number));
+    }
+
     /// What has come in since the last call.
     pub fn take(&self) -> Vec<Finished> {
         self.with(|board| std::mem::take(&mut board.finished))
@@ -100,13 +139,16 @@ impl Beside {
     pub fn progress(&self) -> Option<String> {
         self.with(|board| {
             let building = (board.building > 0).then(|| "building a tree".to_owned());
-            board.progress.clone().or(building)
+            let remaking = board.remaking.last().map(|(.., title)| title.clone());
+            board.progress.clone().or(remaking).or(building)
         })
     }
 
     /// Nothing is under way and nothing waits to be taken.
     pub fn is_idle(&self) -> bool {
-        self.with(|board| board.progress.is_none() && board.building == 0 && board.finished.is_empty())
+        self.with(|board| {
+            board.progress.is_none() && board.building == 0 && board.remaking.is_empty() && board.finished.is_empty()
+        })
     }
 
     fn spawn(&self, name: &str, work: impl FnOnce() + Send + 'static, on_error: impl FnOnce(&mut Board, String)) {

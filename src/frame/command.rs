@@ -4,7 +4,8 @@
 //! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
 //! so the same list of commands always leads to the same picture.
 
-use crate::render::{Integrator, ToneCurve};
+use super::{Edit, Target};
+use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::scene::{Lens, Projection, View};
 use bevy_ecs::message::Message;
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,11 @@ pub enum Command {
         right: f64,
         up: f64,
         forward: f64,
+    },
+    /// From now on a stride is half of the way to what is at this place in the picture.
+    PaceAt {
+        x: f64,
+        y: f64,
     },
     /// Move the eye around the pivot, degrees; positive yaw moves it to the right, positive pitch upwards.
     Orbit {
@@ -55,7 +61,8 @@ pub enum Command {
     ToggleTurntable,
     /// The camera as it was when the scene was opened.
     Home,
-    /// Keep the direction, step back until the whole scene is in the picture, and focus on its middle.
+    /// Keep the direction, place the eye so that what is selected just fits into the picture, or else the whole scene
+    /// but for what lies far off, and focus on its middle.
     FrameAll,
     SetView(View),
     SetProjection(Projection),
@@ -111,6 +118,36 @@ pub enum Command {
     SetThreads {
         threads: usize,
     },
+    /// Save the scene as a scene file; one that is there is replaced.
+    SaveScene {
+        path: PathBuf,
+    },
+    /// When the picture is good enough.
+    SetTarget(Target),
+    /// Nobody can see the picture: rest, without being paused.
+    SetHidden {
+        hidden: bool,
+    },
+    /// What is shown in place of the picture, see [`Inspection`].
+    SetInspection(Inspection),
+    /// Tint what is sharp, and draw the focal plane.
+    SetSharpZone {
+        shown: bool,
+    },
+    /// The focal plane stays with the point that was focused on last, or moves with the camera again.
+    ToggleFocusLock,
+    /// Keep the view under a number from 1 to 9.
+    SetBookmark {
+        slot: u8,
+    },
+    GoToBookmark {
+        slot: u8,
+    },
+    /// To where the camera rested before.
+    PreviousView,
+    NextView,
+    /// Change what the scene is made of.
+    Edit(Edit),
     /// Open a scene file, a model or, when there is no such file, the built-in scene of that name.
     Open {
         path: PathBuf,

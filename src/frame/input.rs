@@ -1,16 +1,20 @@
 //! Carries out what a person asks for: commands become changes of components and resources.
 
+use super::edit::EditQueue;
+use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
+use super::saving::Saving;
+use super::selection::{Picked, Selection, pick};
 use super::status::{MessageKind, Status};
-use super::systems::{Around, Clock, Paused, PictureSize, Renderer, Shown, Threads};
+use super::systems::{Around, Clock, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads};
+use super::views::{Bookmarks, ViewTrail};
 use super::{Command, beside::Beside};
-use crate::geometry::Ray;
 use crate::render::ToneCurve;
 use crate::scene::file::check_film_size;
 use crate::scene::{Developing, Lens, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
-use glam::Vec3;
+use glam::DVec3;
 
 /// Commands that wait for the next frame, in order.
 #[derive(Resource, Default)]
@@ -31,10 +35,19 @@ pub struct Desk<'w, 's> {
     size: ResMut<'w, PictureSize>,
     paused: ResMut<'w, Paused>,
     threads: ResMut<'w, Threads>,
+    hidden: ResMut<'w, Hidden>,
+    stop_at: ResMut<'w, StopAt>,
+    looking: ResMut<'w, Looking>,
+    focus: ResMut<'w, Focus>,
+    bookmarks: ResMut<'w, Bookmarks>,
+    trail: ResMut<'w, ViewTrail>,
+    edits: ResMut<'w, EditQueue>,
+    selection: Res<'w, Selection>,
     around: ResMut<'w, Around>,
     shown: ResMut<'w, Shown>,
     status: ResMut<'w, Status>,
     beside: Res<'w, Beside>,
+    saving: ResMut<'w, Saving>,
     renderer: Res<'w, Renderer>,
     clock: Res<'w, Clock>,
     up: Res<'w, ModelUp>,
@@ -47,6 +60,10 @@ pub fn input(mut queue: ResMut<CommandQueue>, mut desk: Desk) {
     for command in queue.0.drain(..) {
         desk.carry_out(command);
     }
+    if let Some(rig) = desk.rig() {
+        let now = desk.clock.0;
+        desk.trail.see(rig, now);
+    }
 }
 
 impl Desk<'_, '_> {
@@ -55,20 +72,69 @@ impl Desk<'_, '_> {
         if let Some(rig) = self.rig()
             && let Some(steered) = navigation::steer(&rig, &command, &surroundings)
         {
+            // Whoever moves the focal plane by hand wants it there.
+            if steered.lens.focus_distance != rig.lens.focus_distance {
+                self.focus.set_if_neq(Focus::default());
+            }
             self.set_rig(steered);
             return;
         }
         match command {
             Command::PivotAt { x, y } => {
-                if let (Some(rig), Some(depth)) = (self.rig(), self.depth_at(x, y)) {
+                if let (Some(rig), Some(picked)) = (self.rig(), self.pick(x, y)) {
+                    let depth = picked.depth;
                     self.set_rig(Rig { view: View { pivot_distance: depth, ..rig.view }, ..rig });
                 }
             }
+            Command::PaceAt { x, y } => self.around.pace = self.pick(x, y).map(|picked| picked.depth),
             Command::FocusAt { x, y } => {
-                if let (Some(rig), Some(depth)) = (self.rig(), self.depth_at(x, y)) {
-                    self.set_rig(Rig { lens: navigation::focus_at(&rig.lens, depth), ..rig });
+                if let (Some(rig), Some(picked)) = (self.rig(), self.pick(x, y)) {
+                    self.set_rig(Rig { lens: navigation::focus_at(&rig.lens, picked.depth), ..rig });
+                    let target = match self.focus.target {
+                        FocusTarget::Camera => FocusTarget::Camera,
+                        _ => self.stuck_to(picked.entity, picked.point),
+                    };
+                    *self.focus = Focus { target, last: Some((picked.entity, picked.point)) };
                 }
             }
+            Command::FrameAll => {
+                if let Some(rig) = self.rig() {
+                    let points = self.what_to_frame();
+                    let view = navigation::frame_points(&rig.view, &rig.projection, self.size.aspect(), &points);
+                    self.set_rig(Rig { view, lens: navigation::focus_at(&rig.lens, view.pivot_distance), ..rig });
+                }
+            }
+            Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
+            Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
+            Command::SetInspection(inspection) => {
+                let look = super::Look { inspection, ..self.looking.0 };
+                self.looking.set_if_neq(Looking(look));
+            }
+            Command::SetSharpZone { shown } => {
+                let look = super::Look { sharp_zone: shown, ..self.looking.0 };
+                self.looking.set_if_neq(Looking(look));
+            }
+            Command::ToggleFocusLock => self.toggle_focus_lock(),
+            Command::SetBookmark { slot } => {
+                if let Some(rig) = self.rig()
+                    && self.bookmarks.set(slot, rig)
+                {
+                    self.note(format!("view kept under {slot}"));
+                }
+            }
+            Command::GoToBookmark { slot } => match self.bookmarks.get(slot) {
+                Some(rig) => self.set_rig(rig),
+                None => self.note(format!("no view is kept under {slot}: Ctrl+{slot} keeps this one")),
+            },
+            Command::PreviousView => match self.trail.previous() {
+                Some(rig) => self.set_rig(rig),
+                None => self.note("no view before this one".to_owned()),
+            },
+            Command::NextView => match self.trail.next() {
+                Some(rig) => self.set_rig(rig),
+                None => self.note("no view after this one".to_owned()),
+            },
+            Command::Edit(edit) => self.edits.0.push(edit),
             Command::ToggleTurntable => {
                 self.around.turning = match self.around.turning {
                     Turning::Turntable => Turning::Free,
@@ -102,6 +168,7 @@ impl Desk<'_, '_> {
                 Ok(source) => self.beside.load(source, self.up.0, self.size.aspect(), self.renderer.0.pool()),
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
+            Command::SaveScene { path } => self.saving.requests.push(path),
             // Everything else steers, and there is no camera to be steered.
             _ => {}
         }
@@ -152,21 +219,51 @@ impl Desk<'_, '_> {
         }
     }
 
-    /// Metres along the view axis to what is at this place in the picture (0..1 from the upper left), if anything.
-    fn depth_at(&mut self, x: f64, y: f64) -> Option<f64> {
-        let aspect = self.size.aspect() as f32;
-        let extraction = self.shown.extraction.as_ref()?;
-        let camera = extraction.snapshot.camera;
-        let (across, upwards) = (2.0 * x as f32 - 1.0, 1.0 - 2.0 * y as f32);
-        let dir = camera.forward
-            + camera.right * (across * aspect * camera.tan_half_vfov)
-            + camera.up * (upwards * camera.tan_half_vfov);
-        let dir = if dir.is_finite() { dir.normalize_or_zero() } else { Vec3::ZERO };
-        if dir == Vec3::ZERO {
-            return None;
+    /// What is at this place in the picture (0..1 from the upper left), if anything.
+    fn pick(&self, x: f64, y: f64) -> Option<Picked> {
+        pick(self.shown.extraction.as_ref()?, x, y, self.size.aspect())
+    }
+
+    /// Corners of the boxes of what is selected, or else of the scene.
+    fn what_to_frame(&mut self) -> Vec<DVec3> {
+        let Shown { inputs, extents, .. } = &mut *self.shown;
+        let selected: Vec<DVec3> = (self.selection.0.iter())
+            .flat_map(|entity| {
+                let object = inputs.objects.iter().find(|object| object.entity == *entity);
+                let light = inputs.lights.iter().find(|light| light.entity == *entity);
+                let corners = object.map(|object| extents.corners_of(object)).unwrap_or_default();
+                corners.into_iter().chain(light.map(|light| light.placement.translation))
+            })
+            .collect();
+        if selected.is_empty() { self.around.corners.clone() } else { selected }
+    }
+
+    fn toggle_focus_lock(&mut self) {
+        let Some(rig) = self.rig() else { return };
+        self.focus.target = match (self.focus.target, self.focus.last) {
+            (FocusTarget::Camera, Some((entity, point))) => self.stuck_to(entity, point),
+            (FocusTarget::Camera, None) => {
+                FocusTarget::Point(rig.view.eye + rig.view.forward * rig.lens.focus_distance)
+            }
+            _ => FocusTarget::Camera,
+        };
+        self.note(match self.focus.target {
+            FocusTarget::Camera => "focus moves with the camera".to_owned(),
+            FocusTarget::Point(_) => "focus stays with a point".to_owned(),
+            FocusTarget::Object(..) => "focus stays with the object".to_owned(),
+        });
+    }
+
+    /// A point of an object as something to stay focused on.
+    fn stuck_to(&self, entity: Entity, point: DVec3) -> FocusTarget {
+        let object = self.shown.inputs.objects.iter().find(|object| object.entity == entity);
+        match object.map(|object| object.placement.affine().inverse().transform_point3(point)) {
+            Some(local) if local.is_finite() => FocusTarget::Object(entity, local),
+            _ => FocusTarget::Point(point),
         }
-        let hit = extraction.snapshot.geometry.tree.closest_hit(&Ray::new(camera.eye, dir))?;
-        let depth = f64::from(hit.t * dir.dot(camera.forward));
-        (depth > 0.0 && depth.is_finite()).then_some(depth)
+    }
+
+    fn note(&mut self, text: String) {
+        self.status.say(self.clock.0, MessageKind::Note, text);
     }
 }

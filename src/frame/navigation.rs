@@ -54,6 +54,8 @@ pub struct Surroundings {
     /// Width of the picture by its height.
     pub aspect: f64,
     pub turning: Turning,
+    /// Metres to what a person flies towards, if that is known.
+    pub pace: Option<f64>,
 }
 
 /// Carries out a command that needs nothing but the camera and its surroundings; `None` for every other command.
@@ -66,7 +68,7 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
             with_view(turn(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
         }
         Command::Fly { right, up, forward } => {
-            with_view(fly(&view, DVec3::new(right, up, forward) * stride(&view, around.radius)))
+            with_view(fly(&view, DVec3::new(right, up, forward) * stride(&view, around.radius, around.pace)))
         }
         Command::Orbit { yaw_deg, pitch_deg } => {
             with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
@@ -77,10 +79,6 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
         Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),
         Command::Level => with_view(level(&view)),
         Command::Home => Some(around.home),
-        Command::FrameAll => {
-            let view = frame_sphere(&view, &projection, around.aspect, around.center, around.radius);
-            Some(Rig { view, lens: focus_at(&lens, view.pivot_distance), ..*rig })
-        }
         Command::SetView(view) => with_view(view),
         Command::SetProjection(projection) => Some(Rig { projection, ..*rig }),
         Command::SetLens(lens) => with_lens(lens),
@@ -93,11 +91,13 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
     }
 }
 
-/// How far a person flies in a second at speed 1, metres: half of the smaller of the distance looked at and the
-/// scene's radius, so that neither a room seen from inside nor a model seen from afar is left in one step.
-pub fn stride(view: &View, scene_radius: f64) -> f64 {
+/// How far a person flies in a second at speed 1, metres: half of the way to what they fly towards. Where that is not
+/// known, half of the smaller of the distance looked at and the scene's radius, so that neither a room seen from inside
+/// nor a model seen from afar is left in one step.
+pub fn stride(view: &View, scene_radius: f64, pace: Option<f64>) -> f64 {
     let size = if scene_radius > 0.0 { scene_radius.min(view.pivot_distance) } else { view.pivot_distance };
-    0.5 * size
+    // Right before a wall a person still gets away from it, and the horizon is not reached in a second.
+    0.5 * pace.map_or(size, |pace| pace.clamp(0.02 * size, 4.0 * size))
 }
 
 /// Looks about from the eye; radians to the right and upwards in the picture.
@@ -158,17 +158,36 @@ pub fn level(view: &View) -> View {
     View { up: VERTICAL, ..*view }.orthonormalized()
 }
 
-/// Keeps the direction and places the eye so that the sphere just fits into a picture of this `aspect` (width by
-/// height); the centre becomes the pivot. A sphere without a size keeps the distance.
-pub fn frame_sphere(view: &View, projection: &Projection, aspect: f64, center: DVec3, radius: f64) -> View {
-    let pivot_distance = if radius > 0.0 {
-        // The sphere touches the cone whose half angle is the smaller one of the picture.
-        let tan_half = projection.tan_half_vfov() * aspect.min(1.0);
-        radius / tan_half.atan().sin()
-    } else {
-        view.pivot_distance
+/// Keeps the direction and places the eye as near as all points still are in a picture of this `aspect` (width by
+/// height), with a little room around them; the middle of their box becomes the pivot's depth. One point alone keeps
+/// its distance; without any, the view stays.
+pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &[DVec3]) -> View {
+    /// Of half the picture.
+    const ROOM: f64 = 0.08;
+    let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
+    let Some((min, max)) = around else { return *view };
+    let middle = 0.5 * min + 0.5 * max;
+    if min == max {
+        return finite_or(view, View { eye: middle - view.forward * view.pivot_distance, ..*view });
+    }
+    let tan_v = projection.tan_half_vfov() * (1.0 - ROOM);
+    // In each direction, lines at the edge of the picture through the outermost points meet at the nearest eye.
+    let fit = |axis: DVec3, tan: f64| {
+        let most = |sign: f64| {
+            let edge = |point: &DVec3| {
+                let offset = *point - middle;
+                sign * offset.dot(axis) - tan * offset.dot(view.forward)
+            };
+            points.iter().map(edge).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let (right, left) = (most(1.0), most(-1.0));
+        (0.5 * (right - left), -0.5 * (right + left) / tan)
     };
-    finite_or(view, View { eye: center - view.forward * pivot_distance, pivot_distance, ..*view })
+    let (across, depth_h) = fit(view.right(), tan_v * aspect);
+    let (upwards, depth_v) = fit(view.up, tan_v);
+    let depth = depth_h.min(depth_v);
+    let eye = middle + across * view.right() + upwards * view.up + depth * view.forward;
+    finite_or(view, View { eye, pivot_distance: -depth, ..*view })
 }
 
 /// Puts the focal plane at `distance` metres, if that is a distance.
@@ -260,7 +279,14 @@ mod tests {
     }
 
     fn around(turning: Turning) -> Surroundings {
-        Surroundings { center: DVec3::new(1.0, 0.0, 2.0), radius: 3.0, home: Rig::default(), aspect: 1.5, turning }
+        Surroundings {
+            center: DVec3::new(1.0, 0.0, 2.0),
+            radius: 3.0,
+            home: Rig::default(),
+            aspect: 1.5,
+            turning,
+            pace: None,
+        }
     }
 
     fn close(a: DVec3, b: DVec3, tolerance: f64) -> bool {
@@ -383,17 +409,27 @@ mod tests {
     }
 
     #[test]
-    fn framing_fits_the_sphere_exactly() {
-        for aspect in [0.4, 1.0, 2.5] {
+    fn framing_is_as_near_as_everything_is_in_the_picture() {
+        let points: Vec<DVec3> =
+            (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 3.0, f64::from(i >> 2))).collect();
+        for (aspect, offset) in [(0.4, 0.0), (1.0, 1e6), (2.5, 0.0)] {
             let projection = Projection { vfov_deg: 60.0 };
-            let view = frame_sphere(&start(), &projection, aspect, DVec3::new(1.0, 0.0, 2.0), 3.0);
+            let points: Vec<DVec3> = points.iter().map(|point| *point + DVec3::splat(offset)).collect();
+            let view = frame_points(&start(), &projection, aspect, &points);
             assert_eq!(view.forward, start().forward);
-            assert!(close(view.pivot(), DVec3::new(1.0, 0.0, 2.0), 1e-14 * view.pivot_distance));
-            let half_angle = (3.0 / view.pivot_distance).asin();
-            let smaller = (projection.tan_half_vfov() * aspect).atan().min(30f64.to_radians());
-            assert!((half_angle - smaller).abs() < 1e-14, "aspect {aspect}");
+            let largest = points.iter().map(|point| {
+                let seen = *point - view.eye;
+                let height = projection.tan_half_vfov() * seen.dot(view.forward);
+                (seen.dot(view.right()).abs() / (height * aspect)).max(seen.dot(view.up).abs() / height)
+            });
+            let largest = largest.fold(0.0, f64::max);
+            assert!((largest - 0.92).abs() < 1e-6, "aspect {aspect}: {largest}");
+            let middle = DVec3::new(0.5, 1.5, 0.5) + DVec3::splat(offset);
+            assert!(((middle - view.eye).dot(view.forward) - view.pivot_distance).abs() < 1e-6);
         }
-        assert_eq!(frame_sphere(&start(), &Projection::default(), 1.0, DVec3::ZERO, 0.0).pivot(), DVec3::ZERO);
+        let one = frame_points(&start(), &Projection::default(), 1.0, &[DVec3::ZERO]);
+        assert!(close(one.pivot(), DVec3::ZERO, 1e-12) && one.pivot_distance == start().pivot_distance);
+        assert_eq!(frame_points(&start(), &Projection::default(), 1.0, &[]), start());
     }
 
     #[test]
@@ -412,9 +448,11 @@ mod tests {
     #[test]
     fn strides_fit_the_scene() {
         let view = start();
-        assert_eq!(stride(&view, 0.0), 0.5 * view.pivot_distance);
-        assert_eq!(stride(&view, 1e9), 0.5 * view.pivot_distance);
-        assert_eq!(stride(&view, 0.5), 0.25);
+        assert_eq!(stride(&view, 0.0, None), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 1e9, None), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 0.5, None), 0.25);
+        assert_eq!(stride(&view, 0.5, Some(0.7)), 0.35, "half of the way to what is under the mouse");
+        assert_eq!(stride(&view, 0.5, Some(1e9)), 1.0, "and the horizon stays where it is");
     }
 
     #[test]
@@ -469,9 +507,7 @@ mod tests {
         );
         assert_eq!(go(Command::Home), around.home);
         let flown = go(Command::Fly { right: 0.0, up: 0.0, forward: 2.0 }).view;
-        assert!(((flown.eye - rig.view.eye).length() - 2.0 * stride(&rig.view, 3.0)).abs() < 1e-14);
-        let framed = go(Command::FrameAll);
-        assert_eq!(framed.lens.focus_distance, framed.view.pivot_distance, "what is framed is sharp");
+        assert!(((flown.eye - rig.view.eye).length() - 2.0 * stride(&rig.view, 3.0, None)).abs() < 1e-14);
         assert_eq!(go(Command::ScaleFocus { factor: 2.0 }).view, rig.view);
         assert_eq!(steer(&rig, &Command::Restart, &around), None);
         assert_eq!(steer(&rig, &Command::FocusAt { x: 0.5, y: 0.5 }, &around), None);

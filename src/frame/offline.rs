@@ -1,10 +1,11 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
 use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
+use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
 /// When a picture is good enough; the first that is reached ends it. Without any, it goes on for ever.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Samples per pixel.
     pub spp: Option<u32>,

@@ -1,20 +1,30 @@
 //! One scene, its picture, and everything between: what a window or a script holds on to.
 
 use super::beside::Beside;
+use super::edit::{EditQueue, edit_scene};
+use super::focus::{Focus, hold_focus};
+use super::history::{History, notice, remember};
 use super::input::{CommandQueue, ModelUp, input};
 use super::navigation::{Rig, Turning};
+use super::recording::{Recorder, record};
+use super::reload::{HotReload, reload};
+use super::saving::{SavedAs, Saving, save};
+use super::selection::{OwnBox, Selection};
 use super::status::{Picture, Status};
 use super::systems::{
-    Around, Clock, Found, Paused, PictureSize, Renderer, Shown, StopAt, Threads, accumulate, adopt, develop, edit,
-    present, rebuild, reset,
+    Adopted, Around, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt,
+    Threads, accumulate, adopt, develop, edit, present, rebuild, reset,
 };
+use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, Target};
 use crate::render::{Film, RenderSettings};
-use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneSource, UpAxis};
-use bevy_ecs::prelude::{IntoScheduleConfigs, World};
+use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis};
+use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
 use bevy_ecs::system::ScheduleSystem;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
@@ -72,13 +82,20 @@ impl Session {
         let worker = Worker::start(threads, options.target, options.waker.clone())?;
         let mut world = World::new();
         world.insert_resource(Renderer(worker));
-        world.insert_resource(Beside::new(options.waker));
+        let waker = options.waker;
+        world.insert_resource(Beside::new(waker.clone()));
         world.insert_resource(PictureSize { width: options.width, height: options.height });
         world.insert_resource(Rendering(RenderSettings { seed: options.seed, ..RenderSettings::default() }));
         world.insert_resource(StopAt(options.target));
         world.insert_resource(Threads(threads));
         world.insert_resource(ModelUp(options.up));
-        let around = Around { extent: Extent::default(), home: Rig::default(), turning: Turning::default() };
+        let around = Around {
+            extent: Extent::default(),
+            corners: Vec::new(),
+            home: Rig::default(),
+            turning: Turning::default(),
+            pace: None,
+        };
         world.insert_resource(around);
         world.init_resource::<Clock>();
         world.init_resource::<Paused>();
@@ -88,6 +105,19 @@ impl Session {
         world.init_resource::<Found>();
         world.init_resource::<Picture>();
         world.init_resource::<Status>();
+        world.init_resource::<Adopted>();
+        world.init_resource::<SavedAs>();
+        world.init_resource::<Recorder>();
+        world.insert_resource(Saving::new(waker.clone()));
+        world.insert_resource(HotReload::new(waker));
+        world.init_resource::<EditQueue>();
+        world.init_resource::<Selection>();
+        world.init_resource::<History>();
+        world.init_resource::<Focus>();
+        world.init_resource::<Bookmarks>();
+        world.init_resource::<ViewTrail>();
+        world.init_resource::<Hidden>();
+        world.init_resource::<Looking>();
 
         let mut frame = Schedule::new(Frame);
         frame.configure_sets(
@@ -103,8 +133,10 @@ impl Session {
                 .chain(),
         );
         frame.add_systems((
-            input.in_set(Stage::Input),
-            edit.in_set(Stage::Edit),
+            (record, input).chain().in_set(Stage::Input),
+            (edit, edit_scene, hold_focus, save, reload).chain().in_set(Stage::Edit),
+            // After a user's own systems, so that what they change can be undone too.
+            (notice, remember).chain().after(Stage::Edit).before(Stage::Rebuild),
             rebuild.in_set(Stage::Rebuild),
             reset.in_set(Stage::Reset),
             accumulate.in_set(Stage::Accumulate),
@@ -175,13 +207,49 @@ impl Session {
         self.world.resource::<Renderer>().0.keep_film()
     }
 
+    /// What a picture of what is seen now is to say about itself: see [`ShotDraft::note`].
+    pub fn shot_draft(&mut self) -> ShotDraft {
+        let current = self.world.get_resource::<CurrentScene>().map(|current| current.0.clone());
+        ShotDraft::of(&mut self.world, current.as_deref())
+    }
+
+    /// Where the open scene is saved: where it was saved last, or else the scene file that was opened.
+    pub fn scene_file(&self) -> Option<PathBuf> {
+        let saved = self.world.resource::<SavedAs>().path.clone();
+        saved.or_else(|| match &self.world.get_resource::<CurrentScene>()?.0.source {
+            SceneSource::Scene(path) => Some(path.clone()),
+            _ => None,
+        })
+    }
+
+    /// The workers' threads.
+    pub fn pool(&self) -> Arc<rayon::ThreadPool> {
+        self.world.resource::<Renderer>().0.pool()
+    }
+
+    /// The scene as the picture shows it.
+    pub fn inputs(&self) -> &SceneInputs {
+        &self.world.resource::<Shown>().inputs
+    }
+
+    /// The box around an object or a light, along its own axes.
+    pub fn box_of(&mut self, entity: Entity) -> Option<OwnBox> {
+        super::selection::box_of(&mut self.world, entity)
+    }
+
+    /// Memory of all trees, bytes.
+    pub fn tree_bytes(&self) -> usize {
+        self.world.resource::<Shown>().trees.bytes()
+    }
+
     /// Nothing will come unless something is changed: the workers sleep and nothing is being read.
     pub fn is_idle(&self) -> bool {
         let renderer = &self.world.resource::<Renderer>().0;
         let nothing_to_show = !renderer.has_picture();
         let asleep = renderer.is_asleep();
         let no_commands = self.world.resource::<CommandQueue>().0.is_empty();
-        asleep && nothing_to_show && no_commands && self.world.resource::<Beside>().is_idle()
+        let saved = self.world.resource::<Saving>().is_idle();
+        asleep && nothing_to_show && no_commands && saved && self.world.resource::<Beside>().is_idle()
     }
 
     /// When [`update`](Self::update) should be called even if nothing calls the waker; `None` for never.

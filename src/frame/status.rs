@@ -1,7 +1,7 @@
 //! What a session has to show: the picture, and how it is getting on.
 
 use super::navigation::Rig;
-use crate::render::{BadSample, Display, Integrator, RayCounts};
+use crate::render::{BadSample, Display, Integrator, Legend, RayCounts};
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -62,6 +62,8 @@ pub struct Status {
     /// The first few of them.
     pub bad: Vec<BadSample>,
     pub threads: usize,
+    /// Of the inspection that is shown.
+    pub legend: Option<Legend>,
     pub paused: bool,
     /// The target is reached.
     pub done: bool,

@@ -1,10 +1,14 @@
 //! The systems of a frame, in the order in which they run. Each says what it reads and what it writes.
 
 use super::beside::{Beside, Finished};
+use super::focus::Focus;
+use super::history::History;
 use super::navigation::Surroundings;
 use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
+use super::saving::SavedAs;
 use super::status::{MessageKind, Picture, Status};
-use super::worker::{Job, Worker};
+use super::views::ViewTrail;
+use super::worker::{Job, Look, Worker};
 use super::{Target, navigation};
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
@@ -50,6 +54,14 @@ pub struct Threads(pub usize);
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Paused(pub bool);
 
+/// Nobody can see the picture: rendering rests, whatever else is asked for.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hidden(pub bool);
+
+/// What is shown in place of the picture, and over it; no sample depends on this.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Looking(pub Look);
+
 /// The far end of the pipe.
 #[derive(Resource)]
 pub struct Renderer(pub Worker);
@@ -58,14 +70,18 @@ pub struct Renderer(pub Worker);
 #[derive(Resource, Clone, Debug)]
 pub struct Around {
     pub extent: Extent,
+    /// Corners of the boxes of the things that made it, for framing.
+    pub corners: Vec<glam::DVec3>,
     pub home: navigation::Rig,
     pub turning: navigation::Turning,
+    /// Metres to what is flown towards.
+    pub pace: Option<f64>,
 }
 
 impl Around {
     pub fn surroundings(&self, aspect: f64) -> Surroundings {
         let Extent { center, radius } = self.extent;
-        Surroundings { center, radius, home: self.home, aspect, turning: self.turning }
+        Surroundings { center, radius, home: self.home, aspect, turning: self.turning, pace: self.pace }
     }
 }
 
@@ -73,13 +89,18 @@ impl Around {
 #[derive(Resource, Clone)]
 pub struct CurrentScene(pub Arc<LoadedScene>);
 
+/// How many scenes have taken their place so far.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Adopted(pub u64);
+
 /// What the workers have been given, to compare with.
 #[derive(Resource, Default)]
 pub struct Shown {
     pub inputs: SceneInputs,
     pub extraction: Option<Extraction>,
     pub trees: Trees,
-    extents: ExtentCache,
+    pub(super) extents: ExtentCache,
+    look: Look,
     settings: RenderSettings,
     display: Display,
     size: Option<PictureSize>,
@@ -152,6 +173,7 @@ pub fn edit(world: &mut World) {
     let now = world.resource::<Clock>().0;
     for finished in world.resource::<Beside>().take() {
         match finished {
+            Finished::Mesh(remade) => super::remesh::take(world, *remade),
             Finished::Trees(trees) => {
                 let mut shown = world.resource_mut::<Shown>();
                 shown.trees.extend(trees);
@@ -177,6 +199,10 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
         |(view, projection, lens)| navigation::Rig { view: *view, projection: *projection, lens: *lens },
     );
     world.resource_mut::<Around>().home = home;
+    world.resource_mut::<History>().forget();
+    world.resource_mut::<ViewTrail>().forget();
+    world.insert_resource(Focus::default());
+    world.insert_resource(super::Selection::default());
     let mut shown = world.resource_mut::<Shown>();
     shown.trees.extend(scene.trees.clone());
     shown.restart = Some(SCENE_OPENED);
@@ -186,6 +212,8 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
         status.say(now, MessageKind::Warning, warning.clone());
     }
     world.insert_resource(CurrentScene(Arc::new(scene)));
+    world.insert_resource(SavedAs::default());
+    world.resource_mut::<Adopted>().0 += 1;
 }
 
 /// Finds out what changed, and makes anew that part of the snapshot and no other.
@@ -243,6 +271,7 @@ pub fn rebuild(
         if rebuilt {
             trees.keep_used(inputs);
             around.extent = extents.extent(inputs);
+            around.corners = extents.corners(inputs);
             for problem in extraction.iter().flat_map(|extraction| &extraction.problems) {
                 status.say(clock.0, MessageKind::Warning, problem.clone());
             }
@@ -292,10 +321,12 @@ pub fn reset(size: Res<PictureSize>, mut found: ResMut<Found>, mut shown: ResMut
 /// Tells the workers what to add samples to, until when, and with how many threads.
 ///
 /// Reads [`Shown`], [`StopAt`], [`Threads`], [`Paused`]; writes [`Found`] and to the [`Renderer`].
+#[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
 pub fn accumulate(
     stop_at: Res<StopAt>,
     threads: Res<Threads>,
     paused: Res<Paused>,
+    hidden: Res<Hidden>,
     size: Res<PictureSize>,
     renderer: Res<Renderer>,
     mut shown: ResMut<Shown>,
@@ -310,7 +341,7 @@ pub fn accumulate(
         renderer.0.set_target(stop_at.0);
         found.0.add(Level::Reschedule, "target");
     }
-    let paused = paused.0 || size.is_empty();
+    let paused = paused.0 || hidden.0 || size.is_empty();
     if shown.paused != paused {
         renderer.0.set_paused(paused);
         shown.paused = paused;
@@ -334,10 +365,16 @@ pub fn accumulate(
 /// Reads [`Developing`]; writes [`Shown`], [`Found`], and to the [`Renderer`].
 pub fn develop(
     developing: Option<Res<Developing>>,
+    looking: Res<Looking>,
     renderer: Res<Renderer>,
     mut shown: ResMut<Shown>,
     mut found: ResMut<Found>,
 ) {
+    if shown.look != looking.0 {
+        found.0.add(Level::Redraw, "view");
+        renderer.0.set_look(looking.0);
+        shown.look = looking.0;
+    }
     let display = developing.map(|developing| developing.0).unwrap_or_default();
     if shown.display != display {
         compare_displays(&shown.display, &display, &mut found.0);
@@ -378,6 +415,7 @@ pub fn present(
     status.bounce_mrays = per_second(stats.recent_rays.bounce);
     status.shadow_mrays = per_second(stats.recent_rays.shadow);
     (status.film_width, status.film_height, status.divider) = (stats.film_width, stats.film_height, stats.divider);
+    status.legend = stats.legend;
     status.n_bad = stats.n_bad;
     status.bad = stats.bad;
     status.threads = stats.threads;

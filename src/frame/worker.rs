@@ -6,7 +6,11 @@
 
 use super::scheduler::{Scheduler, Step, StepReport};
 use super::{Picture, Target};
-use crate::render::{BadSample, Display, Film, RayCounts, RenderSettings, Snapshot, advance, develop};
+use crate::render::{
+    BadSample, Display, Film, Inspected, Inspection, Legend, RayCounts, RenderSettings, Snapshot, advance, depths,
+    develop, inspect, tint_sharp_zone,
+};
+use glam::UVec2;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -24,6 +28,14 @@ pub struct Job {
     pub settings: RenderSettings,
     pub width: u32,
     pub height: u32,
+}
+
+/// What is shown of it; no sample depends on this.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Look {
+    pub inspection: Inspection,
+    /// Tint what is sharp, and draw the focal plane.
+    pub sharp_zone: bool,
 }
 
 /// How far the current job is.
@@ -52,6 +64,8 @@ pub struct Stats {
     pub asleep: bool,
     /// The target is reached.
     pub done: bool,
+    /// Of the inspection that is shown.
+    pub legend: Option<Legend>,
     /// What went wrong in the renderer itself.
     pub failure: Option<String>,
 }
@@ -61,6 +75,7 @@ pub struct Stats {
 struct Inbox {
     job: Option<Job>,
     display: Option<Display>,
+    look: Option<Look>,
     target: Option<Target>,
     paused: Option<bool>,
     threads: Option<usize>,
@@ -125,6 +140,11 @@ impl Worker {
     /// Keeps all samples.
     pub fn set_display(&self, display: Display) {
         self.post(|inbox| inbox.display = Some(display));
+    }
+
+    /// Keeps all samples.
+    pub fn set_look(&self, look: Look) {
+        self.post(|inbox| inbox.look = Some(look));
     }
 
     /// Keeps all samples.
@@ -212,6 +232,11 @@ struct Loop<'a> {
     clock: Instant,
     scheduler: Scheduler,
     display: Display,
+    look: Look,
+    /// The view of the scene that was made last, and what for.
+    inspected: Option<(ViewKey, Inspected)>,
+    /// Depths of the film's pixels, and what for.
+    depths: Option<(ViewKey, Vec<f32>)>,
     job: Option<Job>,
     film: Option<(u32, Film)>,
     /// The film before it, as long as the new one has pixels without a sample.
@@ -232,6 +257,9 @@ impl<'a> Loop<'a> {
             clock: Instant::now(),
             scheduler: Scheduler::new(1, 1, target),
             display: Display::default(),
+            look: Look::default(),
+            inspected: None,
+            depths: None,
             job: None,
             film: None,
             previous: None,
@@ -275,6 +303,10 @@ impl<'a> Loop<'a> {
         if let Some(paused) = inbox.paused {
             self.scheduler.set_paused(paused);
         }
+        if let Some(look) = inbox.look {
+            self.redraw |= look != self.look;
+            self.look = look;
+        }
         if let Some(display) = inbox.display {
             self.redraw |= display != self.display;
             self.display = display;
@@ -313,7 +345,7 @@ impl<'a> Loop<'a> {
 
     /// One step of the scheduler, and the picture that comes of it.
     fn render(&mut self, step: Step) {
-        let Step::Render { divider, target_spp, at_most } = step else { return };
+        let Step::Render { divider, mut target_spp, mut at_most } = step else { return };
         let Some(job) = &self.job else { return };
         if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
             let film = Film::new(job.width.div_ceil(divider), job.height.div_ceil(divider));
@@ -324,6 +356,10 @@ impl<'a> Loop<'a> {
             self.stats.bad.clear();
         }
         let Some((_, film)) = &mut self.film else { return };
+        if divider == 1 && !self.to_keep.is_empty() {
+            // Who keeps a picture wants to be able to make it again, so all pixels get as many samples.
+            (target_spp, at_most) = (film.max_spp().max(1), None);
+        }
         let pool = lock(&self.shared.pool).clone();
         let start = Instant::now();
         let interrupt = &self.shared.interrupt;
@@ -371,7 +407,7 @@ impl<'a> Loop<'a> {
             return;
         }
         if let Some((divider, film)) = self.visible()
-            && (*divider == 1 || no_better)
+            && ((*divider == 1 && film.max_spp() == film.spp()) || no_better)
         {
             let film = film.clone();
             for sender in self.to_keep.drain(..) {
@@ -411,12 +447,45 @@ impl<'a> Loop<'a> {
         let pool = lock(&self.shared.pool).clone();
         let (width, height) = (job.width, job.height);
         let picture = &mut self.spare;
-        pool.install(|| develop(film, &self.display, width, height, &mut picture.rgba));
+        let interrupt = &self.shared.interrupt;
+        // Another look or job is on its way: this picture would not be seen.
+        let stop = || interrupt.load(Ordering::Relaxed);
+        let key = ViewKey {
+            generation: job.generation,
+            inspection: self.look.inspection,
+            size: UVec2::new(film.width(), film.height()),
+        };
+        let mut legend = None;
+        if self.look.inspection == Inspection::Picture {
+            pool.install(|| develop(film, &self.display, width, height, &mut picture.rgba));
+        } else {
+            let known = self.inspected.take().filter(|(of, _)| *of == key && !key.inspection.is_of_film());
+            let view = known
+                .map(|(_, view)| view)
+                .or_else(|| pool.install(|| inspect(key.inspection, &job.snapshot, &job.settings, film, &stop)));
+            let Some(view) = view else { return };
+            enlarge(&view, width, height, &mut picture.rgba);
+            legend = view.legend;
+            self.inspected = Some((key, view));
+        }
+        if self.look.sharp_zone && job.snapshot.camera.lens_radius > 0.0 {
+            let key = ViewKey { inspection: Inspection::Depth, ..key };
+            let known = self.depths.take().filter(|(of, _)| *of == key).map(|(_, depths)| depths);
+            let Some(depths) = known.or_else(|| pool.install(|| depths(&job.snapshot, key.size, &stop))) else {
+                return;
+            };
+            let camera = &job.snapshot.camera;
+            let zone = camera.sharp_zone(height);
+            let size = UVec2::new(width, height);
+            pool.install(|| tint_sharp_zone(&mut picture.rgba, size, &depths, key.size, zone, camera.focus_distance));
+            self.depths = Some((key, depths));
+        }
         (picture.width, picture.height) = (width, height);
         (picture.generation, picture.divider, picture.spp) = (job.generation, *divider, film.spp());
         {
             let mut outbox = lock(&self.shared.outbox);
             std::mem::swap(&mut outbox.picture, &mut self.spare);
+            outbox.stats.legend = legend;
             outbox.fresh = true;
         }
         self.redraw = false;
@@ -457,6 +526,28 @@ impl<'a> Loop<'a> {
     fn wake(&self) {
         if let Some(waker) = &self.shared.waker {
             waker();
+        }
+    }
+}
+
+/// What a view of the scene was made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct ViewKey {
+    generation: u64,
+    inspection: Inspection,
+    size: UVec2,
+}
+
+/// Without mixing: colours that stand for numbers have no mean.
+fn enlarge(view: &Inspected, width: u32, height: u32, rgba: &mut Vec<u8>) {
+    rgba.clear();
+    rgba.reserve(4 * width as usize * height as usize);
+    for y in 0..height {
+        let row =
+            &view.rgb[(u64::from(y) * u64::from(view.height) / u64::from(height)) as usize * view.width as usize..];
+        for x in 0..width {
+            let [r, g, b] = row[(u64::from(x) * u64::from(view.width) / u64::from(width)) as usize];
+            rgba.extend_from_slice(&[r, g, b, 255]);
         }
     }
 }

@@ -48,10 +48,54 @@ pub fn intersect_plane(origin: DVec3, dir: DVec3, point: Vec3, normal: Vec3) -> 
 mod tests {
     use super::*;
     use glam::vec3;
+    use proptest::prelude::*;
 
     fn hits(origin: Vec3, dir: Vec3, center: Vec3, radius: f32) -> Option<(f32, f32)> {
         let dir = dir.as_dvec3();
         intersect_sphere(origin.as_dvec3(), dir, 1.0 / dir.length_squared(), center, radius)
+    }
+
+    proptest! {
+        #![proptest_config(crate::geometry::robust::fixed_cases(20_000))]
+
+        #[test]
+        fn both_crossings_lie_on_the_sphere(
+            o in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0), d in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0),
+            c in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0), size in -6i32..6, length in -6i32..6, r in 0.01f32..1.5,
+        ) {
+            let (scale, d) = (10f32.powi(size), Vec3::from(d) * 10f32.powi(length));
+            let (o, c, r) = (Vec3::from(o) * scale, Vec3::from(c) * scale, r * scale);
+            prop_assume!(d != Vec3::ZERO);
+            let wide = |v: Vec3| v.as_dvec3();
+            let line = wide(d).normalize();
+            let passes = (wide(c) - wide(o)).cross(line).length();
+            match hits(o, d, c, r) {
+                None => prop_assert!(passes > f64::from(r) * (1.0 - 1e-9)),
+                Some((near, far)) => {
+                    prop_assert!(passes < f64::from(r) * (1.0 + 1e-9) && near <= far);
+                    for t in [near, far] {
+                        let distance = (wide(o) + f64::from(t) * wide(d) - wide(c)).length();
+                        // One rounding of t.
+                        let bound = f64::from(t.abs()) * wide(d).length() * 2f64.powi(-24) + 1e-12 * f64::from(scale);
+                        prop_assert!((distance - f64::from(r)).abs() <= bound, "{distance} for {r} at {t}");
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn a_crossing_lies_on_the_plane(
+            o in (-1e3f32..1e3, -1e3f32..1e3, -1e3f32..1e3), d in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0),
+            p in (-1e3f32..1e3, -1e3f32..1e3, -1e3f32..1e3), n in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0),
+        ) {
+            let [o, d, p, n] = [o, d, p, n].map(Vec3::from);
+            let n = n.normalize_or(Vec3::Y);
+            let t = intersect_plane(o.as_dvec3(), d.as_dvec3(), p, n);
+            prop_assume!(t.is_finite());
+            let height = (o.as_dvec3() + f64::from(t) * d.as_dvec3() - p.as_dvec3()).dot(n.as_dvec3());
+            let bound = f64::from(t.abs()) * f64::from(d.dot(n).abs()) * 2f64.powi(-23) + 1e-9;
+            prop_assert!(height.abs() <= bound, "{height} above the plane, {bound} allowed");
+        }
     }
 
     #[test]

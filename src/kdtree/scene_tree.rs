@@ -8,7 +8,7 @@ use super::simd::InstructionSet;
 use super::sphere_tree::{WideRay, ball_bounds};
 use super::surface::Instance;
 use super::trace::{Instances, TopLevel};
-use super::{HitBatch, MeshTree, RayBatch, SphereTree};
+use super::{HitBatch, MeshTree, RayBatch, SphereTree, Visits};
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
 use std::sync::Arc;
@@ -193,6 +193,50 @@ impl SceneTree {
             self.offer_object(object, &scene_ray, &mut best, Effort::Naive);
         }
         best
+    }
+
+    /// What the nearest hit of a ray costs in the trees of meshes and in the one above them, whatever traversal finds
+    /// it.
+    pub fn count_visits(&self, ray: &Ray) -> Visits {
+        let scene_ray = SceneRay::new(ray);
+        let (mut best, mut visits) = (None, Visits::default());
+        for &object in &self.top.simple_objects {
+            self.offer_object(object, &scene_ray, &mut best, Effort::Closest);
+        }
+        let loose = &self.top.loose;
+        self.walk_loose(loose.spheres.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, Effort::Closest);
+        let mut offer = |object: u32, best: &mut Option<Hit>| {
+            if let Shape::Mesh { tree, .. } = &self.shapes[object as usize] {
+                let t_max = best.map_or(ray.t_max, |hit| hit.t);
+                let own = tree.count_visits(&Ray { t_max, ..self.instances[object as usize].ray(ray) });
+                visits.inner += own.inner;
+                visits.leaves += own.leaves;
+                visits.blocks += own.blocks;
+            }
+            self.offer_object(object, &scene_ray, best, Effort::Closest);
+        };
+        let mut above = Visits::default();
+        match &self.top.instances {
+            Instances::Few(instances) => instances.iter().for_each(|&object| offer(object, &mut best)),
+            Instances::Many(tree) => {
+                let tree_ray = TreeRay::new(ray.origin, ray.dir, &scene_ray.shear, tree.extent);
+                let mut tested = Recent::default();
+                let (mut leaves, mut inner) = (0, 0);
+                let t_max = best.map_or(ray.t_max, |hit| hit.t);
+                let visit = |first, count, _| {
+                    leaves += 1;
+                    for object in tree.leaf(first, count).filter(|&object| tested.is_new(object)) {
+                        offer(object, &mut best);
+                    }
+                    limit(&best, ray, Effort::Closest)
+                };
+                tree.nodes.walk_cells(&tree_ray, 0.0, t_max, visit, || inner += 1);
+                (above.leaves, above.inner) = (leaves, inner);
+            }
+        }
+        Visits { inner: visits.inner + above.inner, leaves: visits.leaves + above.leaves, ..visits }
     }
 
     fn trace(&self, ray: &Ray, any: bool) -> Option<Hit> {

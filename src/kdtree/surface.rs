@@ -8,11 +8,14 @@
 //!   whole triangle stays within that slab, and a ray that starts outside of it and points away never meets it;
 //! - for an instance, the way to the world and back again, of the point and of the direction.
 //!
+//! At the rim of a triangle that is not all: the neighbour is as uncertain as the triangle itself, so a ray that starts
+//! where the two meet may start behind it and get away. Points are kept clear of the rim by as much ([`INSET`]).
+//!
 //! Start reading at [`SceneTree::surface_point`].
 
 use super::scene_tree::{Hit, SceneTree, Shape, transform_point, transform_vector};
 use crate::geometry::robust::{UNIT_ROUNDOFF, gamma};
-use crate::geometry::{Ray, quad_corners};
+use crate::geometry::{Aabb, Ray, quad_corners};
 use glam::{Affine3A, Mat3A, Vec2, Vec3};
 
 /// Where a ray met a surface.
@@ -42,6 +45,8 @@ pub(super) struct Instance {
     round_trip_offset: Vec3,
     /// Largest growth of a relative error of a direction.
     condition: f32,
+    /// What the way to the world and back adds to the error of points, in the object's own metres.
+    rim: f32,
 }
 
 impl Instance {
@@ -55,13 +60,23 @@ impl Instance {
         let row_sum = |m: Mat3A| (m.x_axis + m.y_axis + m.z_axis).max_element();
         let (there, back) = (abs(world_from_object.matrix3), abs(object_from_world.matrix3));
         let offset = there * object_from_world.translation.abs() + world_from_object.translation.abs();
+        let round_trip = there * back;
+        let reach = match shape {
+            Shape::Mesh { tree, .. } if !tree.bounds().is_empty() => {
+                let Aabb { min, max } = tree.bounds();
+                there * min.abs().max(max.abs()) + Vec3::from(world_from_object.translation.abs())
+            }
+            _ => Vec3::ZERO,
+        };
+        let rim = gamma(8) * (round_trip * reach + Vec3::from(offset)).max_element() * row_sum(back);
         Self {
             object_from_world,
             normal_from_object: object_from_world.matrix3.transpose(),
             world_from_object_abs: there,
-            round_trip: there * back,
+            round_trip,
             round_trip_offset: offset.into(),
             condition: row_sum(there) * row_sum(back),
+            rim,
         }
     }
 
@@ -90,6 +105,12 @@ impl Instance {
     }
 }
 
+/// Distance of a point from the rim of its triangle, in bounds of its error along one axis.
+///
+/// A ray that starts `e` above one face and `4e` from the edge lies at least `e` in front of the other face, for all
+/// angles between the faces down to 30°.
+const INSET: f32 = 4.0;
+
 struct LocalPoint {
     position: Vec3,
     error: Vec3,
@@ -103,7 +124,7 @@ impl SceneTree {
         let uv = Vec2::new(hit.u, hit.v);
         match &self.shapes()[hit.object as usize] {
             Shape::Triangle { vertices } => {
-                let local = triangle_point(vertices, hit.u, hit.v, 1.0);
+                let local = triangle_point(vertices, hit.u, hit.v, 1.0, 0.0);
                 SurfacePoint {
                     position: local.position,
                     error: local.error,
@@ -113,20 +134,24 @@ impl SceneTree {
             }
             Shape::Mesh { tree, world_from_object } => {
                 let instance = &self.instances[hit.object as usize];
-                let local = triangle_point(&tree.vertices(hit.prim), hit.u, hit.v, instance.condition);
+                let local = triangle_point(&tree.vertices(hit.prim), hit.u, hit.v, instance.condition, instance.rim);
                 instance.carry_to_world(world_from_object, local, uv)
             }
             Shape::Quad { corner, edge_u, edge_v } => {
                 let corners = quad_corners(*corner, *edge_u, *edge_v);
-                let position = *corner + hit.u * *edge_u + hit.v * *edge_v;
                 // The corners that are tested are rounded themselves.
                 let size = corner.abs() + edge_u.abs() + edge_v.abs();
-                SurfacePoint {
-                    position,
-                    error: gamma(6) * size + test_slab(&corners, position, 1.0),
-                    geometric_normal: wide_cross(*edge_u, *edge_v).normalize(),
-                    uv,
-                }
+                let middle = *corner + 0.5 * *edge_u + 0.5 * *edge_v;
+                let error = gamma(6) * size + 2.0 * test_slab(&corners, middle, 1.0);
+                let (cross, area) = wide_cross(*edge_u, *edge_v);
+                // Away from the rim, as points of triangles are.
+                let inset = INSET * error.max_element() / area;
+                let clear = |at: f32, edge: Vec3| {
+                    let least = (inset * edge.length()).min(0.5);
+                    at.clamp(least, 1.0 - least)
+                };
+                let position = *corner + clear(hit.u, *edge_v) * *edge_u + clear(hit.v, *edge_u) * *edge_v;
+                SurfacePoint { position, error, geometric_normal: cross.normalize(), uv }
             }
             Shape::Sphere { center, radius } => {
                 let (position, error, geometric_normal) = sphere_point(ray, hit.t, *center, *radius);
@@ -144,7 +169,8 @@ impl SceneTree {
                 let (point, wide) = (point.as_dvec3(), normal.as_dvec3());
                 let near = ray.origin.as_dvec3() + f64::from(hit.t) * ray.dir.as_dvec3();
                 let position = (near - wide * ((near - point).dot(wide) / wide.length_squared())).as_vec3();
-                let error = 2.0 * UNIT_ROUNDOFF * position.abs();
+                let wide_error = WIDE_ERROR * (point.abs().max_element() + position.as_dvec3().abs().max_element());
+                let error = 2.0 * UNIT_ROUNDOFF * position.abs() + wide_error as f32;
                 SurfacePoint { position, error, geometric_normal: *normal, uv }
             }
         }
@@ -152,17 +178,44 @@ impl SceneTree {
 }
 
 /// - `condition`: growth of a relative error of the next ray's direction on its way into this space.
+/// - `rim`: what will be added to the error on the way to the world.
 #[inline]
-fn triangle_point(vertices: &[Vec3; 3], u: f32, v: f32, condition: f32) -> LocalPoint {
+fn triangle_point(vertices: &[Vec3; 3], u: f32, v: f32, condition: f32, rim: f32) -> LocalPoint {
     let [a, b, c] = *vertices;
-    let w = 1.0 - u - v;
-    let position = w * a + u * b + v * c;
-    let size = w.abs() * a.abs() + u * b.abs() + v * c.abs();
-    LocalPoint {
-        position,
-        error: gamma(7) * size + test_slab(vertices, position, condition),
-        normal: wide_cross(b - a, c - a),
+    let at = |u: f32, v: f32| {
+        let w = 1.0 - u - v;
+        let position = w * a + u * b + v * c;
+        let size = w.abs() * a.abs() + u * b.abs() + v * c.abs();
+        (position, gamma(7) * size + test_slab(vertices, position, condition))
+    };
+    let (cross, doubled_area) = wide_cross(b - a, c - a);
+    let (mut position, mut error) = at(u, v);
+    // The longest edge is at most four times as long as its largest component: most points are clear of the rim.
+    let longest = (b - a).abs().max((c - a).abs()).max_element() * 4.0;
+    let inset = INSET * (error.max_element() + rim);
+    if u.min(v).min(1.0 - u - v) * doubled_area < inset * longest {
+        let [u, v] = clear_of_rim(vertices, [u, v], doubled_area, inset);
+        (position, error) = at(u, v);
     }
+    LocalPoint { position, error, normal: cross }
+}
+
+/// The weights of vertices 1 and 2, moved so that the point is `inset` away from all edges, or as far as can be.
+#[cold]
+fn clear_of_rim(&[a, b, c]: &[Vec3; 3], [u, v]: [f32; 2], doubled_area: f32, inset: f32) -> [f32; 2] {
+    // The weight of a vertex is the distance from the edge across over the height of the vertex above it.
+    let least = [b.distance(c), c.distance(a), a.distance(b)].map(|edge| inset * edge / doubled_area);
+    let sum: f32 = least.iter().sum();
+    let weights = if sum < 1.0 {
+        let kept = [1.0 - u - v, u, v].map(|weight| weight.max(0.0));
+        std::array::from_fn(|k| least[k] + (1.0 - sum) * kept[k])
+    } else if sum.is_finite() {
+        // Thinner than twice the inset: in the middle.
+        least.map(|least| least / sum)
+    } else {
+        [1.0 - u - v, u, v]
+    };
+    [weights[1], weights[2]]
 }
 
 /// Half the thickness of the slab that holds the polygon, however a test from `point` rounds it: `5u` of the
@@ -173,13 +226,17 @@ fn test_slab<const N: usize>(vertices: &[Vec3; N], point: Vec3, condition: f32) 
     Vec3::splat((16.0 + 4.0 * condition) * UNIT_ROUNDOFF * reach.max_element())
 }
 
-/// The cross product, exact to a rounding for needles too, scaled so that it neither vanishes nor overflows.
+/// The cross product, exact to a rounding for needles too, scaled so that it neither vanishes nor overflows; and its
+/// largest component, which is its length within a factor of √3.
 #[inline]
-fn wide_cross(a: Vec3, b: Vec3) -> Vec3 {
+fn wide_cross(a: Vec3, b: Vec3) -> (Vec3, f32) {
     let cross = a.as_dvec3().cross(b.as_dvec3());
     let largest = cross.abs().max_element();
-    if largest > 0.0 { (cross / largest).as_vec3() } else { Vec3::ZERO }
+    if largest > 0.0 { ((cross / largest).as_vec3(), largest as f32) } else { (Vec3::ZERO, 0.0) }
 }
+
+/// What a few roundings in `f64` add, here and in the test of the next ray, relative to the numbers that they work on.
+const WIDE_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The hit projected onto the sphere, its error, and the outward normal.
 #[inline]
@@ -187,6 +244,7 @@ fn sphere_point(ray: &Ray, t: f32, center: Vec3, radius: f32) -> (Vec3, Vec3, Ve
     let near = ray.origin.as_dvec3() + f64::from(t) * ray.dir.as_dvec3();
     let outwards = (near - center.as_dvec3()).normalize();
     let position = (center.as_dvec3() + f64::from(radius) * outwards).as_vec3();
-    // One rounding to f32; everything before it is exact by comparison.
-    (position, 2.0 * UNIT_ROUNDOFF * position.abs(), outwards.as_vec3())
+    // One rounding to f32, and next to the origin, where f32 has more digits than the centre has in f64, those of f64.
+    let wide_error = WIDE_ERROR * f64::from(center.abs().max_element() + radius);
+    (position, 2.0 * UNIT_ROUNDOFF * position.abs() + wide_error as f32, outwards.as_vec3())
 }

@@ -37,8 +37,25 @@ impl Camera {
         }
         let offset = self.lens_offset(lens);
         let offset = offset.x * self.right + offset.y * self.up;
-        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye.
-        Ray::new(self.eye + offset, (direction - offset / self.focus_distance).normalize())
+        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye. Or
+        // the other way round, for a plane so near that the quotient would leave the range of f32.
+        let focus = self.focus_distance;
+        let towards = if focus >= 1.0 { direction - offset / focus } else { direction * focus - offset };
+        Ray::new(self.eye + offset, (towards / towards.abs().max_element()).normalize())
+    }
+
+    /// Nearest and farthest depth, metres along `forward`, at which the circle of confusion is at most one pixel of a
+    /// picture so many pixels high; the farthest may be infinite, and for a pinhole everything is sharp.
+    ///
+    /// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane
+    /// a metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|.
+    pub fn sharp_zone(&self, height: u32) -> (f32, f32) {
+        let pixel = 2.0 * self.tan_half_vfov / height.max(1) as f32;
+        // For a pinhole infinite, and then nothing is subtracted from it.
+        let slack = pixel / (2.0 * self.lens_radius);
+        let focus = self.focus_distance.recip();
+        let far = if focus > slack { (focus - slack).recip() } else { f32::INFINITY };
+        ((focus + slack).recip(), far)
     }
 
     /// A point of the lens by its distance from the eye along `right` and `up`, metres.
@@ -133,6 +150,17 @@ mod tests {
                 assert!((found - film).length() < 1e-3, "{found} for {film}");
                 assert!((cos - ray.dir.dot(camera.forward)).abs() < 1e-6);
                 assert_eq!(camera.film_point(offset, -ray.dir, size), None);
+            }
+        }
+    }
+
+    /// `offset / focus` left the range of `f32`, or its square did, and rays had no direction.
+    #[test]
+    fn no_lens_and_no_focus_leave_a_ray_without_direction() {
+        for lens in [1e-30, 1e-3, 1.0, 1e12] {
+            for focus in [f32::MIN_POSITIVE, 1e-30, 1e-20, 1e-3, 1.0, 1e12, f32::MAX, f32::INFINITY] {
+                let ray = camera(lens, focus).ray(Vec2::new(3.0, 90.0), Vec2::new(200.0, 100.0), Vec2::new(0.1, 0.9));
+                assert!((ray.dir.length() - 1.0).abs() < 1e-6, "{lens} {focus}: {}", ray.dir);
             }
         }
     }

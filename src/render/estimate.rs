@@ -99,6 +99,8 @@ pub(super) struct TileConvergence {
     pub checkpoint_spp: u32,
     /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (level² + 0.01), n = 2ᵏ; NaN where it is not known.
     pub steps: Vec<f64>,
+    /// Each pixel's share of the last step, mean over channels.
+    pub last: Vec<f32>,
     /// Pixels times channels.
     pub n_values: f64,
 }
@@ -116,13 +118,21 @@ impl TileConvergence {
                 let (difference, level) = (*a - *b, local_level(&self.checkpoint, *a, width, i));
                 (difference * difference / (level * level + 0.01)).element_sum()
             });
-            let sum = relative.sum();
+            let mut last = std::mem::take(&mut self.last);
+            last.clear();
+            let sum = relative.inspect(|step| last.push((step / 3.0) as f32)).sum();
+            self.last = last;
             self.steps.resize(level - 1, f64::NAN);
             self.steps.push(sum);
         } else {
             // Samples came in too large a lump to tell.
             self.steps.resize(level, f64::NAN);
         }
+    }
+
+    /// Of one pixel, relative and squared; 0 before the second sample.
+    pub fn last_step(&self, pixel: usize) -> f32 {
+        self.last.get(pixel).copied().unwrap_or(0.0)
     }
 }
 

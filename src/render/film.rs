@@ -74,7 +74,7 @@ impl Film {
         self.light = None;
         for tile in &mut self.tiles {
             *tile = FilmTile::new(tile.origin, tile.size);
-            tile.ranges = vec![first..first];
+            tile.ranges = std::iter::once(first..first).collect();
         }
         self
     }
@@ -98,9 +98,10 @@ impl Film {
         self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
     }
 
-    /// Samples that the pixel with the most has.
+    /// Samples that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
     pub fn max_spp(&self) -> u32 {
-        self.tiles.iter().map(|tile| tile.spp).max().unwrap_or(0)
+        let from_lamps = self.light.as_ref().map(LightLayer::begun);
+        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).max().unwrap_or(0)
     }
 
     /// The number of the first sample.
@@ -185,6 +186,13 @@ impl Film {
         ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
     }
 
+    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
+    /// mean over many pixels is the variance that is left. 0 before the second sample.
+    pub fn doubling_step(&self, x: u32, y: u32) -> f32 {
+        let (tile, local) = self.locate(x, y);
+        tile.convergence.last_step(local)
+    }
+
     /// Tells every tile's part of the error estimate how far the picture is.
     pub(super) fn record_convergence(&mut self) {
         let (light, width) = (self.light.as_ref(), self.width);
@@ -201,7 +209,7 @@ impl Film {
 impl FilmTile {
     fn new(origin: UVec2, size: UVec2) -> Self {
         let n = (size.x * size.y) as usize;
-        let (sums, ranges) = (vec![ExactSum::default(); n], vec![0..0]);
+        let (sums, ranges) = (vec![ExactSum::default(); n], std::iter::once(0..0).collect());
         Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence: TileConvergence::default() }
     }
 

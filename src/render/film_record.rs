@@ -134,6 +134,8 @@ impl Film {
                     checkpoint,
                     checkpoint_spp: record_of_tile.mean_of,
                     steps: record_of_tile.steps.iter().map(|&bits| f64::from_bits(bits)).collect(),
+                    // Not kept on disk: known again after the next doubling.
+                    last: Vec::new(),
                 };
             }
         }

@@ -45,7 +45,17 @@ impl MediumStack {
     #[inline]
     pub fn eta(&self, scene: &Snapshot, id: MaterialId, front: bool) -> f32 {
         let own = ior(scene, Some(id));
-        if front { ior(scene, self.top()) / own } else { own / ior(scene, self.crossed(id, false).top()) }
+        let here = ior(scene, self.top());
+        if front {
+            here / own
+        } else if self.0.contains(&id) {
+            // Where surfaces touch, rounding may swap the order in which they are met: then the path is inside of
+            // another glass before and after, and nothing bends.
+            here / ior(scene, self.crossed(id, false).top())
+        } else {
+            // The eye began inside.
+            own / here
+        }
     }
 
     /// Index of refraction where the path is.

@@ -279,6 +279,38 @@ pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: 
     radiance[0]
 }
 
+/// Bounces of the first sample of each pixel, the mean over blocks of 4 × 4; `None` when `stop` said so.
+pub(super) fn mean_bounces(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    size: UVec2,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<f32>> {
+    const SIDE: u32 = 4;
+    // Paths from the eye alone; light from the lamps has no pixel to begin with.
+    let (caustics, filter) = (None, FilterSampler::new(settings.filter));
+    let pass = Pass { snapshot, settings, caustics, filter, size };
+    let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
+    let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
+        .into_par_iter()
+        .map_init(Wave::default, |wave, block| {
+            let first = UVec2::new(block % blocks.x, block / blocks.x) * SIDE;
+            let end = (first + SIDE).min(size);
+            wave.pixels = Pixels::default();
+            for (y, x) in (first.y..end.y).flat_map(|y| (first.x..end.x).map(move |x| (y, x))) {
+                wave.pixels.x.push(x);
+                wave.pixels.y.push(y);
+                wave.pixels.local.push(0);
+            }
+            let rays = wave.trace(&pass, 0..1, 1, &mut [Vec3::ZERO], stop)?;
+            Some(rays.bounce as f32 / rays.camera.max(1) as f32)
+        })
+        .collect();
+    let means = means?;
+    let block_of = |i: u32| i % size.x / SIDE + i / size.x / SIDE * blocks.x;
+    Some((0..size.x * size.y).map(|i| means[block_of(i) as usize]).collect())
+}
+
 impl Pass<'_> {
     fn lens(&self) -> Lens<'_> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;

@@ -18,8 +18,29 @@ pub struct Extent {
 pub struct ExtentCache(HashMap<usize, (Shape, (DVec3, DVec3))>);
 
 impl ExtentCache {
-    /// The extent of what can be seen; lamps count only when there is nothing else, since nobody goes to look at one.
+    /// The extent of what can be seen, but for what lies far off; lamps count only when there is nothing else, since
+    /// nobody goes to look at one.
     pub fn extent(&mut self, inputs: &SceneInputs) -> Extent {
+        let boxes = self.near_boxes(inputs);
+        let around =
+            boxes.into_iter().reduce(|(min, max), (other_min, other_max)| (min.min(other_min), max.max(other_max)));
+        match around {
+            Some((min, max)) => Extent { center: 0.5 * min + 0.5 * max, radius: 0.5 * (max - min).length() },
+            None => Extent::default(),
+        }
+    }
+
+    /// Corners of the boxes of what [`Self::extent`] counts, for framing.
+    pub fn corners(&mut self, inputs: &SceneInputs) -> Vec<DVec3> {
+        self.near_boxes(inputs).into_iter().flat_map(|(min, max)| corners_of(min, max)).collect()
+    }
+
+    /// Corners of the box of one object in the world; none for infinite and broken ones.
+    pub fn corners_of(&mut self, object: &ObjectInput) -> Vec<DVec3> {
+        self.world_box(object).map(|(min, max)| corners_of(min, max).to_vec()).unwrap_or_default()
+    }
+
+    fn near_boxes(&mut self, inputs: &SceneInputs) -> Vec<(DVec3, DVec3)> {
         let used: HashSet<usize> = inputs.objects.iter().filter_map(|object| key(&object.shape)).collect();
         self.0.retain(|key, _| used.contains(key));
         let glowing: HashSet<_> = (inputs.materials.iter())
@@ -29,44 +50,59 @@ impl ExtentCache {
         let is_lamp =
             |object: &&ObjectInput| !object.slots.is_empty() && object.slots.iter().all(|slot| glowing.contains(slot));
         let (lamps, things): (Vec<_>, Vec<_>) = inputs.objects.iter().partition(is_lamp);
-        let around = |objects: Vec<&ObjectInput>, cache: &mut Self| {
-            objects
-                .into_iter()
-                .filter_map(|object| cache.world_box(object))
-                .reduce(|(min, max), (other_min, other_max)| (min.min(other_min), max.max(other_max)))
+        let mut boxes = |objects: Vec<&ObjectInput>| -> Vec<(DVec3, DVec3)> {
+            objects.into_iter().filter_map(|object| self.world_box(object)).collect()
         };
-        match around(things, self).or_else(|| around(lamps, self)) {
-            Some((min, max)) => Extent { center: 0.5 * min + 0.5 * max, radius: 0.5 * (max - min).length() },
-            None => Extent::default(),
+        let mut near = boxes(things);
+        if near.is_empty() {
+            near = boxes(lamps);
         }
+        leave_out_far(&mut near);
+        near
     }
 
     /// The box of an object in the world; `None` for infinite and broken ones.
     fn world_box(&mut self, object: &ObjectInput) -> Option<(DVec3, DVec3)> {
-        let (min, max) = match &object.shape {
-            Shape::Plane { .. } => return None,
-            Shape::Sphere { radius } => (DVec3::splat(-radius), DVec3::splat(*radius)),
-            Shape::Quad { edge_u, edge_v } => box_of([DVec3::ZERO, *edge_u, *edge_v, edge_u + edge_v])?,
-            Shape::Triangle { vertices } => box_of(*vertices)?,
+        let (min, max) = self.own_box(&object.shape)?;
+        let world = object.placement.affine();
+        let corners = corners_of(min, max).map(|corner| world.transform_point3(corner));
+        box_of(corners).filter(|(min, max)| min.is_finite() && max.is_finite())
+    }
+
+    /// The box of a shape in its own space; `None` for infinite and broken ones.
+    pub fn own_box(&mut self, shape: &Shape) -> Option<(DVec3, DVec3)> {
+        match shape {
+            Shape::Plane { .. } => None,
+            Shape::Sphere { radius } => Some((DVec3::splat(-radius), DVec3::splat(*radius))),
+            Shape::Quad { edge_u, edge_v } => box_of([DVec3::ZERO, *edge_u, *edge_v, edge_u + edge_v]),
+            Shape::Triangle { vertices } => box_of(*vertices),
             shape @ (Shape::Mesh(_) | Shape::Spheres(_)) => {
                 let key = key(shape)?;
                 match self.0.get(&key) {
-                    Some((_, known)) => *known,
+                    Some((_, known)) => Some(*known),
                     None => {
                         let own = own_box(shape)?;
                         self.0.insert(key, (shape.clone(), own));
-                        own
+                        Some(own)
                     }
                 }
             }
-        };
-        let world = object.placement.affine();
-        let corners = (0..8).map(|i| {
-            let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
-            world.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-        });
-        box_of(corners).filter(|(min, max)| min.is_finite() && max.is_finite())
+        }
     }
+}
+
+/// Drops the boxes that reach more than twice as far from the middle of things as half of all do: single things far
+/// off, and grounds that go on and on.
+fn leave_out_far(boxes: &mut Vec<(DVec3, DVec3)>) {
+    let median = |mut values: Vec<f64>| {
+        values.sort_unstable_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    };
+    let middle =
+        DVec3::from_array([0, 1, 2].map(|axis| median(boxes.iter().map(|(a, b)| 0.5 * (a[axis] + b[axis])).collect())));
+    let reach = |(min, max): &(DVec3, DVec3)| (0.5 * (*min + *max) - middle).length() + 0.5 * (*max - *min).length();
+    let limit = 2.0 * median(boxes.iter().map(reach).collect());
+    boxes.retain(|bounds| reach(bounds) <= limit);
 }
 
 fn key(shape: &Shape) -> Option<usize> {
@@ -93,6 +129,13 @@ fn own_box(shape: &Shape) -> Option<(DVec3, DVec3)> {
         _ => return None,
     };
     Some((min + center, max + center))
+}
+
+fn corners_of(min: DVec3, max: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|i| {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    })
 }
 
 fn box_of(points: impl IntoIterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {

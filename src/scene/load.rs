@@ -12,6 +12,7 @@ use super::meshes::{LoadedMesh, load_mesh, plain_io};
 use super::picture::read_picture;
 use super::shot::Shot;
 use super::showcase;
+use super::stamp::{Stamp, stamp};
 use crate::render::ImageTexture;
 use std::collections::HashMap;
 use std::io::Read;
@@ -46,6 +47,8 @@ pub struct LoadOptions<'a> {
     pub up: Option<UpAxis>,
     /// Width over height of the picture that a model is framed for; 16:9 when not given.
     pub aspect: Option<f64>,
+    /// What was read before: of it is taken what has not changed on disk.
+    pub known: Option<&'a LoadedScene>,
     /// Told what is being done now.
     pub progress: Option<&'a (dyn Fn(&str) + Sync)>,
 }
@@ -71,6 +74,8 @@ pub struct LoadedScene {
     pub(super) balls: Vec<Option<Arc<Balls>>>,
     /// By the path in `file`.
     pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
+    /// Where they lie, and what they were when they were read.
+    picture_files: HashMap<String, (PathBuf, Stamp)>,
     pub trees: Trees,
     pub warnings: Vec<String>,
     /// Which axis of a model was asked to point up.
@@ -145,7 +150,8 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             let mesh_source = MeshSourcePart::Obj(file);
-            let mesh = load_mesh(&mesh_source, MeshShadingPart::Auto, None, &folder)?;
+            let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
+            let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShadingPart::Auto, None, &folder), Ok)?;
             let file = showcase::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
@@ -233,7 +239,8 @@ fn resolve(
                 } else {
                     let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = source;
                     options.say(&format!("reading {name}"));
-                    match load_mesh(source, *shading, *simplify, &scene.folder) {
+                    let kept = options.known.and_then(|known| known.fresh_mesh(&scene.folder, object));
+                    match kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok) {
                         Ok(loaded) => {
                             scene.warnings.extend(loaded.warnings.iter().cloned());
                             mesh = Some(known.entry(key).or_insert(loaded).clone());
@@ -241,6 +248,11 @@ fn resolve(
                         Err(error) => note(format!("objects/{i}/source"), error),
                     }
                 }
+            }
+            ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. }
+                if options.known.is_some_and(|known| known.same_balls(object).is_some()) =>
+            {
+                balls = options.known.and_then(|known| known.same_balls(object));
             }
             ObjectPart::BallGrid { first, steps, radius, .. } => {
                 let centers = ball_grid(*first, steps);
@@ -285,6 +297,7 @@ impl LoadedScene {
             meshes: Vec::new(),
             balls: Vec::new(),
             pictures: HashMap::new(),
+            picture_files: HashMap::new(),
             trees: Trees::default(),
             warnings: Vec::new(),
             up: None,
@@ -298,7 +311,19 @@ impl LoadedScene {
         if self.pictures.contains_key(name) {
             return Ok(());
         }
+        let before = stamp(path);
+        if let Some(known) = options.known
+            && known.picture_files.get(name) == Some(&(path.to_owned(), before))
+            && before.is_some()
+            && let Some(picture) = known.pictures.get(name)
+        {
+            self.pictures.insert(name.to_owned(), picture.clone());
+            self.picture_files.insert(name.to_owned(), (path.to_owned(), before));
+            return Ok(());
+        }
         options.say(&format!("reading {name}"));
+        // Also where it cannot be read: it may come to be.
+        self.picture_files.insert(name.to_owned(), (path.to_owned(), before));
         let (picture, warning) = read_picture(path).map_err(|reason| SceneError::in_file(path, reason))?;
         self.warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
         self.pictures.insert(name.to_owned(), Arc::new(picture));
@@ -316,7 +341,60 @@ impl LoadedScene {
         }
     }
 
+    /// Every file that this scene was read from.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let own = match &self.source {
+            SceneSource::Scene(path) | SceneSource::Model(path) => Some(path.clone()),
+            SceneSource::Builtin(_) | SceneSource::Picture(_) => None,
+        };
+        let of_meshes = self.meshes.iter().flatten().flat_map(|mesh| mesh.files.iter().map(|(path, _)| path.clone()));
+        let of_pictures = self.picture_files.values().map(|(path, _)| path.clone());
+        let mut files: Vec<PathBuf> = own.into_iter().chain(of_meshes).chain(of_pictures).collect();
+        files.sort();
+        files.dedup();
+        files
+    }
+
+    /// The mesh of an object that asks for the same, if its files are still the same.
+    fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
+        let key = |object: &ObjectPart| match object {
+            ObjectPart::Mesh { source, shading, simplify, .. } => {
+                Some((source.clone(), *shading, simplify.map(f64::to_bits)))
+            }
+            _ => None,
+        };
+        let wanted = key(wanted)?;
+        let is_builtin = matches!(wanted.0, MeshSourcePart::Builtin(_));
+        let place = self.file.objects.iter().position(|object| key(object).as_ref() == Some(&wanted))?;
+        let mesh = self.meshes[place].as_ref()?;
+        ((is_builtin || self.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
+    }
+
+    /// The mesh of a model, if its files are still the same.
+    fn fresh_model(&self) -> Option<LoadedMesh> {
+        self.meshes.iter().flatten().find(|mesh| mesh.is_fresh()).cloned()
+    }
+
+    /// The balls of an object that has the same.
+    fn same_balls(&self, wanted: &ObjectPart) -> Option<Arc<Balls>> {
+        let same = |object: &ObjectPart| match (object, wanted) {
+            (
+                ObjectPart::BallGrid { first: a, steps: b, radius: c, .. },
+                ObjectPart::BallGrid { first, steps, radius, .. },
+            ) => (a, b, c) == (first, steps, radius),
+            (ObjectPart::Spheres { centers: a, radii: b, .. }, ObjectPart::Spheres { centers, radii, .. }) => {
+                (a, b) == (centers, radii)
+            }
+            _ => false,
+        };
+        self.balls[self.file.objects.iter().position(same)?].clone()
+    }
+
     fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
+        // Trees go by what they were built over, so those of what has not changed are found again.
+        if let Some(known) = options.known {
+            self.trees = known.trees.clone();
+        }
         let shapes = (self.meshes.iter().flatten().map(|mesh| Shape::Mesh(mesh.mesh.clone())))
             .chain(self.balls.iter().flatten().map(|balls| Shape::Spheres(balls.clone())));
         let shapes: Vec<Shape> = shapes.collect();

@@ -2,7 +2,8 @@
 
 use super::error::SceneError;
 use super::file::{Amount, MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
-use super::obj::{ImportedMaterial, ObjError, ObjNormals, ObjOptions, load_obj_with};
+use super::obj::{ImportedMaterial, ImportedObj, ObjError, ObjNormals, ObjOptions, load_obj_with};
+use super::stamp::{Stamp, stamp};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use glam::{DVec2, DVec3, Vec3};
 use std::io;
@@ -50,6 +51,8 @@ pub struct LoadedMesh {
     /// Textures that `slots` name, and where their pictures lie.
     pub textures: Vec<(String, TexturePart, PathBuf)>,
     pub warnings: Vec<String>,
+    /// What was read for it, and what that was then.
+    pub files: Vec<(PathBuf, Stamp)>,
 }
 
 /// Reads or makes a mesh, then simplifies and shades it as asked.
@@ -60,17 +63,121 @@ pub fn load_mesh(
     folder: &Path,
 ) -> Result<LoadedMesh, SceneError> {
     match source {
-        MeshSourcePart::Obj(file) => read_obj(&folder.join(file), shading, simplify),
-        MeshSourcePart::Builtin(name) => {
-            let (mesh, crease) =
-                builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?;
-            let mesh = shaded(simplified(mesh, simplify)?, shading, crease);
-            Ok(LoadedMesh { mesh: Arc::new(mesh), slots: Vec::new(), textures: Vec::new(), warnings: Vec::new() })
+        MeshSourcePart::Obj(file) => read_obj(source, &folder.join(file), shading, simplify),
+        MeshSourcePart::Builtin(_) => {
+            let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
+            Ok(LoadedMesh {
+                mesh: Arc::new(mesh),
+                slots: Vec::new(),
+                textures: Vec::new(),
+                warnings: Vec::new(),
+                files: Vec::new(),
+            })
         }
     }
 }
 
-fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Result<LoadedMesh, SceneError> {
+/// A mesh before it is simplified and shaded, for making it anew in another way without reading it again.
+#[derive(Clone, Debug)]
+pub struct MeshBase {
+    source: MeshSourcePart,
+    /// Of the file, normals are kept or not.
+    shading: MeshShadingPart,
+    simplified: bool,
+    folder: PathBuf,
+    mesh: Mesh,
+    /// Radians beyond which an edge is hard in automatic shading.
+    crease: Option<f32>,
+}
+
+impl MeshBase {
+    /// Reads or makes what [`load_mesh`] would begin with.
+    pub fn read(
+        source: &MeshSourcePart,
+        shading: MeshShadingPart,
+        simplify: Option<f64>,
+        folder: &Path,
+    ) -> Result<Self, SceneError> {
+        let (mesh, crease) = match source {
+            MeshSourcePart::Obj(file) => {
+                let (imported, crease) = read_obj_base(&folder.join(file), shading, simplify.is_some())?;
+                (imported.mesh, crease)
+            }
+            MeshSourcePart::Builtin(name) => {
+                builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?
+            }
+        };
+        let (source, folder) = (source.clone(), folder.to_owned());
+        Ok(Self { source, shading, simplified: simplify.is_some(), folder, mesh, crease })
+    }
+
+    /// Whether this is what would be read.
+    pub fn serves(
+        &self,
+        source: &MeshSourcePart,
+        shading: MeshShadingPart,
+        simplify: Option<f64>,
+        folder: &Path,
+    ) -> bool {
+        (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
+    }
+
+    /// Simplified and shaded, as [`load_mesh`] ends.
+    pub fn finish(&self, shading: MeshShadingPart, simplify: Option<f64>) -> Result<Mesh, SceneError> {
+        finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
+    }
+
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+}
+
+fn finish(
+    mesh: Mesh,
+    source: &MeshSourcePart,
+    shading: MeshShadingPart,
+    simplify: Option<f64>,
+    crease: Option<f32>,
+) -> Result<Mesh, SceneError> {
+    let mesh = simplified(mesh, simplify)?;
+    // Normals that a file gave are what automatic shading shows.
+    let keeps =
+        shading == MeshShadingPart::Auto && matches!(source, MeshSourcePart::Obj(_)) && !mesh.normals.is_empty();
+    Ok(if keeps { mesh } else { shaded(mesh, shading, crease) })
+}
+
+fn read_obj(
+    source: &MeshSourcePart,
+    path: &Path,
+    shading: MeshShadingPart,
+    simplify: Option<f64>,
+) -> Result<LoadedMesh, SceneError> {
+    // Before it is read: what changes in the meantime is read again.
+    let before = stamp(path);
+    let (mut imported, crease) = read_obj_base(path, shading, simplify.is_some())?;
+    imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
+    let mesh = Arc::new(imported.mesh);
+    let files = std::iter::once((path.to_owned(), before))
+        .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
+        .collect();
+    let (slots, textures, warnings) = (Vec::new(), Vec::new(), imported.warnings);
+    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, files };
+    // A file without any material leaves the choice to whoever uses it.
+    if imported.materials.iter().any(|material| !material.name.is_empty()) {
+        for material in &imported.materials {
+            let part = loaded.material(material);
+            loaded.slots.push((material.name.clone(), part));
+        }
+    }
+    Ok(loaded)
+}
+
+/// The file as simplification wants it, and the crease angle of normals that are still to be computed.
+fn read_obj_base(
+    path: &Path,
+    shading: MeshShadingPart,
+    simplify: bool,
+) -> Result<(ImportedObj, Option<f32>), SceneError> {
     let read = |normals| {
         load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
             // The reader's own words for a missing file speak of an error number.
@@ -81,31 +188,13 @@ fn read_obj(path: &Path, shading: MeshShadingPart, simplify: Option<f64>) -> Res
         })
     };
     let computed = ObjOptions::default().normals;
+    let ObjNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
     let mut imported = read(if shading == MeshShadingPart::Auto { computed } else { ObjNormals::Ignore })?;
-    if shading == MeshShadingPart::Auto {
-        // Normals that were computed would hold simplification back at every crease; they are computed after it.
-        if simplify.is_some() && !imported.normals_from_file {
-            imported.mesh = read(ObjNormals::Ignore)?.mesh;
-        }
-        imported.mesh = simplified(imported.mesh, simplify)?;
-        if imported.mesh.normals.is_empty()
-            && let ObjNormals::FileOrComputed { crease_angle } = computed
-        {
-            imported.mesh = shaded(imported.mesh, shading, Some(crease_angle));
-        }
-    } else {
-        imported.mesh = shaded(simplified(imported.mesh, simplify)?, shading, None);
+    // Normals that were computed would hold simplification back at every crease; they are computed after it.
+    if shading == MeshShadingPart::Auto && simplify && !imported.normals_from_file {
+        imported.mesh = read(ObjNormals::Ignore)?.mesh;
     }
-    let mesh = Arc::new(imported.mesh);
-    let mut loaded = LoadedMesh { mesh, slots: Vec::new(), textures: Vec::new(), warnings: imported.warnings };
-    // A file without any material leaves the choice to whoever uses it.
-    if imported.materials.iter().any(|material| !material.name.is_empty()) {
-        for material in &imported.materials {
-            let part = loaded.material(material);
-            loaded.slots.push((material.name.clone(), part));
-        }
-    }
-    Ok(loaded)
+    Ok((imported, Some(crease_angle)))
 }
 
 fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
@@ -128,6 +217,11 @@ fn shaded(mesh: Mesh, shading: MeshShadingPart, crease: Option<f32>) -> Mesh {
 }
 
 impl LoadedMesh {
+    /// Whether the files that it was read from are still the same.
+    pub fn is_fresh(&self) -> bool {
+        self.files.iter().all(|(path, then)| then.is_some() && stamp(path) == *then)
+    }
+
     /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
     /// matte, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
@@ -219,5 +313,23 @@ mod tests {
             loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         }
         assert!(BUILTIN_NAMES.is_sorted());
+    }
+
+    #[test]
+    fn highlights_of_material_files_keep_their_peak() {
+        let material = |specular: f32, shininess: f32, illumination_model: Option<u8>| ImportedMaterial {
+            specular: Some(Vec3::splat(specular)),
+            shininess: Some(shininess),
+            illumination_model,
+            ..ImportedMaterial::default()
+        };
+        for (strength, exponent) in [(0.3, 9.0), (0.8, 30.0), (1.0, 100.0)] {
+            let (share, shininess) = highlight_of(&material(strength, exponent, Some(2))).unwrap();
+            // What `render::phong` makes of it at its peak, against Lambert's albedo of the same strength.
+            assert!((share * (shininess + 1.0) / 2.0 - strength).abs() < 1e-6, "{strength} {exponent}");
+        }
+        assert_eq!(highlight_of(&material(0.8, 30.0, Some(1))), None, "matte by its illumination model");
+        assert_eq!(highlight_of(&material(0.5, 1000.0, None)), None, "nobody would see it");
+        assert_eq!(highlight_of(&ImportedMaterial::default()), None);
     }
 }

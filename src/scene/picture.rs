@@ -78,6 +78,20 @@ mod tests {
         assert_eq!(picture.texels[1], Vec3::X);
     }
 
+    /// A few hundred bytes that would take gigabytes are refused by their size; devices and pipes are not opened.
+    #[test]
+    fn pictures_beyond_the_limit_are_refused_before_they_are_decoded() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("wide.png");
+        image::GrayImage::new(100, 40).save(&path).unwrap();
+        let limits = Limits { picture_pixels: 3999, ..Limits::USUAL };
+        let error = read_picture_within(&path, &limits).unwrap_err();
+        assert!(error.contains("100 x 40") && error.contains("3999") && error.contains(Limits::VARIABLE), "{error}");
+        assert!(read_picture_within(&path, &Limits { picture_pixels: 4000, ..limits }).is_ok());
+        #[cfg(unix)]
+        assert!(read_picture(Path::new("/dev/zero")).unwrap_err().contains("not a regular file"));
+    }
+
     #[test]
     fn broken_pictures_are_refused() {
         let dir = tempfile::tempdir().unwrap();

@@ -26,8 +26,18 @@ pub struct SavedScene {
 /// # Errors
 /// When the world holds what no scene file may say, or the file cannot be written.
 pub fn save_scene(world: &mut World, loaded: Option<&LoadedScene>, path: &Path) -> Result<SavedScene, String> {
+    Description::of(world, loaded).save(path)
+}
+
+impl Description {
+    /// See [`save_scene`].
+    pub fn save(self, path: &Path) -> Result<SavedScene, String> {
+        save(self, path)
+    }
+}
+
+fn save(mut description: Description, path: &Path) -> Result<SavedScene, String> {
     let failed = |reason: &dyn std::fmt::Display| format!("{}: cannot be saved: {reason}", path.display());
-    let mut description = Description::of(world, loaded);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     move_paths(&mut description.file, &description.folder, &folder);
     let mut notes = std::mem::take(&mut description.losses);

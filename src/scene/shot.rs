@@ -227,6 +227,7 @@ impl Shot {
             (view.eye, view.forward, view.up, projection, lens)
         };
         let checks = [
+            (self.program != other.program, "version of firstlight"),
             (self.fingerprint != other.fingerprint, "scene, or of this one before it was changed"),
             ((self.film.width, self.film.height) != (other.film.width, other.film.height), "size"),
             (seen(self) != seen(other), "view"),

@@ -6,15 +6,22 @@
 //! picture costs nothing.
 
 use super::display::Display;
+use super::handles::Handles;
 use super::input::Input;
 use super::keys::Action;
+use super::overlay::Help;
+use super::panel::{self, PanelState};
 use super::presenter::{PresentError, Presenter};
-use super::saver::{Saved, Saver};
+use super::reaction::Reaction;
+use super::saver::{Saved, Saver, new_scene_file};
 use super::status;
 use super::toasts::{Toasts, Tone};
 use super::{camera_text, display, overlay};
-use crate::frame::{Command, MessageKind, PictureFormat, Session, SessionOptions, Target, Waker};
-use crate::render::Integrator;
+use crate::frame::{
+    Command, Edit, Looking, MessageKind, PictureFormat, Selection, Session, SessionOptions, Settings, SettingsStore,
+    Target, Waker, gizmo,
+};
+use crate::render::{Inspection, Integrator};
 use crate::scene::{SceneSource, UpAxis};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -24,8 +31,9 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
-use winit::event::{MouseScrollDelta, StartCause, WindowEvent};
+use winit::event::{MouseButton, MouseScrollDelta, StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::keyboard::{Key, NamedKey};
 use winit::window::{Fullscreen, Window, WindowId};
 
 /// How to open the window.
@@ -42,6 +50,8 @@ pub struct ViewerOptions {
     pub up: Option<UpAxis>,
     /// Where kept pictures go.
     pub folder: PathBuf,
+    /// Where to write down what is done.
+    pub record: Option<PathBuf>,
 }
 
 /// Why the window could not be opened, or closed by itself.
@@ -73,6 +83,8 @@ const FRAME: Duration = Duration::from_micros(8_000);
 const LATEST: Duration = Duration::from_millis(250);
 /// Figures that change by themselves are shown again so often.
 const FIGURES: Duration = Duration::from_millis(250);
+/// What a window stops at by itself, so that nothing runs hot for ever: an error that nobody sees.
+const GOOD_ENOUGH: Target = Target { spp: None, seconds: None, error: Some(0.005) };
 /// Pixels of a touchpad that count as a notch of a wheel.
 const PIXELS_A_NOTCH: f64 = 40.0;
 
@@ -102,6 +114,8 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     };
     let mut app = App::new(options, pending, waker)?;
     event_loop.run_app(&mut app).map_err(ViewerError::EventLoop)?;
+    app.session.end_record();
+    app.keep_window_size();
     for saved in app.saver.finish() {
         app.tell_saved(saved);
     }
@@ -118,12 +132,17 @@ struct App {
     saver: Saver,
     input: Input,
     toasts: Toasts,
-    help: bool,
+    help: Help,
+    panel: PanelState,
+    handles: Handles,
+    reaction: Reaction,
     overlays: bool,
     // Before the window, so that the device goes before the display.
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
     title: String,
+    /// Logical pixels.
+    window_size: (u32, u32),
     occluded: bool,
     /// Something happened since the last tick.
     stirred: bool,
@@ -148,11 +167,14 @@ impl App {
             height: options.height,
             threads: options.threads,
             seed: options.seed,
-            target: Target::default(),
+            target: GOOD_ENOUGH,
             up: options.up,
             waker: Some(waker.clone()),
         })
         .map_err(ViewerError::Session)?;
+        if let Some(path) = &options.record {
+            session.record(path, &options.source, options.up).map_err(ViewerError::Session)?;
+        }
         session.open(options.source.clone());
         let start = Instant::now();
         Ok(Self {
@@ -163,11 +185,15 @@ impl App {
             saver: Saver::new(&options.folder, waker),
             input: Input::new(options.width, options.height),
             toasts: Toasts::default(),
-            help: false,
+            help: Help::default(),
+            panel: PanelState::default(),
+            handles: Handles::default(),
+            reaction: Reaction::default(),
             overlays: true,
             presenter: None,
             window: None,
             title: String::new(),
+            window_size: (options.width, options.height),
             occluded: false,
             stirred: true,
             shown_picture: None,
@@ -181,6 +207,15 @@ impl App {
         })
     }
 
+    /// For the next window.
+    fn keep_window_size(&self) {
+        let store = SettingsStore::of_platform();
+        let settings = Settings { window: Some(self.window_size), ..store.settings().0 };
+        if let Err(error) = store.keep_settings(&settings) {
+            log::warn!("{error}");
+        }
+    }
+
     fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
         let size = LogicalSize::new(self.options.width, self.options.height);
         self.title = title(&self.options.source.title());
@@ -190,7 +225,7 @@ impl App {
         overlay::style(presenter.egui_context());
         (self.window, self.presenter) = (Some(window), Some(presenter));
         self.resized();
-        self.toasts.add(Tone::News, "H shows the keys", Instant::now());
+        self.toasts.add(Tone::News, "H shows the keys, N the panel", Instant::now());
         Ok(())
     }
 
@@ -198,6 +233,10 @@ impl App {
     fn resized(&mut self) {
         let (Some(window), Some(presenter)) = (&self.window, &self.presenter) else { return };
         let size = window.inner_size();
+        let logical = size.to_logical::<u32>(window.scale_factor());
+        if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
+            self.window_size = (logical.width, logical.height);
+        }
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
         self.input.resize(width, height);
         self.session.send(Command::Resize { width, height });
@@ -210,11 +249,14 @@ impl App {
         self.stirred = false;
         self.last_tick = Some(now);
         let clock = now - self.start;
+        let restarts = self.session.status().restarts;
         self.session.update(clock);
         // A movement that came before the last one was seen would only take its place: it waits, and adds up.
         let answered = self.is_answered(now);
         if answered {
             self.steer(now, clock);
+            let generation = self.session.status().restarts;
+            self.reaction.carried_out((generation != restarts).then_some(generation));
         }
         let status = self.session.status();
         for message in status.messages.iter().filter(|message| message.at == clock) {
@@ -294,17 +336,38 @@ impl App {
             tracing::debug!("picture {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
+        let scale = f64::from(presenter.pixels_per_point());
+        let size = window.inner_size();
+        let size = glam::DVec2::new(f64::from(size.width), f64::from(size.height)) / scale;
+        self.handles.update(&mut self.session, self.panel.gizmo, size);
+        let (session, handles, panel) = (&self.session, &self.handles, &mut self.panel);
+        let around = panel::Around {
+            reaction: &self.reaction,
+            speed: self.input.speed(),
+            spinning: self.input.is_spinning(),
+            memory: panel.shown.then(memory_of_process).flatten(),
+        };
+        let mut asked = panel::Asked::default();
         let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
         let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
         let presented = presenter.present(|context| {
             if overlays {
+                handles.draw(context);
+                if panel.shown {
+                    panel::show(context, panel, session, &around, &mut asked);
+                }
+                let inspection = session.world().resource::<Looking>().0.inspection;
+                if inspection != Inspection::Picture {
+                    overlay::legend(context, inspection.label(), session.status().legend);
+                }
                 overlay::status_line(context, left, right);
                 overlay::toasts(context, toasts);
             }
-            if *help {
+            if help.open {
                 overlay::help(context, help);
             }
         })?;
+        self.reaction.shown(self.session.picture().generation, Instant::now());
         tracing::trace!("drawn in {:.1} ms", now.elapsed().as_secs_f64() * 1e3);
         if presented.again {
             window.request_redraw();
@@ -314,6 +377,7 @@ impl App {
         self.shown_figures = figures;
         // The overlays may have asked for a time that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
+        self.carry_out(asked, now);
         Ok(())
     }
 
@@ -341,6 +405,33 @@ impl App {
         event_loop.exit();
     }
 
+    /// What was asked for in the panel.
+    fn carry_out(&mut self, asked: panel::Asked, now: Instant) {
+        if !asked.commands.is_empty() {
+            self.reaction.asked(now);
+            self.stirred = true;
+        }
+        for command in asked.commands {
+            self.session.send(command);
+        }
+        if let Some(speed) = asked.speed {
+            self.input.set_speed(speed, now);
+        }
+        if asked.toggle_spin {
+            self.input.toggle_spin(now);
+            self.stirred = true;
+        }
+        if let Some(linear) = asked.screenshot {
+            self.screenshot(linear);
+        }
+    }
+
+    /// The mouse in points, as overlays count.
+    fn mouse(&self) -> glam::DVec2 {
+        let scale = self.presenter.as_ref().map_or(1.0, |presenter| f64::from(presenter.pixels_per_point()));
+        glam::DVec2::from_array(self.input.cursor_place()) / scale
+    }
+
     fn act(&mut self, action: Action, event_loop: &ActiveEventLoop) {
         let now = Instant::now();
         match action {
@@ -357,6 +448,11 @@ impl App {
                 self.session.send(Command::SetIntegrator(other));
             }
             Action::Screenshot { linear } => self.screenshot(linear),
+            Action::SaveScene { new } => {
+                let known = self.session.scene_file().filter(|_| !new);
+                let path = known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene));
+                self.session.send(Command::SaveScene { path });
+            }
             Action::PrintView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
                 // Standard output may be closed; the window goes on.
@@ -365,7 +461,32 @@ impl App {
                     Err(error) => self.toasts.add(Tone::Problem, format!("the camera was not printed: {error}"), now),
                 }
             }
-            Action::ToggleHelp => self.help = !self.help,
+            Action::Inspect(inspection) => {
+                let shown = self.session.world().resource::<Looking>().0.inspection;
+                let wanted = if shown == inspection { Inspection::Picture } else { inspection };
+                self.session.send(Command::SetInspection(wanted));
+            }
+            Action::ToggleSharpZone => {
+                let shown = !self.session.world().resource::<Looking>().0.sharp_zone;
+                self.session.send(Command::SetSharpZone { shown });
+                if shown && !self.session.status().rig.lens.enabled {
+                    self.toasts.add(Tone::News, "all is sharp: O opens the lens", now);
+                }
+            }
+            Action::NextGizmo => {
+                let modes = gizmo::Mode::ALL;
+                self.panel.gizmo = match self.panel.gizmo {
+                    None => Some(modes[0]),
+                    Some(mode) => modes.into_iter().skip_while(|other| *other != mode).nth(1),
+                };
+                let name = self.panel.gizmo.map_or("no handles", gizmo::Mode::label);
+                let hint =
+                    if self.session.world().resource::<Selection>().0.is_empty() { ": click on something" } else { "" };
+                self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
+            }
+            Action::ToggleSpin => self.input.toggle_spin(now),
+            Action::TogglePanel => self.panel.shown = !self.panel.shown,
+            Action::ToggleHelp => self.help.toggle(),
             Action::ToggleOverlays => self.overlays = !self.overlays,
             Action::ToggleFullscreen => {
                 if let Some(window) = &self.window {
@@ -373,7 +494,10 @@ impl App {
                     window.set_fullscreen((!full).then_some(Fullscreen::Borderless(None)));
                 }
             }
-            Action::Leave if self.help => self.help = false,
+            Action::Leave if self.help.open => self.help.open = false,
+            Action::Leave if !self.session.world().resource::<Selection>().0.is_empty() => {
+                self.session.send(Command::Edit(Edit::SelectNone));
+            }
             Action::Leave | Action::Quit => event_loop.exit(),
         }
         self.repaint_at = Some(now);
@@ -384,7 +508,9 @@ impl App {
         let status = self.session.status();
         let picture = self.session.picture();
         let size = (picture.width.max(1), picture.height.max(1));
-        self.saver.save(self.session.keep_film(), status.display, size, &status.scene, format);
+        let (display, scene) = (status.display, status.scene.clone());
+        let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
+        self.saver.save(self.session.keep_film(), draft, display, size, &scene, format);
     }
 
     fn tell_saved(&mut self, saved: Saved) {
@@ -429,7 +555,8 @@ impl ApplicationHandler<Wake> for App {
         let response = presenter.on_window_event(&event);
         // Overlays take the keyboard only while somebody types into them; they always want Tab, which is ours.
         let typing = presenter.egui_context().wants_keyboard_input();
-        if response.repaint && self.help {
+        let has_widgets = self.help.open || self.panel.shown && self.overlays;
+        if response.repaint && has_widgets && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
         self.stirred = true;
@@ -438,6 +565,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.resized(),
             WindowEvent::Occluded(occluded) => {
                 self.occluded = occluded;
+                self.session.send(Command::SetHidden { hidden: occluded });
                 self.repaint_at = Some(now);
             }
             WindowEvent::Focused(false) => self.input.release_all(now),
@@ -447,17 +575,49 @@ impl ApplicationHandler<Wake> for App {
             }
             WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
                 let pressed = event.state.is_pressed();
-                if pressed && typing {
+                // Typing into the list of keys must not keep a person in it.
+                let leaves = event.logical_key == Key::Named(NamedKey::Escape);
+                if pressed && typing && !(leaves && self.help.open) {
                     return;
+                }
+                if pressed {
+                    self.reaction.asked(now);
                 }
                 if let Some(action) = self.input.key(event.physical_key, &event.logical_key, pressed, event.repeat, now)
                 {
                     self.act(action, event_loop);
                 }
             }
-            WindowEvent::CursorMoved { position, .. } => self.input.cursor(position.x, position.y),
+            WindowEvent::CursorMoved { position, .. } => {
+                self.input.cursor(position.x, position.y);
+                if self.input.is_dragging() || self.handles.is_grabbed() {
+                    self.reaction.asked(now);
+                }
+                let (mouse, snap) = (self.mouse(), self.input.modifiers().control_key());
+                let (command, news) = self.handles.mouse_at(mouse, snap);
+                if let Some(command) = command {
+                    self.session.send(command);
+                }
+                if news {
+                    self.repaint_at = Some(now);
+                }
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
+                if !state.is_pressed() && self.handles.release() =>
+            {
+                self.session.send(Command::Edit(Edit::End));
+                self.repaint_at = Some(now);
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
+                if state.is_pressed() && !response.consumed && self.handles.grab(self.mouse()) =>
+            {
+                self.session.send(Command::Edit(Edit::Begin));
+            }
             WindowEvent::MouseInput { state, button, .. } if !(state.is_pressed() && response.consumed) => {
                 self.input.button(button, state.is_pressed(), now);
+                self.reaction.asked(now);
+                // What is selected is drawn, and changes no picture.
+                self.repaint_at = Some(now);
             }
             WindowEvent::MouseWheel { delta, .. } if !response.consumed => {
                 // Shift turns a vertical wheel into a horizontal one on some systems.
@@ -497,6 +657,16 @@ impl ApplicationHandler<Wake> for App {
         self.window = None;
     }
 }
+
+/// Bytes that the process holds, where the system tells.
+fn memory_of_process() -> Option<u64> {
+    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
+    Some(pages * PAGE)
+}
+
+/// Linux on the processors that we know counts memory in pages of this many bytes.
+const PAGE: u64 = 4096;
 
 fn title(scene: &str) -> String {
     let name = Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy());

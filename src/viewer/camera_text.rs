@@ -7,14 +7,16 @@ use crate::scene::file::CameraPart;
 pub fn camera_text(rig: &Rig) -> String {
     let Rig { view, projection, lens } = rig;
     let radius = lens.effective_radius();
+    // A millionth of the viewing distance is a thousandth of a pixel.
+    let place = |point: glam::DVec3| point.map(|value| rounded(value, view.pivot_distance));
     let part = CameraPart {
-        up: view.up,
-        vfov: projection.vfov_deg,
-        lens_radius: (radius > 0.0).then_some(radius),
-        focus_distance: Some(lens.focus_distance),
+        up: view.up.map(|value| rounded(value, 1.0)),
+        vfov: rounded(projection.vfov_deg, projection.vfov_deg),
+        lens_radius: (radius > 0.0).then_some(rounded(radius, radius)),
+        focus_distance: Some(rounded(lens.focus_distance, lens.focus_distance)),
         blades: lens.blades,
         blade_rotation: lens.blade_rotation_deg,
-        ..CameraPart::looking_at(view.eye, view.pivot())
+        ..CameraPart::looking_at(place(view.eye), place(view.pivot()))
     };
     let style = ron::ser::PrettyConfig::new()
         .depth_limit(2)
@@ -25,6 +27,15 @@ pub fn camera_text(rig: &Rig) -> String {
     let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
     let text = options.to_string_pretty(&part, style).expect("numbers can be written");
     format!("camera: {text},")
+}
+
+/// To a millionth of `scale`, in as few digits as that takes.
+fn rounded(value: f64, scale: f64) -> f64 {
+    let digits = 6 - scale.abs().log10().floor() as i32;
+    let step = 10f64.powi(digits);
+    let rounded = (value * step).round() / step;
+    // Without the sign of a negative zero; what has no such rounding stays as it is.
+    if rounded.is_finite() { rounded + 0.0 } else { value }
 }
 
 #[cfg(test)]
@@ -41,7 +52,10 @@ mod tests {
         let rig = Rig { view, projection: Projection { vfov_deg: 33.3 }, lens };
         let text = format!("(\n{}\n)", camera_text(&rig));
         let camera = SceneFile::parse(&text, "printed").unwrap_or_else(|error| panic!("{error}\n{text}")).camera;
-        assert_eq!((camera.eye, camera.look_at, camera.up), (view.eye, Some(view.pivot()), view.up));
+        let near = |a: DVec3, b: DVec3, scale: f64| assert!((a - b).abs().max_element() <= 1e-6 * scale, "{a} for {b}");
+        near(camera.eye, view.eye, view.pivot_distance);
+        near(camera.look_at.unwrap(), view.pivot(), view.pivot_distance);
+        near(camera.up, view.up, 1.0);
         assert_eq!((camera.vfov, camera.lens_radius, camera.focus_distance), (33.3, Some(0.025), Some(1.75)));
         assert_eq!((camera.blades, camera.blade_rotation), (6, 15.0));
 

@@ -4,7 +4,7 @@
 //! distance it went, and whatever happens between two calls is added up into one command of a kind.
 
 use super::keys::{Action, Motion, action_of, motion_of};
-use crate::frame::Command;
+use crate::frame::{Command, Edit};
 use std::time::{Duration, Instant};
 use winit::event::MouseButton;
 use winit::keyboard::{Key, ModifiersState, PhysicalKey};
@@ -12,6 +12,8 @@ use winit::keyboard::{Key, ModifiersState, PhysicalKey};
 /// Degrees a second while an orbit or roll key is down.
 const ORBIT_RATE_DEG: f64 = 75.0;
 const ROLL_RATE_DEG: f64 = 45.0;
+/// Once around in 18 seconds.
+const SPIN_RATE_DEG: f64 = 20.0;
 /// Picture heights a second.
 const PAN_RATE: f64 = 0.5;
 /// What Shift multiplies the flying speed by.
@@ -44,6 +46,8 @@ pub struct Input {
     cursor: [f64; 2],
     /// Strides a second.
     speed: f64,
+    /// Since when the camera goes around by itself and has not been counted.
+    spin: Option<Instant>,
     sum: Sum,
 }
 
@@ -70,6 +74,8 @@ struct Drag {
     /// Where the mouse was last; until it `moved` out of the slack, where it was pressed.
     last: [f64; 2],
     moved: bool,
+    /// Of a click: select beside what is selected.
+    add: bool,
 }
 
 /// Movement not yet sent, and the commands that must keep their order behind it.
@@ -82,6 +88,8 @@ struct Sum {
     roll: f64,
     dolly: f64,
     zoom: f64,
+    pace: Option<[f64; 2]>,
+    pick: Option<([f64; 2], bool)>,
     focus: Option<[f64; 2]>,
     pivot: Option<[f64; 2]>,
 }
@@ -97,6 +105,7 @@ impl Input {
             size: [f64::from(width), f64::from(height)],
             cursor: [0.0; 2],
             speed: 1.0,
+            spin: None,
             sum: Sum::default(),
         }
     }
@@ -118,7 +127,37 @@ impl Input {
 
     /// A key that moves is down, so time alone changes the view.
     pub fn is_moving(&self) -> bool {
-        !self.held.is_empty()
+        !self.held.is_empty() || self.spin.is_some()
+    }
+
+    /// The camera goes around by itself from now on, or stops.
+    pub fn toggle_spin(&mut self, now: Instant) {
+        self.count(now);
+        self.spin = if self.spin.is_some() { None } else { Some(now) };
+    }
+
+    pub fn is_spinning(&self) -> bool {
+        self.spin.is_some()
+    }
+
+    /// A mouse button that turns, moves or focuses is down.
+    pub fn is_dragging(&self) -> bool {
+        self.drag.is_some()
+    }
+
+    /// Where the mouse is, physical pixels.
+    pub fn cursor_place(&self) -> [f64; 2] {
+        self.cursor
+    }
+
+    pub fn modifiers(&self) -> ModifiersState {
+        self.modifiers
+    }
+
+    /// Flying speed, strides a second.
+    pub fn set_speed(&mut self, speed: f64, now: Instant) {
+        self.count(now);
+        self.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1);
     }
 
     /// A key went down (again, if `repeat`) or up; answers with what is to be done besides moving.
@@ -137,13 +176,20 @@ impl Input {
             }
             // With Ctrl or Super, letters are commands of the program or of the desktop.
             if !self.modifiers.control_key() && !self.modifiers.super_key() {
+                let flies = |motion| {
+                    !matches!(motion, Motion::OrbitLeft | Motion::OrbitRight | Motion::OrbitUp | Motion::OrbitDown)
+                };
+                // How fast is decided by where the flight begins, not anew at every tree that passes.
+                if !repeat && flies(motion) && self.held.is_empty() {
+                    self.sum.pace = Some(self.place());
+                }
                 if !repeat && !self.held.iter().any(|held| held.motion == motion) {
                     self.held.push(Held { motion, since: now, counted: 0.0 });
                 }
                 return None;
             }
         }
-        let action = pressed.then(|| action_of(typed, self.modifiers)).flatten()?;
+        let action = pressed.then(|| action_of(physical, typed, self.modifiers)).flatten()?;
         // Only steps repeat: a toggle held down would flicker, a screenshot held down would fill the disk.
         let steps = matches!(
             action,
@@ -153,6 +199,7 @@ impl Input {
                     | Command::Dolly { .. }
                     | Command::Zoom { .. }
                     | Command::AdjustExposure { .. }
+                    | Command::Edit(Edit::Undo | Edit::Redo)
             )
         );
         (steps || !repeat).then_some(action)
@@ -170,8 +217,13 @@ impl Input {
     /// A mouse button went down or up.
     pub fn button(&mut self, button: MouseButton, pressed: bool, now: Instant) {
         if !pressed {
-            if self.drag.as_ref().is_some_and(|drag| drag.button == button) {
-                self.drag = None;
+            if let Some(drag) = self.drag.take_if(|drag| drag.button == button)
+                && drag.kind == DragKind::Look
+                && !drag.moved
+            {
+                // The second click of two focuses, and leaves the selection of the first.
+                let second = self.last_press.is_none();
+                self.sum.pick = (!second).then(|| (self.place(), drag.add)).or(self.sum.pick);
             }
             return;
         }
@@ -199,7 +251,8 @@ impl Input {
             // A third press begins anew.
             self.last_press = (!again).then_some((now, self.cursor));
         }
-        self.drag = Some(Drag { kind, button, last: self.cursor, moved: false });
+        let add = self.modifiers.control_key();
+        self.drag = Some(Drag { kind, button, last: self.cursor, moved: false, add });
     }
 
     /// The mouse is at this place of the window, physical pixels.
@@ -248,6 +301,11 @@ impl Input {
 
     /// Adds up what the held keys have moved by now.
     fn count(&mut self, now: Instant) {
+        if let Some(since) = &mut self.spin {
+            let since = std::mem::replace(since, now);
+            let seconds = now.saturating_duration_since(since).as_secs_f64();
+            add(&mut self.sum.orbit, [SPIN_RATE_DEG * seconds, 0.0]);
+        }
         for i in 0..self.held.len() {
             let held = &mut self.held[i];
             let seconds = now.saturating_duration_since(held.since).as_secs_f64();
@@ -309,11 +367,22 @@ impl Sum {
         push(self.turn != zero, Command::Turn { yaw_deg: self.turn[0], pitch_deg: self.turn[1] });
         push(self.orbit != zero, Command::Orbit { yaw_deg: self.orbit[0], pitch_deg: self.orbit[1] });
         push(self.pan != zero, Command::Pan { right: self.pan[0], up: self.pan[1] });
+        if let Some([x, y]) = self.pace {
+            commands.push(Command::PaceAt { x, y });
+        }
+        let mut push = |wanted: bool, command| {
+            if wanted {
+                commands.push(command);
+            }
+        };
         let [right, up, forward] = self.fly;
         push(self.fly != [0.0; 3], Command::Fly { right, up, forward });
         push(self.roll != 0.0, Command::Roll { angle_deg: self.roll });
         push(self.dolly != 0.0, Command::Dolly { factor: self.dolly.exp() });
         push(self.zoom != 0.0, Command::Zoom { factor: self.zoom.exp() });
+        if let Some(([x, y], add)) = self.pick {
+            commands.push(Command::Edit(Edit::PickAt { x, y, add }));
+        }
         if let Some([x, y]) = self.focus {
             commands.push(Command::FocusAt { x, y });
         }
@@ -360,6 +429,9 @@ mod tests {
             let mut flown = 0.0;
             let mut collect = |input: &mut Input, now| {
                 for command in input.take(now) {
+                    if let Command::PaceAt { .. } = command {
+                        continue;
+                    }
                     let Command::Fly { right: 0.0, up: 0.0, forward } = command else { panic!("{command:?}") };
                     flown += forward;
                 }
@@ -382,7 +454,9 @@ mod tests {
         press(&mut input, KeyCode::KeyW, "w", true, start);
         input.wheel(1.0, after(start, 1000));
         input.set_modifiers(ModifiersState::SHIFT, after(start, 2000));
-        let [Command::Fly { forward, .. }] = input.take(after(start, 3000))[..] else { panic!() };
+        let [Command::PaceAt { .. }, Command::Fly { forward, .. }] = input.take(after(start, 3000))[..] else {
+            panic!()
+        };
         assert!((forward - (1.0 + SPEED_NOTCH + FAST * SPEED_NOTCH)).abs() < 1e-9, "{forward}");
     }
 
@@ -391,10 +465,11 @@ mod tests {
         let (mut input, start) = input();
         press(&mut input, KeyCode::KeyD, "d", true, start);
         press(&mut input, KeyCode::KeyD, "d", false, start);
-        assert_eq!(input.take(start), [Command::Fly { right: TAP, up: 0.0, forward: 0.0 }]);
+        let pace = Command::PaceAt { x: 0.0, y: 0.0 };
+        assert_eq!(input.take(start), [pace.clone(), Command::Fly { right: TAP, up: 0.0, forward: 0.0 }]);
         press(&mut input, KeyCode::KeyA, "a", true, start);
         press(&mut input, KeyCode::KeyD, "d", true, start);
-        assert_eq!(input.take(after(start, 500)), []);
+        assert_eq!(input.take(after(start, 500)), [pace]);
     }
 
     #[test]
@@ -406,7 +481,11 @@ mod tests {
         let commands = input.take(after(start, 1000));
         assert_eq!(
             commands,
-            [Command::Pan { right: -PAN_RATE, up: 0.0 }, Command::Fly { right: 0.0, up: FAST, forward: 0.0 }]
+            [
+                Command::Pan { right: -PAN_RATE, up: 0.0 },
+                Command::PaceAt { x: 0.0, y: 0.0 },
+                Command::Fly { right: 0.0, up: FAST, forward: 0.0 }
+            ]
         );
     }
 
@@ -426,7 +505,8 @@ mod tests {
         input.button(MouseButton::Middle, true, start);
         input.release_all(after(start, 100));
         input.cursor(300.0, 300.0);
-        assert_eq!(input.take(after(start, 900)), [Command::Fly { right: 0.0, up: 0.0, forward: 0.1 }]);
+        let commands = input.take(after(start, 900));
+        assert_eq!(commands[1..], [Command::Fly { right: 0.0, up: 0.0, forward: 0.1 }]);
     }
 
     #[test]
@@ -459,13 +539,18 @@ mod tests {
         input.cursor(200.0, 100.0);
         input.button(MouseButton::Left, true, start);
         input.button(MouseButton::Left, false, start);
-        assert_eq!(input.take(start), [], "one click does nothing");
+        let picked = |add| Command::Edit(Edit::PickAt { x: 0.25, y: 0.25, add });
+        assert_eq!(input.take(start), [picked(false)], "one click selects");
         input.button(MouseButton::Left, true, after(start, 200));
         input.button(MouseButton::Left, false, after(start, 250));
         assert_eq!(input.take(start), [Command::FocusAt { x: 0.25, y: 0.25 }, Command::PivotAt { x: 0.25, y: 0.25 }]);
         input.button(MouseButton::Left, true, after(start, 300));
         input.button(MouseButton::Left, false, after(start, 310));
-        assert_eq!(input.take(start), [], "a third click is not a second double click");
+        assert_eq!(input.take(start), [picked(false)], "a third click is not a second double click");
+        input.set_modifiers(ModifiersState::CONTROL, start);
+        input.button(MouseButton::Left, true, after(start, 1300));
+        input.button(MouseButton::Left, false, after(start, 1310));
+        assert_eq!(input.take(start), [picked(true)]);
 
         input.set_modifiers(ModifiersState::SHIFT, start);
         input.button(MouseButton::Left, true, after(start, 2000));
@@ -492,6 +577,17 @@ mod tests {
             input.wheel(1.0, start);
         }
         assert_eq!(input.speed(), SPEED_RANGE.1);
+    }
+
+    #[test]
+    fn a_turntable_goes_around_by_itself_until_it_is_stopped() {
+        let (mut input, start) = input();
+        input.toggle_spin(start);
+        assert!(input.is_moving());
+        assert_eq!(input.take(after(start, 1500)), [Command::Orbit { yaw_deg: 1.5 * SPIN_RATE_DEG, pitch_deg: 0.0 }]);
+        input.toggle_spin(after(start, 2000));
+        assert_eq!(input.take(after(start, 9000)), [Command::Orbit { yaw_deg: 0.5 * SPIN_RATE_DEG, pitch_deg: 0.0 }]);
+        assert!(!input.is_moving());
     }
 
     #[test]

@@ -4,7 +4,8 @@
 //! cannot disagree. Keys that move are physical (WASD is the same block of keys on every layout); all others are
 //! what the key types.
 
-use crate::frame::Command;
+use crate::frame::{Command, Edit};
+use crate::render::Inspection;
 use std::fmt::Write as _;
 use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 
@@ -25,6 +26,8 @@ pub enum Trigger {
     Hold(KeyCode, Motion),
     /// Happens once a press, and again as the keyboard repeats.
     Press(Chord, Action),
+    /// One of the keys 1 to 9, whatever it types.
+    Digit { ctrl: bool, shift: bool, action: fn(u8) -> Action },
     /// A gesture, told in words; `input` knows how.
     Mouse(&'static str),
 }
@@ -72,11 +75,23 @@ pub enum Action {
     Screenshot {
         linear: bool,
     },
+    /// As a scene file: the one that is open, or a new one.
+    SaveScene {
+        new: bool,
+    },
     PrintView,
+    /// Shows this in place of the picture, or the picture again.
+    Inspect(Inspection),
+    ToggleSharpZone,
+    /// Moves, turns or scales; then none.
+    NextGizmo,
+    /// The camera goes around by itself.
+    ToggleSpin,
+    TogglePanel,
     ToggleHelp,
     ToggleOverlays,
     ToggleFullscreen,
-    /// Closes the help, or else the window.
+    /// Closes the help, or lets go of what is selected, or closes the window.
     Leave,
     Quit,
 }
@@ -99,6 +114,18 @@ const fn shifted(key: Typed, shift: bool, action: Action) -> Trigger {
 
 const fn ctrl(key: &'static str, action: Action) -> Trigger {
     Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: None }, action)
+}
+
+const fn ctrl_shifted(key: &'static str, shift: bool, action: Action) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: Some(shift) }, action)
+}
+
+const fn edit(key: &'static str, shift: Option<bool>, edit: Edit) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift }, Action::Send(Command::Edit(edit)))
+}
+
+const fn inspect(key: &'static str, inspection: Inspection) -> Trigger {
+    Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, shift: Some(false) }, Action::Inspect(inspection))
 }
 
 const fn send(key: &'static str, command: Command) -> Trigger {
@@ -201,8 +228,32 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding {
                 triggers: &[send("f", Command::FrameAll)],
-                effect: "frame the whole scene, and focus on its middle",
+                effect: "frame what is selected, or the whole scene, and focus on it",
             },
+            Binding {
+                triggers: &[
+                    shifted(Typed::Named(NamedKey::Backspace), false, Action::Send(Command::PreviousView)),
+                    shifted(Typed::Named(NamedKey::Backspace), true, Action::Send(Command::NextView)),
+                ],
+                effect: "back to the view before, and forth again",
+            },
+            Binding {
+                triggers: &[Trigger::Digit {
+                    ctrl: true,
+                    shift: false,
+                    action: |slot| Action::Send(Command::SetBookmark { slot }),
+                }],
+                effect: "keep this view under a number",
+            },
+            Binding {
+                triggers: &[Trigger::Digit {
+                    ctrl: false,
+                    shift: true,
+                    action: |slot| Action::Send(Command::GoToBookmark { slot }),
+                }],
+                effect: "go to the view of that number",
+            },
+            Binding { triggers: &[text("u", Action::ToggleSpin)], effect: "turntable: go around the pivot, or stop" },
             Binding { triggers: &[text("v", Action::PrintView)], effect: "print the view as a scene file's camera" },
         ],
     },
@@ -220,6 +271,66 @@ pub static BINDINGS: &[Group] = &[
                 effect: "focus on what is under the mouse",
             },
             Binding { triggers: &[Trigger::Mouse("Double click")], effect: "focus there, and orbit at that depth" },
+            Binding {
+                triggers: &[send("l", Command::ToggleFocusLock)],
+                effect: "focus stays with what was focused on, or moves with the camera",
+            },
+            Binding {
+                triggers: &[text("y", Action::ToggleSharpZone)],
+                effect: "show what is sharp to a pixel, and the focal plane",
+            },
+        ],
+    },
+    Group {
+        title: "Select and edit",
+        bindings: &[
+            Binding { triggers: &[Trigger::Mouse("Click")], effect: "select what is under the mouse" },
+            Binding {
+                triggers: &[Trigger::Mouse("Ctrl+click")],
+                effect: "select it beside the others, or leave it out",
+            },
+            Binding { triggers: &[edit("a", None, Edit::SelectAll)], effect: "select everything" },
+            Binding {
+                triggers: &[text("g", Action::NextGizmo)],
+                effect: "handles to move, turn or scale what is selected, or none",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Ctrl, dragging a handle")],
+                effect: "in steps: 15 degrees, a tenth of the size",
+            },
+            Binding { triggers: &[edit("d", None, Edit::Duplicate)], effect: "duplicate what is selected" },
+            Binding {
+                triggers: &[named(NamedKey::Delete, Action::Send(Command::Edit(Edit::Delete)))],
+                effect: "delete what is selected",
+            },
+            Binding { triggers: &[edit("z", Some(false), Edit::Undo)], effect: "undo" },
+            Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "do again" },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Add")],
+                effect: "add a sphere, a plane, a cube, a light, a mesh",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Selected")],
+                effect: "place, material, light and mesh of what is selected, by numbers",
+            },
+        ],
+    },
+    Group {
+        title: "See what is going on",
+        bindings: &[
+            Binding { triggers: &[inspect("1", Inspection::Normals)], effect: "normals" },
+            Binding { triggers: &[inspect("2", Inspection::Depth)], effect: "depth" },
+            Binding { triggers: &[inspect("3", Inspection::Albedo)], effect: "albedo: colour without light" },
+            Binding { triggers: &[inspect("4", Inspection::Error)], effect: "relative error of each pixel" },
+            Binding { triggers: &[inspect("5", Inspection::Samples)], effect: "samples of each pixel" },
+            Binding { triggers: &[inspect("6", Inspection::TreeSteps)], effect: "kd-tree nodes that a ray visits" },
+            Binding {
+                triggers: &[inspect("7", Inspection::TriangleTests)],
+                effect: "blocks of triangles that a ray is tested against",
+            },
+            Binding { triggers: &[inspect("8", Inspection::Bounces)], effect: "bounces of a path" },
+            Binding { triggers: &[inspect("9", Inspection::Luminance)], effect: "false colour: brightness in stops" },
+            Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "the picture" },
         ],
     },
     Group {
@@ -253,7 +364,18 @@ pub static BINDINGS: &[Group] = &[
                 ],
                 effect: "keep its linear light as a new EXR file",
             },
-            Binding { triggers: &[Trigger::Mouse("Drop a file")], effect: "open a scene (.ron) or a model (.obj)" },
+            Binding {
+                triggers: &[ctrl_shifted("s", false, Action::SaveScene { new: false })],
+                effect: "save the scene file, or the scene as a new one",
+            },
+            Binding {
+                triggers: &[ctrl_shifted("s", true, Action::SaveScene { new: true })],
+                effect: "save the scene as a new scene file",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Drop a file")],
+                effect: "open a scene (.ron), a model (.obj) or a picture that was kept (.png, .exr)",
+            },
         ],
     },
     Group {
@@ -261,8 +383,9 @@ pub static BINDINGS: &[Group] = &[
         bindings: &[
             Binding {
                 triggers: &[text("h", Action::ToggleHelp), named(NamedKey::F1, Action::ToggleHelp)],
-                effect: "show these keys",
+                effect: "show these keys, and find one by a word",
             },
+            Binding { triggers: &[text("n", Action::TogglePanel)], effect: "panel: every setting, and figures" },
             Binding {
                 triggers: &[named(NamedKey::Tab, Action::ToggleOverlays)],
                 effect: "hide everything but the picture",
@@ -270,7 +393,7 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen" },
             Binding {
                 triggers: &[named(NamedKey::Escape, Action::Leave)],
-                effect: "close this list, or else the window",
+                effect: "close this list, or select nothing, or close the window",
             },
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
@@ -289,12 +412,25 @@ pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
     })
 }
 
-/// What pressing this key does.
-pub fn action_of(key: &Key, modifiers: ModifiersState) -> Option<Action> {
+/// What pressing this key does; digits count where they are on the keyboard, since Shift types something else there.
+pub fn action_of(physical: PhysicalKey, key: &Key, modifiers: ModifiersState) -> Option<Action> {
+    let digit = digit_of(physical).filter(|_| !modifiers.super_key() && !modifiers.alt_key());
     triggers().find_map(|trigger| match trigger {
         Trigger::Press(chord, action) if chord.matches(key, modifiers) => Some(action.clone()),
+        Trigger::Digit { ctrl, shift, action }
+            if (*ctrl, *shift) == (modifiers.control_key(), modifiers.shift_key()) =>
+        {
+            digit.map(action)
+        }
         _ => None,
     })
+}
+
+/// 1 to 9.
+fn digit_of(key: PhysicalKey) -> Option<u8> {
+    use KeyCode::{Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7, Digit8, Digit9};
+    let keys = [Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7, Digit8, Digit9];
+    (1..).zip(keys).find_map(|(digit, code)| (key == PhysicalKey::Code(code)).then_some(digit))
 }
 
 impl Chord {
@@ -340,6 +476,7 @@ impl Binding {
                     _ => format!("{code:?}").replace("Key", ""),
                 },
                 Trigger::Press(chord, _) => chord.label(),
+                Trigger::Digit { ctrl, .. } => if *ctrl { "Ctrl+1…9" } else { "Shift+1…9" }.to_owned(),
                 Trigger::Mouse(gesture) => (*gesture).to_owned(),
             })
             .collect();
@@ -409,13 +546,23 @@ mod tests {
     fn presses_find_their_actions() {
         let none = ModifiersState::empty();
         let key = |text: &str| Key::Character(text.into());
-        assert_eq!(action_of(&key("O"), ModifiersState::SHIFT), Some(Action::Send(Command::ToggleDepthOfField)));
-        assert_eq!(action_of(&key("k"), none), Some(Action::Screenshot { linear: false }));
-        assert_eq!(action_of(&key("K"), ModifiersState::SHIFT), Some(Action::Screenshot { linear: true }));
-        assert_eq!(action_of(&key("q"), none), None, "Q alone flies");
-        assert_eq!(action_of(&key("q"), ModifiersState::CONTROL), Some(Action::Quit));
-        assert_eq!(action_of(&key("}"), ModifiersState::SHIFT), Some(Action::Send(WIDER)));
-        assert_eq!(action_of(&Key::Named(NamedKey::Escape), none), Some(Action::Leave));
+        let pressed = |key: Key, modifiers| action_of(PhysicalKey::Code(KeyCode::F24), &key, modifiers);
+        let digit = |modifiers, typed: &str| action_of(PhysicalKey::Code(KeyCode::Digit3), &key(typed), modifiers);
+        assert_eq!(digit(none, "3"), Some(Action::Inspect(Inspection::Albedo)));
+        assert_eq!(digit(ModifiersState::CONTROL, "3"), Some(Action::Send(Command::SetBookmark { slot: 3 })));
+        assert_eq!(digit(ModifiersState::SHIFT, "§"), Some(Action::Send(Command::GoToBookmark { slot: 3 })));
+        assert_eq!(
+            pressed(key("Z"), ModifiersState::CONTROL | ModifiersState::SHIFT),
+            Some(Action::Send(Command::Edit(Edit::Redo)))
+        );
+        assert_eq!(pressed(key("z"), ModifiersState::CONTROL), Some(Action::Send(Command::Edit(Edit::Undo))));
+        assert_eq!(pressed(key("O"), ModifiersState::SHIFT), Some(Action::Send(Command::ToggleDepthOfField)));
+        assert_eq!(pressed(key("k"), none), Some(Action::Screenshot { linear: false }));
+        assert_eq!(pressed(key("K"), ModifiersState::SHIFT), Some(Action::Screenshot { linear: true }));
+        assert_eq!(pressed(key("q"), none), None, "Q alone flies");
+        assert_eq!(pressed(key("q"), ModifiersState::CONTROL), Some(Action::Quit));
+        assert_eq!(pressed(key("}"), ModifiersState::SHIFT), Some(Action::Send(WIDER)));
+        assert_eq!(pressed(Key::Named(NamedKey::Escape), none), Some(Action::Leave));
         assert_eq!(motion_of(PhysicalKey::Code(KeyCode::KeyW)), Some(Motion::Forward));
         assert_eq!(motion_of(PhysicalKey::Code(KeyCode::KeyH)), None);
     }

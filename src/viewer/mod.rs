@@ -10,6 +10,9 @@
 //! | `presenter` | picture and overlays onto the window; the only place that knows the graphics device |
 //! | [`keys`] | the one table of keys and gestures |
 //! | `input` | keys and mouse to commands, independent of the frame rate |
+//! | `panel` | every setting and figure, answered with commands |
+//! | `handles` | what is selected: its box and its handles |
+//! | `reaction` | how long a person waits |
 //! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
 //! | `saver` | pictures to disk, on the side |
 //! | [`display`] | is there a display at all |
@@ -17,10 +20,13 @@
 mod app;
 mod camera_text;
 pub mod display;
+mod handles;
 mod input;
 pub mod keys;
 mod overlay;
+mod panel;
 mod presenter;
+mod reaction;
 mod saver;
 mod status;
 mod toasts;

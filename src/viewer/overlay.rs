@@ -1,11 +1,14 @@
 //! What is written over the picture: the status line, messages, and the list of keys.
 
-use super::keys::{BINDINGS, Group};
+use super::keys::{BINDINGS, Binding, Group};
 use super::toasts::{Toast, Tone};
+use crate::render::{Legend, scale_color};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
 
 /// Dark glass, so that text reads on any picture.
-const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
+/// Of panels and lists, which are read for longer.
+pub const PANE: Color32 = Color32::from_rgba_premultiplied(19, 20, 23, 246);
+pub const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
 const TEXT: Color32 = Color32::from_gray(228);
 const KEY: Color32 = Color32::from_rgb(250, 205, 125);
 const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
@@ -20,7 +23,7 @@ pub fn style(context: &Context) {
     });
     context.all_styles_mut(|style| {
         style.visuals.override_text_color = Some(TEXT);
-        style.visuals.window_fill = GLASS;
+        style.visuals.window_fill = PANE;
         style.visuals.window_stroke = Stroke::new(1.0, Color32::from_gray(60));
         style.interaction.selectable_labels = false;
     });
@@ -74,26 +77,64 @@ pub fn toasts(context: &Context, toasts: &[Toast]) {
         });
 }
 
-/// The list of keys, in the middle; `open` becomes false when its cross is clicked.
-pub fn help(context: &Context, open: &mut bool) {
+/// What the list of keys remembers while it is open.
+#[derive(Default)]
+pub struct Help {
+    pub open: bool,
+    /// Only lines with all of these words are shown.
+    search: String,
+    /// Just opened: the search field takes the keyboard.
+    fresh: bool,
+}
+
+impl Help {
+    pub fn toggle(&mut self) {
+        *self = Self { open: !self.open, search: String::new(), fresh: true };
+    }
+}
+
+/// The list of keys, in the middle, to be searched and scrolled.
+pub fn help(context: &Context, help: &mut Help) {
     let screen = context.content_rect();
-    let column_width = 430.0;
+    let column_width = 430.0_f32.min(screen.width() - 60.0).max(120.0);
     let columns = if screen.width() >= 2.0 * column_width + 80.0 { 2 } else { 1 };
-    let room = Vec2::new(screen.width() - 50.0, screen.height() - 110.0).max(Vec2::splat(60.0));
+    let height = (screen.height() - 130.0).max(60.0);
+    let Help { open, search, fresh } = help;
     egui::Window::new("Keys and mouse")
         .open(open)
-        .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+        .anchor(Align2::CENTER_CENTER, Vec2::new(0.0, -8.0))
         .collapsible(false)
-        .auto_sized()
+        .resizable(false)
+        .fixed_size(Vec2::new(columns as f32 * column_width + 20.0, height))
         .show(context, |ui| {
-            egui::ScrollArea::both().max_width(room.x).max_height(room.y).show(ui, |ui| {
+            let field = egui::TextEdit::singleline(search).hint_text("find: focus, undo, depth …").desired_width(220.0);
+            let field = ui.add(field);
+            if std::mem::take(fresh) {
+                field.request_focus();
+            }
+            ui.add_space(4.0);
+            let words: Vec<String> = search.to_lowercase().split_whitespace().map(str::to_owned).collect();
+            let found = |group: &Group| -> Vec<&'static Binding> {
+                let is_found = |binding: &&Binding| {
+                    let line = format!("{} {} {}", group.title, binding.keys(), binding.effect).to_lowercase();
+                    words.iter().all(|word| line.contains(word))
+                };
+                group.bindings.iter().filter(is_found).collect()
+            };
+            let groups: Vec<(&str, Vec<&Binding>)> = BINDINGS
+                .iter()
+                .map(|group| (group.title, found(group)))
+                .filter(|(_, found)| !found.is_empty())
+                .collect();
+            egui::ScrollArea::vertical().auto_shrink([false, false]).max_height(height - 36.0).show(ui, |ui| {
+                if groups.is_empty() {
+                    ui.weak("nothing is called that");
+                }
                 ui.horizontal_top(|ui| {
-                    // The first groups fill the left column, the rest the right one.
-                    let split = BINDINGS.len().div_ceil(columns);
-                    for (i, groups) in BINDINGS.chunks(split).enumerate() {
+                    for (i, groups) in in_columns(&groups, columns).into_iter().enumerate() {
                         ui.vertical(|ui| {
                             ui.set_width(column_width);
-                            groups_grid(ui, i, groups);
+                            groups_grid(ui, i, groups, column_width);
                         });
                     }
                 });
@@ -101,21 +142,80 @@ pub fn help(context: &Context, open: &mut bool) {
         });
 }
 
-fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[Group]) {
-    egui::Grid::new(("keys", id)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
-        for group in groups {
-            ui.label(RichText::new(group.title).size(TEXT_SIZE + 2.0).strong());
-            ui.end_row();
-            for binding in group.bindings {
-                ui.label(RichText::new(binding.keys()).size(TEXT_SIZE).color(KEY));
-                ui.label(RichText::new(binding.effect).size(TEXT_SIZE));
+/// Splits the groups so that the columns are about as long as each other.
+fn in_columns<'a>(groups: &'a [(&'a str, Vec<&'a Binding>)], columns: usize) -> Vec<&'a [(&'a str, Vec<&'a Binding>)]> {
+    if columns < 2 {
+        return vec![groups];
+    }
+    let lines = |groups: &[(&str, Vec<&Binding>)]| groups.iter().map(|(_, found)| found.len() + 2).sum::<usize>();
+    let longer = |split: usize| lines(&groups[..split]).max(lines(&groups[split..]));
+    let split = (0..=groups.len()).min_by_key(|&split| longer(split)).unwrap_or(0);
+    vec![&groups[..split], &groups[split..]]
+}
+
+fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[(&str, Vec<&Binding>)], width: f32) {
+    let keys_width = 0.38 * width;
+    for (title, bindings) in groups {
+        ui.label(RichText::new(*title).size(TEXT_SIZE + 2.0).strong());
+        egui::Grid::new(("keys", id, title)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
+            for binding in bindings {
+                // Both sides wrap rather than push each other out.
+                ui.scope(|ui| {
+                    ui.set_width(keys_width);
+                    ui.add(egui::Label::new(RichText::new(binding.keys()).size(TEXT_SIZE).color(KEY)).wrap());
+                });
+                ui.scope(|ui| {
+                    ui.set_width(width - keys_width - 24.0);
+                    ui.add(egui::Label::new(RichText::new(binding.effect).size(TEXT_SIZE)).wrap());
+                });
                 ui.end_row();
             }
-            // An empty row parts the groups.
-            ui.label("");
-            ui.end_row();
-        }
-    });
+        });
+        ui.add_space(10.0);
+    }
+}
+
+/// What the colours of an inspection mean, in the lower left corner; it takes no mouse.
+pub fn legend(context: &Context, title: &str, legend: Option<Legend>) {
+    egui::Area::new("legend".into())
+        .order(Order::Foreground)
+        .interactable(false)
+        .fixed_pos(context.content_rect().left_bottom() + Vec2::new(10.0, -34.0))
+        .pivot(Align2::LEFT_BOTTOM)
+        .show(context, |ui| {
+            glass().show(ui, |ui| {
+                ui.label(RichText::new(title).size(TEXT_SIZE).strong());
+                let Some(Legend { low, high, unit }) = legend else { return };
+                let (rect, _) = ui.allocate_exact_size(Vec2::new(190.0, 10.0), egui::Sense::hover());
+                let n = 38;
+                for i in 0..n {
+                    let [r, g, b] = scale_color((i as f32 + 0.5) / n as f32);
+                    let left = rect.left() + rect.width() * i as f32 / n as f32;
+                    let cell = egui::Rect::from_min_size(
+                        egui::pos2(left, rect.top()),
+                        Vec2::new(rect.width() / n as f32 + 0.5, 10.0),
+                    );
+                    ui.painter().rect_filled(cell, 0.0, Color32::from_rgb(r, g, b));
+                }
+                ui.horizontal(|ui| {
+                    ui.set_width(190.0);
+                    ui.label(RichText::new(format!("{} {unit}", short(low))).size(TEXT_SIZE - 1.0));
+                    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                        ui.label(RichText::new(format!("{} {unit}", short(high))).size(TEXT_SIZE - 1.0));
+                    });
+                });
+            });
+        });
+}
+
+/// Three digits that mean something.
+fn short(value: f32) -> String {
+    match value.abs() {
+        v if v >= 100.0 || v.fract() == 0.0 => format!("{value:.0}"),
+        v if v >= 10.0 => format!("{value:.1}"),
+        v if v >= 0.1 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
 }
 
 fn glass() -> Frame {

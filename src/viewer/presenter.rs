@@ -83,6 +83,11 @@ impl Presenter {
         self.egui_state.egui_ctx()
     }
 
+    /// Physical pixels of a point, the unit of the overlays.
+    pub fn pixels_per_point(&self) -> f32 {
+        self.egui_state.egui_ctx().pixels_per_point()
+    }
+
     /// The largest side of a picture that can be shown.
     pub fn max_side(&self) -> u32 {
         self.pixels.device().limits().max_texture_dimension_2d

@@ -2,6 +2,7 @@
 
 use crate::frame::{PictureFormat, Print, Waker};
 use crate::render::{Display, Film};
+use crate::scene::{ShotDraft, ShotSamples};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
@@ -32,10 +33,11 @@ impl Saver {
         Self { folder: folder.to_owned(), waker, sender, receiver, threads: Vec::new() }
     }
 
-    /// Saves the film that will come, under the name of `scene` and the next free number; a PNG with `size` pixels.
+    /// Saves the film that will come, with what `draft` says of it, under the name of `scene` and the next free number; a PNG with `size` pixels.
     pub fn save(
         &mut self,
         film: Receiver<Film>,
+        draft: Option<ShotDraft>,
         display: Display,
         size: (u32, u32),
         scene: &str,
@@ -45,9 +47,15 @@ impl Saver {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
             let saved = match film.recv() {
-                Ok(film) => Print { film: &film, display: &display, size, note: None }
-                    .write_new(&folder, &stem, format)
-                    .map(|path| Kept { path, coarse: (film.width(), film.height()) != size }),
+                Ok(film) => {
+                    let coarse = (film.width(), film.height()) != size;
+                    let uneven = coarse || film.max_spp() > film.spp();
+                    let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven };
+                    // Paths in the note count from the folder, whatever the picture will be called.
+                    let note = draft.map(|draft| draft.note(&folder.join(&stem), size, samples, display.into()));
+                    let print = Print { film: &film, display: &display, size, note: note.as_deref() };
+                    print.write_new(&folder, &stem, format).map(|path| Kept { path, coarse })
+                }
                 Err(_) => Err("there was no picture to be kept".to_owned()),
             };
             // The window may be gone, and then nobody needs the news.
@@ -77,6 +85,14 @@ impl Saver {
         }
         self.finished()
     }
+}
+
+/// A scene file in `folder` that is not there yet, for what is open: `NAME-0001.ron`.
+pub fn new_scene_file(folder: &Path, scene: &str) -> PathBuf {
+    let stem = file_stem(scene);
+    let names = (1..=u32::MAX).map(|number| folder.join(format!("{stem}-{number:04}.ron")));
+    let mut free = names.filter(|path| !path.exists());
+    free.next().unwrap_or_else(|| folder.join(format!("{stem}.ron")))
 }
 
 /// A file name for pictures of this scene: its own name without folder and extension.
@@ -111,7 +127,7 @@ mod tests {
         );
         for _ in 0..8 {
             let film = ready(Film::new(3, 2));
-            saver.save(film, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
+            saver.save(film, None, Display::default(), (3, 2), "scenes/my room.ron", PictureFormat::Png);
         }
         let saved = saver.finish().into_iter().map(|saved| saved.unwrap());
         let mut saved: Vec<PathBuf> = saved.inspect(|kept| assert!(!kept.coarse)).map(|kept| kept.path).collect();
@@ -124,12 +140,12 @@ mod tests {
     #[test]
     fn a_failure_is_told() {
         let mut saver = Saver::new(Path::new("/no/such/folder"), Arc::new(|| ()));
-        saver.save(ready(Film::new(1, 1)), Display::default(), (1, 1), "gallery", PictureFormat::Exr);
+        saver.save(ready(Film::new(1, 1)), None, Display::default(), (1, 1), "gallery", PictureFormat::Exr);
         let [Err(error)] = &saver.finish()[..] else { panic!("it cannot have been saved") };
         assert!(error.contains("/no/such/folder"), "{error}");
 
         let (_, never) = channel();
-        saver.save(never, Display::default(), (1, 1), "gallery", PictureFormat::Png);
+        saver.save(never, None, Display::default(), (1, 1), "gallery", PictureFormat::Png);
         assert_eq!(saver.finish(), [Err("there was no picture to be kept".to_owned())]);
     }
 

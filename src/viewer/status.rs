@@ -53,7 +53,7 @@ pub fn settings(status: &Status) -> String {
     if status.display.tone_curve != ToneCurve::default() {
         parts.push(tone_curve(status.display.tone_curve).to_owned());
     }
-    parts.push("H: keys".to_owned());
+    parts.push("N: panel, H: keys".to_owned());
     parts.join("   ")
 }
 
@@ -65,7 +65,7 @@ pub fn tone_curve(curve: ToneCurve) -> &'static str {
     }
 }
 
-fn seconds(s: f64) -> String {
+pub fn seconds(s: f64) -> String {
     if s < 60.0 {
         format!("{s:.1} s")
     } else if s < 3600.0 {
@@ -76,7 +76,7 @@ fn seconds(s: f64) -> String {
 }
 
 /// Two digits that mean something.
-fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
         p if !p.is_finite() => "–".to_owned(),
@@ -87,7 +87,7 @@ fn percent(share: f64) -> String {
 }
 
 /// A length with the unit that suits it.
-fn metres(m: f64) -> String {
+pub fn metres(m: f64) -> String {
     match m {
         m if m.is_infinite() => "∞".to_owned(),
         m if m >= 1e5 => format!("{:.0} km", m / 1e3),
@@ -96,6 +96,15 @@ fn metres(m: f64) -> String {
         m if m >= 1e-2 => format!("{:.1} cm", m * 1e2),
         m if m >= 1e-4 => format!("{:.2} mm", m * 1e3),
         m => format!("{:.2} µm", m * 1e6),
+    }
+}
+
+/// A size of memory.
+pub fn bytes(n: u64) -> String {
+    match n as f64 {
+        n if n >= 1e9 => format!("{:.2} GB", n / 1e9),
+        n if n >= 1e6 => format!("{:.0} MB", n / 1e6),
+        n => format!("{:.0} kB", n / 1e3),
     }
 }
 
@@ -120,11 +129,11 @@ mod tests {
     #[test]
     fn settings_tell_only_what_is_unusual() {
         let mut status = Status::default();
-        assert_eq!(settings(&status), "H: keys");
+        assert_eq!(settings(&status), "N: panel, H: keys");
         status.rig.lens = Lens::thin(0.01, 2.5);
         status.paused = true;
         status.display.exposure_stops = -1.0 / 3.0;
-        assert_eq!(settings(&status), "paused   focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   H: keys");
+        assert_eq!(settings(&status), "paused   focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   N: panel, H: keys");
     }
 
     #[test]

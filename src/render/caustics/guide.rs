@@ -67,14 +67,7 @@ impl Guide {
             // All of equal points lie in one leaf: enough of them say as much as all.
             let list = &traces[..traces.len().min(LIST)];
             let first = self.exits.len() as u32;
-            self.exits.extend(list.iter().map(|trace| {
-                let mut distances: Vec<f32> =
-                    list.iter().map(|other| other.from.distance_squared(trace.from)).collect();
-                distances.sort_by(f32::total_cmp);
-                // A lone point, as under a pinhole, still stands for a small piece of its surface.
-                let least = (1e-3 * trace.at.distance(trace.from)).powi(2);
-                Exit { center: trace.from, radius2: distances[NEIGHBOR.min(list.len() - 1)].max(least) }
-            }));
+            self.exits.extend(exits_of(list, size.length()));
             let margin = Vec3::splat(0.25 * size.length());
             let n = list.len() as u32;
             self.nodes.push(Node::Leaf { first, n, min: min - margin, max: max + margin });
@@ -118,6 +111,33 @@ impl Guide {
             }
         }
     }
+}
+
+/// A ball around each exit of a list.
+///
+/// - `extent`: of the places reached, metres.
+///
+/// It reaches to a neighbour, so that the balls of one mirror image of a lamp overlap. A faint image of few exits has its
+/// next neighbours in another one: its balls are no larger than those of most exits, or than what exits move by from one
+/// end of the places to the other.
+fn exits_of(list: &[Trace], extent: f32) -> Vec<Exit> {
+    let reach = |trace: &Trace| {
+        let mut distances: Vec<f32> = list.iter().map(|other| other.from.distance_squared(trace.from)).collect();
+        distances.sort_by(f32::total_cmp);
+        distances[NEIGHBOR.min(list.len() - 1)]
+    };
+    let reaches: Vec<f32> = list.iter().map(reach).collect();
+    let mut sorted = reaches.clone();
+    sorted.sort_by(f32::total_cmp);
+    let most = sorted[sorted.len() / 2].max((0.5 * extent).powi(2));
+    list.iter()
+        .zip(reaches)
+        .map(|(trace, reach)| {
+            // A lone point still stands for a small piece of its surface.
+            let least = (1e-3 * trace.at.distance(trace.from)).powi(2);
+            Exit { center: trace.from, radius2: reach.min(most).max(least) }
+        })
+        .collect()
 }
 
 /// Where gathered light may come from at one place; never empty.
@@ -228,15 +248,21 @@ mod tests {
             let (n, fine) = (400_000, 40);
             let mut expected = vec![0.0_f64; side * side];
             let steps = side * fine;
-            for i in 0..steps * steps {
-                let y = ((i % steps) as f32 + 0.5) / steps as f32;
-                let phi = ((i / steps) as f32 + 0.5) / steps as f32 * std::f32::consts::TAU - std::f32::consts::PI;
+            let mut whole = 0.0;
+            for i in 0..2 * steps * steps {
+                let y = ((i % (2 * steps)) as f32 + 0.5) / steps as f32 - 1.0;
+                let phi =
+                    ((i / (2 * steps)) as f32 + 0.5) / steps as f32 * std::f32::consts::TAU - std::f32::consts::PI;
                 let r = (1.0 - y * y).sqrt();
                 let w = Vec3::new(r * phi.cos(), y, r * phi.sin());
                 let solid_angle = std::f64::consts::TAU / (steps * steps) as f64;
-                expected[bin(w)] += f64::from(guided.eval(Vec3::Y, w, Vec3::Y).1) * solid_angle;
+                let share = f64::from(guided.eval(Vec3::Y, w, Vec3::Y).1) * solid_angle;
+                whole += share;
+                // Below the surface nothing is kept.
+                if y > 0.0 {
+                    expected[bin(w)] += share;
+                }
             }
-            let whole: f64 = expected.iter().sum();
             assert!((whole - 1.0).abs() < 5e-3, "place {place}: {whole}");
             let mut found = vec![0.0_f64; side * side];
             for i in 0..n {

@@ -76,7 +76,13 @@ impl LightLayer {
         let sums = vec![ExactSum::default(); (size.x * size.y) as usize];
         let batches = Batches::of_film(sums.len());
         let first = batches.of_sample(first_sample);
-        Self { sums, batches, done: vec![first..first], spp: 0 }
+        Self { sums, batches, done: std::iter::once(first..first).collect(), spp: 0 }
+    }
+
+    /// Samples of the picture that some of the paths belong to, more than are complete when it was stopped.
+    pub fn begun(&self) -> u32 {
+        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
+        n_done.div_ceil(u64::from(self.batches.per_sample)) as u32
     }
 
     /// Mean over the paths so far.

@@ -5,6 +5,7 @@
 
 mod selection;
 mod shape;
+mod tree;
 mod wide;
 
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};

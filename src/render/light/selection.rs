@@ -1,5 +1,6 @@
-//! Which light to ask: a few lights by what each could send to the point, many by their power.
+//! Which light to ask: a few lights by what each could send to the point, many by a tree over them.
 
+use super::tree::LightTree;
 use super::{Light, LightShape, Techniques};
 use crate::lanes::{Float, Simd, Vector, select};
 use crate::sampling::AliasTable;
@@ -12,7 +13,9 @@ pub const MAX_ESTIMATED: usize = 16;
 pub(super) struct Selection {
     /// Bounds for the estimate; empty when there are too many lights.
     bounds: Vec<LightBounds>,
-    /// By power, when there are many.
+    /// When there are many.
+    tree: LightTree,
+    /// The same by power alone, for what has no point to ask from.
     alias: AliasTable,
 }
 
@@ -29,11 +32,11 @@ pub(super) struct LightBounds {
 impl Selection {
     pub fn build(lights: &[Light]) -> Self {
         if lights.len() <= MAX_ESTIMATED {
-            return Self { bounds: lights.iter().map(LightBounds::new).collect(), alias: AliasTable::default() };
+            return Self { bounds: lights.iter().map(LightBounds::new).collect(), ..Self::default() };
         }
         let powers: Vec<f64> =
             lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
-        Self { bounds: Vec::new(), alias: AliasTable::new(&powers) }
+        Self { bounds: Vec::new(), tree: LightTree::build(lights), alias: AliasTable::new(&powers) }
     }
 
     /// A light and the probability of the choice; `None` when no light can reach the point.
@@ -73,10 +76,7 @@ impl Selection {
                 *u = (rest / estimates[chosen]).clamp(0.0, 1.0f32.next_down());
                 (estimates[chosen] > 0.0).then(|| (chosen as u32, estimates[chosen] / sum))
             }
-            _ => {
-                let (id, pmf, _) = self.alias.sample(u_select());
-                Some((id, pmf))
-            }
+            _ => self.tree.sample(position, normal, u_select()),
         }
     }
 
@@ -98,7 +98,7 @@ impl Selection {
                 let (estimates, sum) = self.estimates(position, normal);
                 if sum > 0.0 { estimates[id as usize] / sum } else { 0.0 }
             }
-            _ => self.alias.pmf(id),
+            _ => self.tree.pmf(id, position, normal),
         }
     }
 

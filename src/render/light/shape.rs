@@ -248,6 +248,9 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
     let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
     let (local, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
     let frame = Frame::around(to_center / distance2.sqrt());
+    if distance2 < 2.0 * r2 {
+        return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));
+    }
     // The angle at the centre that belongs to the angle at the shading point (Pharr et al., section 6.2.4), written
     // so that nothing cancels for a sphere of few pixels.
     let sin2 = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0);
@@ -266,6 +269,29 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
         normal,
         uv: Vec2::ZERO,
     })
+}
+
+/// Where the direction `wi` (about the centre) meets a sphere that fills much of the sky.
+///
+/// Right above the surface all points that are seen lie within an angle at the centre that `f32` cannot resolve, so the way to
+/// the surface is what is computed, and its length from the power of the point, which does not cancel.
+#[cold]
+fn sphere_from_close_by(center: Vec3, radius: f32, position: Vec3, wi: Vec3, one_minus_cos_max: f32) -> LightPoint {
+    let (to_center, dir, r) = (center.as_dvec3() - position.as_dvec3(), wi.as_dvec3().normalize(), f64::from(radius));
+    let middle = to_center.dot(dir);
+    let power = to_center.length_squared() - r * r;
+    let distance = power / (middle + (middle * middle - power).max(0.0).sqrt());
+    let normal = (distance * dir - to_center).normalize();
+    let point = (center.as_dvec3() + r * normal).as_vec3();
+    let error = 2.0 * robust::UNIT_ROUNDOFF * point.abs();
+    let normal = normal.as_vec3();
+    LightPoint {
+        target: lifted(point, error, normal, distance as f32),
+        wi,
+        pdf: cone_pdf(one_minus_cos_max),
+        normal,
+        uv: Vec2::ZERO,
+    }
 }
 
 /// A sphere seen as a point in its centre, where all of its light is: π r² of radiance over distance².

@@ -1,0 +1,162 @@
+//! `firstlight stability`: the hard cases, counted, as a table or for machines. Fails if there is a finding.
+
+use super::Failure;
+use super::console::print;
+use clap::Args;
+use firstlight::report::cpu_seconds;
+use firstlight::stability::{CASES, Case, Tally};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::Instant;
+
+#[derive(Args, Clone, Debug)]
+pub struct StabilityArgs {
+    /// How many rays the largest case traces; the others trace a share of it. 1e9 is a long run.
+    #[arg(long, value_name = "N", default_value = "1e7", value_parser = parse_rays)]
+    rays: u64,
+    /// Only this case; may be given several times.
+    #[arg(long = "case", value_name = "NAME")]
+    cases: Vec<String>,
+    /// Tell what cases there are.
+    #[arg(long)]
+    list: bool,
+    /// Tell everything about one ray of one case, as a finding names it.
+    #[arg(long, value_name = "STAGE:RAY", value_parser = parse_ray)]
+    replay: Option<(usize, u64)>,
+    /// Worker threads; all cores when not given. The counts do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
+    if args.list {
+        let width = CASES.iter().map(|case| case.name.len()).max().unwrap_or(0);
+        return CASES.iter().try_for_each(|case| print(format_args!("{:width$}  {}", case.name, case.about)));
+    }
+    let cases = chosen(args)?;
+    if let Some((stage, ray)) = args.replay {
+        let [case] = cases[..] else {
+            return Err(Failure::Usage("--replay wants one --case NAME beside it".to_owned()));
+        };
+        let told = case.replay(stage, ray);
+        let told =
+            told.ok_or_else(|| Failure::Failed(format!("{}: there is no stage {stage} to replay", case.name)))?;
+        return print(told.trim_end());
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.map_or(0, usize::from))
+        .build()
+        .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
+    pool.install(|| count(args, &cases))
+}
+
+fn chosen(args: &StabilityArgs) -> Result<Vec<&'static Case>, Failure> {
+    if args.cases.is_empty() {
+        return Ok(CASES.iter().collect());
+    }
+    let find = |name: &String| {
+        let hint = || firstlight::scene::suggestion(name, CASES.iter().map(|case| case.name));
+        Case::find(name).ok_or_else(|| Failure::Usage(format!("there is no case `{name}`{}; see --list", hint())))
+    };
+    args.cases.iter().map(find).collect()
+}
+
+fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
+    let total: u64 = cases.iter().map(|case| case.rays(args.rays)).sum();
+    let watched = std::io::stderr().is_terminal();
+    let target = if watched { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
+        .expect("the template is well formed");
+    let bar = ProgressBar::with_draw_target(Some(total.max(1)), target).with_style(style);
+    if !args.json {
+        print(HEAD.trim_end())?;
+    }
+    let (start, cpu_before) = (Instant::now(), cpu_seconds());
+    let mut rows = Vec::new();
+    let mut before = 0;
+    for case in cases {
+        bar.set_message(case.name);
+        bar.set_position(before);
+        let clock = Instant::now();
+        let tally = case.run(args.rays, &|rays| bar.inc(rays));
+        before += case.rays(args.rays);
+        if !args.json {
+            bar.suspend(|| print(row(case, &tally).trim_end()))?;
+        }
+        rows.push((case, tally, clock.elapsed().as_secs_f64()));
+    }
+    bar.finish_and_clear();
+    let cpu = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
+    let findings: u64 = rows.iter().map(|(_, tally, _)| tally.findings()).sum();
+    let rays: u64 = rows.iter().map(|(_, tally, _)| tally.rays).sum();
+    if args.json {
+        let cases: Vec<_> = rows.iter().map(|(case, tally, seconds)| json(case, tally, *seconds)).collect();
+        let seconds = start.elapsed().as_secs_f64();
+        print(
+            serde_json::json!({ "cases": cases, "rays": rays, "findings": findings, "seconds": seconds, "cpu_s": cpu }),
+        )?;
+    } else {
+        print(format_args!("\n{rays} rays, {findings} findings, {:.0} s", start.elapsed().as_secs_f64()))?;
+        for (case, tally, _) in rows.iter().filter(|(_, tally, _)| tally.findings() > 0) {
+            let Some(worst) = &tally.worst else { continue };
+            print(format_args!("\nworst of {}: {}", case.name, worst.what))?;
+            if case.can_replay() {
+                let (stage, ray) = (worst.stage, worst.ray);
+                print(format_args!("  firstlight stability --case {} --replay {stage}:{ray}", case.name))?;
+            }
+        }
+    }
+    if findings > 0 { Err(Failure::Failed(format!("{findings} findings"))) } else { Ok(()) }
+}
+
+const HEAD: &str = "\
+| case           |          rays | leaks | acne | missed | wrong t | non-finite | light error (allowed) | worst of bound |
+|----------------|--------------:|------:|-----:|-------:|--------:|-----------:|----------------------:|---------------:|
+";
+
+fn row(case: &Case, tally: &Tally) -> String {
+    let Tally { rays, leaks, acne, missed, wrong_t, non_finite, energy, worst } = tally;
+    let light = energy.map_or(String::new(), |energy| format!("{:.1e} ({:.0e})", energy.error, energy.allowed));
+    let worst = worst.as_ref().map_or(String::new(), |worst| format!("{:.2}", worst.severity));
+    format!(
+        "| {:14} | {rays:13} | {leaks:5} | {acne:4} | {missed:6} | {wrong_t:7} | {non_finite:10} | {light:>21} | {worst:>14} |\n",
+        case.name
+    )
+}
+
+fn json(case: &Case, tally: &Tally, seconds: f64) -> serde_json::Value {
+    let energy = tally.energy.map(|energy| serde_json::json!({ "error": energy.error, "allowed": energy.allowed }));
+    let worst = tally.worst.as_ref().map(|worst| {
+        let replay = case.can_replay().then(|| format!("--case {} --replay {}:{}", case.name, worst.stage, worst.ray));
+        serde_json::json!({ "severity": worst.severity, "what": worst.what, "replay": replay })
+    });
+    serde_json::json!({
+        "case": case.name,
+        "rays": tally.rays,
+        "leaks": tally.leaks,
+        "acne": tally.acne,
+        "missed": tally.missed,
+        "wrong_t": tally.wrong_t,
+        "non_finite": tally.non_finite,
+        "energy": energy,
+        "worst": worst,
+        "findings": tally.findings(),
+        "seconds": seconds,
+    })
+}
+
+/// A whole number, also written as 1e9.
+fn parse_rays(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(rays) if (1.0..=1e15).contains(&rays) => Ok(rays as u64),
+        _ => Err("must be a number of rays from 1 to 1e15, such as 1e8".to_owned()),
+    }
+}
+
+fn parse_ray(text: &str) -> Result<(usize, u64), String> {
+    let parsed = text.split_once(':').and_then(|(stage, ray)| Some((stage.parse().ok()?, ray.parse().ok()?)));
+    parsed.ok_or_else(|| "write it as STAGE:RAY, such as 12:345, as a finding names it".to_owned())
+}

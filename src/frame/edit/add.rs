@@ -1,0 +1,209 @@
+//! New things, copies, and removal.
+//!
+//! What is removed keeps its entity and loses its components, so that an undone removal comes back as the same entity
+//! and everything that names it is right again.
+
+use crate::frame::selection::{Selection, pick};
+use crate::frame::systems::{PictureSize, Shown};
+use crate::mesh::procedural;
+use crate::scene::file::{MeshShadingPart, MeshSourcePart};
+use crate::scene::{Material, MaterialSlots, MeshOrigin, Ordinal, Paint, Placement, PointLight, Shape, View};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, World};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// What can be added. It comes to stand on what the middle of the picture shows, as large as a tenth of its distance.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum NewThing {
+    Sphere,
+    Plane,
+    /// A glowing square above, that faces down.
+    AreaLight,
+    PointLight,
+    Cube,
+    /// A built-in mesh or an OBJ file; read beside the picture.
+    Mesh(MeshSourcePart),
+}
+
+/// Whether the entity is an object or a light that stands in the scene.
+pub fn is_thing(world: &World, entity: Entity) -> bool {
+    world.get::<Shape>(entity).is_some() || world.get::<PointLight>(entity).is_some()
+}
+
+/// Where new things go: the place, and how large they should be, metres.
+pub fn spot(world: &mut World) -> (DVec3, f64) {
+    let view = world.resource::<Shown>().inputs.camera.map_or_else(View::default, |camera| camera.view);
+    let aspect = world.resource::<PictureSize>().aspect();
+    let hit = world.resource::<Shown>().extraction.as_ref().and_then(|scene| pick(scene, 0.5, 0.5, aspect));
+    // What lies far behind the pivot is a wall or the floor at the horizon.
+    let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
+    let (place, distance) = hit.map_or((view.pivot(), view.pivot_distance), |hit| (hit.point, hit.depth));
+    (place, 0.1 * distance)
+}
+
+pub fn add(world: &mut World, new: &NewThing) {
+    let (place, size) = spot(world);
+    let up = DVec3::Y * size;
+    let entity = match new {
+        NewThing::Sphere => {
+            let material =
+                new_material(world, "ball", Material::Diffuse { albedo: Paint::Rgb(Vec3::new(0.7, 0.35, 0.2)) });
+            spawn(
+                world,
+                "ball",
+                (Shape::Sphere { radius: size }, Placement::at(place + up), MaterialSlots(vec![material])),
+            )
+        }
+        NewThing::Plane => {
+            let material = new_material(world, "ground", Material::Diffuse { albedo: Paint::Rgb(Vec3::splat(0.5)) });
+            let shape = Shape::Plane { normal: DVec3::Y };
+            spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))
+        }
+        NewThing::AreaLight => {
+            let radiance = Paint::Rgb(Vec3::new(12.0, 11.0, 9.5));
+            let material = new_material(world, "lamp", Material::Emissive { radiance });
+            let edge = 2.0 * size;
+            // u × v looks down.
+            let shape = Shape::Quad { edge_u: edge * DVec3::X, edge_v: edge * DVec3::Z };
+            let corner = place + 6.0 * up - 0.5 * edge * (DVec3::X + DVec3::Z);
+            spawn(world, "lamp", (shape, Placement::at(corner), MaterialSlots(vec![material])))
+        }
+        NewThing::PointLight => {
+            let intensity = Vec3::splat((50.0 * size * size) as f32);
+            let light = PointLight { intensity, radius: 0.1 * size };
+            spawn(world, "point light", (light, Placement::at(place + 5.0 * up)))
+        }
+        NewThing::Cube => {
+            let material =
+                new_material(world, "cube", Material::Diffuse { albedo: Paint::Rgb(Vec3::new(0.25, 0.4, 0.6)) });
+            let mesh = procedural::cuboid(DVec3::ONE);
+            let shape = Shape::Mesh(std::sync::Arc::new(mesh));
+            let placement = sized(Placement::at(place + up), 2.0 * size);
+            let origin = MeshOrigin {
+                source: MeshSourcePart::Builtin("cube".to_owned()),
+                shading: MeshShadingPart::Flat,
+                simplify: None,
+                own_materials: false,
+            };
+            spawn(world, "cube", (shape, placement, MaterialSlots(vec![material]), origin))
+        }
+        NewThing::Mesh(source) => {
+            crate::frame::remesh::start_new(world, source.clone(), place, size);
+            return;
+        }
+    };
+    world.resource_mut::<Selection>().choose(entity, false);
+}
+
+/// Evenly scaled.
+pub fn sized(placement: Placement, factor: f64) -> Placement {
+    let linear = crate::scene::Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
+    Placement { linear, ..placement }
+}
+
+/// With a name that nothing else has, after everything else in the scene file.
+pub fn spawn(world: &mut World, name: &str, bundle: impl bevy_ecs::bundle::Bundle) -> Entity {
+    let (name, ordinal) = (free_name(world, name), next_ordinal(world));
+    world.spawn((bundle, Name::new(name), ordinal)).id()
+}
+
+pub fn new_material(world: &mut World, name: &str, material: Material) -> Entity {
+    spawn(world, name, material)
+}
+
+/// `name`, or the first of `name 2`, `name 3`, … that is free.
+fn free_name(world: &mut World, name: &str) -> String {
+    let taken: std::collections::HashSet<String> =
+        world.query::<&Name>().iter(world).map(|name| name.as_str().to_owned()).collect();
+    let numbered = (2..).map(|i| format!("{name} {i}"));
+    std::iter::once(name.to_owned()).chain(numbered).find(|name| !taken.contains(name)).expect("numbers go on")
+}
+
+fn next_ordinal(world: &mut World) -> Ordinal {
+    let last = world.query::<&Ordinal>().iter(world).map(|ordinal| ordinal.0).max();
+    Ordinal(last.map_or(0, |last| last.saturating_add(1)))
+}
+
+pub fn delete(world: &mut World) {
+    for entity in std::mem::take(&mut world.resource_mut::<Selection>().0) {
+        bury(world, entity);
+    }
+}
+
+/// Takes all that makes the entity a part of the scene.
+pub fn bury(world: &mut World, entity: Entity) {
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        entity.remove::<(Shape, Placement, MaterialSlots, Material, PointLight, MeshOrigin, Ordinal, Name)>();
+    }
+}
+
+pub fn duplicate(world: &mut World) {
+    let selected = world.resource::<Selection>().0.clone();
+    let (_, size) = spot(world);
+    let mut copies = Vec::new();
+    for entity in selected {
+        let name = world.get::<Name>(entity).map_or("copy".to_owned(), |name| plain_name(name.as_str()).to_owned());
+        let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
+        // Beside the old one, or nobody would see it.
+        placement.translation.x += size;
+        let copy = spawn(world, &name, placement);
+        if let Some(shape) = world.get::<Shape>(entity).cloned() {
+            let slots = world.get::<MaterialSlots>(entity).cloned().unwrap_or_default();
+            let origin = world.get::<MeshOrigin>(entity).cloned();
+            let mut copy = world.entity_mut(copy);
+            copy.insert((shape, slots));
+            if let Some(origin) = origin {
+                copy.insert(origin);
+            }
+        }
+        if let Some(&light) = world.get::<PointLight>(entity) {
+            world.entity_mut(copy).insert(light);
+        }
+        copies.push(copy);
+    }
+    world.resource_mut::<Selection>().0 = copies;
+}
+
+/// Without the number that [`free_name`] has put behind it.
+fn plain_name(name: &str) -> &str {
+    match name.rsplit_once(' ') {
+        Some((plain, number)) if !plain.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()) => plain,
+        _ => name,
+    }
+}
+
+/// Gives `object` a copy of its first material; plain grey if it has none.
+pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
+    let old = world.get::<MaterialSlots>(object).and_then(|slots| slots.0.first().copied());
+    let material = old.and_then(|old| world.get::<Material>(old)).cloned().unwrap_or(Material::GREY);
+    let name = old.and_then(|old| world.get::<Name>(old)).map(|name| plain_name(name.as_str()).to_owned());
+    let material = new_material(world, &name.unwrap_or_else(|| "material".to_owned()), material);
+    let mut slots = world.get_mut::<MaterialSlots>(object).ok_or("this has no material")?;
+    match slots.0.first_mut() {
+        Some(first) => *first = material,
+        None => slots.0.push(material),
+    }
+    Ok(())
+}
+
+/// A material for things that come without one.
+pub fn clay(world: &mut World) -> Entity {
+    let clay = Material::Diffuse { albedo: Paint::Rgb(Vec3::new(0.72, 0.56, 0.45)) };
+    new_material(world, "clay", clay)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_numbered_and_copies_do_not_pile_up_numbers() {
+        let mut world = World::new();
+        for expected in ["ball", "ball 2", "ball 3"] {
+            let entity = spawn(&mut world, "ball", Placement::default());
+            assert_eq!(world.get::<Name>(entity).unwrap().as_str(), expected);
+        }
+        assert_eq!([plain_name("ball 17"), plain_name("tall ball"), plain_name("7")], ["ball", "tall ball", "7"]);
+    }
+}

@@ -1,0 +1,213 @@
+//! Changing the scene itself: what can be asked for, and how it is carried out.
+//!
+//! Every edit is data, so that a window, a script and a recording can ask for it, and every edit changes ordinary
+//! components, so that the smallest reset follows by itself. Nothing here knows how to undo: [`super::history`] sees
+//! what became of the world and keeps what was before.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `mod` | the list of edits, and the system that empties the queue |
+//! | `property` | numbers of materials, lights, shapes and sky |
+//! | `place` | moving, turning and scaling what is selected |
+//! | `add` | new things, copies, removal |
+
+mod add;
+mod place;
+mod property;
+
+pub use add::NewThing;
+pub(super) use add::{clay, spawn};
+pub use property::{MaterialKind, Property, paint_of, textures};
+
+use super::history::History;
+use super::selection::{Selection, pick};
+use super::status::{MessageKind, Status};
+use super::systems::{Clock, PictureSize, Shown};
+use crate::scene::MaterialSlots;
+use crate::scene::file::MeshShadingPart;
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, Resource, World};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// An entity as a number, see [`Entity::to_bits`].
+pub type Id = u64;
+
+/// One change of the scene, or of what is selected.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Edit {
+    /// Select what is at this place of the picture, fractions as in [`super::Command`]. With `add`, beside what is
+    /// selected already, or no longer.
+    PickAt {
+        x: f64,
+        y: f64,
+        add: bool,
+    },
+    Select {
+        id: Id,
+        add: bool,
+    },
+    SelectAll,
+    SelectNone,
+    /// From here to [`Edit::End`] everything is one step to undo, and [`Edit::Move`], [`Edit::Turn`] and
+    /// [`Edit::Scale`] count from here.
+    Begin,
+    End,
+    Undo,
+    Redo,
+    /// What is selected.
+    Delete,
+    /// Copies of what is selected, which then are selected.
+    Duplicate,
+    Add(NewThing),
+    /// What is selected, metres in the world.
+    Move {
+        by: DVec3,
+    },
+    /// What is selected, about the middle of the last one's place; `axis` in the world.
+    Turn {
+        axis: DVec3,
+        angle_deg: f64,
+    },
+    /// What is selected, about the last one's place: along its own axes if it is one, evenly if they are several.
+    Scale {
+        factors: DVec3,
+    },
+    /// One number or one colour of an entity.
+    Set {
+        id: Id,
+        property: Property,
+        value: DVec3,
+    },
+    /// Another kind of material, as near to the old one as it can be.
+    SetKind {
+        id: Id,
+        kind: MaterialKind,
+    },
+    /// A texture that the scene has, by name, in the place of a material's colour.
+    SetTexture {
+        id: Id,
+        name: String,
+    },
+    /// Gives an object a material that the scene has.
+    Assign {
+        id: Id,
+        material: Id,
+    },
+    /// Gives an object a copy of its material, for itself alone.
+    OwnMaterial {
+        id: Id,
+    },
+    Rename {
+        id: Id,
+        name: String,
+    },
+    /// Makes an object's mesh anew from where it came from, beside the picture.
+    Remesh {
+        id: Id,
+        shading: MeshShadingPart,
+        /// Share of the faces to keep, (0, 1].
+        ratio: f64,
+    },
+}
+
+/// Edits that wait for their stage of the frame, in order.
+#[derive(Resource, Default)]
+pub struct EditQueue(pub Vec<Edit>);
+
+/// Carries out the edits that were asked for.
+///
+/// Reads [`EditQueue`]; writes entities, [`Selection`], [`History`], [`Status`].
+pub fn edit_scene(world: &mut World) {
+    for edit in std::mem::take(&mut world.resource_mut::<EditQueue>().0) {
+        if let Err(problem) = carry_out(world, edit) {
+            let now = world.resource::<Clock>().0;
+            world.resource_mut::<Status>().say(now, MessageKind::Warning, problem);
+        }
+    }
+    // What is gone is not selected.
+    let gone: Vec<Entity> =
+        world.resource::<Selection>().0.iter().copied().filter(|&entity| !add::is_thing(world, entity)).collect();
+    if !gone.is_empty() {
+        world.resource_mut::<Selection>().0.retain(|entity| !gone.contains(entity));
+    }
+}
+
+fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
+    match edit {
+        Edit::PickAt { x, y, add } => {
+            let aspect = world.resource::<PictureSize>().aspect();
+            let picked = world.resource::<Shown>().extraction.as_ref().and_then(|scene| pick(scene, x, y, aspect));
+            let mut selection = world.resource_mut::<Selection>();
+            match picked {
+                Some(picked) => selection.choose(picked.entity, add),
+                None if !add => selection.0.clear(),
+                None => {}
+            }
+        }
+        Edit::Select { id, add } => {
+            let entity = thing(world, id)?;
+            world.resource_mut::<Selection>().choose(entity, add);
+        }
+        Edit::SelectAll => {
+            let inputs = &world.resource::<Shown>().inputs;
+            let objects = inputs.objects.iter().map(|object| object.entity);
+            let all = objects.chain(inputs.lights.iter().map(|light| light.entity)).collect();
+            world.resource_mut::<Selection>().0 = all;
+        }
+        Edit::SelectNone => world.resource_mut::<Selection>().0.clear(),
+        Edit::Begin => History::begin(world),
+        Edit::End => History::end(world),
+        Edit::Undo => History::step_back(world).ok_or("there is nothing to undo")?,
+        Edit::Redo => History::step_on(world).ok_or("there is nothing to do again")?,
+        Edit::Delete => add::delete(world),
+        Edit::Duplicate => add::duplicate(world),
+        Edit::Add(new) => add::add(world, &new),
+        Edit::Move { by } => place::displace(world, |_| place::Change::Move(by)),
+        Edit::Turn { axis, angle_deg } => {
+            let axis = axis.try_normalize().filter(|_| angle_deg.is_finite()).ok_or("this is no way to turn")?;
+            place::displace(world, |center| place::Change::Turn { center, axis, angle_deg });
+        }
+        Edit::Scale { factors } => {
+            // Flat or inside out is never meant.
+            if !(factors.is_finite() && factors.min_element() > 0.0) {
+                return Err("sizes are multiplied by numbers above 0".to_owned());
+            }
+            place::displace(world, |center| place::Change::Scale { center, factors });
+        }
+        Edit::Set { id, property, value } => property::set(world, Entity::try_from_bits(id), property, value)?,
+        Edit::SetKind { id, kind } => property::set_kind(world, existing(world, id)?, kind)?,
+        Edit::SetTexture { id, name } => property::set_texture(world, existing(world, id)?, &name)?,
+        Edit::Assign { id, material } => {
+            let (object, material) = (thing(world, id)?, existing(world, material)?);
+            if let Some(mut slots) = world.get_mut::<MaterialSlots>(object) {
+                slots.0 = vec![material];
+            }
+        }
+        Edit::OwnMaterial { id } => {
+            let object = thing(world, id)?;
+            add::own_material(world, object)?;
+        }
+        Edit::Rename { id, name } => {
+            let entity = existing(world, id)?;
+            let name = name.trim();
+            match name.is_empty() {
+                true => drop(world.entity_mut(entity).remove::<Name>()),
+                false => drop(world.entity_mut(entity).insert(Name::new(name.to_owned()))),
+            }
+        }
+        Edit::Remesh { id, shading, ratio } => super::remesh::start(world, thing(world, id)?, shading, ratio)?,
+    }
+    Ok(())
+}
+
+fn existing(world: &World, id: Id) -> Result<Entity, String> {
+    let entity = Entity::try_from_bits(id).filter(|&entity| world.get_entity(entity).is_ok());
+    entity.ok_or_else(|| "what was to be changed is gone".to_owned())
+}
+
+/// An entity that stands in the scene.
+fn thing(world: &World, id: Id) -> Result<Entity, String> {
+    let entity = existing(world, id)?;
+    if add::is_thing(world, entity) { Ok(entity) } else { Err("what was to be changed is gone".to_owned()) }
+}

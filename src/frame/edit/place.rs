@@ -1,0 +1,113 @@
+//! Moving, turning and scaling what is selected.
+//!
+//! Amounts count from the beginning of a change ([`super::Edit::Begin`]), never from the frame before, so that a long
+//! drag rounds no more than a short one, and dragging back gives back the old bits.
+
+use crate::frame::history::History;
+use crate::frame::selection::{OwnBox, Selection, box_of};
+use crate::scene::{Linear, Placement};
+use bevy_ecs::prelude::World;
+use glam::{DMat3, DQuat, DVec3, EulerRot};
+
+/// What is to be done to a placement.
+pub enum Change {
+    Move(DVec3),
+    /// `axis` is unit.
+    Turn {
+        center: DVec3,
+        axis: DVec3,
+        angle_deg: f64,
+    },
+    Scale {
+        center: DVec3,
+        factors: DVec3,
+    },
+}
+
+/// Changes the placements of all that is selected; `change` is told the middle of the last one.
+pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
+    let selected = world.resource::<Selection>().0.clone();
+    let several = selected.len() > 1;
+    let before: Vec<_> = selected
+        .into_iter()
+        .filter_map(|entity| {
+            let begun = world.resource::<History>().placement_at_begin(entity);
+            Some((entity, begun.or_else(|| world.get::<Placement>(entity).copied())?))
+        })
+        .collect();
+    let Some(&(active, last)) = before.last() else { return };
+    let own_box = box_of(world, active).map(|own| OwnBox { world_from_box: last.affine(), ..own });
+    let change = change(own_box.map_or(last.translation, |own| own.middle()));
+    for (entity, placement) in before {
+        let changed = changed(&placement, &change, several);
+        // Reading first: a mutable borrow alone would mark it.
+        if changed.affine().is_finite() && world.get::<Placement>(entity) != Some(&changed) {
+            world.entity_mut(entity).insert(changed);
+        }
+    }
+}
+
+/// Of `several`, each is scaled evenly: along the axes of one, the others would shear.
+fn changed(placement: &Placement, change: &Change, several: bool) -> Placement {
+    let Placement { translation, linear } = *placement;
+    match *change {
+        Change::Move(by) => Placement { translation: translation + by, linear },
+        Change::Turn { center, axis, angle_deg } => {
+            let turn = DQuat::from_axis_angle(axis, angle_deg.to_radians());
+            Placement { translation: center + turn * (translation - center), linear: turned(&linear, turn) }
+        }
+        Change::Scale { center, factors } => {
+            let factors = if several { DVec3::splat(factors.max_element()) } else { factors };
+            let linear = match linear {
+                Linear::Turned { rotation_deg, scale } => Linear::Turned { rotation_deg, scale: scale * factors },
+                Linear::Matrix(matrix) => Linear::Matrix(matrix * DMat3::from_diagonal(factors)),
+            };
+            Placement { translation: center + factors * (translation - center), linear }
+        }
+    }
+}
+
+/// Turned in the world, in the form in which it was given, so that its numbers stay readable.
+fn turned(linear: &Linear, turn: DQuat) -> Linear {
+    match *linear {
+        Linear::Turned { rotation_deg, scale } => {
+            let DVec3 { x, y, z } = rotation_deg.map(f64::to_radians);
+            let (z, y, x) = (turn * DQuat::from_euler(EulerRot::ZYX, z, y, x)).to_euler(EulerRot::ZYX);
+            // A billionth of a degree is nothing to see, and rounds away what a right angle lost on the way.
+            let tidy = |angle: f64| (angle.to_degrees() * 1e9).round() / 1e9 + 0.0;
+            Linear::Turned { rotation_deg: DVec3::new(x, y, z).map(tidy), scale }
+        }
+        Linear::Matrix(matrix) => Linear::Matrix(DMat3::from_quat(turn) * matrix),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turning_in_the_world_is_what_matrices_say() {
+        let placement = Placement {
+            translation: DVec3::new(1.0, 2.0, 3.0),
+            linear: Linear::Turned { rotation_deg: DVec3::new(20.0, -70.0, 130.0), scale: DVec3::new(1.0, 2.0, 0.5) },
+        };
+        let (center, axis) = (DVec3::new(0.5, 0.0, -1.0), DVec3::new(1.0, 2.0, -0.5).normalize());
+        let change = Change::Turn { center, axis, angle_deg: 77.0 };
+        let expected = DMat3::from_axis_angle(axis, 77f64.to_radians());
+        let result = changed(&placement, &change, false);
+        assert!(result.linear().abs_diff_eq(expected * placement.linear(), 1e-10));
+        let matrix = Placement { linear: Linear::Matrix(placement.linear()), ..placement };
+        assert!(changed(&matrix, &change, false).affine().abs_diff_eq(result.affine(), 1e-10));
+        let back = changed(&result, &Change::Turn { center, axis, angle_deg: -77.0 }, false);
+        assert!(back.affine().abs_diff_eq(placement.affine(), 1e-9));
+    }
+
+    #[test]
+    fn one_is_scaled_along_its_axes_and_several_evenly() {
+        let placement = Placement::at(DVec3::X);
+        let change = Change::Scale { center: DVec3::ZERO, factors: DVec3::new(1.0, 3.0, 1.0) };
+        assert_eq!(changed(&placement, &change, false).linear(), DMat3::from_diagonal(DVec3::new(1.0, 3.0, 1.0)));
+        let evenly = changed(&placement, &change, true);
+        assert_eq!((evenly.translation, evenly.even_scale()), (3.0 * DVec3::X, Some(3.0)));
+    }
+}

@@ -1,0 +1,277 @@
+//! The numbers and colours of materials, lights, shapes and sky, one at a time.
+
+use crate::render::{Environment, Fresnel};
+use crate::scene::file::{EnvironmentPart, Rgb};
+use crate::scene::{Amount, Linear, Material, Paint, Placement, PointLight, SceneEnvironment, Shape, SurfaceTexture};
+use bevy_ecs::prelude::{Entity, World};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What [`super::Edit::Set`] sets. A number is the first of the three values, and `x` is all that counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Property {
+    /// Metres.
+    Translation,
+    /// Degrees about X, then Y, then Z.
+    Rotation,
+    Scale,
+    /// Of a sphere or of a point light, metres.
+    Radius,
+    /// Of a point light, W·sr⁻¹.
+    Intensity,
+    /// The colour of a material: albedo, reflectance, the diffuse share of Phong, or the radiance of a light.
+    Color,
+    /// GGX width, the square of what users call roughness.
+    Alpha,
+    /// 0: the same reflectance at every angle; else Schlick's.
+    Schlick,
+    Ior,
+    /// Per metre.
+    Absorption,
+    Ambient,
+    Specular,
+    Shininess,
+    Transparency,
+    /// Of the second part of a blend.
+    Weight,
+    /// Radiance of an even sky.
+    Sky,
+    Zenith,
+    Horizon,
+    Ground,
+}
+
+/// The kinds of [`Material`] that one can be turned into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum MaterialKind {
+    Diffuse,
+    Mirror,
+    Metal,
+    Glass,
+    Phong,
+    Emissive,
+}
+
+impl MaterialKind {
+    pub const ALL: [Self; 6] = [Self::Diffuse, Self::Mirror, Self::Metal, Self::Glass, Self::Phong, Self::Emissive];
+
+    /// `None` for a blend.
+    pub fn of(material: &Material) -> Option<Self> {
+        Some(match material {
+            Material::Diffuse { .. } => Self::Diffuse,
+            Material::Mirror { .. } => Self::Mirror,
+            Material::Metal { .. } => Self::Metal,
+            Material::Glass { .. } => Self::Glass,
+            Material::Phong { .. } => Self::Phong,
+            Material::Emissive { .. } => Self::Emissive,
+            Material::Blend { .. } => return None,
+        })
+    }
+
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Diffuse => "matte",
+            Self::Mirror => "mirror",
+            Self::Metal => "metal",
+            Self::Glass => "glass",
+            Self::Phong => "Phong",
+            Self::Emissive => "light",
+        }
+    }
+}
+
+/// The colour of a material, if it has one.
+pub fn paint_of(material: &Material) -> Option<&Paint> {
+    match material {
+        Material::Diffuse { albedo: paint }
+        | Material::Mirror { reflectance: paint }
+        | Material::Metal { reflectance: paint, .. }
+        | Material::Phong { diffuse: paint, .. }
+        | Material::Emissive { radiance: paint } => Some(paint),
+        Material::Glass { .. } | Material::Blend { .. } => None,
+    }
+}
+
+fn paint_mut(material: &mut Material) -> Option<&mut Paint> {
+    match material {
+        Material::Diffuse { albedo: paint }
+        | Material::Mirror { reflectance: paint }
+        | Material::Metal { reflectance: paint, .. }
+        | Material::Phong { diffuse: paint, .. }
+        | Material::Emissive { radiance: paint } => Some(paint),
+        Material::Glass { .. } | Material::Blend { .. } => None,
+    }
+}
+
+/// Sets one property; the sky needs no entity.
+pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value: DVec3) -> Result<(), String> {
+    if !value.is_finite() {
+        return Err("a number must be finite".to_owned());
+    }
+    if matches!(property, Property::Sky | Property::Zenith | Property::Horizon | Property::Ground) {
+        return set_sky(world, property, value.max(DVec3::ZERO).as_vec3());
+    }
+    let entity = entity.filter(|&entity| world.get_entity(entity).is_ok());
+    let entity = entity.ok_or("what was to be changed is gone")?;
+    let wrong = || format!("this has no {property:?}");
+    if let Some(placement) = world.get::<Placement>(entity).copied()
+        && let Some(placement) = with_placement(placement, property, value)
+    {
+        set_if_different(world, entity, placement);
+        return Ok(());
+    }
+    if property == Property::Radius && !(value.x > 0.0) {
+        return Err("a radius is above 0".to_owned());
+    }
+    if let (Some(Shape::Sphere { .. }), Property::Radius) = (world.get::<Shape>(entity), property) {
+        set_if_different(world, entity, Shape::Sphere { radius: value.x });
+        return Ok(());
+    }
+    if let Some(&light) = world.get::<PointLight>(entity) {
+        let light = match property {
+            Property::Radius => PointLight { radius: value.x, ..light },
+            Property::Intensity => PointLight { intensity: value.max(DVec3::ZERO).as_vec3(), ..light },
+            _ => return Err(wrong()),
+        };
+        set_if_different(world, entity, light);
+        return Ok(());
+    }
+    let mut material = world.get::<Material>(entity).cloned().ok_or_else(wrong)?;
+    set_in_material(&mut material, property, value).ok_or_else(wrong)?;
+    set_if_different(world, entity, material);
+    Ok(())
+}
+
+fn set_if_different<T: bevy_ecs::component::Component + PartialEq>(world: &mut World, entity: Entity, value: T) {
+    if world.get::<T>(entity) != Some(&value) {
+        world.entity_mut(entity).insert(value);
+    }
+}
+
+/// `None` where the property is not of a placement. What is given as a matrix keeps its linear part.
+fn with_placement(placement: Placement, property: Property, value: DVec3) -> Option<Placement> {
+    let Placement { translation, linear } = placement;
+    Some(match (property, linear) {
+        (Property::Translation, linear) => Placement { translation: value, linear },
+        (Property::Rotation, Linear::Turned { scale, .. }) => {
+            Placement { translation, linear: Linear::Turned { rotation_deg: value, scale } }
+        }
+        (Property::Scale, Linear::Turned { rotation_deg, .. }) if value.min_element() > 0.0 => {
+            Placement { translation, linear: Linear::Turned { rotation_deg, scale: value } }
+        }
+        (Property::Rotation | Property::Scale, _) => placement,
+        _ => return None,
+    })
+}
+
+fn set_in_material(material: &mut Material, property: Property, value: DVec3) -> Option<()> {
+    let number = value.x as f32;
+    let share = number.clamp(0.0, 1.0);
+    match (property, material) {
+        (Property::Color, Material::Emissive { radiance }) => {
+            *radiance = Paint::Rgb(value.max(DVec3::ZERO).as_vec3());
+        }
+        (Property::Color, material) => {
+            *paint_mut(material)? = Paint::Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3());
+        }
+        (Property::Alpha, Material::Metal { alpha, .. }) => *alpha = Amount::Number(number.clamp(1e-3, 1.0)),
+        (Property::Schlick, Material::Metal { fresnel, .. }) => {
+            *fresnel = if number == 0.0 { Fresnel::Constant } else { Fresnel::Schlick };
+        }
+        (Property::Ior, Material::Glass { ior, .. } | Material::Phong { ior, .. }) => *ior = number.clamp(0.1, 10.0),
+        (Property::Absorption, Material::Glass { absorption, .. } | Material::Phong { absorption, .. }) => {
+            *absorption = value.max(DVec3::ZERO).as_vec3();
+        }
+        (Property::Ambient, Material::Phong { ambient, .. }) => *ambient = share,
+        (Property::Specular, Material::Phong { specular, .. }) => *specular = Amount::Number(share),
+        (Property::Shininess, Material::Phong { shininess, .. }) => *shininess = number.clamp(1.0, 1e5),
+        (Property::Transparency, Material::Phong { transparency, .. }) => *transparency = share,
+        (Property::Weight, Material::Blend { weight, .. }) => *weight = Amount::Number(share),
+        _ => return None,
+    }
+    Some(())
+}
+
+/// Keeps the colour, where both have one.
+pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result<(), String> {
+    let old = world.get::<Material>(entity).ok_or("this is not a material")?;
+    if MaterialKind::of(old) == Some(kind) {
+        return Ok(());
+    }
+    let was_light = matches!(old, Material::Emissive { .. });
+    let paint = paint_of(old).cloned().unwrap_or(Paint::Rgb(Vec3::splat(0.7)));
+    // A light is brighter than white, and a surface is not.
+    let color = match paint {
+        Paint::Rgb(rgb) if was_light => Paint::Rgb(rgb / rgb.max_element().max(1.0)),
+        Paint::Rgb(rgb) if kind == MaterialKind::Emissive => Paint::Rgb(rgb * 5.0),
+        paint => paint,
+    };
+    world.entity_mut(entity).insert(match kind {
+        MaterialKind::Diffuse => Material::Diffuse { albedo: color },
+        MaterialKind::Mirror => Material::Mirror { reflectance: color },
+        MaterialKind::Metal => Material::Metal {
+            alpha: Amount::Number(0.04),
+            reflectance: color,
+            fresnel: Fresnel::Schlick,
+            compensate: true,
+        },
+        MaterialKind::Glass => Material::Glass { ior: 1.5, absorption: Vec3::ZERO },
+        MaterialKind::Phong => Material::Phong {
+            diffuse: color,
+            ambient: 1.0,
+            specular: Amount::Number(0.2),
+            shininess: 50.0,
+            transparency: 0.0,
+            ior: 1.5,
+            absorption: Vec3::ZERO,
+        },
+        MaterialKind::Emissive => Material::Emissive { radiance: color },
+    });
+    Ok(())
+}
+
+/// All textures that materials of the world use, by name.
+pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
+    let mut found: Vec<Arc<SurfaceTexture>> = Vec::new();
+    for material in world.query::<&Material>().iter(world) {
+        if let Some(Paint::Texture(texture)) = paint_of(material)
+            && !found.iter().any(|known| Arc::ptr_eq(known, texture))
+        {
+            found.push(texture.clone());
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    found
+}
+
+pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), String> {
+    let texture = textures(world).into_iter().find(|texture| texture.name == name);
+    let texture = texture.ok_or_else(|| format!("no material uses a texture `{name}`"))?;
+    let mut material = world.get::<Material>(entity).cloned().ok_or("this is not a material")?;
+    *paint_mut(&mut material).ok_or("this material has no colour")? = Paint::Texture(texture);
+    set_if_different(world, entity, material);
+    Ok(())
+}
+
+fn set_sky(world: &mut World, property: Property, value: Vec3) -> Result<(), String> {
+    let sky = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default();
+    let (light, part) = match (property, &sky.light) {
+        (Property::Sky, Environment::Black | Environment::Constant(_)) => {
+            (Environment::Constant(value), EnvironmentPart::Constant(Rgb(value)))
+        }
+        (_, &Environment::Gradient { zenith, horizon, ground }) => {
+            let pick = |which, old| if property == which { value } else { old };
+            let zenith = pick(Property::Zenith, zenith);
+            let (horizon, ground) = (pick(Property::Horizon, horizon), pick(Property::Ground, ground));
+            let part = EnvironmentPart::Gradient { zenith: Rgb(zenith), horizon: Rgb(horizon), ground: Rgb(ground) };
+            (Environment::Gradient { zenith, horizon, ground }, part)
+        }
+        _ => return Err(format!("this sky has no {property:?}")),
+    };
+    let changed = SceneEnvironment { light, part, air: sky.air };
+    if changed != sky {
+        world.insert_resource(changed);
+    }
+    Ok(())
+}

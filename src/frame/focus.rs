@@ -1,0 +1,123 @@
+//! What is sharp: the zone of a lens, and a focal plane that stays with what was focused on.
+
+use super::navigation::focus_at;
+use crate::scene::{Lens, Placement, Projection, View};
+use bevy_ecs::prelude::{Entity, Resource, World};
+use glam::DVec3;
+
+/// Depths between which a lens blurs no more than asked, metres along the view axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharpZone {
+    pub near: f64,
+    /// May be infinite.
+    pub far: f64,
+}
+
+/// Where the circle of confusion is at most one pixel of a picture so many pixels high; `None` without depth of field.
+///
+/// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane a
+/// metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|.
+pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<SharpZone> {
+    let radius = lens.effective_radius();
+    if !(radius > 0.0) {
+        return None;
+    }
+    let pixel = 2.0 * projection.tan_half_vfov() / f64::from(height.max(1));
+    let (focus, slack) = (lens.focus_distance.recip(), pixel / (2.0 * radius));
+    let far = if focus > slack { (focus - slack).recip() } else { f64::INFINITY };
+    Some(SharpZone { near: (focus + slack).recip(), far })
+}
+
+/// The number that photographers give an aperture, for a film 24 mm high.
+pub fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
+    focal_length(projection) / (2.0 * lens_radius)
+}
+
+/// Metres.
+pub fn radius_of_f_stop(f_stop: f64, projection: &Projection) -> f64 {
+    focal_length(projection) / (2.0 * f_stop)
+}
+
+/// Of a lens before a film 24 mm high, metres.
+fn focal_length(projection: &Projection) -> f64 {
+    0.012 / projection.tan_half_vfov()
+}
+
+/// What the focal plane stays with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum FocusTarget {
+    /// It moves with the camera.
+    #[default]
+    Camera,
+    /// A point of the world.
+    Point(DVec3),
+    /// A point of an object, in the object's own space.
+    Object(Entity, DVec3),
+}
+
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Focus {
+    pub target: FocusTarget,
+    /// What was focused on last.
+    pub last: Option<(Entity, DVec3)>,
+}
+
+/// Moves the focal plane to where its target is.
+///
+/// Reads [`Focus`] and placements; writes the lens of the first camera.
+pub fn hold_focus(world: &mut World) {
+    let point = match world.resource::<Focus>().target {
+        FocusTarget::Camera => return,
+        FocusTarget::Point(point) => point,
+        FocusTarget::Object(entity, local) => match world.get::<Placement>(entity) {
+            Some(placement) => placement.affine().transform_point3(local),
+            None => {
+                world.resource_mut::<Focus>().target = FocusTarget::Camera;
+                return;
+            }
+        },
+    };
+    let cameras: Vec<(Entity, View, Lens)> = world
+        .query::<(Entity, &View, &Lens)>()
+        .iter(world)
+        .map(|(entity, view, lens)| (entity, *view, *lens))
+        .collect();
+    for (entity, view, lens) in cameras {
+        let held = focus_at(&lens, (point - view.eye).dot(view.forward));
+        if held != lens {
+            world.entity_mut(entity).insert(held);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_the_limits_the_circle_of_confusion_is_one_pixel() {
+        let projection = Projection { vfov_deg: 40.0 };
+        for (radius, focus, height) in [(0.05, 3.0, 720), (0.002, 12.0, 1080), (0.3, 0.5, 90)] {
+            let zone = sharp_zone(&Lens::thin(radius, focus), &projection, height).unwrap();
+            assert!(zone.near < focus && focus < zone.far);
+            for limit in [zone.near, zone.far].into_iter().filter(|limit| limit.is_finite()) {
+                // Two rays from opposite ends of the lens through one point of the focal plane, at that depth.
+                let apart = 2.0 * radius * (1.0 - limit / focus).abs();
+                let pixels = apart / limit / (2.0 * projection.tan_half_vfov()) * f64::from(height);
+                assert!((pixels - 1.0).abs() < 1e-9, "{pixels} pixels at {limit}");
+            }
+        }
+        assert_eq!(sharp_zone(&Lens::pinhole(1.0), &projection, 720), None);
+        assert_eq!(sharp_zone(&Lens::thin(1e-6, 3.0), &projection, 720).unwrap().far, f64::INFINITY);
+        let infinite = sharp_zone(&Lens::thin(0.01, f64::INFINITY), &projection, 720).unwrap();
+        assert!(infinite.near > 1.0 && infinite.far == f64::INFINITY);
+    }
+
+    #[test]
+    fn f_stops_and_radii_say_the_same() {
+        // A lens of 50 mm at f/2 is 25 mm wide.
+        let projection = Projection { vfov_deg: 2.0 * (12.0_f64 / 50.0).atan().to_degrees() };
+        assert!((f_stop(0.0125, &projection) - 2.0).abs() < 1e-12);
+        assert!((radius_of_f_stop(2.0, &projection) - 0.0125).abs() < 1e-12);
+    }
+}

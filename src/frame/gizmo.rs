@@ -1,0 +1,297 @@
+//! Handles to move, turn and scale what is selected: where they are in the window, which one the mouse is on, and what
+//! a drag of it means. Pure: no window, no world.
+//!
+//! A drag is measured from where it was grabbed, so its result depends on where the mouse is and not on the way there.
+
+use super::selection::Projector;
+use glam::{DVec2, DVec3};
+use std::f64::consts::TAU;
+
+/// What the handles do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    #[default]
+    Move,
+    Turn,
+    Scale,
+}
+
+impl Mode {
+    pub const ALL: [Self; 3] = [Self::Move, Self::Turn, Self::Scale];
+
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Move => "move",
+            Self::Turn => "turn",
+            Self::Scale => "scale",
+        }
+    }
+}
+
+/// A part of the gizmo that can be grabbed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handle {
+    /// Along an axis, or about it.
+    Axis(usize),
+    /// In the plane across an axis.
+    Plane(usize),
+    /// In the plane of the picture; evenly; about the view axis.
+    Middle,
+}
+
+/// What a drag amounts to since it began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drag {
+    Move(DVec3),
+    Turn { axis: DVec3, angle_deg: f64 },
+    Scale(DVec3),
+}
+
+/// The handles around a place in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gizmo {
+    pub mode: Mode,
+    pub center: DVec3,
+    /// Unit: the world's axes, or for scaling the thing's own.
+    pub axes: [DVec3; 3],
+    /// Length of an axis, metres.
+    pub size: f64,
+}
+
+/// What is drawn of a handle.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    pub handle: Handle,
+    /// Places in the window.
+    pub line: Vec<DVec2>,
+    /// A surface rather than a line.
+    pub filled: bool,
+}
+
+/// Length of an axis in the window, points.
+const LENGTH: f64 = 86.0;
+/// How near the mouse must come, points.
+const REACH: f64 = 8.0;
+/// Where the squares between two axes lie, as parts of the length.
+const SQUARE: (f64, f64) = (0.3, 0.48);
+const RING_STEPS: usize = 48;
+/// Steps of a snapped drag: degrees, and a part of the size.
+const SNAP_DEG: f64 = 15.0;
+
+impl Gizmo {
+    /// As large in the window wherever it is; `None` for a place that is not in front of the eye.
+    pub fn at(center: DVec3, mode: Mode, axes: [DVec3; 3], projector: &Projector) -> Option<Self> {
+        let size = LENGTH * projector.metres_at(center)?;
+        size.is_normal().then_some(Self { mode, center, axes, size })
+    }
+
+    /// Everything there is to draw, the farthest first in importance.
+    pub fn marks(&self, projector: &Projector) -> Vec<Mark> {
+        let mut marks = Vec::new();
+        let mut add = |handle, filled, points: &mut dyn Iterator<Item = DVec3>| {
+            let line: Option<Vec<DVec2>> = points.map(|point| projector.place(point)).collect();
+            if let Some(line) = line {
+                marks.push(Mark { handle, line, filled });
+            }
+        };
+        for i in 0..3 {
+            let (u, v) = (self.axes[(i + 1) % 3], self.axes[(i + 2) % 3]);
+            match self.mode {
+                Mode::Turn => {
+                    let at = |k: usize| {
+                        let (sin, cos) = (k as f64 / RING_STEPS as f64 * TAU).sin_cos();
+                        self.center + self.size * (cos * u + sin * v)
+                    };
+                    add(Handle::Axis(i), false, &mut (0..=RING_STEPS).map(at));
+                }
+                Mode::Move | Mode::Scale => {
+                    if self.mode == Mode::Move {
+                        let (a, b) = SQUARE;
+                        let corner = |s: f64, t: f64| self.center + self.size * (s * u + t * v);
+                        let corners = [corner(a, a), corner(b, a), corner(b, b), corner(a, b)];
+                        add(Handle::Plane(i), true, &mut corners.into_iter());
+                    }
+                    let end = self.center + self.size * self.axes[i];
+                    let start = self.center + 0.12 * self.size * self.axes[i];
+                    add(Handle::Axis(i), false, &mut [start, end].into_iter());
+                }
+            }
+        }
+        add(Handle::Middle, false, &mut std::iter::once(self.center));
+        marks
+    }
+
+    /// The handle under the mouse.
+    pub fn handle_at(&self, mouse: DVec2, projector: &Projector) -> Option<Handle> {
+        let distance = |mark: &Mark| match (mark.handle, mark.filled) {
+            // A ring's middle is empty space, and stays for clicking through.
+            (Handle::Middle, _) if self.mode == Mode::Turn => f64::INFINITY,
+            (Handle::Middle, _) => (mark.line[0] - mouse).length() - 4.0,
+            (_, true) if is_inside(mouse, &mark.line) => 0.0,
+            (_, true) => f64::INFINITY,
+            (_, false) => {
+                mark.line.windows(2).map(|ends| to_segment(mouse, ends[0], ends[1])).fold(f64::INFINITY, f64::min)
+            }
+        };
+        let marks = self.marks(projector);
+        let nearest = marks.iter().map(|mark| (distance(mark), mark.handle)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (nearest.0 <= REACH).then_some(nearest.1)
+    }
+
+    /// What dragging `handle` from one place of the window to another does; snapped to steps if so asked.
+    pub fn drag(&self, handle: Handle, from: DVec2, to: DVec2, projector: &Projector, snap: bool) -> Option<Drag> {
+        let step = |value: f64, step: f64| if snap { (value / step).round() * step } else { value };
+        let grid = 10f64.powf(self.size.log10().floor() - 1.0);
+        let view = (self.center - projector.eye()).try_normalize()?;
+        let on_plane = |normal: DVec3, place: DVec2| {
+            let dir = projector.direction(place);
+            let t = (self.center - projector.eye()).dot(normal) / dir.dot(normal);
+            // Behind the eye, or so flat that a pixel is a mile.
+            let flat = dir.dot(normal).abs() < 0.02 * dir.length();
+            (t > 0.0 && t.is_finite() && !flat).then(|| projector.eye() + t * dir)
+        };
+        let along = |axis: DVec3, place: DVec2| {
+            // The plane through the axis that faces the eye most.
+            let normal = (view - view.dot(axis) * axis).try_normalize()?;
+            Some((on_plane(normal, place)? - self.center).dot(axis))
+        };
+        match (self.mode, handle) {
+            (Mode::Move, Handle::Axis(i)) => {
+                let axis = self.axes[i];
+                let by = along(axis, to)? - along(axis, from)?;
+                Some(Drag::Move(step(by, grid) * axis))
+            }
+            (Mode::Move, Handle::Plane(i)) => {
+                let by = on_plane(self.axes[i], to)? - on_plane(self.axes[i], from)?;
+                let parts = self.axes.map(|axis| step(by.dot(axis), grid) * axis);
+                Some(Drag::Move(parts[(i + 1) % 3] + parts[(i + 2) % 3]))
+            }
+            (Mode::Move, Handle::Middle) => Some(Drag::Move(on_plane(view, to)? - on_plane(view, from)?)),
+            (Mode::Turn, handle) => {
+                let axis = if let Handle::Axis(i) = handle { self.axes[i] } else { view };
+                let angle = match (on_plane(axis, from), on_plane(axis, to)) {
+                    (Some(a), Some(b)) => {
+                        let (a, b) = (a - self.center, b - self.center);
+                        a.cross(b).dot(axis).atan2(a.dot(b))
+                    }
+                    // A ring seen from its edge turns by the way of the mouse around it.
+                    _ => {
+                        let tangent = axis.cross(view).try_normalize()?;
+                        let (a, b) =
+                            (projector.place(self.center)?, projector.place(self.center + self.size * tangent)?);
+                        (to - from).dot((b - a).try_normalize()?) / LENGTH
+                    }
+                };
+                Some(Drag::Turn { axis, angle_deg: step(angle.to_degrees(), SNAP_DEG) })
+            }
+            (Mode::Scale, Handle::Axis(i)) => {
+                let (a, b) = (along(self.axes[i], from)?, along(self.axes[i], to)?);
+                let mut factors = DVec3::ONE;
+                factors[i] = positive(step(b / a, 0.1))?;
+                Some(Drag::Scale(factors))
+            }
+            (Mode::Scale, _) => {
+                // To the right and up is larger; the length of an axis doubles.
+                let way = (to - from).dot(DVec2::new(1.0, -1.0)) / LENGTH;
+                Some(Drag::Scale(DVec3::splat(positive(step(way.exp2(), 0.1))?)))
+            }
+        }
+    }
+}
+
+fn positive(factor: f64) -> Option<f64> {
+    (factor.is_finite() && factor > 0.0).then_some(factor.max(1e-3))
+}
+
+fn to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
+    let along = b - a;
+    let t = ((point - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    let nearest = if t.is_finite() { a + t * along } else { a };
+    (point - nearest).length()
+}
+
+fn is_inside(point: DVec2, corners: &[DVec2]) -> bool {
+    let sides =
+        (0..corners.len()).map(|i| (corners[(i + 1) % corners.len()] - corners[i]).perp_dot(point - corners[i]));
+    let (mut left, mut right) = (false, false);
+    sides.for_each(|side| (left, right) = (left || side > 0.0, right || side < 0.0));
+    left != right
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::navigation::Rig;
+    use crate::scene::View;
+
+    fn projector() -> Projector {
+        let view = View::look_at(DVec3::new(4.0, 3.0, 6.0), DVec3::ZERO, DVec3::Y).unwrap();
+        Projector::new(&Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0))
+    }
+
+    fn gizmo(mode: Mode) -> Gizmo {
+        Gizmo::at(DVec3::new(0.2, 0.1, -0.3), mode, DVec3::AXES, &projector()).unwrap()
+    }
+
+    fn place(point: DVec3) -> DVec2 {
+        projector().place(point).unwrap()
+    }
+
+    #[test]
+    fn dragging_an_axis_moves_as_far_as_the_mouse_along_it() {
+        let (gizmo, projector) = (gizmo(Mode::Move), projector());
+        for i in 0..3 {
+            let axis = gizmo.axes[i];
+            let (from, to) = (gizmo.center + 0.7 * gizmo.size * axis, gizmo.center + 2.0 * gizmo.size * axis);
+            assert_eq!(gizmo.handle_at(place(from), &projector), Some(Handle::Axis(i)));
+            let Some(Drag::Move(by)) = gizmo.drag(Handle::Axis(i), place(from), place(to), &projector, false) else {
+                panic!()
+            };
+            assert!((by - (to - from)).length() < 1e-9, "axis {i}: {by}");
+        }
+        let (from, to) = (gizmo.center + DVec3::new(0.1, 0.0, 0.2), gizmo.center + DVec3::new(-0.4, 0.0, 0.6));
+        let Some(Drag::Move(by)) = gizmo.drag(Handle::Plane(1), place(from), place(to), &projector, false) else {
+            panic!()
+        };
+        assert!((by - (to - from)).length() < 1e-9, "{by}");
+    }
+
+    #[test]
+    fn squares_rings_and_the_middle_can_be_grabbed() {
+        let (mover, ring, projector) = (gizmo(Mode::Move), gizmo(Mode::Turn), projector());
+        let square = mover.center + 0.39 * mover.size * (DVec3::X + DVec3::Y);
+        assert_eq!(mover.handle_at(place(square), &projector), Some(Handle::Plane(2)));
+        assert_eq!(mover.handle_at(place(mover.center), &projector), Some(Handle::Middle));
+        assert_eq!(mover.handle_at(DVec2::new(5.0, 5.0), &projector), None);
+        let on_ring = ring.center + ring.size * DVec3::new(0.6, 0.0, 0.8);
+        assert_eq!(ring.handle_at(place(on_ring), &projector), Some(Handle::Axis(1)));
+        assert_eq!(ring.handle_at(place(ring.center), &projector), None, "the middle of a ring is free");
+    }
+
+    #[test]
+    fn dragging_along_a_ring_turns_by_that_angle_and_snaps() {
+        let (ring, projector) = (gizmo(Mode::Turn), projector());
+        let on_ring =
+            |deg: f64| place(ring.center + ring.size * DVec3::new(deg.to_radians().sin(), 0.0, deg.to_radians().cos()));
+        let turn = |snap| ring.drag(Handle::Axis(1), on_ring(10.0), on_ring(47.0), &projector, snap);
+        let Some(Drag::Turn { axis: DVec3::Y, angle_deg }) = turn(false) else { panic!() };
+        assert!((angle_deg - 37.0).abs() < 1e-9, "{angle_deg}");
+        assert_eq!(turn(true), Some(Drag::Turn { axis: DVec3::Y, angle_deg: 30.0 }));
+    }
+
+    #[test]
+    fn scaling_is_by_the_ratio_along_an_axis_or_even() {
+        let (gizmo, projector) = (gizmo(Mode::Scale), projector());
+        let (from, to) = (gizmo.center + gizmo.size * DVec3::X, gizmo.center + 1.5 * gizmo.size * DVec3::X);
+        let Some(Drag::Scale(factors)) = gizmo.drag(Handle::Axis(0), place(from), place(to), &projector, false) else {
+            panic!()
+        };
+        assert!((factors - DVec3::new(1.5, 1.0, 1.0)).length() < 1e-9, "{factors}");
+        let middle = place(gizmo.center);
+        let even = gizmo.drag(Handle::Middle, middle, middle + DVec2::new(LENGTH, 0.0), &projector, false);
+        assert_eq!(even, Some(Drag::Scale(DVec3::splat(2.0))));
+        let inside_out =
+            gizmo.drag(Handle::Axis(0), place(from), place(gizmo.center - DVec3::X * gizmo.size), &projector, false);
+        assert_eq!(inside_out, None);
+    }
+}

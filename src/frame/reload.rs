@@ -1,0 +1,185 @@
+//! Hot reload: when the open scene's file changes on disk, or a mesh, a material library or a picture that it points
+//! at, it is read again beside the old picture, and only what changed is read and built anew. The camera stays, unless
+//! the file says that it has moved. A file that cannot be read is a message, and the old scene stays.
+
+use super::Waker;
+use super::input::ModelUp;
+use super::saving::SavedAs;
+use super::status::{MessageKind, Status};
+use super::systems::{Clock, CurrentScene, Renderer, Shown, adopt};
+use super::watch::Watch;
+use crate::scene::{
+    Description, Developing, LoadOptions, LoadedScene, Rendering, SceneContent, SceneError, SceneInputs, SceneSource,
+    load,
+};
+use bevy_ecs::prelude::{Resource, World};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// No scene when it is the same as before.
+type ReadAgain = Result<Option<LoadedScene>, SceneError>;
+
+/// Looks after the files of the open scene.
+#[derive(Resource, Default)]
+pub struct HotReload {
+    watch: Option<Watch>,
+    /// What the watch has found.
+    changed: Arc<Mutex<Vec<PathBuf>>>,
+    /// What came of reading it again.
+    loaded: Arc<Mutex<Option<ReadAgain>>>,
+    waker: Option<Waker>,
+    /// Whose files are looked after, and the scene file it is known by.
+    watched: Option<(Arc<LoadedScene>, Option<PathBuf>)>,
+    /// Something is being read again.
+    busy: Arc<Mutex<bool>>,
+}
+
+impl HotReload {
+    /// `waker` is called when a file has changed.
+    pub fn new(waker: Option<Waker>) -> Self {
+        Self { waker, ..Self::default() }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Reads again what has changed on disk, and puts it into the place of the old scene.
+///
+/// Reads [`CurrentScene`]; writes the world, [`Status`].
+pub fn reload(world: &mut World) {
+    let Some(current) = world.get_resource::<CurrentScene>().map(|current| current.0.clone()) else { return };
+    let saved_as = world.resource::<SavedAs>().path.clone();
+    look_after(world, &current, saved_as.clone());
+    let now = world.resource::<Clock>().0;
+    let reload = world.resource::<HotReload>();
+    let finished = lock(&reload.loaded).take();
+    if let Some(result) = finished {
+        *lock(&world.resource::<HotReload>().busy) = false;
+        take(world, &current, result, now);
+        return;
+    }
+    if *lock(&reload.busy) {
+        return;
+    }
+    let changed = std::mem::take(&mut *lock(&reload.changed));
+    if changed.is_empty() {
+        return;
+    }
+    let names: Vec<String> = changed.iter().map(|path| path.display().to_string()).collect();
+    if has_unsaved_changes(world, &current) {
+        let message = "changed on disk, but the scene has changes that are not saved: save it, or open it again";
+        return world.resource_mut::<Status>().say(
+            now,
+            MessageKind::Warning,
+            format!("{} {message}", names.join(", ")),
+        );
+    }
+    let reload = world.resource::<HotReload>();
+    *lock(&reload.busy) = true;
+    let (loaded, waker) = (reload.loaded.clone(), reload.waker.clone());
+    let pool = world.resource::<Renderer>().0.pool();
+    let saved = world.resource::<SavedAs>().content;
+    let source = saved_as.map_or_else(|| current.source.clone(), SceneSource::Scene);
+    let options = world.resource::<ModelUp>().0;
+    let work = move || {
+        let options = LoadOptions { up: current.up.or(options), known: Some(&current), ..LoadOptions::default() };
+        let read = || pool.install(|| load(&source, &options));
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(read));
+        let result = result.unwrap_or_else(|_| {
+            Err(SceneError::in_file(source.title(), "cannot be read again: this is a bug in firstlight"))
+        });
+        // A file that was only touched, or saved by this very session.
+        let is_same = |scene: &LoadedScene| match saved {
+            Some(saved) => scene.content_fingerprint() == saved,
+            None => scene.file == current.file && scene.content_fingerprint() == current.content_fingerprint(),
+        };
+        *lock(&loaded) = Some(result.map(|scene| Some(scene).filter(|scene| !is_same(scene))));
+        if let Some(waker) = waker {
+            waker();
+        }
+    };
+    if let Err(error) = std::thread::Builder::new().name("firstlight reload".to_owned()).spawn(work) {
+        *lock(&world.resource::<HotReload>().busy) = false;
+        world.resource_mut::<Status>().say(now, MessageKind::Error, format!("no thread can be started: {error}"));
+    }
+}
+
+/// Watches the files of the open scene, if it is another one.
+fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<PathBuf>) {
+    let mut reload = world.resource_mut::<HotReload>();
+    let same = |(scene, path): &(Arc<LoadedScene>, Option<PathBuf>)| Arc::ptr_eq(scene, current) && *path == saved_as;
+    if reload.watched.as_ref().is_some_and(same) {
+        return;
+    }
+    let mut files = current.files();
+    if let Some(path) = &saved_as {
+        files.push(path.clone());
+    }
+    if reload.watch.is_none() {
+        let (changed, waker) = (reload.changed.clone(), reload.waker.clone());
+        let started = Watch::start(move |paths| {
+            lock(&changed).extend(paths);
+            if let Some(waker) = &waker {
+                waker();
+            }
+        });
+        match started {
+            Ok(watch) => reload.watch = Some(watch),
+            // Everything but this goes on without.
+            Err(error) => tracing::warn!("files are not looked after: {error}"),
+        }
+    }
+    if let Some(watch) = &reload.watch {
+        watch.set(files);
+    }
+    lock(&reload.changed).clear();
+    reload.watched = Some((current.clone(), saved_as));
+}
+
+/// Whether what the world holds is neither what was opened nor what was saved; the view does not count.
+fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
+    let description = Description::of(world, Some(current));
+    let now = SceneContent::of(world, &description).fingerprint();
+    let clean = world.resource::<SavedAs>().content;
+    now != clean.unwrap_or_else(|| current.content_fingerprint())
+}
+
+fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) {
+    let mut scene = match result {
+        Ok(Some(scene)) => scene,
+        Ok(None) => return,
+        Err(error) => {
+            let mut status = world.resource_mut::<Status>();
+            for problem in &error.problems {
+                status.say(now, MessageKind::Error, format!("{problem} (the scene stays as it was)"));
+            }
+            return;
+        }
+    };
+    // What a person has set stays, unless the file says something new about it.
+    let camera = SceneInputs::of(world).camera.filter(|_| scene.file.camera == old.file.camera);
+    let developing = (scene.file.display == old.file.display).then(|| *world.resource::<Developing>());
+    let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
+        == (old.file.integrator, old.file.max_depth, old.file.film.filter);
+    let rendering = same_settings.then(|| *world.resource::<Rendering>());
+    scene.shot = None;
+    let title = scene.source.title();
+    let trees = scene.trees.clone();
+    adopt(world, scene, now);
+    world.resource_mut::<Shown>().trees.extend(trees);
+    if let Some(camera) = camera
+        && let Some(new) = SceneInputs::of(world).camera
+    {
+        world.entity_mut(new.entity).insert((camera.view, camera.projection, camera.lens));
+    }
+    if let Some(developing) = developing {
+        world.insert_resource(developing);
+    }
+    if let Some(rendering) = rendering {
+        world.insert_resource(rendering);
+    }
+    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{title} was read again"));
+}

@@ -1,0 +1,146 @@
+//! Meshes made anew beside the picture: simplified, smoothed, or read for the first time.
+//!
+//! The new mesh is made from where the old one came from, by the same code that opens a scene, so that a saved scene
+//! opens with the very same triangles.
+
+use super::beside::Beside;
+use super::selection::Selection;
+use super::status::{MessageKind, Status};
+use super::systems::{Clock, CurrentScene, Renderer};
+use crate::mesh::{Deviation, Mesh};
+use crate::scene::file::{MeshShadingPart, MeshSourcePart};
+use crate::scene::{Linear, MaterialSlots, MeshBase, MeshOrigin, Placement, SceneError, Shape};
+use bevy_ecs::prelude::{Component, Entity, World};
+use glam::DVec3;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How far a simplified mesh is from the whole one.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct MeshMeasure {
+    pub whole_faces: usize,
+    pub faces: usize,
+    /// Between the two surfaces; `None` for the whole one.
+    pub deviation: Option<Deviation>,
+}
+
+/// Points for each direction of the measured distance: its mean to about a hundredth.
+const SAMPLES: usize = 20_000;
+
+/// What is to be made.
+#[derive(Clone, Debug)]
+pub struct Remake {
+    pub for_whom: ForWhom,
+    pub source: MeshSourcePart,
+    pub shading: MeshShadingPart,
+    pub ratio: f64,
+    folder: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ForWhom {
+    Object(Entity),
+    /// A new object, to stand here, as large as this, metres.
+    NewObject {
+        place: DVec3,
+        size: f64,
+    },
+}
+
+/// What came of it.
+pub struct Remade {
+    pub job: Remake,
+    pub result: Result<(Arc<Mesh>, MeshMeasure), SceneError>,
+}
+
+/// Begins to make an object's mesh anew. An earlier one of the same object that is not done yet is forgotten.
+pub fn start(world: &mut World, entity: Entity, shading: MeshShadingPart, ratio: f64) -> Result<(), String> {
+    if !(ratio > 0.0 && ratio <= 1.0) {
+        return Err(format!("the share of faces to keep is above 0 and at most 1, not {ratio}"));
+    }
+    let origin = world.get::<MeshOrigin>(entity).ok_or("it is not known where this mesh came from")?;
+    let source = origin.source.clone();
+    run(world, ForWhom::Object(entity), source, shading, ratio);
+    Ok(())
+}
+
+/// Begins to read a mesh that will become a new object.
+pub fn start_new(world: &mut World, source: MeshSourcePart, place: DVec3, size: f64) {
+    run(world, ForWhom::NewObject { place, size }, source, MeshShadingPart::Auto, 1.0);
+}
+
+fn run(world: &mut World, for_whom: ForWhom, source: MeshSourcePart, shading: MeshShadingPart, ratio: f64) {
+    let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
+    let job = Remake { for_whom, source, shading, ratio, folder };
+    let pool = world.resource::<Renderer>().0.pool();
+    world.resource::<Beside>().remake(job, pool);
+}
+
+impl Remake {
+    /// Does it; `base` is what the last one was made from, and then what this one was.
+    pub fn run(&self, base: &mut Option<MeshBase>) -> Result<(Arc<Mesh>, MeshMeasure), SceneError> {
+        let simplify = (self.ratio < 1.0).then_some(self.ratio);
+        let known = base.take().filter(|base| base.serves(&self.source, self.shading, simplify, &self.folder));
+        let whole = match known {
+            Some(base) => base,
+            None => MeshBase::read(&self.source, self.shading, simplify, &self.folder)?,
+        };
+        let mesh = whole.finish(self.shading, simplify);
+        let measured = mesh.map(|mesh| {
+            let deviation = simplify.map(|_| Deviation::between(whole.mesh(), &mesh, SAMPLES));
+            let (whole_faces, faces) = (whole.mesh().triangles.len(), mesh.triangles.len());
+            (Arc::new(mesh), MeshMeasure { whole_faces, faces, deviation })
+        });
+        *base = Some(whole);
+        measured
+    }
+
+    /// For people.
+    pub fn title(&self) -> String {
+        let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = &self.source;
+        match self.for_whom {
+            ForWhom::Object(_) => format!("simplifying {name}"),
+            ForWhom::NewObject { .. } => format!("reading {name}"),
+        }
+    }
+}
+
+/// Puts a mesh that was made into the world.
+pub fn take(world: &mut World, remade: Remade) {
+    let Remade { job, result } = remade;
+    let (mesh, measure) = match result {
+        Ok(made) => made,
+        Err(error) => {
+            let now = world.resource::<Clock>().0;
+            for problem in &error.problems {
+                world.resource_mut::<Status>().say(now, MessageKind::Error, problem.to_string());
+            }
+            return;
+        }
+    };
+    let simplify = (job.ratio < 1.0).then_some(job.ratio);
+    match job.for_whom {
+        ForWhom::Object(entity) => {
+            let Some(origin) = world.get::<MeshOrigin>(entity).cloned() else { return };
+            let origin = MeshOrigin { shading: job.shading, simplify, ..origin };
+            world.entity_mut(entity).insert((Shape::Mesh(mesh), origin, measure));
+        }
+        ForWhom::NewObject { place, size } => {
+            let material = super::edit::clay(world);
+            let bounds = mesh.bounds();
+            let extent = f64::from((bounds.max - bounds.min).max_element()).max(f64::MIN_POSITIVE);
+            let factor = 2.0 * size / extent;
+            // Its lowest point stands on the place.
+            let foot = mesh.center + 0.5 * (bounds.min + bounds.max).as_dvec3().with_y(2.0 * f64::from(bounds.min.y));
+            let linear = Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
+            let placement = Placement { translation: place - factor * foot, linear };
+            let origin =
+                MeshOrigin { source: job.source.clone(), shading: job.shading, simplify, own_materials: false };
+            let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = &job.source;
+            let stem = std::path::Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+            let bundle = (Shape::Mesh(mesh), placement, MaterialSlots(vec![material]), origin, measure);
+            let entity = super::edit::spawn(world, &stem.unwrap_or_else(|| name.clone()), bundle);
+            world.resource_mut::<Selection>().choose(entity, false);
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Saves the open scene beside the picture: the world is described in the frame, and written on a thread of its own.
+
+use super::Waker;
+use super::status::{MessageKind, Status};
+use super::systems::{Clock, CurrentScene};
+use crate::scene::{Description, Fingerprint, SavedScene, SceneContent};
+use bevy_ecs::prelude::{Resource, World};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+/// Where the open scene was saved last, and what it was then; forgotten when another is opened.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
+pub struct SavedAs {
+    pub path: Option<PathBuf>,
+    pub content: Option<Fingerprint>,
+}
+
+struct Saved {
+    path: PathBuf,
+    result: Result<SavedScene, String>,
+    content: Fingerprint,
+}
+
+/// What is to be saved, and what has been.
+#[derive(Resource, Default)]
+pub struct Saving {
+    /// Where to, for the next frame.
+    pub(super) requests: Vec<PathBuf>,
+    finished: Arc<Mutex<Vec<Saved>>>,
+    threads: Vec<JoinHandle<()>>,
+    waker: Option<Waker>,
+}
+
+impl Saving {
+    /// `waker` is called when a scene has been saved, or has not.
+    pub fn new(waker: Option<Waker>) -> Self {
+        let mut saving = Self::default();
+        saving.waker = waker;
+        saving
+    }
+
+    /// Nothing is asked for or under way.
+    pub fn is_idle(&self) -> bool {
+        let finished = self.finished.lock().unwrap_or_else(PoisonError::into_inner);
+        self.requests.is_empty() && finished.is_empty() && self.threads.iter().all(JoinHandle::is_finished)
+    }
+}
+
+impl Drop for Saving {
+    /// What a person has asked to be saved is saved, even if the window closes in the same moment.
+    fn drop(&mut self) {
+        for thread in self.threads.drain(..) {
+            // A panic has been printed by the thread itself.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Saves what was asked to be saved, and tells what came of it.
+///
+/// Reads the world; writes [`Saving`], [`SavedAs`], [`Status`].
+pub fn save(world: &mut World) {
+    let now = world.resource::<Clock>().0;
+    let finished = {
+        let mut saving = world.resource_mut::<Saving>();
+        saving.threads.retain(|thread| !thread.is_finished());
+        std::mem::take(&mut *saving.finished.lock().unwrap_or_else(PoisonError::into_inner))
+    };
+    for Saved { path, result, content } in finished {
+        match result {
+            Ok(saved) => {
+                let notes: String = saved.notes.iter().map(|note| format!("; {note}")).collect();
+                let mut status = world.resource_mut::<Status>();
+                status.scene = path.display().to_string();
+                status.say(now, MessageKind::Note, format!("saved {}{notes}", path.display()));
+                world.insert_resource(SavedAs { path: Some(path), content: Some(content) });
+            }
+            Err(error) => world.resource_mut::<Status>().say(now, MessageKind::Error, error),
+        }
+    }
+    for path in std::mem::take(&mut world.resource_mut::<Saving>().requests) {
+        let current = world.get_resource::<CurrentScene>().map(|current| current.0.clone());
+        let description = Description::of(world, current.as_deref());
+        let content = SceneContent::of(world, &description);
+        let mut saving = world.resource_mut::<Saving>();
+        let (finished, waker) = (saving.finished.clone(), saving.waker.clone());
+        let target = path.clone();
+        let work = move || {
+            let content = content.fingerprint();
+            let result = description.save(&path);
+            finished.lock().unwrap_or_else(PoisonError::into_inner).push(Saved { path, result, content });
+            if let Some(waker) = waker {
+                waker();
+            }
+        };
+        match std::thread::Builder::new().name("firstlight save".to_owned()).spawn(work) {
+            Ok(thread) => saving.threads.push(thread),
+            Err(error) => {
+                let message = format!("{}: cannot be saved: no thread can be started: {error}", target.display());
+                world.resource_mut::<Status>().say(now, MessageKind::Error, message);
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! What is selected, and what lies under the mouse.
+
+use super::navigation::Rig;
+use super::systems::Shown;
+use crate::geometry::Ray;
+use crate::render::Camera;
+use crate::scene::{Extraction, Placement, PointLight};
+use bevy_ecs::prelude::{Entity, Resource, World};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
+
+/// The selected objects and lights, in the order in which they were chosen; the last one is the active one.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection(pub Vec<Entity>);
+
+impl Selection {
+    pub fn active(&self) -> Option<Entity> {
+        self.0.last().copied()
+    }
+
+    /// Alone; or with `add` beside the others, or out of them if it was the active one.
+    pub fn choose(&mut self, entity: Entity, add: bool) {
+        let was_active = self.active() == Some(entity);
+        match add {
+            false => self.0 = vec![entity],
+            true => {
+                self.0.retain(|&other| other != entity);
+                if !was_active {
+                    self.0.push(entity);
+                }
+            }
+        }
+    }
+}
+
+/// What a place in the picture shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picked {
+    pub entity: Entity,
+    /// In the world.
+    pub point: DVec3,
+    /// Metres along the view axis.
+    pub depth: f64,
+}
+
+/// What lies at this place of the picture (0..1 from the upper left), through the middle of the lens.
+pub fn pick(scene: &Extraction, x: f64, y: f64, aspect: f64) -> Option<Picked> {
+    let camera = scene.snapshot.camera;
+    let dir = direction(&camera, x, y, aspect)?;
+    let hit = scene.snapshot.geometry.tree.closest_hit(&Ray::new(camera.eye, dir))?;
+    let depth = f64::from(hit.t * dir.dot(camera.forward));
+    let point = scene.origin + (camera.eye + hit.t * dir).as_dvec3();
+    let entity = *scene.entities.get(hit.object as usize)?;
+    (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, point, depth })
+}
+
+fn direction(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Vec3> {
+    let (across, upwards) = (2.0 * x as f32 - 1.0, 1.0 - 2.0 * y as f32);
+    let dir = camera.forward
+        + camera.right * (across * aspect as f32 * camera.tan_half_vfov)
+        + camera.up * (upwards * camera.tan_half_vfov);
+    if dir.is_finite() { dir.try_normalize() } else { None }
+}
+
+/// The box around a thing, along its own axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OwnBox {
+    pub min: DVec3,
+    pub max: DVec3,
+    pub world_from_box: DAffine3,
+}
+
+impl OwnBox {
+    /// Corner `i` has its maximum along axis `a` where bit `a` of `i` is set.
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+            self.world_from_box.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+        })
+    }
+
+    pub fn middle(&self) -> DVec3 {
+        self.world_from_box.transform_point3(0.5 * (self.min + self.max))
+    }
+}
+
+/// The box around an object or a light as it is in the picture; of what has no end, its own point.
+pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
+    if let Some(light) = world.get::<PointLight>(entity) {
+        let (min, max) = (DVec3::splat(-light.radius), DVec3::splat(light.radius));
+        let at = world.get::<Placement>(entity)?.translation;
+        return Some(OwnBox { min, max, world_from_box: DAffine3::from_translation(at) });
+    }
+    let shown = &mut *world.resource_mut::<Shown>();
+    let object = shown.inputs.objects.iter().find(|object| object.entity == entity)?;
+    let (min, max) = shown.extents.own_box(&object.shape).unwrap_or_default();
+    Some(OwnBox { min, max, world_from_box: object.placement.affine() })
+}
+
+/// From the world to the window: a pinhole at the eye of a camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Projector {
+    eye: DVec3,
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+    /// Units of the window for a metre at a metre.
+    scale: f64,
+    middle: DVec2,
+}
+
+impl Projector {
+    /// `size`: of the window, in the units in which places are wanted.
+    pub fn new(rig: &Rig, size: DVec2) -> Self {
+        let Rig { view, projection, .. } = rig;
+        Self {
+            eye: view.eye,
+            right: view.right(),
+            up: view.up,
+            forward: view.forward,
+            scale: 0.5 * size.y / projection.tan_half_vfov(),
+            middle: 0.5 * size,
+        }
+    }
+
+    /// `None` for what is not in front of the eye.
+    pub fn place(&self, point: DVec3) -> Option<DVec2> {
+        let offset = point - self.eye;
+        let depth = offset.dot(self.forward);
+        let place = self.middle + DVec2::new(offset.dot(self.right), -offset.dot(self.up)) * (self.scale / depth);
+        (depth > 0.0 && place.is_finite()).then_some(place)
+    }
+
+    /// The direction, not unit, in which a place of the window is seen.
+    pub fn direction(&self, place: DVec2) -> DVec3 {
+        let offset = (place - self.middle) / self.scale;
+        self.forward + offset.x * self.right - offset.y * self.up
+    }
+
+    pub fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// How many metres a unit of the window spans where `point` is; `None` for what is not in front of the eye.
+    pub fn metres_at(&self, point: DVec3) -> Option<f64> {
+        let depth = (point - self.eye).dot(self.forward);
+        (depth > 0.0).then(|| depth / self.scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::View;
+
+    #[test]
+    fn adding_toggles_and_the_last_one_is_active() {
+        let mut world = World::new();
+        let [a, b] = [world.spawn_empty().id(), world.spawn_empty().id()];
+        let mut selection = Selection::default();
+        selection.choose(a, false);
+        selection.choose(b, true);
+        assert_eq!((selection.0.clone(), selection.active()), (vec![a, b], Some(b)));
+        selection.choose(a, true);
+        assert_eq!(selection.0, [b, a], "one that was not active becomes so first");
+        selection.choose(a, true);
+        assert_eq!(selection.0, [b]);
+        selection.choose(a, false);
+        assert_eq!(selection.0, [a]);
+    }
+
+    #[test]
+    fn a_place_and_its_direction_agree() {
+        let view = View::look_at(DVec3::new(3.0, 2.0, 5e6), DVec3::new(0.0, 1.0, 5e6 - 4.0), DVec3::Y).unwrap();
+        let projector = Projector::new(&Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));
+        for place in [DVec2::new(400.0, 300.0), DVec2::new(10.0, 580.0), DVec2::new(799.0, 0.0)] {
+            let point = view.eye + 7.0 * projector.direction(place);
+            assert!((projector.place(point).unwrap() - place).length() < 1e-6);
+        }
+        assert_eq!(projector.place(view.eye - view.forward), None);
+    }
+}

@@ -1,0 +1,197 @@
+//! What the program remembers from one run to the next: settings, and the bookmarks of each scene. Small RON files in
+//! the platform's folder for settings; a file that cannot be read is set aside, said, and never stops anything.
+
+use super::navigation::Rig;
+use crate::scene::file::DisplayPart;
+use crate::scene::whole_file::write_whole;
+use crate::scene::{Fingerprint, SceneSource, absolute, plain_io};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What does not belong to a scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// Of the window, logical pixels.
+    pub window: Option<(u32, u32)>,
+    /// Exposure and tone curve of what has none of its own, such as a model.
+    pub display: Option<DisplayPart>,
+    /// What was opened last comes first: built-in names and whole paths.
+    pub recent: Vec<String>,
+}
+
+impl Settings {
+    /// Scenes that are remembered.
+    pub const MAX_RECENT: usize = 16;
+
+    /// Puts a scene in front of what was opened.
+    pub fn remember(&mut self, source: &SceneSource) {
+        let name = name_of(source);
+        self.recent.retain(|other| *other != name);
+        self.recent.insert(0, name);
+        self.recent.truncate(Self::MAX_RECENT);
+    }
+}
+
+/// The views of one scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SceneBookmarks {
+    /// Built-in name or whole path, for people.
+    pub scene: String,
+    /// By number, 1 to 9.
+    pub views: BTreeMap<u8, Rig>,
+}
+
+/// Where all of it is kept.
+#[derive(Clone, Debug)]
+pub struct SettingsStore {
+    folder: Option<PathBuf>,
+}
+
+impl SettingsStore {
+    /// In the platform's folder for settings; keeps nothing where there is none.
+    pub fn of_platform() -> Self {
+        let folders = directories::ProjectDirs::from("", "", "firstlight");
+        Self { folder: folders.map(|folders| folders.config_dir().to_path_buf()) }
+    }
+
+    pub fn in_folder(folder: &Path) -> Self {
+        Self { folder: Some(folder.to_path_buf()) }
+    }
+
+    /// Defaults when there are none; the second part says why a file could not be read.
+    pub fn settings(&self) -> (Settings, Option<String>) {
+        self.read("settings.ron")
+    }
+
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn keep_settings(&self, settings: &Settings) -> Result<(), String> {
+        self.write("settings.ron", settings)
+    }
+
+    /// The bookmarks of a scene, none when it has none; the second part says why a file could not be read.
+    pub fn bookmarks(&self, source: &SceneSource) -> (SceneBookmarks, Option<String>) {
+        let (bookmarks, trouble): (SceneBookmarks, _) = self.read(&bookmark_file(source));
+        (SceneBookmarks { scene: name_of(source), ..bookmarks }, trouble)
+    }
+
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn keep_bookmarks(&self, source: &SceneSource, bookmarks: &SceneBookmarks) -> Result<(), String> {
+        let bookmarks = SceneBookmarks { scene: name_of(source), views: bookmarks.views.clone() };
+        self.write(&bookmark_file(source), &bookmarks)
+    }
+
+    fn read<T: DeserializeOwned + Default>(&self, name: &str) -> (T, Option<String>) {
+        let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return (T::default(), None) };
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return (T::default(), None),
+            Err(error) => {
+                return (T::default(), Some(format!("{}: cannot be read: {}", path.display(), plain_io(&error))));
+            }
+        };
+        match options().from_str(&text) {
+            Ok(value) => (value, None),
+            Err(error) => {
+                // Set aside, so that what is in it is not lost when new settings are kept.
+                let aside = path.with_extension("broken");
+                let kept = match std::fs::rename(&path, &aside) {
+                    Ok(()) => format!("set aside as {}", aside.display()),
+                    Err(_) => "left where it is".to_owned(),
+                };
+                (T::default(), Some(format!("{}:{error}; {kept}, and defaults are used", path.display())))
+            }
+        }
+    }
+
+    fn write(&self, name: &str, value: &impl Serialize) -> Result<(), String> {
+        let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return Ok(()) };
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)
+                .map_err(|error| format!("{}: the folder cannot be made: {error}", folder.display()))?;
+        }
+        let pretty = ron::ser::PrettyConfig::new()
+            .indentor("    ")
+            .depth_limit(4)
+            .extensions(ron::extensions::Extensions::IMPLICIT_SOME);
+        // Plain structs, numbers and strings can always be written.
+        let text = options().to_string_pretty(value, pretty).expect("settings are plain data") + "\n";
+        write_whole(&path, text.as_bytes())
+    }
+}
+
+fn options() -> ron::Options {
+    ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
+}
+
+/// The same wherever the program is started.
+fn name_of(source: &SceneSource) -> String {
+    match source {
+        SceneSource::Builtin(name) => name.clone(),
+        SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
+            absolute(path).display().to_string()
+        }
+    }
+}
+
+/// Scenes of one name in different folders have bookmarks of their own.
+fn bookmark_file(source: &SceneSource) -> String {
+    let name = name_of(source);
+    let stem = Path::new(&name).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    let plain: String =
+        stem.chars().take(40).map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
+    format!("bookmarks/{plain}-{}.ron", Fingerprint::default().with(name.bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Lens, Projection, View};
+
+    #[test]
+    fn what_is_kept_comes_back_and_what_is_broken_is_set_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SettingsStore::in_folder(&folder.path().join("new/firstlight"));
+        assert_eq!(store.settings(), (Settings::default(), None));
+        let mut settings = Settings { window: Some((800, 600)), ..Settings::default() };
+        settings.display = Some(DisplayPart { exposure: -0.1, ..DisplayPart::default() });
+        for i in 0..20 {
+            settings.remember(&SceneSource::Builtin(format!("scene {i}")));
+        }
+        settings.remember(&SceneSource::Builtin("scene 10".to_owned()));
+        assert_eq!((settings.recent.len(), settings.recent[0].as_str()), (Settings::MAX_RECENT, "scene 10"));
+        store.keep_settings(&settings).unwrap();
+        assert_eq!(store.settings(), (settings, None));
+
+        let path = folder.path().join("new/firstlight/settings.ron");
+        std::fs::write(&path, "(window: (800, ").unwrap();
+        let (settings, trouble) = store.settings();
+        assert_eq!(settings, Settings::default());
+        let trouble = trouble.unwrap();
+        assert!(trouble.contains("settings.ron:1:") && trouble.contains("settings.broken"), "{trouble}");
+        assert_eq!(std::fs::read_to_string(path.with_extension("broken")).unwrap(), "(window: (800, ");
+        assert_eq!(store.settings(), (Settings::default(), None));
+        // What a newer program knows is no reason to forget the rest.
+        std::fs::write(&path, "(window: (3, 4), theme: \"dark\")").unwrap();
+        assert_eq!(store.settings().0.window, Some((3, 4)));
+    }
+
+    #[test]
+    fn every_scene_has_bookmarks_of_its_own_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SettingsStore::in_folder(folder.path());
+        let [a, b] = ["a/room.ron", "b/room.ron"].map(|path| SceneSource::Scene(folder.path().join(path)));
+        let lens = Lens { focus_distance: f64::INFINITY, ..Lens::thin(1.0 / 3.0, 0.1) };
+        let bookmark = Rig { view: View::default(), projection: Projection { vfov_deg: 33.3 }, lens };
+        let mut bookmarks = store.bookmarks(&a).0;
+        bookmarks.views.insert(3, bookmark);
+        store.keep_bookmarks(&a, &bookmarks).unwrap();
+        assert_eq!(store.bookmarks(&a), (bookmarks, None));
+        assert_eq!(store.bookmarks(&b).0.views.len(), 0);
+    }
+}

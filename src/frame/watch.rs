@@ -1,0 +1,93 @@
+//! Looks after files from a thread of its own, and says when one has changed and come to rest.
+//!
+//! Sizes and times of modification are compared a few times a second: that needs nothing of the system, works on every
+//! disk, and finds files that editors replace by new ones.
+
+use crate::scene::{Stamp, stamp};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Between two looks. A change must be the same in two looks, so that no file is read half-written.
+const PAUSE: Duration = Duration::from_millis(150);
+
+/// Files under watch; dropped, it ends.
+pub struct Watch {
+    sender: Option<Sender<Vec<PathBuf>>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watch {
+    /// `changed` is told which files have changed and come to rest.
+    ///
+    /// # Errors
+    /// When no thread can be started.
+    pub fn start(changed: impl Fn(Vec<PathBuf>) + Send + 'static) -> Result<Self, String> {
+        let (sender, receiver) = channel::<Vec<PathBuf>>();
+        let work = move || {
+            // Each with the stamp that is known, and the one that was seen last.
+            let mut files: BTreeMap<PathBuf, (Stamp, Stamp)> = BTreeMap::new();
+            loop {
+                let news = if files.is_empty() {
+                    receiver.recv().map_err(|_| RecvTimeoutError::Disconnected)
+                } else {
+                    receiver.recv_timeout(PAUSE)
+                };
+                match news {
+                    Ok(paths) => {
+                        files = paths
+                            .into_iter()
+                            .map(|path| {
+                                let now = stamp(&path);
+                                (path, (now, now))
+                            })
+                            .collect();
+                        continue;
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return,
+                }
+                let mut moving = false;
+                for (path, (_, seen)) in &mut files {
+                    let now = stamp(path);
+                    moving |= now != *seen;
+                    *seen = now;
+                }
+                let is_new = |(known, seen): &(Stamp, Stamp)| known != seen && seen.is_some();
+                let new: Vec<PathBuf> =
+                    files.iter().filter(|(_, stamps)| is_new(stamps)).map(|(path, _)| path.clone()).collect();
+                if !moving && !new.is_empty() {
+                    for (known, seen) in files.values_mut() {
+                        *known = *seen;
+                    }
+                    changed(new);
+                }
+            }
+        };
+        let thread = std::thread::Builder::new()
+            .name("firstlight watch".to_owned())
+            .spawn(work)
+            .map_err(|error| format!("no thread can be started: {error}"))?;
+        Ok(Self { sender: Some(sender), thread: Some(thread) })
+    }
+
+    /// Looks after these from now on, as they are now, and after no others.
+    pub fn set(&self, paths: Vec<PathBuf>) {
+        if let Some(sender) = &self.sender {
+            // The thread ends only with this.
+            let _ = sender.send(paths);
+        }
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.sender = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic over there has been reported already.
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! Cases that render: hard materials, lights, lenses and long runs in scenes whose light is known on paper.
+
+use super::tally::{Energy, Tally};
+use crate::kdtree::Shape;
+use crate::render::{
+    BadSample, Camera, ColorInput, Environment, Film, Fresnel, Geometry, Material, Object, RenderSettings, ScalarInput,
+    Shading, Snapshot, advance, replay_sample,
+};
+use glam::{UVec2, Vec3, vec3};
+use std::sync::Arc;
+
+/// One small scene with a known picture.
+pub struct Picture {
+    pub name: String,
+    pub scene: Snapshot,
+    pub width: u32,
+    pub height: u32,
+    pub spp: u32,
+    /// Of every pixel, or of the mean of all.
+    pub expected: f64,
+    /// Relative error that is allowed, besides the noise.
+    pub allowed: f64,
+    /// Whether each pixel must have the expected value, not only their mean.
+    pub every_pixel: bool,
+}
+
+impl Picture {
+    /// Renders it, and counts samples that are not finite, and how far the light is off.
+    pub fn run(&self, index: usize, spp: u32, tick: &(dyn Fn(u64) + Sync)) -> Tally {
+        let mut film = Film::new(self.width, self.height);
+        let report = advance(&self.scene, &RenderSettings::default(), &mut film, spp, &|| false);
+        let samples = u64::from(self.width) * u64::from(self.height) * u64::from(spp);
+        tick(samples);
+        let means: Vec<f64> = film.means().iter().map(|mean| f64::from(mean.element_sum()) / 3.0).collect();
+        let n = means.len() as f64;
+        let mean = means.iter().sum::<f64>() / n;
+        let variance = means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n * (n - 1.0).max(1.0));
+        let error = if self.every_pixel {
+            // Not `max`, which would lose a NaN.
+            means
+                .iter()
+                .map(|value| (value - self.expected).abs())
+                .fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+        } else {
+            ((mean - self.expected).abs() - 4.0 * variance.sqrt()).max(0.0)
+        };
+        let energy = Energy { error: error / self.expected, allowed: self.allowed };
+        let mut tally = Tally { rays: samples, non_finite: report.n_bad, energy: Some(energy), ..Tally::default() };
+        let severity = energy.error / energy.allowed;
+        tally.offer(severity, index, 0, || format!("{}: mean {mean} for {}", self.name, self.expected));
+        if let Some(&BadSample { x, y, sample }) = report.bad.first() {
+            let ray =
+                (u64::from(sample) * u64::from(self.height) + u64::from(y)) * u64::from(self.width) + u64::from(x);
+            tally.offer(1e9, index, ray, || format!("{}: pixel {x}, {y}, sample {sample} is not finite", self.name));
+        }
+        tally
+    }
+}
+
+pub fn camera(eye: Vec3, look_at: Vec3, vfov_deg: f32) -> Camera {
+    let forward = (look_at - eye).normalize();
+    let right = forward.cross(if forward.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }).normalize();
+    Camera {
+        eye,
+        right,
+        up: right.cross(forward),
+        forward,
+        tan_half_vfov: (0.5 * vfov_deg.to_radians()).tan(),
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+        blades: 0,
+        blade_rotation: 0.0,
+    }
+}
+
+fn snapshot(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, environment: Environment, camera: Camera) -> Snapshot {
+    let (shapes, objects) = shapes.into_iter().map(|(shape, material)| (shape, Object::plain(material))).unzip();
+    let geometry = Geometry::build(shapes, objects);
+    let shading = Shading::build(&geometry, materials, Vec::new(), environment);
+    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+}
+
+fn grey(value: f32) -> ColorInput {
+    ColorInput::Constant(Vec3::splat(value))
+}
+
+fn diffuse(albedo: f32) -> Material {
+    Material::Diffuse { albedo: grey(albedo) }
+}
+
+fn emissive(radiance: f32) -> Material {
+    Material::Emissive { radiance: grey(radiance) }
+}
+
+fn ball(center: Vec3, radius: f32) -> Shape {
+    Shape::Sphere { center, radius }
+}
+
+fn floor() -> Shape {
+    Shape::Plane { point: Vec3::ZERO, normal: Vec3::Y }
+}
+
+/// In an evenly bright world, things that lose no light cannot be seen.
+fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Material>, allowed: f64) -> Picture {
+    let eye = camera(vec3(0.0, 0.4, 4.0), Vec3::ZERO, 40.0);
+    Picture {
+        name: name.into(),
+        scene: snapshot(shapes, materials, Environment::Constant(Vec3::ONE), eye),
+        width: 16,
+        height: 16,
+        spp: 64,
+        expected: 1.0,
+        allowed,
+        every_pixel: true,
+    }
+}
+
+/// Nested glass, glass on glass, indices next to 1, and angles about that of total reflection.
+pub fn glass() -> Vec<Picture> {
+    let glass = |ior: f32| Material::Glass { ior, absorption: Vec3::ZERO };
+    let mut pictures = vec![
+        furnace(
+            "four nested balls",
+            (0..4).map(|i| (ball(Vec3::ZERO, 1.0 - 0.15 * i as f32), i)).collect(),
+            [1.5, 1.2, 1.8, 1.0].map(glass).into(),
+            1e-4,
+        ),
+        furnace(
+            "two balls that touch",
+            vec![(ball(Vec3::X * 0.5, 0.5), 0), (ball(Vec3::X * -0.5, 0.5), 1)],
+            vec![glass(1.5), glass(1.33)],
+            1e-4,
+        ),
+        furnace(
+            "two balls that share a skin",
+            vec![(ball(Vec3::ZERO, 0.8), 0), (ball(Vec3::ZERO, 0.8), 1)],
+            vec![glass(1.5), glass(1.5)],
+            1e-4,
+        ),
+        furnace(
+            "a ball in a ball that touches it",
+            vec![(ball(Vec3::ZERO, 0.8), 0), (ball(Vec3::Y * 0.4, 0.4), 1)],
+            vec![glass(1.5), glass(1.2)],
+            1e-4,
+        ),
+    ];
+    // Between the two skins some paths go around for hundreds of bounces, and roulette adds its noise.
+    if let Some(wedge) = pictures.last_mut() {
+        (wedge.every_pixel, wedge.allowed) = (false, 1e-3);
+    }
+    for ior in [1.0, 1.0 + 1e-6, 1.0 - 1e-6, 1.0 + 1e-4, 1e-3, 0.5, 1.5, 10.0, 1e3] {
+        pictures.push(furnace(format!("index {ior}"), vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(ior)], 2e-4));
+    }
+    // From inside a ball, at the radius where the flattest rays all but reach the angle of total reflection. The eye counts
+    // as lying in air, so what comes from outside is n² as bright.
+    let mut inside = furnace("inside a ball of glass", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1.5)], 1e-3);
+    inside.scene.camera = camera(vec3(0.666_66, 0.0, 0.0), vec3(0.7, 1.0, 0.0), 150.0);
+    inside.expected = 2.25;
+    pictures.push(inside);
+    pictures
+}
+
+/// Microfacets from a mirror to as rough as can be: none may win light, and with compensation none may lose any.
+pub fn metal() -> Vec<Picture> {
+    let mut pictures = Vec::new();
+    for alpha in [0.0, 1e-20, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5, 1.0] {
+        let metal = Material::Metal {
+            alpha: ScalarInput::Constant(alpha),
+            reflectance: grey(1.0),
+            fresnel: Fresnel::Constant,
+            compensate: true,
+        };
+        // What compensation by tables leaves is its own business, and grows with the roughness.
+        let allowed = 1e-3 + 0.03 * f64::from(alpha.min(1.0));
+        let mut picture = furnace(format!("alpha {alpha:e}"), vec![(ball(Vec3::ZERO, 1.0), 0)], vec![metal], allowed);
+        picture.every_pixel = alpha < 1e-3;
+        picture.spp = 256;
+        pictures.push(picture);
+    }
+    pictures
+}
+
+/// Ball lights over a floor: tiny and bright, huge, and touching it. A floor point at distance d from the centre of a ball of
+/// radius r sees albedo · L · (r/d)² · cos θ while all of the ball is above its horizon.
+pub fn lights() -> Vec<Picture> {
+    let cases: [(&str, f32, f32, f32); 9] = [
+        ("a ball of 1 µm", 1e-6, 1.0, 0.3),
+        ("a ball of 0.1 mm", 1e-4, 1.0, 0.3),
+        ("a ball of 1 mm at 1 km", 1e-3, 1e3, 10.0),
+        ("a ball of 100 m", 100.0, 150.0, 20.0),
+        ("a ball of 10 km", 1e4, 1.5e4, 200.0),
+        ("a ball that touches, near", 1.0, 1.0, 0.01),
+        ("a ball that touches, far", 1.0, 1.0, 3.0),
+        ("a ball of 10 km that touches", 1e4, 1e4, 1e3),
+        ("a ball a hair above", 1.0, 1.000_001, 0.001),
+    ];
+    cases
+        .into_iter()
+        .map(|(name, radius, height, x)| {
+            let d2 = f64::from(x).powi(2) + f64::from(height).powi(2);
+            let share = f64::from(radius).powi(2) / d2 * f64::from(height) / d2.sqrt();
+            // As bright as it takes for the floor to have a radiance of about 1.
+            let radiance = (2.0 / share) as f32;
+            // Grazing, so that the ball is not in the way; a small view, so that all pixels see the same.
+            let eye_height = (1e-3 * x).min(0.1);
+            let eye = vec3(x, eye_height, eye_height);
+            let materials = vec![diffuse(0.5), emissive(radiance)];
+            let shapes = vec![(floor(), 0), (ball(vec3(0.0, height, 0.0), radius), 1)];
+            let view = camera(eye, vec3(x, 0.0, 0.0), 0.01);
+            Picture {
+                name: name.to_owned(),
+                scene: snapshot(shapes, materials, Environment::Black, view),
+                width: 8,
+                height: 8,
+                spp: 256,
+                expected: 0.5 * f64::from(radiance) * share,
+                allowed: 3e-3,
+                every_pixel: false,
+            }
+        })
+        .collect()
+}
+
+/// Fields of view of 1° … 170°, focus from 0⁺ to ∞, and lenses larger than the scene: in a world of one colour, whatever
+/// a ray meets has radiance 1.
+pub fn cameras() -> Vec<Picture> {
+    let mut pictures = Vec::new();
+    for vfov in [1e-3, 1.0, 30.0, 120.0, 170.0, 179.9] {
+        for focus in [f32::MIN_POSITIVE, 1e-30, 1e-21, 1e-6, 1.0, 1e6, 1e30, f32::MAX, f32::INFINITY] {
+            for lens in [0.0, 1e-30, 1e-6, 0.05, 1e3, 1e12] {
+                let mut view = camera(vec3(0.0, 0.4, 4.0), Vec3::ZERO, vfov);
+                (view.focus_distance, view.lens_radius) = (focus, lens);
+                let shapes = vec![(ball(Vec3::ZERO, 1.0), 0), (ball(vec3(0.3, 0.2, 1.5), 0.1), 1)];
+                let materials = vec![Material::Mirror { reflectance: grey(1.0) }, emissive(1.0)];
+                pictures.push(Picture {
+                    name: format!("{vfov}°, focus {focus:e} m, lens {lens:e} m"),
+                    scene: snapshot(shapes, materials, Environment::Constant(Vec3::ONE), view),
+                    width: 8,
+                    height: 6,
+                    spp: 16,
+                    expected: 1.0,
+                    allowed: 1e-6,
+                    every_pixel: true,
+                });
+            }
+        }
+    }
+    // The back of a ball that shines is dark: a lens that reaches into it would see that.
+    pictures.iter_mut().filter(|p| p.scene.camera.lens_radius >= 1e3).for_each(|p| p.every_pixel = false);
+    pictures
+}
+
+/// 10⁶ samples in one pixel of a room whose walls emit 1 − ρ and reflect ρ: its radiance is 1 everywhere, and a sum
+/// that loses digits drifts away from it.
+pub fn long_sums() -> Vec<Picture> {
+    [0.0f32, 0.5, 0.9]
+        .into_iter()
+        .map(|albedo| {
+            // A blend has the share w of a black body of radiance 1, and 1 − w of a white surface.
+            let blend = Material::Blend { weight: ScalarInput::Constant(1.0 - albedo), a: 0, b: 1 };
+            let materials = vec![diffuse(1.0), emissive(1.0), blend];
+            let shapes = vec![
+                (Shape::Plane { point: Vec3::Y, normal: Vec3::NEG_Y }, 2),
+                (Shape::Plane { point: Vec3::NEG_Y, normal: Vec3::Y }, 2),
+                (Shape::Plane { point: Vec3::X, normal: Vec3::NEG_X }, 2),
+                (Shape::Plane { point: Vec3::NEG_X, normal: Vec3::X }, 2),
+                (Shape::Plane { point: Vec3::Z, normal: Vec3::NEG_Z }, 2),
+                (Shape::Plane { point: Vec3::NEG_Z, normal: Vec3::Z }, 2),
+            ];
+            let view = camera(vec3(0.1, 0.2, 0.3), vec3(1.0, 0.4, 0.2), 30.0);
+            Picture {
+                name: format!("a glowing room of albedo {albedo}, one pixel"),
+                scene: snapshot(shapes, materials, Environment::Black, view),
+                width: 1,
+                height: 1,
+                spp: 1_000_000,
+                expected: 1.0,
+                // Of the exact kind where there is no noise; else about 6 standard errors at a million samples.
+                allowed: if albedo == 0.0 { 1e-12 } else { 0.05 },
+                every_pixel: true,
+            }
+        })
+        .collect()
+}
+
+impl Picture {
+    /// One sample, by its number as [`Self::run`] tells it.
+    pub fn replay(&self, ray: u64) -> String {
+        let (x, row) = (ray % u64::from(self.width), ray / u64::from(self.width));
+        let (y, sample) = (row % u64::from(self.height), row / u64::from(self.height));
+        let at = BadSample { x: x as u32, y: y as u32, sample: sample as u32 };
+        let size = UVec2::new(self.width, self.height);
+        let radiance = replay_sample(&self.scene, &RenderSettings::default(), size, at);
+        format!("picture {}\nsample  {sample} of pixel {x}, {y}: {radiance}, expected {}\n", self.name, self.expected)
+    }
+}

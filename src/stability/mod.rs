@@ -1,0 +1,179 @@
+//! The hard cases, counted: what other renderers are asked to mend, tried here by the million, with findings that can
+//! be replayed.
+//!
+//! Rays are held against an `f64` judge that knows no tree ([`judge`]), light against answers on paper ([`light`]), and the
+//! same scene elsewhere against itself ([`anywhere`]). Every ray is a function of case, stage and index alone: the
+//! counts do not depend on threads, and the worst ray can be had again ([`replay`]). Start reading at [`CASES`].
+
+mod anywhere;
+mod bounces;
+mod judge;
+mod light;
+mod random;
+mod stage;
+mod surfaces;
+mod tally;
+
+pub use judge::{Judge, TEST_ERROR, Verdict};
+pub use tally::{Energy, Tally, Worst};
+
+use light::Picture;
+use surfaces::Plan;
+
+/// One hard case.
+#[derive(Clone, Copy)]
+pub struct Case {
+    pub name: &'static str,
+    pub about: &'static str,
+    /// Rays of this case over those that were asked for.
+    share: f64,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Rays(fn() -> Vec<Plan>),
+    Pictures(fn() -> Vec<Picture>),
+    Bounces,
+    Anywhere,
+    Georeferenced,
+}
+
+pub const CASES: &[Case] = &[
+    Case {
+        name: "closed",
+        about: "closed meshes hit at corners and edges from inside, sizes 10^-6 ... 10^6, 0 ... 10^7 sizes from the origin",
+        share: 1.0,
+        kind: Kind::Rays(surfaces::closed),
+    },
+    Case {
+        name: "georeferenced",
+        about: "a model in map coordinates (500000, 4500000) against the same model at the origin",
+        share: 0.01,
+        kind: Kind::Georeferenced,
+    },
+    Case {
+        name: "slivers",
+        about: "crossing triangles 10^3 ... 10^6 times longer than wide",
+        share: 0.1,
+        kind: Kind::Rays(surfaces::slivers),
+    },
+    Case {
+        name: "degenerate",
+        about: "triangles without area, repeated and coplanar ones",
+        share: 0.1,
+        kind: Kind::Rays(surfaces::degenerate),
+    },
+    Case {
+        name: "split-planes",
+        about: "boxes and sheets along the axes, and rays within their planes, from corners, with -0, denormals, 10^±24",
+        share: 0.1,
+        kind: Kind::Rays(surfaces::split_planes),
+    },
+    Case {
+        name: "leaving",
+        about: "rays that leave every kind of surface, down to 10^-4 rad",
+        share: 0.2,
+        kind: Kind::Rays(surfaces::leaving),
+    },
+    Case {
+        name: "tangent",
+        about: "balls that touch a floor, each other, and a floor that is a ball of 10 km",
+        share: 0.2,
+        kind: Kind::Rays(surfaces::tangent),
+    },
+    Case {
+        name: "white-box",
+        about: "paths of 10^5 bounces in closed boxes, many straight into edges and corners",
+        share: 0.5,
+        kind: Kind::Bounces,
+    },
+    Case {
+        name: "glass",
+        about: "nested and touching glass, indices 1, 1 ± 10^-6 and extreme, in a white furnace",
+        share: 0.02,
+        kind: Kind::Pictures(light::glass),
+    },
+    Case {
+        name: "metal",
+        about: "microfacets of alpha 0 ... 1 in a white furnace",
+        share: 0.02,
+        kind: Kind::Pictures(light::metal),
+    },
+    Case {
+        name: "lights",
+        about: "tiny, huge and touching ball lights over a floor, against the closed form",
+        share: 0.02,
+        kind: Kind::Pictures(light::lights),
+    },
+    Case {
+        name: "cameras",
+        about: "fields of view to 179.9 degrees, focus from 0+ to infinity, lenses larger than the scene",
+        share: 0.02,
+        kind: Kind::Pictures(light::cameras),
+    },
+    Case {
+        name: "long-sums",
+        about: "10^6 samples in one pixel, against the exact answer",
+        share: 0.1,
+        kind: Kind::Pictures(light::long_sums),
+    },
+    Case {
+        name: "anywhere",
+        about: "the same scene moved by 10^6 and scaled by 10^-3 ... 10^3: the same picture within its noise",
+        share: 0.05,
+        kind: Kind::Anywhere,
+    },
+];
+
+impl Case {
+    pub fn find(name: &str) -> Option<&'static Self> {
+        CASES.iter().find(|case| case.name == name)
+    }
+
+    /// About how many rays this case traces when `rays` are asked for.
+    pub fn rays(&self, rays: u64) -> u64 {
+        (rays as f64 * self.share) as u64
+    }
+
+    /// Runs the case with about [`Self::rays`] of `rays`; `tick` is told how many more were traced.
+    pub fn run(&self, rays: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
+        let n = self.rays(rays);
+        match self.kind {
+            Kind::Rays(plans) => {
+                let plans = plans();
+                let each = n.div_ceil(plans.len() as u64).max(64);
+                let stages = plans.iter().enumerate().filter_map(|(i, plan)| Some((i, (plan.build)()?)));
+                stages.map(|(i, stage)| stage.run(i, each, tick)).fold(Tally::default(), Tally::merged)
+            }
+            Kind::Pictures(pictures) => {
+                let pictures = pictures();
+                let usual: u64 = pictures.iter().map(|p| u64::from(p.width * p.height) * u64::from(p.spp)).sum();
+                let factor = n as f64 / usual as f64;
+                let run = |(i, picture): (usize, &Picture)| {
+                    // More rays make the noise smaller; fewer than the usual number would let it decide.
+                    let spp = (f64::from(picture.spp) * factor).clamp(f64::from(picture.spp), 1e8) as u32;
+                    picture.run(i, spp, tick)
+                };
+                pictures.iter().enumerate().map(run).fold(Tally::default(), Tally::merged)
+            }
+            Kind::Bounces => bounces::run(n, tick),
+            Kind::Anywhere => anywhere::run(n, tick),
+            Kind::Georeferenced => anywhere::georeferenced(n, tick),
+        }
+    }
+
+    /// Whether [`Self::replay`] knows the rays that a tally names.
+    pub fn can_replay(&self) -> bool {
+        matches!(self.kind, Kind::Rays(_) | Kind::Pictures(_))
+    }
+
+    /// Everything about one ray of the case, for people; `None` if it has no such stage, or no rays of its own.
+    pub fn replay(&self, stage: usize, ray: u64) -> Option<String> {
+        match self.kind {
+            Kind::Rays(plans) => Some((plans().get(stage)?.build)()?.replay(stage, ray)),
+            Kind::Pictures(pictures) => Some(pictures().get(stage)?.replay(ray)),
+            _ => None,
+        }
+    }
+}

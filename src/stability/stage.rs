@@ -1,0 +1,181 @@
+//! A scene, the rays that are hard on it, and what must be true of the answers.
+
+use super::judge::{Judge, Solid, Verdict};
+use super::random::Random;
+use super::tally::{Tally, hex, hex3};
+use crate::geometry::{Ray, robust::offset_ray_origin};
+use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass, SceneTree};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// One scene with its rays.
+pub struct Stage {
+    pub name: String,
+    pub scene: SceneTree,
+    pub judge: Judge,
+    /// The ray of an index.
+    pub rays: Rays,
+    /// Of so many rays one is held against every primitive; 1 for all.
+    pub brute_every: u64,
+}
+
+pub type Rays = Box<dyn Fn(&mut Random) -> Probe + Send + Sync>;
+
+/// One ray, and what is known of it beforehand.
+#[derive(Clone, Copy, Debug)]
+pub struct Probe {
+    pub ray: Ray,
+    /// It starts inside a closed surface, so it cannot get away.
+    pub must_hit: bool,
+}
+
+/// Rays that are handed to the kernel together.
+const BATCH: u64 = 2048;
+
+impl Stage {
+    /// Traces rays `0..n` and counts what is wrong.
+    pub fn run(&self, index: usize, n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
+        (0..n.div_ceil(BATCH))
+            .into_par_iter()
+            .map(|batch| {
+                let (first, end) = (batch * BATCH, n.min((batch + 1) * BATCH));
+                let tally = self.run_batch(index, first, end);
+                tick(end - first);
+                tally
+            })
+            .reduce(Tally::default, Tally::merged)
+    }
+
+    fn probe(&self, stage: usize, ray: u64) -> (Probe, Random) {
+        let mut random = Random::new(stage as u64, ray);
+        ((self.rays)(&mut random), random)
+    }
+
+    fn run_batch(&self, stage: usize, first: u64, end: u64) -> Tally {
+        let mut tally = Tally { rays: end - first, ..Tally::default() };
+        let (probes, mut randoms): (Vec<Probe>, Vec<Random>) = (first..end).map(|i| self.probe(stage, i)).unzip();
+        let rays: RayBatch = probes.iter().map(|probe| &probe.ray).collect();
+        // Both traversals have their turn.
+        let class = if first / BATCH % 2 == 0 { RayClass::Incoherent } else { RayClass::Coherent };
+        let (mut hits, mut occluded) = (HitBatch::default(), Vec::new());
+        self.scene.closest_hits(&rays, class, &mut hits);
+        self.scene.any_hits(&rays, class, &mut occluded);
+        let (mut second, mut sources) = (RayBatch::default(), Vec::new());
+        for (k, probe) in probes.iter().enumerate() {
+            let (ray, index) = (&probe.ray, first + k as u64);
+            let hit = hits.get(k);
+            if occluded[k] != hit.is_some() {
+                tally.missed += 1;
+                tally.offer(1e9, stage, index, || format!("any-hit says {}: {}", occluded[k], tell(ray, &hit)));
+            }
+            match &hit {
+                None if probe.must_hit => {
+                    tally.leaks += 1;
+                    tally.offer(1e9, stage, index, || format!("leak: {}", tell(ray, &hit)));
+                }
+                _ => self.judge_ray(&mut tally, stage, index, ray, &hit),
+            }
+            // Rays that leave do not meet the same flat primitive again, nor a ball from outside.
+            if let Some(hit) = hit {
+                let next = self.leaving(ray, &hit, &mut randoms[k]);
+                second.push(&next);
+                sources.push((index, hit, *ray));
+            }
+        }
+        tally.rays += second.len() as u64;
+        self.scene.closest_hits(&second, RayClass::Incoherent, &mut hits);
+        for (k, (index, from, ray)) in sources.iter().enumerate() {
+            let (next, again) = (second.get(k), hits.get(k));
+            if let Some(found) = self.self_hit(ray, from, &next, &again) {
+                let count = if found == "leak" { &mut tally.leaks } else { &mut tally.acne };
+                *count += 1;
+                tally.offer(1e9, stage, *index, || format!("{found}: {}", tell(&next, &again)));
+            }
+        }
+        tally
+    }
+
+    fn judge_ray(&self, tally: &mut Tally, stage: usize, index: u64, ray: &Ray, hit: &Option<Hit>) {
+        let verdict = if index.is_multiple_of(self.brute_every) {
+            self.judge.check(ray, hit.as_ref())
+        } else {
+            hit.as_ref().map_or(Verdict::Right(0.0), |hit| self.judge.check_hit(ray, hit))
+        };
+        let severity = match verdict {
+            Verdict::Right(ratio) => ratio,
+            Verdict::WrongT(ratio) => {
+                tally.wrong_t += 1;
+                ratio.max(1.0).next_up()
+            }
+            Verdict::Missed => {
+                tally.missed += 1;
+                1e9
+            }
+        };
+        tally.offer(severity, stage, index, || tell(ray, hit));
+    }
+
+    /// A ray that leaves the hit to either side.
+    fn leaving(&self, ray: &Ray, hit: &Hit, random: &mut Random) -> Ray {
+        let point = self.scene.surface_point(ray, hit);
+        let side = if random.below(2) == 0 { 1.0 } else { -1.0 };
+        let dir = random.leaving(side * point.geometric_normal);
+        Ray::new(offset_ray_origin(point.position, point.error, point.geometric_normal, dir), dir)
+    }
+
+    /// What is wrong with the answer to a ray that has just left `from`.
+    fn self_hit(&self, ray: &Ray, from: &Hit, next: &Ray, again: &Option<Hit>) -> Option<&'static str> {
+        let is_same = again.is_some_and(|again| (again.object, again.prim) == (from.object, from.prim));
+        match self.judge.solid(from) {
+            Solid::Sphere { radius, .. } => {
+                // From inside, the far side is one chord away, and must be met.
+                let point = self.scene.surface_point(ray, from);
+                let cos = f64::from(-next.dir.dot(point.geometric_normal));
+                let chord = 2.0 * radius * cos;
+                if cos < 0.0 {
+                    return is_same.then_some("acne");
+                }
+                let error = f64::from(point.geometric_normal.abs().dot(point.error));
+                match again {
+                    // Where the chord drowns in the rounding of the origin nothing can be said.
+                    _ if chord * cos < 64.0 * error => None,
+                    None => Some("leak"),
+                    Some(again) if is_same && f64::from(again.t) < 0.5 * chord => Some("acne"),
+                    _ => None,
+                }
+            }
+            _ => is_same.then_some("acne"),
+        }
+    }
+
+    /// Everything about one ray, for people.
+    pub fn replay(&self, stage: usize, index: u64) -> String {
+        let (Probe { ray, must_hit }, mut random) = self.probe(stage, index);
+        let hit = self.scene.closest_hit(&ray);
+        let naive = self.scene.closest_hit_naive(&ray);
+        let mut text = format!("stage  {}\nray    {}\n", self.name, tell(&ray, &hit));
+        text += &format!("       must hit: {must_hit}; any hit: {}\n", self.scene.any_hit(&ray));
+        text += &format!("naive  {naive:?}\njudge  {:?}\n", self.judge.check(&ray, hit.as_ref()));
+        if let Some(hit) = &hit {
+            let point = self.scene.surface_point(&ray, hit);
+            text += &format!("point  {} ± {}, normal {}\n", point.position, point.error, point.geometric_normal);
+            let next = self.leaving(&ray, hit, &mut random);
+            text += &format!("next   {}\n", tell(&next, &self.scene.closest_hit(&next)));
+        }
+        text
+    }
+}
+
+/// A ray with all its bits, and what it met.
+pub fn tell(ray: &Ray, hit: &Option<Hit>) -> String {
+    let met = match hit {
+        Some(hit) => format!("t {} ({}), object {}, primitive {}", hex(hit.t), hit.t, hit.object, hit.prim),
+        None => "nothing".to_owned(),
+    };
+    format!("origin {} dir {} t_max {} -> {met}", hex3(ray.origin), hex3(ray.dir), hex(ray.t_max))
+}
+
+/// A ray from `origin` towards `target`, of unit length, or along x if they are the same.
+pub fn towards(origin: Vec3, target: Vec3) -> Ray {
+    Ray::new(origin, (target - origin).as_dvec3().normalize_or(glam::DVec3::X).as_vec3())
+}

@@ -1,0 +1,183 @@
+//! What is selected, over the picture: its box and its handles, and dragging them.
+
+use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
+use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
+use crate::scene::Placement;
+use egui::{Align2, Color32, Context, FontId, Pos2, Stroke};
+use glam::{DVec2, DVec3};
+
+const SELECTED: Color32 = Color32::from_rgb(255, 178, 70);
+const OTHERS: Color32 = Color32::from_rgba_premultiplied(170, 118, 46, 170);
+const AXES: [Color32; 3] =
+    [Color32::from_rgb(235, 85, 85), Color32::from_rgb(125, 205, 85), Color32::from_rgb(85, 140, 245)];
+const MIDDLE: Color32 = Color32::from_gray(235);
+const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
+
+/// What is to be drawn, found out before drawing.
+#[derive(Default)]
+pub struct Handles {
+    boxes: Vec<OwnBox>,
+    gizmo: Option<(Gizmo, Projector)>,
+    projector: Option<Projector>,
+    hovered: Option<Handle>,
+    grabbed: Option<Grabbed>,
+}
+
+/// A drag under way. The handles stay where they were grabbed, so that the measure does not move with what it measures.
+struct Grabbed {
+    gizmo: Gizmo,
+    handle: Handle,
+    from: DVec2,
+    now: Option<Drag>,
+}
+
+impl Handles {
+    /// Looks at what is selected now; `size`: of the window, points.
+    pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, size: DVec2) {
+        self.boxes.clear();
+        let selected = session.world().resource::<Selection>().0.clone();
+        self.boxes.extend(selected.iter().filter_map(|&entity| session.box_of(entity)));
+        let projector = Projector::new(&session.status().rig, size);
+        self.projector = Some(projector);
+        self.gizmo = None;
+        if let (Some(mode), Some(own), Some(&active)) = (mode, self.boxes.last(), selected.last()) {
+            let axes = match (mode, selected.len()) {
+                (Mode::Scale, 1) => own_axes(session.world().get::<Placement>(active)),
+                _ => DVec3::AXES,
+            };
+            self.gizmo = Gizmo::at(own.middle(), mode, axes, &projector).map(|gizmo| (gizmo, projector));
+        }
+        if self.gizmo.is_none() {
+            self.grabbed = None;
+        }
+    }
+
+    /// The mouse went down: whether it holds a handle now.
+    pub fn grab(&mut self, mouse: DVec2) -> bool {
+        let Some((gizmo, projector)) = self.gizmo else { return false };
+        let handle = gizmo.handle_at(mouse, &projector);
+        self.grabbed = handle.map(|handle| Grabbed { gizmo, handle, from: mouse, now: None });
+        handle.is_some()
+    }
+
+    /// The mouse is here: what follows, or whether other handles are to be drawn.
+    pub fn mouse_at(&mut self, mouse: DVec2, snap: bool) -> (Option<Command>, bool) {
+        let Some((gizmo, projector)) = self.gizmo else { return (None, false) };
+        if let Some(grabbed) = &mut self.grabbed {
+            let drag = grabbed.gizmo.drag(grabbed.handle, grabbed.from, mouse, &projector, snap);
+            if drag.is_none() || drag == grabbed.now {
+                return (None, false);
+            }
+            grabbed.now = drag;
+            let edit = drag.map(|drag| match drag {
+                Drag::Move(by) => Edit::Move { by },
+                Drag::Turn { axis, angle_deg } => Edit::Turn { axis, angle_deg },
+                Drag::Scale(factors) => Edit::Scale { factors },
+            });
+            return (edit.map(Command::Edit), true);
+        }
+        let hovered = gizmo.handle_at(mouse, &projector);
+        let news = hovered != self.hovered;
+        self.hovered = hovered;
+        (None, news)
+    }
+
+    /// The mouse came up: whether it had held a handle.
+    pub fn release(&mut self) -> bool {
+        self.grabbed.take().is_some()
+    }
+
+    pub fn is_grabbed(&self) -> bool {
+        self.grabbed.is_some()
+    }
+
+    pub fn draw(&self, context: &Context) {
+        let Some(projector) = &self.projector else { return };
+        let painter = context.layer_painter(egui::LayerId::background());
+        for (i, own) in self.boxes.iter().enumerate() {
+            let color = if i + 1 == self.boxes.len() { SELECTED } else { OTHERS };
+            draw_box(&painter, own, projector, color);
+        }
+        let Some((gizmo, _)) = &self.gizmo else { return };
+        let lit = self.grabbed.as_ref().map(|grabbed| grabbed.handle).or(self.hovered);
+        for mark in gizmo.marks(projector) {
+            let color = match mark.handle {
+                handle if lit == Some(handle) => GRABBED,
+                Handle::Axis(i) | Handle::Plane(i) => AXES[i],
+                Handle::Middle => MIDDLE,
+            };
+            let line: Vec<Pos2> = mark.line.iter().map(|&place| pos(place)).collect();
+            match (mark.handle, gizmo.mode) {
+                (Handle::Middle, Mode::Turn) => {}
+                (Handle::Middle, _) => drop(painter.circle(line[0], 4.5, color, Stroke::new(1.0, Color32::BLACK))),
+                (Handle::Plane(_), _) => {
+                    let shape = egui::Shape::convex_polygon(line, color.gamma_multiply(0.55), Stroke::new(1.0, color));
+                    painter.add(shape);
+                }
+                (Handle::Axis(_), mode) => {
+                    painter.add(egui::Shape::line(line.clone(), Stroke::new(4.5, Color32::from_black_alpha(90))));
+                    painter.add(egui::Shape::line(line.clone(), Stroke::new(2.5, color)));
+                    match (mode, &line[..]) {
+                        (Mode::Move, [start, end]) => draw_arrow(&painter, *start, *end, color),
+                        (Mode::Scale, [_, end]) => {
+                            painter.rect_filled(egui::Rect::from_center_size(*end, egui::Vec2::splat(9.0)), 1.0, color);
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        if let Some(Grabbed { now: Some(drag), from, .. }) = &self.grabbed {
+            let text = match drag {
+                Drag::Move(by) => format!("{:+.3}  {:+.3}  {:+.3} m", by.x, by.y, by.z),
+                Drag::Turn { angle_deg, .. } => format!("{angle_deg:+.1}°"),
+                Drag::Scale(factors) if factors.x == factors.y && factors.y == factors.z => {
+                    format!("× {:.3}", factors.x)
+                }
+                Drag::Scale(factors) => format!("× {:.3}  {:.3}  {:.3}", factors.x, factors.y, factors.z),
+            };
+            let at = pos(*from) + egui::vec2(14.0, -22.0);
+            let galley = painter.layout_no_wrap(text, FontId::monospace(12.5), Color32::WHITE);
+            let rect = Align2::LEFT_BOTTOM.anchor_size(at, galley.size());
+            painter.rect_filled(rect.expand(4.0), 3.0, super::overlay::GLASS);
+            painter.galley(rect.min, galley, Color32::WHITE);
+        }
+    }
+}
+
+fn own_axes(placement: Option<&Placement>) -> [DVec3; 3] {
+    let matrix = placement.map(Placement::linear).unwrap_or_default();
+    [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.try_normalize().unwrap_or(DVec3::X))
+}
+
+/// The corners of a box, drawn in along its edges, so that what is inside stays visible.
+fn draw_box(painter: &egui::Painter, own: &OwnBox, projector: &Projector, color: Color32) {
+    let corners = own.corners();
+    if own.min == own.max {
+        // What has no end, or is a point.
+        if let Some(place) = projector.place(own.middle()) {
+            painter.circle_stroke(pos(place), 9.0, Stroke::new(1.5, color));
+        }
+        return;
+    }
+    for (i, &corner) in corners.iter().enumerate() {
+        for axis in 0..3 {
+            let along = corners[i ^ (1 << axis)] - corner;
+            if let (Some(a), Some(b)) = (projector.place(corner), projector.place(corner + 0.22 * along)) {
+                painter.line_segment([pos(a), pos(b)], Stroke::new(3.0, Color32::from_black_alpha(110)));
+                painter.line_segment([pos(a), pos(b)], Stroke::new(1.5, color));
+            }
+        }
+    }
+}
+
+fn draw_arrow(painter: &egui::Painter, start: Pos2, end: Pos2, color: Color32) {
+    let along = (end - start).normalized();
+    let across = egui::vec2(-along.y, along.x);
+    let points = vec![end + 11.0 * along, end + 5.0 * across, end - 5.0 * across];
+    painter.add(egui::Shape::convex_polygon(points, color, Stroke::NONE));
+}
+
+fn pos(place: DVec2) -> Pos2 {
+    Pos2::new(place.x as f32, place.y as f32)
+}

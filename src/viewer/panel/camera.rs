@@ -1,0 +1,129 @@
+//! Where the camera stands, what its lens makes sharp, and the views that were kept.
+
+use super::{Around, Asked, number, row, rows, slider, vector};
+use crate::frame::{Bookmarks, Command, Focus, FocusTarget, Looking, Session, f_stop, radius_of_f_stop, sharp_zone};
+use crate::scene::{Lens, Projection, View};
+use crate::viewer::status::metres;
+use egui::Ui;
+
+pub fn view(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
+    let rig = session.status().rig;
+    let step = 0.005 * rig.view.pivot_distance;
+    rows(ui, "view", |ui| {
+        row(ui, "eye", |ui| {
+            if let Some(eye) = vector(ui, rig.view.eye, step) {
+                asked.send(Command::SetView(View { eye, ..rig.view }));
+            }
+        });
+        row(ui, "looks at", |ui| {
+            if let Some(target) = vector(ui, rig.view.pivot(), step)
+                && let Ok(view) = View::look_at(rig.view.eye, target, rig.view.up)
+            {
+                asked.send(Command::SetView(view));
+            }
+        });
+        row(ui, "field of view", |ui| {
+            if let Some(vfov_deg) = slider(ui, rig.projection.vfov_deg, 5.0..=120.0, false) {
+                asked.send(Command::SetProjection(Projection { vfov_deg }));
+            }
+        });
+        row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
+    });
+    ui.horizontal_wrapped(|ui| {
+        for (label, command) in [
+            ("Frame", Command::FrameAll),
+            ("Home", Command::Home),
+            ("Level", Command::Level),
+            ("Back", Command::PreviousView),
+            ("Forth", Command::NextView),
+        ] {
+            if ui.button(label).clicked() {
+                asked.send(command);
+            }
+        }
+        asked.toggle_spin |= ui.selectable_label(around.spinning, "Turntable").clicked();
+    });
+    let bookmarks = session.world().resource::<Bookmarks>();
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.weak("kept");
+        for slot in 1..=9 {
+            let kept = bookmarks.get(slot).is_some();
+            let hint = if kept { "go there; Ctrl+click keeps this view" } else { "click keeps this view" };
+            if ui.selectable_label(kept, slot.to_string()).on_hover_text(hint).clicked() {
+                let keep = !kept || ui.input(|input| input.modifiers.command);
+                asked.send(if keep { Command::SetBookmark { slot } } else { Command::GoToBookmark { slot } });
+            }
+        }
+    });
+}
+
+pub fn lens(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+    let rig = session.status().rig;
+    let lens = rig.lens;
+    let set = |asked: &mut Asked, lens: Lens| asked.send(Command::SetLens(lens));
+    let mut enabled = lens.enabled;
+    ui.horizontal(|ui| {
+        if ui.checkbox(&mut enabled, "depth of field").changed() {
+            asked.send(Command::ToggleDepthOfField);
+        }
+        let looking = session.world().resource::<Looking>().0;
+        let mut shown = looking.sharp_zone;
+        ui.add_enabled_ui(enabled, |ui| {
+            if ui.checkbox(&mut shown, "show sharp zone").changed() {
+                asked.send(Command::SetSharpZone { shown });
+            }
+        });
+    });
+    rows(ui, "lens", |ui| {
+        row(ui, "focus", |ui| {
+            ui.horizontal(|ui| {
+                let distance = lens.focus_distance.min(1e9);
+                if let Some(distance) = number(ui, distance, 0.005 * distance, 1e-6..=1e9, " m") {
+                    asked.send(Command::SetFocus { distance });
+                }
+                let target = session.world().resource::<Focus>().target;
+                let mut stays = target != FocusTarget::Camera;
+                let hint = "stays with what was focused on last, however the camera moves";
+                if ui.checkbox(&mut stays, "stays").on_hover_text(hint).changed() {
+                    asked.send(Command::ToggleFocusLock);
+                }
+            })
+        });
+        if !lens.enabled {
+            return;
+        }
+        row(ui, "aperture", |ui| {
+            let stop = f_stop(lens.radius, &rig.projection);
+            let hint = "f-stop, for a film 24 mm high";
+            let mut new = stop;
+            let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6).max_decimals(3);
+            if ui.add(drag.update_while_editing(false)).on_hover_text(hint).changed() {
+                asked.send(Command::SetAperture { radius: radius_of_f_stop(new, &rig.projection) });
+            }
+        });
+        row(ui, "radius", |ui| {
+            // In the unit that scenes of any size need: millimetres have enough digits down to a mouse's eye.
+            if let Some(mm) = number(ui, 1e3 * lens.radius, 10.0 * lens.radius, 1e-6..=1e9, " mm") {
+                asked.send(Command::SetAperture { radius: 1e-3 * mm });
+            }
+        });
+        row(ui, "blades", |ui| {
+            ui.horizontal(|ui| {
+                if let Some(blades) = number(ui, f64::from(lens.blades), 0.05, 0.0..=16.0, "") {
+                    set(asked, Lens { blades: blades.round() as u32, ..lens });
+                }
+                if lens.blades >= 3 {
+                    if let Some(turn) = number(ui, lens.blade_rotation_deg, 0.5, -360.0..=360.0, "°") {
+                        set(asked, Lens { blade_rotation_deg: turn, ..lens });
+                    }
+                } else {
+                    ui.weak("round");
+                }
+            })
+        });
+        if let Some(zone) = sharp_zone(&lens, &rig.projection, session.picture().height) {
+            row(ui, "sharp", |ui| ui.label(format!("{} – {}", metres(zone.near), metres(zone.far))));
+        }
+    });
+}

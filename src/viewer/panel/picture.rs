@@ -1,0 +1,109 @@
+//! How the picture is made and shown.
+
+use super::{Asked, number, row, rows, slider};
+use crate::frame::{Command, Looking, Session, StopAt, Target};
+use crate::render::{Inspection, Integrator, ToneCurve};
+use crate::viewer::status::tone_curve;
+use egui::Ui;
+
+pub fn render(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+    let status = session.status();
+    rows(ui, "render", |ui| {
+        row(ui, "light", |ui| {
+            ui.horizontal(|ui| {
+                for (integrator, label) in [(Integrator::Path, "path"), (Integrator::Phong, "Phong")] {
+                    if ui.selectable_label(status.integrator == integrator, label).clicked() {
+                        asked.send(Command::SetIntegrator(integrator));
+                    }
+                }
+            })
+        });
+        let target = session.world().resource::<StopAt>().0;
+        row(ui, "until error", |ui| {
+            let shown = 100.0 * target.error.unwrap_or(0.0);
+            limit(ui, target.error.is_some(), shown, 0.01, 0.5, " %", |on, value| {
+                let error = on.then_some((value / 100.0).max(1e-5));
+                asked.send(Command::SetTarget(Target { error, ..target }));
+            });
+        });
+        row(ui, "until time", |ui| {
+            limit(ui, target.seconds.is_some(), target.seconds.unwrap_or(0.0), 1.0, 60.0, " s", |on, value| {
+                let seconds = on.then_some(value.max(0.1));
+                asked.send(Command::SetTarget(Target { seconds, ..target }));
+            });
+        });
+        row(ui, "until samples", |ui| {
+            limit(ui, target.spp.is_some(), f64::from(target.spp.unwrap_or(0)), 4.0, 1024.0, "", |on, value| {
+                let spp = on.then_some((value.round() as u32).max(1));
+                asked.send(Command::SetTarget(Target { spp, ..target }));
+            });
+        });
+        row(ui, "threads", |ui| {
+            if let Some(threads) = number(ui, status.threads as f64, 0.05, 1.0..=256.0, "") {
+                asked.send(Command::SetThreads { threads: threads.round() as usize });
+            }
+        });
+    });
+    ui.horizontal(|ui| {
+        if ui.button(if status.paused { "Go on" } else { "Pause" }).clicked() {
+            asked.send(if status.paused { Command::Resume } else { Command::Pause });
+        }
+        if ui.button("Begin again").clicked() {
+            asked.send(Command::Restart);
+        }
+        if ui.button("Keep PNG").clicked() {
+            asked.screenshot = Some(false);
+        }
+        if ui.button("EXR").clicked() {
+            asked.screenshot = Some(true);
+        }
+    });
+}
+
+/// A limit that can be switched off.
+fn limit(ui: &mut Ui, on: bool, value: f64, speed: f64, first: f64, suffix: &str, mut set: impl FnMut(bool, f64)) {
+    ui.horizontal(|ui| {
+        let mut checked = on;
+        if ui.checkbox(&mut checked, "").changed() {
+            set(checked, first);
+        }
+        if on {
+            if let Some(value) = number(ui, value, speed, 0.0..=1e9, suffix) {
+                set(true, value);
+            }
+        } else {
+            ui.weak("no limit");
+        }
+    });
+}
+
+pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+    let display = session.status().display;
+    rows(ui, "display", |ui| {
+        row(ui, "exposure", |ui| {
+            if let Some(stops) = slider(ui, f64::from(display.exposure_stops), -8.0..=8.0, false) {
+                asked.send(Command::SetExposure { stops: stops as f32 });
+            }
+        });
+        row(ui, "tone curve", |ui| {
+            ui.horizontal(|ui| {
+                for curve in [ToneCurve::Linear, ToneCurve::Neutral, ToneCurve::Filmic] {
+                    if ui.selectable_label(display.tone_curve == curve, tone_curve(curve)).clicked() {
+                        asked.send(Command::SetToneCurve(curve));
+                    }
+                }
+            })
+        });
+        let looking = session.world().resource::<Looking>().0;
+        row(ui, "show", |ui| {
+            let shown = looking.inspection;
+            egui::ComboBox::from_id_salt("inspection").selected_text(shown.label()).width(130.0).show_ui(ui, |ui| {
+                for inspection in Inspection::ALL {
+                    if ui.selectable_label(shown == inspection, inspection.label()).clicked() {
+                        asked.send(Command::SetInspection(inspection));
+                    }
+                }
+            })
+        });
+    });
+}

@@ -1,0 +1,41 @@
+//! Figures: how fast, how good, how much, how prompt.
+
+use super::selected::thousands;
+use super::{Around, row, rows};
+use crate::frame::{History, Session};
+use crate::scene::Shape;
+use crate::viewer::status::{bytes, percent, seconds};
+use egui::Ui;
+
+pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
+    let status = session.status();
+    rows(ui, "statistics", |ui| {
+        let mut figure = |name: &str, text: String| row(ui, name, |ui| drop(ui.label(text)));
+        figure("samples", format!("{} per pixel, {}", status.spp, seconds(status.seconds)));
+        figure("rays", format!("{:.2} M/s", status.mrays()));
+        let (camera, bounce, shadow) = (status.camera_mrays, status.bounce_mrays, status.shadow_mrays);
+        figure("", format!("{camera:.2} eye, {bounce:.2} bounce, {shadow:.2} light"));
+        figure("error", status.estimated_error.map_or("–".to_owned(), percent));
+        figure("left out", format!("{} samples not finite", status.n_bad));
+        let milliseconds = |share| {
+            around.reaction.quantile(share).map_or("–".to_owned(), |wait| format!("{:.0}", wait.as_secs_f64() * 1e3))
+        };
+        figure("reaction", format!("{} ms; {} ms in 99 of 100", milliseconds(0.5), milliseconds(0.99)));
+        let faces: usize = (session.inputs().objects.iter())
+            .map(|object| if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 0 })
+            .sum();
+        figure("triangles", thousands(faces));
+        figure("trees", bytes(session.tree_bytes() as u64));
+        if let Some(memory) = around.memory {
+            figure("memory", bytes(memory));
+        }
+        let history = session.world().resource::<History>();
+        if let Some(label) = history.undo_label() {
+            figure("undo", label.to_owned());
+        }
+        if let Some(label) = history.redo_label() {
+            figure("do again", label.to_owned());
+        }
+        figure("restarted", status.restart_cause.clone());
+    });
+}

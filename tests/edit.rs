@@ -1,0 +1,271 @@
+//! Changing a scene through a session, without a window: selecting, editing, undoing, looking at it in other ways.
+
+use bevy_ecs::component::Component;
+use bevy_ecs::entity::Entity;
+use firstlight::frame::{
+    Bookmarks, Command, Edit, Focus, FocusTarget, MaterialKind, MeshMeasure, NewThing, Property, Selection, Session,
+    SessionOptions, Target,
+};
+use firstlight::render::Inspection;
+use firstlight::scene::file::{MeshShadingPart, MeshSourcePart};
+use firstlight::scene::{Material, MaterialSlots, MeshOrigin, Placement, PointLight, SceneSource, Shape};
+use glam::{DVec3, Vec3};
+use std::time::{Duration, Instant};
+
+struct Driver {
+    session: Session,
+    start: Instant,
+}
+
+impl Driver {
+    /// A small picture of a scene, with two samples a pixel.
+    fn open(name: &str) -> Self {
+        let target = Target { spp: Some(2), ..Target::default() };
+        let options = SessionOptions { width: 48, height: 32, threads: Some(2), target, ..SessionOptions::default() };
+        let mut driver = Self { session: Session::new(options).unwrap(), start: Instant::now() };
+        driver.session.open(SceneSource::Builtin(name.to_owned()));
+        driver.until(|session| session.status().done && session.is_idle());
+        driver
+    }
+
+    fn frame(&mut self) {
+        self.session.update(self.start.elapsed());
+    }
+
+    #[track_caller]
+    fn until(&mut self, done: impl Fn(&Session) -> bool) {
+        let start = Instant::now();
+        self.frame();
+        while !done(&self.session) {
+            assert!(start.elapsed() < Duration::from_secs(120), "nothing came: {:?}", self.session.status());
+            std::thread::sleep(Duration::from_millis(2));
+            self.frame();
+        }
+    }
+
+    /// Each in a frame of its own.
+    fn edit(&mut self, edits: impl IntoIterator<Item = Edit>) {
+        for edit in edits {
+            self.session.send(Command::Edit(edit));
+            self.frame();
+        }
+    }
+
+    fn named(&self, name: &str) -> Entity {
+        let inputs = self.session.inputs();
+        let objects = inputs.objects.iter().map(|object| (object.entity, &object.name));
+        let lights = inputs.lights.iter().map(|light| (light.entity, &light.name));
+        let materials = inputs.materials.iter().map(|material| (material.entity, &material.name));
+        let mut all = objects.chain(lights).chain(materials);
+        all.find(|(_, other)| other.as_deref() == Some(name)).unwrap_or_else(|| panic!("no {name}")).0
+    }
+
+    fn select(&mut self, name: &str) -> u64 {
+        let id = self.named(name).to_bits();
+        self.edit([Edit::Select { id, add: false }]);
+        id
+    }
+
+    fn selected(&self) -> &Selection {
+        self.session.world().resource()
+    }
+
+    fn get<T: Component + Clone>(&self, name: &str) -> T {
+        self.session.world().get::<T>(self.named(name)).unwrap_or_else(|| panic!("{name} has none")).clone()
+    }
+}
+
+#[test]
+fn clicking_selects_what_is_seen_there() {
+    let mut driver = Driver::open("gallery");
+    driver.edit([Edit::PickAt { x: 0.8, y: 0.95, add: false }]);
+    assert_eq!(driver.selected().active(), Some(driver.named("floor")));
+    driver.edit([Edit::PickAt { x: 0.2, y: 0.42, add: true }]);
+    assert_eq!(driver.selected().0, [driver.named("floor"), driver.named("mirror ball")]);
+    driver.edit([Edit::PickAt { x: 0.5, y: 0.02, add: false }]);
+    assert_eq!(driver.selected().0, [], "the sky is nothing");
+    driver.edit([Edit::SelectAll]);
+    assert_eq!(driver.selected().0.len(), 12);
+}
+
+#[test]
+fn every_edit_can_be_undone_and_done_again_to_the_bit() {
+    let mut driver = Driver::open("gallery");
+    let mut states = vec![driver.session.inputs().clone()];
+    let red = driver.named("red").to_bits();
+    let ball = driver.select("gold ball");
+    let edits = [
+        Edit::Move { by: DVec3::new(0.5, 0.25, -1.0) },
+        Edit::Turn { axis: DVec3::Y, angle_deg: 30.0 },
+        Edit::Scale { factors: DVec3::splat(1.5) },
+        Edit::Set { id: ball, property: Property::Radius, value: DVec3::splat(0.4) },
+        Edit::Set { id: red, property: Property::Color, value: DVec3::new(0.1, 0.8, 0.2) },
+        Edit::SetKind { id: red, kind: MaterialKind::Glass },
+        Edit::Assign { id: ball, material: red },
+        Edit::OwnMaterial { id: ball },
+        Edit::Rename { id: ball, name: "brass ball".to_owned() },
+        Edit::Set { id: 0, property: Property::Zenith, value: DVec3::new(0.0, 0.5, 1.0) },
+        Edit::Duplicate,
+        Edit::Delete,
+        Edit::Add(NewThing::Sphere),
+        Edit::Add(NewThing::Plane),
+        Edit::Add(NewThing::Cube),
+        Edit::Add(NewThing::AreaLight),
+        Edit::Add(NewThing::PointLight),
+    ];
+    for edit in edits {
+        driver.edit([edit.clone()]);
+        let now = driver.session.inputs().clone();
+        assert_ne!(states.last(), Some(&now), "{edit:?} did nothing: {:?}", driver.session.status().messages);
+        states.push(now);
+    }
+    for expected in states.iter().rev().skip(1) {
+        driver.edit([Edit::Undo]);
+        assert_eq!(driver.session.inputs(), expected);
+    }
+    driver.edit([Edit::Undo]);
+    assert!(driver.session.status().messages.back().unwrap().text.contains("nothing to undo"));
+    for expected in &states[1..] {
+        driver.edit([Edit::Redo]);
+        assert_eq!(driver.session.inputs(), expected);
+    }
+}
+
+#[test]
+fn a_drag_is_one_step_and_counts_from_where_it_began() {
+    let mut driver = Driver::open("gallery");
+    driver.select("red ball");
+    let before: Placement = driver.get("red ball");
+    driver.edit([Edit::Begin]);
+    for i in 1..=20 {
+        driver.edit([Edit::Move { by: DVec3::X * 0.125 * f64::from(i) }]);
+    }
+    driver.edit([Edit::End]);
+    let after: Placement = driver.get("red ball");
+    assert_eq!(after.translation, before.translation + 2.5 * DVec3::X);
+    driver.edit([Edit::Undo]);
+    assert_eq!(driver.get::<Placement>("red ball"), before);
+    // A walk of the camera between two edits is one step too.
+    let home = driver.session.status().rig;
+    for _ in 0..10 {
+        driver.session.send(Command::Turn { yaw_deg: 1.0, pitch_deg: 0.0 });
+        driver.frame();
+    }
+    driver.edit([Edit::Delete, Edit::Undo]);
+    assert_ne!(driver.session.status().rig, home);
+    driver.edit([Edit::Undo]);
+    assert_eq!(driver.session.status().rig, home);
+    assert_eq!(driver.get::<Placement>("red ball"), before);
+}
+
+#[test]
+fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
+    let mut driver = Driver::open("gallery");
+    driver.edit([Edit::Add(NewThing::Sphere)]);
+    assert_eq!(driver.selected().active(), Some(driver.named("ball")));
+    let (shape, place): (Shape, Placement) = (driver.get("ball"), driver.get("ball"));
+    let Shape::Sphere { radius } = shape else { panic!("{shape:?}") };
+    assert!(radius > 0.0 && place.translation.length() < 10.0, "{place:?}");
+    driver.edit([Edit::Duplicate]);
+    let copy: Placement = driver.get("ball 2");
+    assert!(copy.translation.x > place.translation.x);
+    assert_eq!(driver.get::<MaterialSlots>("ball"), driver.get::<MaterialSlots>("ball 2"), "they share a material");
+    let id = driver.named("ball 2").to_bits();
+    driver.edit([Edit::OwnMaterial { id }]);
+    assert_ne!(driver.session.world().get::<MaterialSlots>(Entity::from_bits(id)), Some(&driver.get("ball")));
+    driver.edit([Edit::Add(NewThing::PointLight)]);
+    let id = driver.named("point light").to_bits();
+    driver.edit([Edit::Set { id, property: Property::Intensity, value: DVec3::new(3.0, 2.0, 1.0) }]);
+    assert_eq!(driver.get::<PointLight>("point light").intensity, Vec3::new(3.0, 2.0, 1.0));
+    // Nonsense is refused, and nothing changes.
+    let (material, id): (Material, u64) = (driver.get("red"), driver.named("red").to_bits());
+    for (property, value) in
+        [(Property::Color, DVec3::NAN), (Property::Ior, DVec3::ONE), (Property::Radius, DVec3::ONE)]
+    {
+        driver.edit([Edit::Set { id, property, value }]);
+    }
+    assert_eq!(driver.get::<Material>("red"), material);
+}
+
+#[test]
+fn a_mesh_is_simplified_beside_the_picture() {
+    let mut driver = Driver::open("gallery");
+    let id = driver.named("serpent").to_bits();
+    let whole: Shape = driver.get("serpent");
+    let restarts = driver.session.status().restarts;
+    let before = Instant::now();
+    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Auto, ratio: 0.05 }]);
+    assert!(before.elapsed() < Duration::from_millis(200), "the frame waited {:?}", before.elapsed());
+    driver.until(|session| session.status().restarts > restarts && session.is_idle());
+    let (shape, measure): (Shape, MeshMeasure) = (driver.get("serpent"), driver.get("serpent"));
+    let Shape::Mesh(coarse) = shape else { panic!() };
+    assert_eq!(measure.faces, coarse.triangles.len());
+    assert!(measure.faces <= measure.whole_faces / 20 && measure.faces > measure.whole_faces / 25);
+    let deviation = measure.deviation.unwrap();
+    assert!(deviation.mean() > 0.0 && deviation.max() < 0.2, "{deviation:?}");
+    assert_eq!(driver.get::<MeshOrigin>("serpent").simplify, Some(0.05));
+    driver.edit([Edit::Undo]);
+    driver.until(Session::is_idle);
+    assert_eq!(driver.get::<Shape>("serpent"), whole);
+    driver.edit([Edit::Add(NewThing::Mesh(MeshSourcePart::Builtin("torus".to_owned())))]);
+    driver.until(|session| session.inputs().objects.iter().any(|object| object.name.as_deref() == Some("torus")));
+    driver.edit([Edit::Add(NewThing::Mesh(MeshSourcePart::Obj("/no/such.obj".to_owned())))]);
+    driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("no such file")));
+}
+
+#[test]
+fn looking_in_other_ways_keeps_all_samples() {
+    let mut driver = Driver::open("gallery");
+    let (picture, restarts) = (driver.session.picture().rgba.clone(), driver.session.status().restarts);
+    let mut seen = vec![picture.clone()];
+    for inspection in Inspection::ALL.into_iter().filter(|inspection| *inspection != Inspection::Picture) {
+        let number = driver.session.picture().number;
+        driver.session.send(Command::SetInspection(inspection));
+        driver.until(|session| session.picture().number > number && session.is_idle());
+        let rgba = driver.session.picture().rgba.clone();
+        assert!(!seen.contains(&rgba), "{inspection:?} looks like another one");
+        seen.push(rgba);
+    }
+    driver.session.send(Command::SetInspection(Inspection::Picture));
+    driver.until(|session| session.is_idle() && session.picture().rgba == picture);
+    driver.session.send(Command::SetSharpZone { shown: true });
+    driver.until(|session| session.is_idle() && session.picture().rgba != picture);
+    driver.session.send(Command::SetSharpZone { shown: false });
+    driver.until(|session| session.is_idle() && session.picture().rgba == picture);
+    assert_eq!((driver.session.status().restarts, driver.session.status().spp), (restarts, 2));
+}
+
+#[test]
+fn focus_stays_with_a_thing_and_views_can_be_come_back_to() {
+    let mut driver = Driver::open("gallery");
+    driver.session.send(Command::FocusAt { x: 0.2, y: 0.42 });
+    driver.session.send(Command::ToggleFocusLock);
+    driver.frame();
+    assert!(matches!(driver.session.world().resource::<Focus>().target, FocusTarget::Object(..)));
+    let near = driver.session.status().rig;
+    driver.session.send(Command::SetBookmark { slot: 4 });
+    driver.session.send(Command::Dolly { factor: 2.0 });
+    driver.frame();
+    let far = driver.session.status().rig;
+    let stepped_back = (near.view.eye - far.view.eye).dot(near.view.forward);
+    assert!((far.lens.focus_distance - near.lens.focus_distance - stepped_back).abs() < 1e-5, "{far:?}");
+    // The object takes the focus along.
+    driver.select("mirror ball");
+    driver.edit([Edit::Move { by: far.view.forward }]);
+    assert!((driver.session.status().rig.lens.focus_distance - far.lens.focus_distance - 1.0).abs() < 1e-5);
+    driver.session.send(Command::SetFocus { distance: 3.0 });
+    driver.frame();
+    assert_eq!(driver.session.world().resource::<Focus>().target, FocusTarget::Camera, "a hand takes over");
+    driver.session.send(Command::GoToBookmark { slot: 4 });
+    driver.frame();
+    assert_eq!(driver.session.status().rig, near);
+    assert_eq!(driver.session.world().resource::<Bookmarks>().get(4), Some(near));
+    // What is selected is framed.
+    driver.select("red ball");
+    driver.session.send(Command::FrameAll);
+    driver.frame();
+    let rig = driver.session.status().rig;
+    let ball: Placement = driver.get("red ball");
+    assert!((rig.view.pivot() - ball.translation).length() < 0.1, "{rig:?}");
+    assert!(rig.view.pivot_distance < 2.0);
+}

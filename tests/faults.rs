@@ -1,0 +1,253 @@
+//! Disks that fill up, files that change, processes that are killed, and a session that is flown about at random.
+//!
+//! `FIRSTLIGHT_SOAK_SECONDS`: how long the session is flown, instead of a few seconds.
+
+use firstlight::frame::{Command as Do, MessageKind, Session, SessionOptions, Target, render_offline};
+use firstlight::render::Film;
+use firstlight::scene::obj::load_obj;
+use firstlight::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_firstlight");
+
+/// A small generator with a fixed sequence (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        self.next() % n
+    }
+
+    /// In -1..1.
+    fn signed(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// A picture that is there already, and its bytes.
+fn old_picture(folder: &Path) -> Vec<u8> {
+    let path = folder.join("out.png");
+    image::RgbImage::from_pixel(3, 2, image::Rgb([1, 2, 3])).save(&path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+/// The shell lets no file grow beyond 4 KiB, as a full disk would.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_the_old_picture_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = old_picture(folder.path());
+    for name in ["out.png", "new.exr"] {
+        let script =
+            format!("trap '' XFSZ; ulimit -f 4; exec '{PROGRAM}' render cornell -o {name} --size 128x128 --spp 1");
+        let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("error:") && said.contains(name) && said.contains("cannot be written"), "{said}");
+    }
+    assert_eq!(std::fs::read(folder.path().join("out.png")).unwrap(), before);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "something was left behind");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_takes_no_files_is_named_before_anything_is_rendered() {
+    let output = Command::new(PROGRAM).args(["render", "cornell", "-o", "/proc/out.png"]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("/proc/out.png: cannot be written"), "{said}");
+}
+
+/// Killed as soon as there is anything in the temporary file, and at a few moments after that.
+#[cfg(unix)]
+#[test]
+fn killed_while_saving_the_old_picture_is_still_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.png");
+    let before = old_picture(folder.path());
+    let mut caught = 0;
+    for delay in [0, 1, 3] {
+        let mut child = Command::new(PROGRAM)
+            .args(["render", "cornell", "-o", "out.png", "--size", "1500x1000", "--spp", "1", "--max-depth", "1"])
+            .current_dir(folder.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let start = Instant::now();
+        let is_saving = || {
+            std::fs::read_dir(folder.path()).unwrap().flatten().any(|entry| {
+                let is_part = entry.path().extension().is_some_and(|e| e == "part");
+                is_part && entry.metadata().is_ok_and(|info| info.len() > 0)
+            })
+        };
+        while !is_saving() && child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(60) {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        std::thread::sleep(Duration::from_millis(delay));
+        child.kill().unwrap();
+        caught += u32::from(!child.wait().unwrap().success());
+        let now = std::fs::read(&path).unwrap();
+        let whole = image::load_from_memory(&now).expect("a whole picture");
+        assert!(now == before || (whole.width(), whole.height()) == (1500, 1000));
+        std::fs::write(&path, &before).unwrap();
+        for entry in std::fs::read_dir(folder.path()).unwrap().flatten().filter(|entry| entry.path() != path) {
+            std::fs::remove_file(entry.path()).unwrap();
+        }
+    }
+    assert!(caught > 0, "it was never killed while it saved");
+}
+
+#[test]
+fn a_file_that_is_replaced_while_it_is_read_is_read_whole_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.obj");
+    let model = |n: usize| {
+        let vertices: String = (0..n).map(|i| format!("v {i} {} 0.5\n", i * i % 7)).collect();
+        let faces: String = (1..n - 1).map(|i| format!("f {i} {} {}\n", i + 1, i + 2)).collect();
+        vertices + &faces
+    };
+    let (small, large) = (model(40), model(4000));
+    std::fs::write(&path, &small).unwrap();
+    let done = std::sync::atomic::AtomicBool::new(false);
+    let (mut good, mut refused) = (0, 0);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                std::fs::write(&path, &large).unwrap();
+                std::fs::write(&path, &small).unwrap();
+            }
+        });
+        for _ in 0..150 {
+            match load_obj(&path) {
+                // What was cut off may still be sound: fewer vertices and no faces would not be.
+                Ok(model) => good += u32::from(model.mesh.validate().is_ok()),
+                Err(error) => refused += u32::from(error.to_string().contains("model.obj")),
+            }
+        }
+        done.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    assert_eq!(good + refused, 150);
+}
+
+#[test]
+fn a_film_beyond_the_limit_is_refused_with_the_size_that_it_would_take() {
+    let output =
+        Command::new(PROGRAM).args(["render", "cornell", "-o", "out.png", "--size", "65000x65000"]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("GiB"), "{said}");
+}
+
+#[test]
+fn one_thread_and_sixty_four_render_the_same_bits() {
+    let render = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let scene = load(&SceneSource::Builtin("everything".to_owned()), &LoadOptions::default()).unwrap();
+            let mut world = bevy_ecs::world::World::new();
+            scene.spawn(&mut world);
+            let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
+            let mut film = Film::new(70, 50);
+            let target = Target { spp: Some(2), ..Target::default() };
+            let settings = world.resource::<Rendering>().0;
+            render_offline(&extraction.snapshot, &settings, &mut film, target, |_| true);
+            film.means()
+        })
+    };
+    assert_eq!(render(1), render(64));
+}
+
+/// Resident memory in bytes.
+#[cfg(target_os = "linux")]
+fn resident() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap();
+    text.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() * 4096
+}
+
+/// One thing that somebody at the window may do, sensible or not.
+fn whim(random: &mut Random) -> Do {
+    let (a, b) = (random.signed(), random.signed());
+    let scenes = ["cornell", "glass-balls", "dof-balls", "veach-mis", "soft-shadow", "no-such-scene", "broken.obj"];
+    match random.below(24) {
+        0..3 => Do::Turn { yaw_deg: 400.0 * a, pitch_deg: 100.0 * b },
+        3..6 => Do::Fly { right: a, up: b, forward: 10.0 * random.signed() },
+        6..8 => Do::Orbit { yaw_deg: 90.0 * a, pitch_deg: 200.0 * b },
+        8 => Do::Pan { right: a, up: b },
+        9 => Do::Dolly { factor: (20.0 * a).exp() },
+        10 => Do::Zoom { factor: (8.0 * a).exp() },
+        11 => Do::Roll { angle_deg: 1e5 * a },
+        12 => Do::FrameAll,
+        13 => Do::Home,
+        14 => Do::PivotAt { x: 2.0 * a, y: 2.0 * b },
+        15 => Do::FocusAt { x: 0.5 + a, y: 0.5 + b },
+        16 => Do::ScaleFocus { factor: (50.0 * a).exp() },
+        17 => Do::SetAperture { radius: (30.0 * a).exp() },
+        18 => Do::SetExposure { stops: 200.0 * a as f32 },
+        19 => Do::NextToneCurve,
+        20..22 => Do::Resize { width: random.below(130) as u32, height: random.below(90) as u32 },
+        22 => Do::SetThreads { threads: 1 + random.below(4) as usize },
+        _ => Do::Open { path: scenes[random.below(scenes.len() as u64) as usize].into() },
+    }
+}
+
+#[test]
+fn a_session_survives_whatever_is_done_to_it_without_growing() {
+    let seconds = std::env::var("FIRSTLIGHT_SOAK_SECONDS").ok().and_then(|n| n.parse().ok()).unwrap_or(4.0);
+    let options = SessionOptions { width: 96, height: 64, threads: Some(2), ..SessionOptions::default() };
+    let mut session = Session::new(options).unwrap();
+    session.open(SceneSource::Builtin("cornell".to_owned()));
+    let mut random = Random(0x50A7);
+    let (start, mut frames, mut pictures) = (Instant::now(), 0u64, 0u64);
+    let (mut warm, mut last) = (0, 0);
+    while start.elapsed().as_secs_f64() < seconds {
+        for _ in 0..random.below(4) {
+            session.send(whim(&mut random));
+        }
+        if random.below(40) == 0 {
+            session.send(
+                [Do::Pause, Do::Resume, Do::Restart, Do::Level, Do::ToggleDepthOfField][random.below(5) as usize]
+                    .clone(),
+            );
+            session.send(Do::Resume);
+        }
+        session.update(start.elapsed());
+        frames += 1;
+        pictures = session.picture().number;
+        // Most frames go by quickly; some pictures are waited for.
+        std::thread::sleep(Duration::from_millis(if random.below(10) == 0 { 30 } else { 1 }));
+        #[cfg(target_os = "linux")]
+        {
+            last = resident();
+            // All scenes have been read once or twice by then.
+            if start.elapsed().as_secs_f64() < 0.5 * seconds {
+                warm = warm.max(last);
+            }
+        }
+    }
+    let rig = session.status().rig;
+    assert!(rig.view.eye.is_finite() && rig.view.forward.is_finite(), "{rig:?}");
+    // It still works.
+    session.send(Do::Resize { width: 40, height: 30 });
+    session.send(Do::Resume);
+    session.send(Do::Open { path: "cornell".into() });
+    let settled = Instant::now();
+    let before = session.picture().number;
+    while session.picture().number < before + 3 || session.picture().width != 40 {
+        session.update(start.elapsed());
+        std::thread::sleep(Duration::from_millis(2));
+        assert!(settled.elapsed() < Duration::from_secs(60), "no picture any more: {:?}", session.status());
+    }
+    let errors = session.status().messages.iter().filter(|message| message.kind == MessageKind::Error).count();
+    println!("{frames} frames, {pictures} pictures, {errors} messages; {} MiB, then {} MiB", warm >> 20, last >> 20);
+    assert!(frames > 20 && pictures > 5, "{frames} frames, {pictures} pictures");
+    assert!(last <= warm + (48 << 20), "grew from {warm} to {last} bytes");
+}

@@ -1,0 +1,279 @@
+//! Files of a running session: saved, read again when they change, recorded and played.
+
+use firstlight::frame::{Command, MessageKind, Session, SessionOptions, Target};
+use firstlight::scene::{LoadOptions, Material, Paint, SceneInputs, SceneSource, Shape, load};
+use glam::{DVec3, Vec3};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const ROOM: &str = r#"(
+    // The room.
+    camera: (eye: (0.3, 1, 4), look_at: (0, 0.7, 0)),
+    environment: gradient(zenith: 1, horizon: 0.5, ground: 0.1),
+    textures: { "tiles": image(file: "tiles.png") },
+    materials: { "red": diffuse(albedo: (0.8, 0.2, 0.1)), "floor": diffuse(albedo: "tiles") },
+    objects: [
+        mesh(source: obj("tent.obj"), material: "red"),
+        mesh(source: obj("other.obj"), material: "red"),
+        plane(material: "floor"),
+    ],
+)"#;
+const TENT: &str = "v 0 0 0\nv 1 0 0\nv 0 0 -1\nv 0 1 0\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+
+fn write_room(folder: &Path) -> SceneSource {
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    write("room.ron", ROOM);
+    write("tent.obj", TENT);
+    write("other.obj", &TENT.replace("v 0 1 0", "v 2 1 0"));
+    image::RgbImage::from_pixel(2, 2, image::Rgb([200, 180, 160])).save(folder.join("tiles.png")).unwrap();
+    SceneSource::Scene(folder.join("room.ron"))
+}
+
+struct Driver {
+    session: Session,
+    start: Instant,
+}
+
+impl Driver {
+    fn open(source: SceneSource, threads: usize, spp: u32) -> Self {
+        let target = Target { spp: Some(spp), ..Target::default() };
+        let options = SessionOptions { width: 40, height: 30, threads: Some(threads), target, ..Default::default() };
+        let mut session = Session::new(options).unwrap();
+        session.open(source);
+        Self { session, start: Instant::now() }
+    }
+
+    fn frame(&mut self) {
+        self.session.update(self.start.elapsed());
+    }
+
+    #[track_caller]
+    fn run_until(&mut self, done: impl Fn(&Session) -> bool) {
+        let start = Instant::now();
+        self.frame();
+        while !done(&self.session) {
+            std::thread::sleep(Duration::from_millis(3));
+            assert!(start.elapsed() < Duration::from_secs(120), "nothing came: {:?}", self.session.status());
+            self.frame();
+        }
+    }
+
+    #[track_caller]
+    fn settle(&mut self) {
+        self.run_until(|session| session.status().done && session.is_idle());
+    }
+
+    fn said(&self, kind: MessageKind) -> Vec<String> {
+        let messages = self.session.status().messages.iter();
+        messages.filter(|message| message.kind == kind).map(|message| message.text.clone()).collect()
+    }
+
+    #[track_caller]
+    fn run_until_said(&mut self, kind: MessageKind, words: &str) {
+        self.run_until(|session| {
+            session.status().messages.iter().any(|message| message.kind == kind && message.text.contains(words))
+        });
+    }
+
+    fn meshes(&mut self) -> Vec<Arc<firstlight::mesh::Mesh>> {
+        let objects = SceneInputs::of(self.session.world_mut()).objects;
+        let meshes = objects.into_iter().filter_map(|object| match object.shape {
+            Shape::Mesh(mesh) => Some(mesh),
+            _ => None,
+        });
+        meshes.collect()
+    }
+
+    fn eye(&mut self) -> DVec3 {
+        SceneInputs::of(self.session.world_mut()).camera.unwrap().view.eye
+    }
+}
+
+#[test]
+fn what_changes_on_disk_is_read_again_and_nothing_else_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut driver = Driver::open(write_room(path), 2, 4);
+    driver.settle();
+    driver.session.send(Command::Orbit { yaw_deg: 30.0, pitch_deg: 0.0 });
+    driver.session.send(Command::SetExposure { stops: 1.5 });
+    driver.settle();
+    let (eye, before) = (driver.eye(), driver.meshes());
+
+    // One mesh moves; the other, with its tree, the camera and the exposure stay.
+    std::fs::write(path.join("tent.obj"), TENT.replace("v 0 1 0", "v 0 1.5 0")).unwrap();
+    driver.run_until_said(MessageKind::Note, "was read again");
+    driver.settle();
+    let after = driver.meshes();
+    assert!(!Arc::ptr_eq(&before[0], &after[0]) && before[0].positions != after[0].positions);
+    assert!(Arc::ptr_eq(&before[1], &after[1]), "what has not changed is not read again");
+    assert_eq!((driver.eye(), driver.session.status().display.exposure_stops), (eye, 1.5));
+
+    // A file that cannot be read is a message, and everything stays as it was.
+    let restarts = driver.session.status().restarts;
+    std::fs::write(path.join("tent.obj"), "v 0 0\nf 1 2 3\n").unwrap();
+    driver.run_until_said(MessageKind::Error, "(the scene stays as it was)");
+    driver.settle();
+    let errors = driver.said(MessageKind::Error);
+    assert!(errors.iter().all(|error| error.contains("tent.obj:1")), "{errors:?}");
+    assert_eq!(driver.session.status().restarts, restarts);
+
+    // Mended; the text of the scene and a picture change as well, and the camera follows the file if that moved it.
+    std::fs::write(path.join("tent.obj"), TENT).unwrap();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([20, 180, 160])).save(path.join("tiles.png")).unwrap();
+    std::fs::write(path.join("room.ron"), ROOM.replace("(0.3, 1, 4)", "(0.5, 1, 4)")).unwrap();
+    driver.run_until(|session| session.status().restarts > restarts);
+    driver.settle();
+    driver.run_until(|session| session.is_idle());
+    assert_eq!(driver.eye(), DVec3::new(0.5, 1.0, 4.0));
+    assert!(Arc::ptr_eq(&before[1], &driver.meshes()[1]));
+    // What is shown is what a new session would show.
+    let fresh = load(&SceneSource::Scene(path.join("room.ron")), &LoadOptions::default()).unwrap();
+    let shown = driver.session.world().resource::<firstlight::frame::CurrentScene>().0.clone();
+    assert_eq!(shown.content_fingerprint(), fresh.content_fingerprint());
+}
+
+#[test]
+fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut driver = Driver::open(write_room(path), 2, 4);
+    driver.settle();
+    let paint = |driver: &mut Driver, red: f32| {
+        let world = driver.session.world_mut();
+        let object = SceneInputs::of(world).objects[0].slots[0];
+        world.entity_mut(object).insert(Material::Diffuse { albedo: Paint::Rgb(Vec3::new(red, 0.2, 0.1)) });
+    };
+    paint(&mut driver, 0.25);
+    driver.settle();
+    // Somebody else changes the file: what was done here is not thrown away.
+    std::fs::write(path.join("room.ron"), ROOM.replace("zenith: 1", "zenith: 2")).unwrap();
+    driver.run_until_said(MessageKind::Warning, "has changes that are not saved");
+
+    assert_eq!(driver.session.scene_file(), Some(path.join("room.ron")));
+    let restarts = driver.session.status().restarts;
+    driver.session.send(Command::SaveScene { path: path.join("room.ron") });
+    driver.run_until_said(MessageKind::Note, "the comments of the old file are not kept");
+    let text = std::fs::read_to_string(path.join("room.ron")).unwrap();
+    assert!(text.contains("0.25") && text.contains("\"tent.obj\"") && !text.contains("zenith: 2"), "{text}");
+    // Saving is no change: the samples stay, whatever the watch sees.
+    std::thread::sleep(Duration::from_millis(700));
+    driver.settle();
+    assert_eq!(driver.session.status().restarts, restarts, "{:?}", driver.session.status().messages);
+
+    // From there on the file and the scene are one again.
+    std::fs::write(path.join("room.ron"), text.replace("0.25", "0.75")).unwrap();
+    driver.run_until_said(MessageKind::Note, "was read again");
+    driver.settle();
+    let materials = SceneInputs::of(driver.session.world_mut()).materials;
+    assert!(format!("{materials:?}").contains("0.75"), "{materials:?}");
+
+    driver.session.send(Command::SaveScene { path: path.join("nowhere/room.ron") });
+    driver.run_until_said(MessageKind::Error, "there is no folder");
+}
+
+/// A session that does a bit of everything, and another one that plays it.
+#[test]
+fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let source = write_room(path);
+    let recording = path.join("session.rec");
+    let mut driver = Driver::open(SceneSource::Builtin("dof-balls".to_owned()), 2, 5);
+    driver.session.record(&recording, &SceneSource::Builtin("dof-balls".to_owned()), None).unwrap();
+    driver.settle();
+    let send = |driver: &mut Driver, commands: Vec<Command>| {
+        for command in commands {
+            driver.session.send(command);
+        }
+        driver.frame();
+    };
+    send(&mut driver, vec![Command::Orbit { yaw_deg: 17.3, pitch_deg: 4.0 }, Command::FocusAt { x: 0.4, y: 0.6 }]);
+    send(&mut driver, vec![Command::Resize { width: 33, height: 21 }, Command::ScaleAperture { factor: 1.7 }]);
+    let SceneSource::Scene(room) = source else { unreachable!() };
+    send(&mut driver, vec![Command::Open { path: room.clone() }, Command::Turn { yaw_deg: 5.0, pitch_deg: -3.0 }]);
+    driver.run_until(|session| session.status().scene.ends_with("room.ron"));
+    send(&mut driver, vec![Command::Fly { right: 0.1, up: 0.2, forward: 0.3 }, Command::SetExposure { stops: -0.7 }]);
+    send(&mut driver, vec![Command::PivotAt { x: 0.5, y: 0.5 }, Command::SetAperture { radius: 0.03 }]);
+    driver.settle();
+    let shown = driver.session.film_snapshot().unwrap();
+    driver.session.end_record();
+
+    for threads in [1, 3] {
+        let options = firstlight::frame::ReplayOptions { threads: Some(threads), spp: None };
+        let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
+        assert_eq!(played.warnings, Vec::<String>::new());
+        assert_eq!((played.film.width(), played.film.height(), played.film.spp()), (33, 21, 5));
+        assert!(played.film.means() == shown.means(), "{threads} threads");
+        assert_eq!(played.display().exposure_stops, -0.7);
+    }
+
+    // Through the program, where the last line was cut short by a crash, and the scene has changed since.
+    let text = std::fs::read_to_string(&recording).unwrap();
+    let cut = &text[..text.trim_end().len() - 3];
+    std::fs::write(&recording, cut).unwrap();
+    let run = |args: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+        let output = command.current_dir(path).args(args).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (status, said) = run(&["--replay", "session.rec", "-o", "a.exr", "--spp", "5", "--threads", "1"]);
+    assert_eq!((status, said.as_str()), (Some(0), ""));
+    let picture = image::open(path.join("a.exr")).unwrap().into_rgb32f();
+    assert!(picture.pixels().zip(shown.means()).all(|(pixel, mean)| pixel.0 == mean.to_array()));
+    // The picture at its end opens as any other.
+    assert_eq!(run(&["render", "a.exr", "-o", "b.exr"]).0, Some(0));
+    assert!(std::fs::read(path.join("a.exr")).unwrap() == std::fs::read(path.join("b.exr")).unwrap());
+    std::fs::write(&room, ROOM.replace("zenith: 1", "zenith: 2")).unwrap();
+    let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
+    assert!(status == Some(0) && said.contains("room.ron has changed since the recording"), "{said}");
+    std::fs::write(path.join("no.rec"), "hello").unwrap();
+    let (status, said) = run(&["--replay", "no.rec"]);
+    assert!(status == Some(1) && said.contains("no.rec: is no recording"), "{said}");
+}
+
+#[test]
+fn a_camera_that_moves_is_rendered_to_numbered_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_room(path);
+    let run = |line: &str| {
+        let mut command = assert_cmd::Command::cargo_bin("firstlight").unwrap();
+        command.current_dir(path).args(line.split(' ')).env("XDG_CONFIG_HOME", path.join("config"));
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (status, said) = run("render room.ron -o turn.png --turntable 3 --size 20x15 --spp 2");
+    assert_eq!(status, Some(0), "{said}");
+    let read = |name: &str| std::fs::read(path.join(name)).unwrap();
+    assert!(!path.join("turn.png").exists() && !path.join("turn-0004.png").exists());
+    // The first is the picture of the scene itself; each can be opened and made again.
+    assert_eq!(run("render room.ron -o still.png --size 20x15 --spp 2").0, Some(0));
+    assert!(read("turn-0001.png") == read("still.png"));
+    assert_eq!(run("render turn-0002.png -o again.png").0, Some(0));
+    assert!(read("turn-0002.png") == read("again.png") && read("turn-0002.png") != read("turn-0003.png"));
+
+    #[cfg(target_os = "linux")]
+    {
+        use firstlight::frame::SettingsStore;
+        let (status, said) = run("render room.ron -o way.png --bookmarks 1,2 --frames 3 --size 20x15 --spp 2");
+        assert!(status == Some(1) && said.contains("has no view under 1 (there are: none)"), "{said}");
+        let source = SceneSource::Scene(path.join("room.ron"));
+        let store = SettingsStore::in_folder(&path.join("config/firstlight"));
+        let mut bookmarks = store.bookmarks(&source).0;
+        let scene = load(&source, &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let camera = SceneInputs::of(&mut world).camera.unwrap();
+        let mut rig =
+            firstlight::frame::navigation::Rig { view: camera.view, projection: camera.projection, lens: camera.lens };
+        bookmarks.views.insert(1, rig);
+        rig.view.eye.x += 1.0;
+        bookmarks.views.insert(2, rig);
+        store.keep_bookmarks(&source, &bookmarks).unwrap();
+        let (status, said) = run("render room.ron -o way.png --bookmarks 1,2 --frames 3 --size 20x15 --spp 2");
+        assert_eq!(status, Some(0), "{said}");
+        assert!(read("way-0001.png") == read("still.png") && read("way-0003.png") != read("way-0002.png"));
+    }
+}
