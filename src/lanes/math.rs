@@ -25,7 +25,7 @@ pub(crate) fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
 }
 
 const QUARTER_HIGH: f32 = 1.570_312_5;
-const QUARTER_LOW: f32 = 4.838_267_8e-4;
+const QUARTER_LOW: f32 = 4.838_268e-4;
 
 /// As `sampling::warp::sin_cos_eighth`, rounding for rounding.
 #[inline(always)]
@@ -50,7 +50,7 @@ pub(crate) fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
     let wide = (long * TAN_PI_8).lt(short);
     let t = select(wide, short - long, short) / select(wide, short + long, long);
     let t2 = t * t;
-    let p = ((t2 * 8.053_745e-2 - 1.387_768_6e-1) * t2 + 1.997_771_1e-1) * t2 - 3.333_294_9e-1;
+    let p = ((t2 * 8.053_745e-2 - 1.387_768_6e-1) * t2 + 1.997_771_1e-1) * t2 - 3.333_295e-1;
     let small = p * t2 * t + t;
     let angle = select(wide, small + FRAC_PI_4, small);
     let angle = select(ax.lt(ay), -angle + FRAC_PI_2, angle);

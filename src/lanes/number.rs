@@ -203,7 +203,7 @@ impl<S: Simd> Bits<S> {
     /// The number that these are the bits of.
     #[inline(always)]
     pub fn as_float(self) -> Float<S> {
-        Float { s: self.s, v: self.s.from_bits(self.v) }
+        Float { s: self.s, v: self.s.float_of(self.v) }
     }
 
     /// The number itself, below 2³¹ and rounded.

@@ -72,7 +72,7 @@ pub(crate) trait Simd: Copy {
     /// Of two's complement.
     fn to_f(self, a: Self::U) -> Self::F;
     fn to_bits(self, a: Self::F) -> Self::U;
-    fn from_bits(self, a: Self::U) -> Self::F;
+    fn float_of(self, a: Self::U) -> Self::F;
     /// Modulo 2³², as is `mul_u`.
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn mul_u(self, a: Self::U, b: Self::U) -> Self::U;
@@ -335,7 +335,7 @@ impl Simd for Portable {
         a.map(f32::to_bits)
     }
     #[inline(always)]
-    fn from_bits(self, a: Self::U) -> Self::F {
+    fn float_of(self, a: Self::U) -> Self::F {
         a.map(f32::from_bits)
     }
     #[inline(always)]
@@ -393,8 +393,8 @@ impl Simd for Portable {
 #[inline(always)]
 fn pack<T: Copy>(mask: Mask, a: [T; LANES]) -> [T; LANES] {
     let (mut packed, mut n) = (a, 0);
-    for i in 0..LANES {
-        packed[n] = a[i];
+    for (i, &lane) in a.iter().enumerate() {
+        packed[n] = lane;
         n += usize::from(mask >> i & 1);
         if n == LANES {
             break;
@@ -449,7 +449,7 @@ mod tests {
                 s.splat(numbers[shift]),
                 s.sqrt(a),
                 s.to_f(s.to_bits(a)),
-                s.from_bits(s.to_bits(b)),
+                s.float_of(s.to_bits(b)),
                 s.gather(&numbers, s.load_u(&std::array::from_fn(|i| i as u32 * 5 % 10))),
                 s.gather(&array(7), s.load_u(&std::array::from_fn(|i| i as u32 * 5 % 16))),
                 s.gather(&[array(7), array(3)].concat(), s.load_u(&std::array::from_fn(|i| i as u32 * 5 % 32))),

@@ -94,7 +94,7 @@ impl Simd for Avx512 {
         fn truncate(a: __m512) -> __m512i { _mm512_cvttps_epi32(a) }
         fn to_f(a: __m512i) -> __m512 { _mm512_cvtepi32_ps(a) }
         fn to_bits(a: __m512) -> __m512i { _mm512_castps_si512(a) }
-        fn from_bits(a: __m512i) -> __m512 { _mm512_castsi512_ps(a) }
+        fn float_of(a: __m512i) -> __m512 { _mm512_castsi512_ps(a) }
         fn add_u(a: __m512i, b: __m512i) -> __m512i { _mm512_add_epi32(a, b) }
         fn mul_u(a: __m512i, b: __m512i) -> __m512i { _mm512_mullo_epi32(a, b) }
         fn and_u(a: __m512i, b: __m512i) -> __m512i { _mm512_and_si512(a, b) }
@@ -275,7 +275,7 @@ impl Simd for Avx2 {
         fn truncate(a: Self::F) -> Self::U { halves!(_mm256_cvttps_epi32(a)) }
         fn to_f(a: Self::U) -> Self::F { halves!(_mm256_cvtepi32_ps(a)) }
         fn to_bits(a: Self::F) -> Self::U { halves!(_mm256_castps_si256(a)) }
-        fn from_bits(a: Self::U) -> Self::F { halves!(_mm256_castsi256_ps(a)) }
+        fn float_of(a: Self::U) -> Self::F { halves!(_mm256_castsi256_ps(a)) }
         fn add_u(a: Self::U, b: Self::U) -> Self::U { halves!(_mm256_add_epi32(a, b)) }
         fn mul_u(a: Self::U, b: Self::U) -> Self::U { halves!(_mm256_mullo_epi32(a, b)) }
         fn and_u(a: Self::U, b: Self::U) -> Self::U { halves!(_mm256_and_si256(a, b)) }

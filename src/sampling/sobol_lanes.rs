@@ -52,10 +52,10 @@ impl<S: Simd> Bits<S> {
 
 #[inline(always)]
 fn scramble<S: Simd>(reversed: Bits<S>, seed: Bits<S>) -> Bits<S> {
-    let x = (reversed ^ reversed * 0x3d20_adea) + seed;
+    let x = (reversed ^ (reversed * 0x3d20_adea)) + seed;
     let x = x * (seed.shr(16) | 1);
-    let x = x ^ x * 0x0552_6c56;
-    x ^ x * 0x53a2_2864
+    let x = x ^ (x * 0x0552_6c56);
+    x ^ (x * 0x53a2_2864)
 }
 
 #[inline(always)]

@@ -83,7 +83,7 @@ impl WideLights {
             let values = values.chain([length_u, length_v, radius, light.shape.area(), lift]);
             rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
         }
-        let has_spheres = flags.iter().any(|&flag| flag == SPHERE);
+        let has_spheres = flags.contains(&SPHERE);
         let has_quads = flags.iter().any(|&flag| flag != SPHERE);
         let [ox, oy, oz, ux, uy, uz, vx, vy, vz, nx, ny, nz, r, g, b, length_u, length_v, radius, area, lift] =
             rows.map(padded);

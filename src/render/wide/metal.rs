@@ -73,7 +73,7 @@ impl<S: Simd> MetalLanes<S> {
     }
 
     #[inline(always)]
-    pub fn to_local(&self, wi: Vector<S>) -> Vector<S> {
+    pub fn local(&self, wi: Vector<S>) -> Vector<S> {
         wi.to_local(&self.axes)
     }
 

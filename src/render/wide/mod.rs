@@ -381,7 +381,7 @@ fn eval<S: Simd, const KIND: usize>(surface: &Surface<S>, place: &Place<S>, wi: 
     if let Some(metal) = &surface.metal
         && KIND == METAL
     {
-        let found = metal.eval(metal.to_local(wi));
+        let found = metal.eval(metal.local(wi));
         let valid = above & metal.facing();
         let value = found.tint * found.value;
         let pdf = select(valid, found.pdf, zero);
