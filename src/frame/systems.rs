@@ -15,6 +15,7 @@ use crate::scene::{
     CameraInput, Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal,
     Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
 };
+use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
 use bevy_ecs::system::SystemParam;
 use std::sync::Arc;
@@ -137,6 +138,7 @@ pub struct Touched<'w, 's> {
             Changed<Projection>,
             Changed<Lens>,
             Changed<Ordinal>,
+            Changed<Name>,
         )>,
     >,
     shapes: RemovedComponents<'w, 's, Shape>,
@@ -148,6 +150,8 @@ pub struct Touched<'w, 's> {
     projections: RemovedComponents<'w, 's, Projection>,
     lenses: RemovedComponents<'w, 's, Lens>,
     ordinals: RemovedComponents<'w, 's, Ordinal>,
+    /// No picture shows a name, but messages and lists do.
+    names: RemovedComponents<'w, 's, Name>,
 }
 
 impl Touched<'_, '_> {
@@ -161,7 +165,8 @@ impl Touched<'_, '_> {
             + self.views.read().count()
             + self.projections.read().count()
             + self.lenses.read().count()
-            + self.ordinals.read().count();
+            + self.ordinals.read().count()
+            + self.names.read().count();
         removed > 0 || !self.touched.is_empty()
     }
 }
