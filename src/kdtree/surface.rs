@@ -138,20 +138,10 @@ impl SceneTree {
                 instance.carry_to_world(world_from_object, local, uv)
             }
             Shape::Quad { corner, edge_u, edge_v } => {
-                let corners = quad_corners(*corner, *edge_u, *edge_v);
-                // The corners that are tested are rounded themselves.
-                let size = corner.abs() + edge_u.abs() + edge_v.abs();
-                let middle = *corner + 0.5 * *edge_u + 0.5 * *edge_v;
-                let error = gamma(6) * size + 2.0 * test_slab(&corners, middle, 1.0);
-                let (cross, area) = wide_cross(*edge_u, *edge_v);
-                // Away from the rim, as points of triangles are.
-                let inset = INSET * error.max_element() / area;
-                let clear = |at: f32, edge: Vec3| {
-                    let least = (inset * edge.length()).min(0.5);
-                    at.clamp(least, 1.0 - least)
-                };
-                let position = *corner + clear(hit.u, *edge_v) * *edge_u + clear(hit.v, *edge_u) * *edge_v;
-                SurfacePoint { position, error, geometric_normal: cross.normalize(), uv }
+                let QuadRim { normal, error, least } = quad_rim(*corner, *edge_u, *edge_v);
+                let clear = |at: f32, least: f32| at.clamp(least, 1.0 - least);
+                let position = *corner + clear(hit.u, least[0]) * *edge_u + clear(hit.v, least[1]) * *edge_v;
+                SurfacePoint { position, error, geometric_normal: normal, uv }
             }
             Shape::Sphere { center, radius } => {
                 let (position, error, geometric_normal) = sphere_point(ray, hit.t, *center, *radius);
@@ -175,6 +165,35 @@ impl SceneTree {
             }
         }
     }
+}
+
+/// What all points of a quad share.
+pub(crate) struct QuadRim {
+    /// Unit.
+    pub normal: Vec3,
+    /// As of [`SurfacePoint`].
+    pub error: Vec3,
+    /// How far points stay away from the rim, as points of triangles do: least `u` and `v`, and as far from 1.
+    pub least: [f32; 2],
+}
+
+#[inline]
+pub(crate) fn quad_rim(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> QuadRim {
+    // The corners that are tested are rounded themselves.
+    let size = corner.abs() + edge_u.abs() + edge_v.abs();
+    let middle = corner + 0.5 * edge_u + 0.5 * edge_v;
+    let error = gamma(6) * size + 2.0 * test_slab(&quad_corners(corner, edge_u, edge_v), middle, 1.0);
+    let (cross, area) = wide_cross(edge_u, edge_v);
+    let inset = INSET * error.max_element() / area;
+    let least = [edge_v, edge_u].map(|across| (inset * across.length()).min(0.5));
+    QuadRim { normal: cross.normalize(), error, least }
+}
+
+/// Error of a point of a ball along each axis, without the rounding of the point itself: next to the origin, where `f32` has
+/// more digits than the centre has in `f64`, those of `f64` count.
+#[inline]
+pub(crate) fn sphere_error(center: Vec3, radius: f32) -> f32 {
+    (WIDE_ERROR * f64::from(center.abs().max_element() + radius)) as f32
 }
 
 /// - `condition`: growth of a relative error of the next ray's direction on its way into this space.
@@ -244,7 +263,5 @@ fn sphere_point(ray: &Ray, t: f32, center: Vec3, radius: f32) -> (Vec3, Vec3, Ve
     let near = ray.origin.as_dvec3() + f64::from(t) * ray.dir.as_dvec3();
     let outwards = (near - center.as_dvec3()).normalize();
     let position = (center.as_dvec3() + f64::from(radius) * outwards).as_vec3();
-    // One rounding to f32, and next to the origin, where f32 has more digits than the centre has in f64, those of f64.
-    let wide_error = WIDE_ERROR * f64::from(center.abs().max_element() + radius);
-    (position, 2.0 * UNIT_ROUNDOFF * position.abs() + wide_error as f32, outwards.as_vec3())
+    (position, 2.0 * UNIT_ROUNDOFF * position.abs() + sphere_error(center, radius), outwards.as_vec3())
 }

@@ -236,7 +236,7 @@ impl LightShape {
     }
 }
 
-fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
+pub(super) fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
     let to_center = center - position;
     let distance2 = to_center.length_squared();
     let r2 = radius * radius;
@@ -248,7 +248,7 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
     let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
     let (local, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
     let frame = Frame::around(to_center / distance2.sqrt());
-    if distance2 < 2.0 * r2 {
+    if distance2 < CLOSE * r2 {
         return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));
     }
     // The angle at the centre that belongs to the angle at the shading point (Pharr et al., section 6.2.4), written
@@ -270,6 +270,9 @@ fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<L
         uv: Vec2::ZERO,
     })
 }
+
+/// Within this many squared radii of the centre of a sphere its points are found by [`sphere_from_close_by`].
+pub(super) const CLOSE: f32 = 2.0;
 
 /// Where the direction `wi` (about the centre) meets a sphere that fills much of the sky.
 ///

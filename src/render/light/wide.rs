@@ -6,14 +6,14 @@ use super::super::Techniques;
 use super::super::wide::place::offset_origin;
 use super::super::wide::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
 use super::selection::MAX_ESTIMATED;
-use super::shape::SMALL_SOLID_ANGLE;
+use super::shape::{CLOSE, SMALL_SOLID_ANGLE, sample_sphere};
 use super::{Light, LightShape, LightTable};
 use crate::geometry::robust::gamma;
 use crate::lanes::{
     Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
 };
 use crate::render::ColorInput;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
 /// The lights as arrays that lanes look up.
@@ -377,8 +377,42 @@ impl WideLights {
         let n = normal.abs();
         let around = n.x + n.y + n.z;
         let lift = (n.dot(size) + around * radius) * gamma(6) + around * distance * gamma(16);
-        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+        let lanes = LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi };
+        let close = found & distance2.lt(r2 * CLOSE);
+        if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
     }
+}
+
+/// Puts in what [`sample_sphere`] finds for the lanes of `close`.
+#[cold]
+fn spheres_close_by<S: Simd>(
+    close: Mask,
+    center: Vector<S>,
+    radius: Float<S>,
+    position: Vector<S>,
+    u: [Float<S>; 2],
+    mut lanes: LightLanes<S>,
+) -> LightLanes<S> {
+    let s = radius.s;
+    let [center, position] = [center, position].map(|v| v.to_arrays());
+    let (radius, u) = (radius.to_array(), u.map(|u| u.to_array()));
+    let (mut target, mut wi, mut pdf) = (lanes.target.to_arrays(), lanes.wi.to_arrays(), lanes.pdf.to_array());
+    for lane in (0..LANES).filter(|lane| close >> lane & 1 != 0) {
+        let at = |v: &[[f32; LANES]; 3]| Vec3::from_array([v[0][lane], v[1][lane], v[2][lane]]);
+        let point = sample_sphere(at(&center), radius[lane], at(&position), Vec2::new(u[0][lane], u[1][lane]));
+        let Some(point) = point else {
+            lanes.found &= !(1 << lane);
+            continue;
+        };
+        for axis in 0..3 {
+            (target[axis][lane], wi[axis][lane]) = (point.target[axis], point.wi[axis]);
+        }
+        pdf[lane] = point.pdf;
+    }
+    lanes.target = Vector::from_arrays(s, &target);
+    lanes.wi = Vector::from_arrays(s, &wi);
+    lanes.pdf = Float::load(s, &pdf);
+    lanes
 }
 
 /// See [`crate::sampling::SphericalQuad`].

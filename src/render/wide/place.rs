@@ -39,6 +39,12 @@ pub(super) struct At<'a, S: Simd> {
     pub mask: Mask,
 }
 
+/// Between `least` and as far from 1.
+#[inline(always)]
+fn away_from_rim<S: Simd>(at: Float<S>, least: Float<S>) -> Float<S> {
+    at.max(least).min(at.all(1.0) - least)
+}
+
 impl<S: Simd> Place<S> {
     #[inline(always)]
     pub fn new(s: S, at: &At<S>) -> Self {
@@ -91,10 +97,10 @@ impl<S: Simd> Place<S> {
 
     #[inline(always)]
     fn set_flat(&mut self, table: &SurfaceTable, object: Bits<S>, [u, v]: [Float<S>; 2]) {
-        let t = Float::gather(&table.t, object);
         let (a, b) = (Vector::gather(&table.a, object), Vector::gather(&table.b, object));
         let c = Vector::gather(&table.c, object);
-        self.position = a * (u.all(1.0) - t * u - t * v) + b * u + c * v;
+        let least = [Float::gather(&table.least[0], object), Float::gather(&table.least[1], object)];
+        self.position = a + b * away_from_rim(u, least[0]) + c * away_from_rim(v, least[1]);
         self.geometric_normal = Vector::gather(&table.normal, object);
         self.offset = Float::gather(&table.offset, object);
         self.uv = [u, v];
@@ -123,7 +129,8 @@ impl<S: Simd> Place<S> {
         };
         let normal =
             Vector { x: Float { s, v: s.narrow(x) }, y: Float { s, v: s.narrow(y) }, z: Float { s, v: s.narrow(z) } };
-        let offset = normal.abs().dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF));
+        let (n, error) = (normal.abs(), Float::gather(&table.least[0], object));
+        let offset = n.dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF)) + (n.x + n.y + n.z) * error;
         self.position = select_vector(mask, position, self.position);
         self.geometric_normal = select_vector(mask, normal, self.geometric_normal);
         self.offset = select(mask, offset, self.offset);

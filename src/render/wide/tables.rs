@@ -1,8 +1,7 @@
 //! What shading looks up by object and by material, as arrays that sixteen lanes read at once.
 
 use super::super::{ColorInput, Fresnel, Geometry, Material, MaterialId, ScalarInput};
-use crate::geometry::Ray;
-use crate::kdtree::{Hit, SceneTree, Shape};
+use crate::kdtree::{SceneTree, Shape, quad_rim, sphere_error};
 use crate::lanes::padded;
 use glam::Vec3;
 
@@ -11,59 +10,55 @@ pub(in crate::render) const OTHER: u32 = 0;
 pub(in crate::render) const FLAT: u32 = 1;
 pub(in crate::render) const BALL: u32 = 2;
 
-/// The lone quads, triangles and spheres among the objects of a scene.
+/// The lone quads and spheres among the objects of a scene.
 #[derive(Debug, Default)]
 pub(in crate::render) struct SurfaceTable {
     pub kind: Vec<u32>,
-    /// The point of a flat shape is `(1 − t u − t v) a + u b + v c`, `t` being 1 for triangles and 0 for quads; of a
-    /// ball `a` is the centre and `offset` the radius.
+    /// Corner of a quad, centre of a ball.
     pub a: [Vec<f32>; 3],
+    /// The edges of a quad.
     pub b: [Vec<f32>; 3],
     pub c: [Vec<f32>; 3],
-    pub t: Vec<f32>,
+    /// How far points of a quad stay away from its rim, in its coordinates; of a ball the first is the error of a point along each
+    /// axis beside the rounding, metres.
+    pub least: [Vec<f32>; 2],
     pub normal: [Vec<f32>; 3],
-    /// How far from a flat shape the next ray must start, metres along the normal; more than its error anywhere.
+    /// How far from a quad the next ray must start, metres along the normal; of a ball the radius.
     pub offset: Vec<f32>,
 }
 
 impl SurfaceTable {
     pub fn build(tree: &SceneTree) -> Self {
         let mut table = Self::default();
-        for (object, shape) in (0..).zip(tree.shapes()) {
-            let (kind, [a, b, c], t, corners): (_, _, _, &[(f32, f32)]) = match shape {
+        for shape in tree.shapes() {
+            let (kind, points, normal, least, offset) = match shape {
                 Shape::Quad { corner, edge_u, edge_v } => {
-                    (FLAT, [*corner, *edge_u, *edge_v], 0.0, &[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+                    let rim = quad_rim(*corner, *edge_u, *edge_v);
+                    let offset = rim.normal.abs().dot(rim.error);
+                    (FLAT, [*corner, *edge_u, *edge_v], rim.normal, rim.least, offset)
                 }
-                Shape::Triangle { vertices } => (FLAT, *vertices, 1.0, &[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]),
-                Shape::Sphere { center, .. } => (BALL, [*center, Vec3::ZERO, Vec3::ZERO], 0.0, &[]),
-                _ => (OTHER, [Vec3::ZERO; 3], 0.0, &[]),
+                Shape::Sphere { center, radius } => {
+                    let error = sphere_error(*center, *radius);
+                    (BALL, [*center, Vec3::ZERO, Vec3::ZERO], Vec3::Z, [error, 0.0], *radius)
+                }
+                _ => (OTHER, [Vec3::ZERO; 3], Vec3::Z, [0.0; 2], 0.0),
             };
-            let (mut normal, mut offset) = (Vec3::Z, 0.0f32);
-            // The error grows with the distance to the farthest corner, so nowhere is it larger than in a corner.
-            for &(u, v) in corners {
-                let hit = Hit { t: 1.0, u, v, prim: 0, object };
-                let point = tree.surface_point(&Ray::new(Vec3::ZERO, Vec3::Z), &hit);
-                normal = point.geometric_normal;
-                offset = offset.max(normal.abs().dot(point.error));
-            }
-            if let Shape::Sphere { radius, .. } = shape {
-                offset = *radius;
-            }
+            let [a, b, c] = points;
             table.kind.push(kind);
             push(&mut table.a, a);
             push(&mut table.b, b);
             push(&mut table.c, c);
-            table.t.push(t);
             push(&mut table.normal, normal);
+            table.least.iter_mut().zip(least).for_each(|(array, least)| array.push(least));
             table.offset.push(offset);
         }
-        let Self { kind, a, b, c, t, normal, offset } = table;
+        let Self { kind, a, b, c, least, normal, offset } = table;
         Self {
             kind: padded(kind),
             a: a.map(padded),
             b: b.map(padded),
             c: c.map(padded),
-            t: padded(t),
+            least: least.map(padded),
             normal: normal.map(padded),
             offset: padded(offset),
         }
