@@ -3,13 +3,18 @@
 mod common;
 
 use common::render;
-use firstlight::render::{Integrator, RenderSettings};
+use firstlight::render::{Integrator, RenderSettings, Techniques};
 use firstlight::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
 use glam::Vec3;
 use std::path::Path;
 
 /// Renders a scene file of `objects` seen from `eye` towards `look_at`; returns the colour in the middle.
 fn middle(dir: &Path, objects: &str, eye: &str, look_at: &str, integrator: Integrator) -> Vec3 {
+    let settings = RenderSettings { integrator, ..RenderSettings::default() };
+    middle_with(dir, objects, eye, look_at, &settings, 64)
+}
+
+fn middle_with(dir: &Path, objects: &str, eye: &str, look_at: &str, settings: &RenderSettings, spp: u32) -> Vec3 {
     let text = format!(
         "(camera: (eye: {eye}, look_at: {look_at}, vfov: 0.01), environment: constant(1),
           textures: {{
@@ -30,6 +35,7 @@ fn middle(dir: &Path, objects: &str, eye: &str, look_at: &str, integrator: Integ
               \"clamped\": emissive(radiance: \"clamped\"),
               \"twice\": emissive(radiance: \"twice\"),
               \"matte\": diffuse(albedo: \"picture\"),
+              \"white\": diffuse(albedo: 0.8),
               \"polished\": metal(alpha: \"picture\", reflectance: 1),
           }},
           objects: [{objects}])"
@@ -42,8 +48,7 @@ fn middle(dir: &Path, objects: &str, eye: &str, look_at: &str, integrator: Integ
     scene.spawn(&mut world);
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     assert!(extraction.problems.is_empty(), "{:?}", extraction.problems);
-    let settings = RenderSettings { integrator, ..RenderSettings::default() };
-    render(&extraction.snapshot, &settings, 1, 1, 64).0.mean(0, 0)
+    render(&extraction.snapshot, settings, 1, 1, spp).0.mean(0, 0)
 }
 
 /// Red, green above; blue, white below; a green photo; a bright HDR picture; a model with a material of its own.
@@ -190,4 +195,28 @@ fn a_checker_to_the_horizon_converges_to_its_mean() {
     // Almost along the plane, squares of a quarter metre: thousands of them in one pixel.
     let found = middle(dir.path(), "plane(material: \"checker\")", "(0, 0.02, 0)", "(300, 0, 41)", Integrator::Path);
     assert!((found.x - 0.5).abs() < 0.2 && (found.z - 0.5).abs() < 0.2, "{found}");
+}
+
+/// A lamp that is a mesh with a picture, mirrored or not, over a matte quad in the dark corner beside it: those that ask the
+/// lamp find the light of those that run into it.
+#[test]
+fn textured_lamps_of_meshes_send_what_is_seen_of_them() {
+    let dir = folder();
+    for placed in
+        ["rotate: (90, 0, 0), translate: (0, 1, -1)", "rotate: (90, 0, 0), scale: (-1, 1, 1), translate: (2, 1, -1)"]
+    {
+        let objects = format!(
+            "mesh(source: obj(\"two.obj\"), material: \"picture\", transform: ({placed})),
+             quad(corner: (-1, 0, 1), edge_u: (4, 0, 0), edge_v: (0, 0, -4), material: \"white\")"
+        );
+        let seen = |light_sampling| {
+            let techniques = Techniques { light_sampling, ..Techniques::default() };
+            let settings = RenderSettings { techniques, ..RenderSettings::default() };
+            middle_with(dir.path(), &objects, "(0.3, 0.5, 3)", "(0.3, 0, -0.5)", &settings, 1 << 15)
+        };
+        let (asked, met) = (seen(true), seen(false));
+        assert!((asked - met).abs().max_element() < 0.02 * met.max_element(), "{placed}: {asked} and {met}");
+        // The picture is not grey: green and white lie on one side.
+        assert!((met.x - met.y).abs() > 0.05 * met.max_element(), "{met}");
+    }
 }

@@ -290,11 +290,11 @@ fn a_scene_that_is_not_there_is_told_in_the_terminal() {
     let Some(desktop) = Desktop::start() else { return };
     let folder = desktop.folder();
     std::fs::write(folder.join("broken.ron"), "(camera: (eye: (0, 0, 0), look_at: (0, 0, 0)))").expect("a file");
-    for (scene, expected) in
-        [("broken.ron", "broken.ron:1"), ("galery", "did you mean `gallery`"), ("no.obj", "no.obj")]
+    for (scene, expected, code) in
+        [("broken.ron", "broken.ron:1", 1), ("galery", "did you mean `gallery`", 2), ("no.obj", "no.obj", 1)]
     {
         let (status, errors) = desktop.fails(&[scene], &[]);
-        assert_eq!(status.code(), Some(1), "{scene}: {errors}");
+        assert_eq!(status.code(), Some(code), "{scene}: {errors}");
         assert!(errors.contains(expected) && !errors.contains("panicked"), "{scene}: {errors}");
     }
 }

@@ -130,7 +130,7 @@ impl Desk<'_, '_> {
                 Some(rig) => self.set_rig(rig),
                 None => self.note("no view before this one".to_owned()),
             },
-            Command::NextView => match self.trail.next() {
+            Command::NextView => match self.trail.forth() {
                 Some(rig) => self.set_rig(rig),
                 None => self.note("no view after this one".to_owned()),
             },

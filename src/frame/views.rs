@@ -65,7 +65,7 @@ impl ViewTrail {
         Some(rig)
     }
 
-    pub fn next(&mut self) -> Option<Rig> {
+    pub fn forth(&mut self) -> Option<Rig> {
         let rig = self.ahead.pop()?;
         self.back.extend(self.now.replace(rig));
         Some(rig)
@@ -98,7 +98,7 @@ mod tests {
         trail.see(at(50.0), ms(9000));
         assert_eq!(trail.previous(), Some(at(0.0)));
         assert_eq!(trail.previous(), None);
-        assert_eq!([trail.next(), trail.next(), trail.next()], [Some(at(50.0)), Some(at(80.0)), None]);
+        assert_eq!([trail.forth(), trail.forth(), trail.forth()], [Some(at(50.0)), Some(at(80.0)), None]);
         // From there on a new way.
         trail.see(at(80.0), ms(10_000));
         trail.see(at(7.0), ms(12_000));

@@ -69,7 +69,8 @@ impl ErrorEstimate {
                 let seen = (step(first) / last).log2() / span;
                 // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
                 // much as it is uncertain, where slopes of pictures lie about half around it.
-                let uncertainty = sigma(first).hypot(sigma(level)) / (span * std::f64::consts::LN_2);
+                let of_tiles = sigma(first).hypot(sigma(level)) / std::f64::consts::LN_2;
+                let uncertainty = of_tiles.hypot(WOBBLE) / span;
                 let trust = 0.25 / (0.25 + uncertainty * uncertainty);
                 (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
             }
@@ -89,6 +90,10 @@ impl ErrorEstimate {
 /// Between plain random sampling and the best that scrambled nets do on smooth integrands (Owen 1997).
 const MIN_EXPONENT: f64 = 1.0;
 const MAX_EXPONENT: f64 = 3.0;
+
+/// How far the slope of a single doubling lies from the long one where edges rule, even without any noise: nets of odd
+/// and of even powers of two divide the square differently.
+const WOBBLE: f64 = 0.35;
 
 /// The steps of one tile's pixels from doubling to doubling.
 #[derive(Clone, Debug, Default)]

@@ -366,7 +366,7 @@ mod tests {
         let mut one = [0.0; 63];
         one[3 * 9 + 4] = 25.0;
         let spread = smoothed(&one, size);
-        assert_eq!((spread[3 * 9 + 4], spread[9 + 2], spread[0]), (1.0, 1.0, 0.0));
+        assert_eq!((spread[3 * 9 + 4], spread[2 * 9 + 2], spread[0]), (1.0, 1.0, 0.0));
     }
 
     #[test]

@@ -56,7 +56,7 @@ impl Stage {
         let (probes, mut randoms): (Vec<Probe>, Vec<Random>) = (first..end).map(|i| self.probe(stage, i)).unzip();
         let rays: RayBatch = probes.iter().map(|probe| &probe.ray).collect();
         // Both traversals have their turn.
-        let class = if first / BATCH % 2 == 0 { RayClass::Incoherent } else { RayClass::Coherent };
+        let class = if (first / BATCH).is_multiple_of(2) { RayClass::Incoherent } else { RayClass::Coherent };
         let (mut hits, mut occluded) = (HitBatch::default(), Vec::new());
         self.scene.closest_hits(&rays, class, &mut hits);
         self.scene.any_hits(&rays, class, &mut occluded);

@@ -31,10 +31,9 @@ pub fn camera_text(rig: &Rig) -> String {
 
 /// To a millionth of `scale`, in as few digits as that takes.
 fn rounded(value: f64, scale: f64) -> f64 {
-    let digits = 6 - scale.abs().log10().floor() as i32;
-    let step = 10f64.powi(digits);
+    let step = 10f64.powf(6.0 - scale.abs().log10().floor());
     let rounded = (value * step).round() / step;
-    // Without the sign of a negative zero; what has no such rounding stays as it is.
+    // Without the sign of a negative zero; what has no such rounding, next to a scale of 0, stays as it is.
     if rounded.is_finite() { rounded + 0.0 } else { value }
 }
 

@@ -9,7 +9,7 @@ use crate::mesh::procedural;
 use crate::scene::file::{MeshShadingPart, MeshSourcePart};
 use crate::scene::{Material, MaterialSlots, MeshOrigin, Ordinal, Paint, Placement, PointLight, Shape, View};
 use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Entity, World};
+use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -104,18 +104,22 @@ pub fn sized(placement: Placement, factor: f64) -> Placement {
 
 /// With a name that nothing else has, after everything else in the scene file.
 pub fn spawn(world: &mut World, name: &str, bundle: impl bevy_ecs::bundle::Bundle) -> Entity {
-    let (name, ordinal) = (free_name(world, name), next_ordinal(world));
+    let (name, ordinal) = (free_name(world, name, false), next_ordinal(world));
     world.spawn((bundle, Name::new(name), ordinal)).id()
 }
 
 pub fn new_material(world: &mut World, name: &str, material: Material) -> Entity {
-    spawn(world, name, material)
+    let (name, ordinal) = (free_name(world, name, true), next_ordinal(world));
+    world.spawn((material, Name::new(name), ordinal)).id()
 }
 
-/// `name`, or the first of `name 2`, `name 3`, … that is free.
-fn free_name(world: &mut World, name: &str) -> String {
-    let taken: std::collections::HashSet<String> =
-        world.query::<&Name>().iter(world).map(|name| name.as_str().to_owned()).collect();
+/// `name`, or the first of `name 2`, `name 3`, … that is free among the materials or among all else.
+fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
+    let mut named = world.query::<(&Name, Has<Material>)>();
+    let taken: std::collections::HashSet<String> = (named.iter(world))
+        .filter(|(_, is_material)| *is_material == of_materials)
+        .map(|(name, _)| name.as_str().to_owned())
+        .collect();
     let numbered = (2..).map(|i| format!("{name} {i}"));
     std::iter::once(name.to_owned()).chain(numbered).find(|name| !taken.contains(name)).expect("numbers go on")
 }

@@ -32,6 +32,8 @@ pub(super) struct Light {
     pub is_point: bool,
     /// See [`super::Object::turned`].
     turned: Option<Mat3>,
+    /// Surface coordinates at the vertices of a triangle of a mesh, where its emission is textured.
+    corner_uvs: Option<[Vec2; 3]>,
 }
 
 /// All finite emitters of a scene.
@@ -88,25 +90,31 @@ impl LightTable {
                         }
                 };
                 let first = lights.len() as u32;
-                let mut push = |emission: Emission, shape: LightShape| {
-                    let (is_point, turned) = (object.is_point_light, object.turned);
-                    lights.push(Light { shape, emission, mean_radiance: mean(emission), is_point, turned });
+                let mut push_with = |emission: Emission, shape: LightShape, corner_uvs: Option<[Vec2; 3]>| {
+                    let (is_point, turned, mean_radiance) = (object.is_point_light, object.turned, mean(emission));
+                    lights.push(Light { shape, emission, mean_radiance, is_point, turned, corner_uvs });
                     lights.len() as u32 - 1
                 };
+                let mut push = |emission, shape| push_with(emission, shape, None);
                 let only = emission[0].filter(|_| emission.len() == 1);
                 match (shape, only) {
                     (Shape::Mesh { tree: _, world_from_object }, _) => {
                         let mesh = object.mesh.as_ref().expect("a mesh shape brings its mesh");
                         let corner = |i: u32| world_from_object.transform_point3(mesh.positions[i as usize]);
+                        // The front stays outside under mirroring.
+                        let order = if world_from_object.matrix3.determinant() < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
                         let ids: Vec<u32> = (0..mesh.triangles.len())
                             .map(|t| {
                                 let slot = mesh.slots.get(t).map_or(0, |&s| usize::from(s));
-                                let vertices = mesh.triangles[t].map(corner);
-                                emission
-                                    .get(slot)
-                                    .copied()
-                                    .flatten()
-                                    .map_or(u32::MAX, |emission| push(emission, LightShape::triangle(vertices)))
+                                let Some(emission) = emission.get(slot).copied().flatten() else { return u32::MAX };
+                                let triangle = mesh.triangles[t];
+                                let uv = |k: usize| match mesh.uvs.get(triangle[k] as usize) {
+                                    Some(uv) => *uv,
+                                    None => [Vec2::ZERO, Vec2::X, Vec2::Y][k],
+                                };
+                                let is_textured = matches!(emission.radiance, ColorInput::Texture(_));
+                                let vertices = order.map(|k| corner(triangle[k]));
+                                push_with(emission, LightShape::triangle(vertices), is_textured.then(|| order.map(uv)))
                             })
                             .collect();
                         if only.is_some() { ObjectLights::All(first) } else { ObjectLights::Some(ids) }
@@ -260,7 +268,10 @@ impl Light {
                 let uv = match (&self.shape, &self.turned) {
                     (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * normal),
                     (LightShape::Sphere { .. }, None) => sphere_uv(normal),
-                    _ => uv,
+                    _ => match self.corner_uvs {
+                        Some([a, b, c]) => a + uv.x * (b - a) + uv.y * (c - a),
+                        None => uv,
+                    },
                 };
                 textures[texture as usize].eval(uv)
             }

@@ -313,7 +313,7 @@ mod tests {
                 };
                 let radiance = 0.1 + 20.0 * c.y.powi(4);
                 let emission = Emission { radiance: ColorInput::Constant(Vec3::splat(radiance)), scale: 1.0 };
-                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None }
+                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corner_uvs: None }
             })
             .collect()
     }
@@ -357,7 +357,8 @@ mod tests {
     fn frequencies_follow_the_probabilities() {
         let n = 40;
         let tree = LightTree::build(&lights(n, 6));
-        for (k, (position, normal)) in places().into_iter().take(6).enumerate() {
+        let mut n_judged = 0;
+        for (k, (position, normal)) in places().into_iter().take(12).enumerate() {
             let draws = 200_000;
             let mut found = vec![0.0_f64; n as usize];
             for i in 0..draws {
@@ -369,11 +370,17 @@ mod tests {
             let expected: Vec<f64> =
                 (0..n).map(|id| f64::from(tree.pmf(id, position, normal)) * f64::from(draws)).collect();
             let bins = expected.iter().zip(&found).filter(|(e, _)| **e > 5.0);
+            if expected.iter().all(|e| *e == 0.0) {
+                assert!(found.iter().all(|f| *f == 0.0), "place {k}: no light reaches it");
+                continue;
+            }
+            n_judged += 1;
             let (chi2, dof) = bins.fold((0.0, 0.0), |(sum, dof), (e, f)| (sum + (f - e).powi(2) / e, dof + 1.0));
-            // Wilson–Hilferty; 3 σ is 1 % over six places.
+            // Wilson–Hilferty; 3.2 σ is 1 % over twelve places.
             let z = ((chi2 / dof).cbrt() - (1.0 - 2.0 / (9.0 * dof))) / (2.0f64 / (9.0 * dof)).sqrt();
-            assert!(z < 3.0, "place {k}: χ² {chi2:.1} with {dof} degrees of freedom");
+            assert!(z < 3.2, "place {k}: χ² {chi2:.1} with {dof} degrees of freedom");
         }
+        assert!(n_judged >= 6, "too few places that light reaches: {n_judged}");
     }
 
     #[test]
