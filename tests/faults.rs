@@ -201,7 +201,7 @@ fn whim(random: &mut Random) -> Do {
 
 #[test]
 fn a_session_survives_whatever_is_done_to_it_without_growing() {
-    let seconds = std::env::var("FIRSTLIGHT_SOAK_SECONDS").ok().and_then(|n| n.parse().ok()).unwrap_or(4.0);
+    let seconds = std::env::var("FIRSTLIGHT_SOAK_SECONDS").ok().and_then(|n| n.parse().ok()).unwrap_or(8.0);
     let options = SessionOptions { width: 96, height: 64, threads: Some(2), ..SessionOptions::default() };
     let mut session = Session::new(options).unwrap();
     session.open(SceneSource::Builtin("cornell".to_owned()));

@@ -93,7 +93,7 @@ const MAX_EXPONENT: f64 = 3.0;
 
 /// How far the slope of a single doubling lies from the long one where edges rule, even without any noise: nets of odd
 /// and of even powers of two divide the square differently.
-const WOBBLE: f64 = 0.35;
+const WOBBLE: f64 = 0.2;
 
 /// The steps of one tile's pixels from doubling to doubling.
 #[derive(Clone, Debug, Default)]
