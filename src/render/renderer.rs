@@ -122,7 +122,7 @@ pub fn advance(
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp() < target_spp {
-        let goal = (film.spp() + 1).next_power_of_two().min(target_spp);
+        let goal = (film.spp() + 1).checked_next_power_of_two().unwrap_or(u32::MAX).min(target_spp);
         let mut layer = film.light.take().expect("made above");
         let (tiles, light) =
             rayon::join(|| advance_tiles(&pass, film, goal, stop), || layer.advance(caustics, goal, stop));
