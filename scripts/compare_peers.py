@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Seconds to equal error: firstlight against Mitsuba 3 on the same scenes, machine, threads and run.
+"""Seconds to equal error: firstlight against Mitsuba 3 and Cycles on the same scenes, machine, threads and run.
 
     pip install mitsuba numpy                 # Mitsuba's LLVM mode needs libLLVM: apt-get install libllvm19
     cargo build --release --no-default-features
@@ -10,7 +10,7 @@ name and the ending .exr. Both renderers take samples by the pixel with a box fi
 Mitsuba runs its path integrator with the multijitter sampler, each number of samples as a render of its own, the
 second of two counting, so that compilation is left out; firstlight's times are those of `firstlight report`, tree and
 loading left out. Seconds are CPU seconds / threads, so that other work on the machine counts little; wall time is
-printed beside them. Exit status 1 when something went wrong.
+printed beside them. `--cycles PYTHON` adds Blender's Cycles (see render_in_cycles.py). Exit status 1 when something went wrong.
 """
 
 import argparse
@@ -166,18 +166,7 @@ class MitsubaScene:
 
     def mesh(self, value):
         """Placed positions, faces, and normals by area where it is smooth."""
-        positions, faces = read_obj(os.path.join(self.folder, value["obj"]))
-        if value.get("matrix") is not None:
-            matrix = np.array(value["matrix"], dtype=float).reshape(-1, 4)[:3]
-            positions = positions @ matrix[:, :3].T + matrix[:, 3]
-        else:
-            angle = math.radians(value.get("rotate_y") or 0.0)
-            turn = np.array([
-                [math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)],
-            ])
-            scale = value.get("scale")
-            positions = positions * (1.0 if scale is None else np.array(scale, dtype=float)) @ turn.T
-            positions = positions + np.array(value.get("translate") or [0, 0, 0], dtype=float)
+        positions, faces = placed_mesh(value, self.folder)
         normals = None
         if value.get("smooth", False):
             a, b, c = (positions[faces[:, k]] for k in range(3))
@@ -188,6 +177,19 @@ class MitsubaScene:
             normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
             normals = normals.astype(np.float32)
         return positions.astype(np.float32), faces.astype(np.uint32), normals
+
+
+def placed_mesh(value, folder):
+    """Positions in the world, and triangles."""
+    positions, faces = read_obj(os.path.join(folder, value["obj"]))
+    if value.get("matrix") is not None:
+        matrix = np.array(value["matrix"], dtype=float).reshape(-1, 4)[:3]
+        return positions @ matrix[:, :3].T + matrix[:, 3], faces
+    angle = math.radians(value.get("rotate_y") or 0.0)
+    turn = np.array([[math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)]])
+    scale = value.get("scale")
+    positions = positions * (1.0 if scale is None else np.array(scale, dtype=float)) @ turn.T
+    return positions + np.array(value.get("translate") or [0, 0, 0], dtype=float), faces
 
 
 def read_obj(path):
@@ -225,6 +227,24 @@ def mitsuba_curve(args, scene, folder, reference):
         curve.append((spp, cpu / args.threads, wall, rel_mse(picture, reference)))
         spp *= 4
     return curve
+
+
+def cycles_curve(args, source, reference):
+    import mitsuba as mi
+
+    script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "render_in_cycles.py")
+    with tempfile.TemporaryDirectory() as folder:
+        command = [args.cycles, script, source, "--spp", str(args.spp), "--threads", str(args.threads), "--out", folder]
+        out = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+        curve = []
+        for line in out.splitlines():
+            if not line.startswith("step "):
+                continue
+            spp, cpu, wall = line.split()[1:]
+            bitmap = mi.Bitmap(os.path.join(folder, f"{spp}.exr"))
+            picture = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+            curve.append((int(spp), float(cpu) / args.threads, float(wall), rel_mse(picture, reference)))
+        return curve
 
 
 def firstlight_curve(args, scene, source, reference_path):
@@ -268,19 +288,22 @@ def compare(args, source):
     reference_path = os.path.splitext(os.path.abspath(source))[0] + ".exr"
     reference = np.array(mi.Bitmap(reference_path).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
     ours = firstlight_curve(args, scene, source, reference_path)
-    theirs = mitsuba_curve(args, scene, folder, reference)
+    peers = [("mitsuba", mitsuba_curve(args, scene, folder, reference))]
+    if args.cycles:
+        peers.append(("cycles", cycles_curve(args, source, reference)))
     name = os.path.splitext(os.path.basename(source))[0]
-    for label, curve in (("mitsuba", theirs), ("firstlight", ours)):
+    for label, curve in (*peers, ("firstlight", ours)):
         for spp, cpu, wall, error in curve:
             print(f"# {name:16} {label:10} {spp:6} spp  {cpu:9.4f} cpu/t s  {wall:9.4f} wall s  relMSE {error:.4g}")
     rows = []
-    for spp, cpu, wall, error in theirs:
-        own_cpu, mark = seconds_to(ours, 1, error)
-        own_wall, _ = seconds_to(ours, 2, error)
-        rows.append(
-            f"| {name} | {error:.3g} | {spp} | {cpu:.3f} | {mark}{own_cpu:.3f} | {own_cpu / cpu:.2f} "
-            f"| {wall:.3f} | {own_wall:.3f} | {own_wall / wall:.2f} |"
-        )
+    for label, curve in peers:
+        for spp, cpu, wall, error in curve:
+            own_cpu, mark = seconds_to(ours, 1, error)
+            own_wall, _ = seconds_to(ours, 2, error)
+            rows.append(
+                f"| {name} | {label} | {error:.3g} | {spp} | {cpu:.3f} | {mark}{own_cpu:.3f} | {own_cpu / cpu:.2f} "
+                f"| {wall:.3f} | {own_wall:.3f} | {own_wall / wall:.2f} |"
+            )
     return rows
 
 
@@ -293,6 +316,7 @@ def main():
     parser.add_argument("--further", type=int, default=4, help="how many times as many samples firstlight takes")
     parser.add_argument("--variant", default="llvm_ad_rgb")
     parser.add_argument("--sampler", default="multijitter")
+    parser.add_argument("--cycles", metavar="PYTHON", help="an interpreter that has the package bpy: measures Cycles as well")
     args = parser.parse_args()
     rows, failed = [], False
     for source in args.scenes:
@@ -301,8 +325,8 @@ def main():
         except (OSError, ValueError, KeyError, RuntimeError, subprocess.CalledProcessError) as error:
             print(f"error: {source}: {error}", file=sys.stderr)
             failed = True
-    print("| scene | relMSE | peer's spp | peer, cpu s / threads | firstlight | ratio | peer, wall s | firstlight | ratio |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| scene | peer | relMSE | its spp | its cpu s / threads | firstlight | ratio | its wall s | firstlight | ratio |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
     print("\n".join(rows))
     return 1 if failed else 0
 
