@@ -134,6 +134,16 @@ pub enum Command {
     SetSharpZone {
         shown: bool,
     },
+    /// Tell why what is at this place in the picture looks as it does.
+    ExplainAt {
+        x: f64,
+        y: f64,
+    },
+    ForgetExplanation,
+    /// Give all samples to a part of the picture (left, top, right, bottom), or to all of it again.
+    SetRegion {
+        region: Option<[f64; 4]>,
+    },
     /// The focal plane stays with the point that was focused on last, or moves with the camera again.
     ToggleFocusLock,
     /// Keep the view under a number from 1 to 9.
