@@ -5,19 +5,26 @@
 #![allow(dead_code, reason = "each target uses its own part")]
 
 use bevy_ecs::world::World;
-use firstlight::render::{Film, RenderSettings, advance};
+use firstlight::frame::read_film_file_within;
+use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, RenderSettings, Snapshot, advance};
 use firstlight::scene::file::{MeshSourcePart, ObjectPart, SceneFile};
 use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
 use firstlight::scene::{
-    Extraction, Limits, LoadOptions, Rendering, SceneInputs, SceneSource, load, read_picture_within,
+    Extraction, Limits, LoadOptions, Rendering, SceneInputs, SceneSource, Shot, ShotScene, load, read_picture_within,
 };
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use tempfile::TempDir;
 
 /// Small enough for thousands of inputs a second.
-pub const LIMITS: Limits =
-    Limits { model_bytes: 1 << 20, library_bytes: 1 << 18, scene_bytes: 1 << 20, picture_pixels: 1 << 18 };
+pub const LIMITS: Limits = Limits {
+    model_bytes: 1 << 20,
+    library_bytes: 1 << 18,
+    scene_bytes: 1 << 20,
+    picture_pixels: 1 << 18,
+    film_pixels: 1 << 12,
+    note_bytes: 1 << 18,
+};
 
 /// One folder a process, holding the file under test and what it may refer to.
 static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
@@ -97,6 +104,76 @@ pub fn render(bytes: &[u8]) {
     let mut film = Film::new(5, 3);
     let report = advance(&extraction.snapshot, &settings, &mut film, 2, &|| false);
     assert!(report.completed && film.means().iter().all(|mean| mean.is_finite()));
+}
+
+/// A film, as a file or as the text of its layout alone, which no checksum keeps the fuzzer from; whatever is accepted must
+/// be a film that can be gone on with.
+pub fn film(bytes: &[u8]) {
+    match read_film_file_within(&write("fuzz.exr", bytes), &LIMITS) {
+        Ok(file) => go_on(file.film),
+        Err(error) => assert!(!error.is_empty()),
+    }
+    let Ok(layout) = ron::de::from_bytes::<FilmLayout>(bytes) else { return };
+    let n_pixels = u64::from(layout.width) * u64::from(layout.height);
+    if n_pixels > LIMITS.film_pixels {
+        return;
+    }
+    let numbers = [0.0, 1.0, -0.5, f64::INFINITY, f64::NAN, 1e300, 5e-324];
+    let plane = |k: usize| (0..n_pixels as usize).map(|i| numbers[(i * 3 + k) % numbers.len()]).collect();
+    let record = FilmRecord { layout, planes: (0..N_PLANES).map(plane).collect() };
+    match Film::from_record(&record) {
+        Ok(film) => {
+            // The sums to the last bit, NaN included; what there is no light or no doubling for is not kept.
+            let again = film.to_record();
+            assert_eq!(again.layout, record.layout);
+            assert_eq!(format!("{:?}", &again.planes[..6]), format!("{:?}", &record.planes[..6]));
+            go_on(film);
+        }
+        Err(error) => assert!(!error.is_empty()),
+    }
+}
+
+fn go_on(mut film: Film) {
+    let spp = film.spp();
+    drop((film.means(), film.error_estimate(), film.n_bad(), film.max_spp()));
+    // Films that were stopped in the middle of a pass have tiles that must catch up first: that may be long.
+    if film.max_spp() - spp > 8 || film.first_sample() > Film::MAX_SAMPLES / 2 {
+        return;
+    }
+    static SCENE: LazyLock<Snapshot> = LazyLock::new(|| {
+        let mut world = World::new();
+        let source = SceneSource::Builtin("cornell-balls".to_owned());
+        let scene = load(&source, &LoadOptions::default()).expect("a scene of the program's own");
+        scene.spawn(&mut world);
+        Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot
+    });
+    let settings = RenderSettings { max_depth: 3, ..RenderSettings::default() };
+    if film.width() * film.height() <= 64 {
+        let report = advance(&SCENE, &settings, &mut film, spp.saturating_add(2), &|| false);
+        assert!(report.completed && film.spp() >= spp.saturating_add(2));
+    }
+    let twin = film.clone();
+    // Every sample is in both.
+    assert!(film.merge(&twin).is_err() || film.max_spp() == 0);
+}
+
+/// The note of a picture, in a PNG or EXR or by itself.
+pub fn shot(bytes: &[u8]) {
+    let path = write("fuzz.png", bytes);
+    let own_note = std::str::from_utf8(bytes).map_or(Err(String::new()), Shot::from_note);
+    for shot in [Shot::read_within(&path, &LIMITS), own_note].into_iter().flatten() {
+        let again = Shot::from_note(&shot.to_note()).expect("what is written can be read");
+        assert_eq!(format!("{again:?}"), format!("{shot:?}"));
+        drop((shot.source(&path), shot.up(), shot.differs_from(&again)));
+        drop(shot.moved(&path, &FOLDER.path().join("elsewhere/other.png")));
+    }
+    // Whole scenes are the business of `render`.
+    let shows_no_scene = |shot: &Shot| shot.text.is_none() && !matches!(shot.scene, ShotScene::Builtin(_));
+    if Shot::read_within(&path, &LIMITS).as_ref().is_ok_and(shows_no_scene)
+        && let Err(error) = load(&SceneSource::Picture(path), &LoadOptions::default())
+    {
+        assert!(!error.to_string().is_empty());
+    }
 }
 
 /// Meshes that the program makes, and clouds of millions, are sound but take their time.

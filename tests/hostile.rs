@@ -190,3 +190,13 @@ fn pictures() {
 fn whole_scenes_to_the_last_pixel() {
     assault("render", drive::render, 3000, 64 * MIB, 64);
 }
+
+#[test]
+fn films() {
+    assault("film", drive::film, 2000, 8 * MIB, 1200);
+}
+
+#[test]
+fn notes_of_pictures() {
+    assault("shot", drive::shot, 2000, 8 * MIB, 64);
+}

@@ -222,7 +222,7 @@ fn broken_components_are_left_out_with_a_message_and_never_a_panic() {
 fn clicking_finds_depths_and_framing_finds_the_scene() {
     let mut driver = Driver::new(64, 64, spp(1));
     driver.open("cornell");
-    driver.run_until(|session| session.status().done);
+    driver.run_until(|session| session.status().done && session.is_idle());
     // The middle of the picture is the front of the short block or the tall one: nearer than the wall at 5.9 m.
     driver.session.send(Command::FocusAt { x: 0.5, y: 0.5 });
     driver.session.send(Command::PivotAt { x: 0.5, y: 0.05 });

@@ -358,6 +358,8 @@ fn parse_range(text: &str) -> Result<Range<u32>, String> {
     let range = number(start)?..number(end)?;
     if range.is_empty() {
         Err(format!("there is no sample from {} up to {}", range.start, range.end))
+    } else if range.end > Film::MAX_SAMPLES {
+        Err(format!("samples are numbered below {}", Film::MAX_SAMPLES))
     } else {
         Ok(range)
     }

@@ -8,15 +8,16 @@
 use super::picture_file::mean_channels;
 use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES};
 use crate::scene::file::check_film_size;
+use crate::scene::limits::open_file;
 use crate::scene::shot::NOTE_KEY;
 use crate::scene::whole_file::{WholeFile, unwritable};
-use crate::scene::{Fingerprint, Shot, plain_io};
+use crate::scene::{Fingerprint, Limits, Shot, plain_io};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
     ReadLayers, Text, WritableImage,
 };
 use serde::{Deserialize, Serialize};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 
 /// The attribute that makes a picture a film.
@@ -40,6 +41,9 @@ struct Header {
 }
 
 const FORMAT: u32 = 1;
+
+/// Of all channels: three means, and two words for each number of the film.
+const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * N_PLANES as u64);
 
 /// Writes a film with the note of what it shows; whole or not at all.
 pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), String> {
@@ -72,11 +76,18 @@ pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), Strin
 /// # Errors
 /// A sentence that names the file: when it is not there, no film, cut short or damaged.
 pub fn read_film_file(path: &Path) -> Result<FilmFile, String> {
-    read(path).map_err(|reason| format!("{}: {reason}", path.display()))
+    read_film_file_within(path, &Limits::of_this_process())
 }
 
-fn read(path: &Path) -> Result<FilmFile, String> {
-    let bytes = std::fs::read(path).map_err(|error| format!("cannot be read: {}", plain_io(&error)))?;
+/// The same with limits of one's own.
+pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
+    read(path, limits).map_err(|reason| format!("{}: {reason}", path.display()))
+}
+
+fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
+    let unreadable = |error: std::io::Error| format!("cannot be read: {}", plain_io(&error));
+    let mut bytes = Vec::new();
+    open_file(path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(unreadable)?;
     const NO_FILM: &str = "is no film to go on with: those are written by render --film FILE.exr";
     if bytes.get(..4) != Some(&[0x76, 0x2f, 0x31, 0x01]) {
         return Err(NO_FILM.to_owned());
@@ -95,6 +106,16 @@ fn read(path: &Path) -> Result<FilmFile, String> {
     check_film_size(width, height)?;
     if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {
         return Err(damaged(&"its two sizes differ"));
+    }
+    let n_pixels = u64::from(width) * u64::from(height);
+    if n_pixels > limits.film_pixels {
+        let most = limits.film_pixels;
+        return Err(format!("has {n_pixels} pixels, more than the {most} that may be read: {}", Limits::advice()));
+    }
+    // What claims to be larger than its bytes could unpack to is refused before any memory is asked for it.
+    const MOST_UNPACKED: u64 = 1100;
+    if n_pixels * BYTES_A_PIXEL > MOST_UNPACKED * bytes.len() as u64 {
+        return Err(damaged(&"it is far too short for its size"));
     }
     let image = exr::prelude::read()
         .no_deep_data()
@@ -124,7 +145,7 @@ fn read(path: &Path) -> Result<FilmFile, String> {
         return Err(damaged(&"its checksum is wrong"));
     }
     let film = Film::from_record(&record).map_err(|error| damaged(&error))?;
-    Ok(FilmFile { film, shot: Shot::read(path)? })
+    Ok(FilmFile { film, shot: Shot::read_within(path, limits)? })
 }
 
 fn plane_names() -> impl Iterator<Item = String> {

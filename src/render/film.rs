@@ -48,6 +48,9 @@ impl Film {
     /// Pixels along the side of a tile, unless asked otherwise.
     pub const TILE_SIZE: u32 = 32;
 
+    /// Samples of a pixel are numbered below this.
+    pub const MAX_SAMPLES: u32 = 1 << 31;
+
     /// Memory that a pixel takes: its sums, and its mean at the last power of two.
     pub const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
 

@@ -107,7 +107,7 @@ impl Film {
         let mut film = Self::with_tile_size(width, height, tile_size);
         for (tile, record_of_tile) in film.tiles.iter_mut().zip(tiles) {
             let n_pixels = tile.n_pixels();
-            check_ranges(&record_of_tile.samples)?;
+            check_ranges(&record_of_tile.samples, Self::MAX_SAMPLES)?;
             let spp: u64 = record_of_tile.samples.iter().map(|(start, end)| u64::from(end - start)).sum();
             tile.spp = u32::try_from(spp).map_err(|_| "it has more samples than can be counted".to_owned())?;
             tile.ranges = record_of_tile.samples.iter().map(|&(start, end)| start..end).collect();
@@ -129,6 +129,10 @@ impl Film {
                 checkpoint.push(vector(6));
             }
             if record_of_tile.mean_of > 0 {
+                let n_doublings = record_of_tile.mean_of.ilog2() as usize;
+                if !record_of_tile.mean_of.is_power_of_two() || record_of_tile.steps.len() != n_doublings {
+                    return Err("what it knows of its error does not fit its samples".to_owned());
+                }
                 tile.convergence = TileConvergence {
                     n_values: 3.0 * checkpoint.len() as f64,
                     checkpoint,
@@ -140,13 +144,16 @@ impl Film {
             }
         }
         if let Some(lamps) = lamps {
-            check_ranges(&lamps.batches)?;
             let mut light = LightLayer::new(UVec2::new(width, height), 0);
+            check_ranges(&lamps.batches, light.batches_before(Self::MAX_SAMPLES))?;
             for (at, sum) in light.sums.iter_mut().enumerate() {
                 let vector = |first: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));
                 *sum = ExactSum { sum: vector(9), rest: vector(12) };
             }
             light.done = lamps.batches.iter().map(|&(start, end)| start..end).collect();
+            if light.complete() != lamps.spp {
+                return Err("its light from the lamps has another number of samples".to_owned());
+            }
             light.spp = lamps.spp;
             film.light = Some(light);
         }
@@ -154,11 +161,15 @@ impl Film {
     }
 }
 
-fn check_ranges<T: PartialOrd>(ranges: &[(T, T)]) -> Result<(), String> {
+/// - `most`: that no range may go beyond.
+fn check_ranges<T: PartialOrd>(ranges: &[(T, T)], most: T) -> Result<(), String> {
     let ascending = ranges.windows(2).all(|pair| pair[0].1 < pair[1].0);
     let whole = ranges.iter().all(|(start, end)| start <= end);
-    if ascending && whole && !ranges.is_empty() {
-        return Ok(());
+    if !ascending || !whole || ranges.is_empty() {
+        return Err("its ranges of samples overlap or run backwards".to_owned());
     }
-    Err("its ranges of samples overlap or run backwards".to_owned())
+    if ranges.last().is_some_and(|(_, end)| *end > most) {
+        return Err("its samples have higher numbers than can be counted".to_owned());
+    }
+    Ok(())
 }

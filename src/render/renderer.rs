@@ -136,7 +136,8 @@ pub fn advance_region(
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp_in(region) < target_spp {
-        let goal = (film.spp_in(region) + 1).next_power_of_two().min(target_spp);
+        let next = (film.spp_in(region) + 1).checked_next_power_of_two();
+        let goal = next.unwrap_or(u32::MAX).min(target_spp);
         let mut layer = film.light.take().expect("made above");
         let (tiles, light) =
             rayon::join(|| advance_tiles(&pass, film, region, goal, stop), || layer.advance(caustics, goal, stop));

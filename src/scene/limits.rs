@@ -15,6 +15,10 @@ pub struct Limits {
     pub scene_bytes: u64,
     /// Pixels of a picture; decoding takes up to 32 bytes of memory for each.
     pub picture_pixels: u64,
+    /// Pixels of a film that is read; that takes up to 700 bytes of memory for each.
+    pub film_pixels: u64,
+    /// Bytes of the note that a picture carries.
+    pub note_bytes: u64,
 }
 
 impl Limits {
@@ -22,8 +26,14 @@ impl Limits {
     pub const VARIABLE: &str = "FIRSTLIGHT_LIMITS";
 
     /// What fits a machine of today.
-    pub const USUAL: Self =
-        Self { model_bytes: 1 << 30, library_bytes: 16 << 20, scene_bytes: 256 << 20, picture_pixels: 1 << 27 };
+    pub const USUAL: Self = Self {
+        model_bytes: 1 << 30,
+        library_bytes: 16 << 20,
+        scene_bytes: 256 << 20,
+        picture_pixels: 1 << 27,
+        film_pixels: 1 << 26,
+        note_bytes: 64 << 20,
+    };
 
     /// The usual limits times the number in [`Self::VARIABLE`], where there is one.
     pub fn of_this_process() -> Self {
@@ -41,17 +51,19 @@ impl Limits {
             library_bytes: scaled(self.library_bytes),
             scene_bytes: scaled(self.scene_bytes),
             picture_pixels: scaled(self.picture_pixels),
+            film_pixels: scaled(self.film_pixels),
+            note_bytes: scaled(self.note_bytes),
         }
     }
 
     /// What to do about a refusal.
-    pub(super) fn advice() -> String {
+    pub(crate) fn advice() -> String {
         format!("set {}=2 in the environment to double all limits", Self::VARIABLE)
     }
 }
 
 /// Opens a file whose end is known: a pipe would be waited for and a device might never end.
-pub(super) fn open_file(path: &Path) -> io::Result<File> {
+pub(crate) fn open_file(path: &Path) -> io::Result<File> {
     // Asked by name first, for opening a pipe already waits.
     let info = std::fs::metadata(path)?;
     if info.is_dir() {

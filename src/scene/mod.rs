@@ -13,7 +13,7 @@ mod extract;
 pub mod file;
 mod fingerprint;
 mod inputs;
-mod limits;
+pub(crate) mod limits;
 mod load;
 mod meshes;
 pub mod obj;

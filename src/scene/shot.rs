@@ -7,10 +7,11 @@
 
 use super::describe::Description;
 use super::file::{CameraPart, DisplayPart, FilmPart, IntegratorPart, SceneFile};
+use super::limits::open_file;
 use super::load::{LoadedScene, SceneSource, UpAxis};
 use super::relative::{absolute, relative_path};
 use super::spawn::camera;
-use super::{Fingerprint, SceneContent};
+use super::{Fingerprint, Limits, SceneContent};
 use bevy_ecs::prelude::World;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
@@ -154,7 +155,12 @@ impl Shot {
     /// # Errors
     /// When the picture cannot be read or has no note.
     pub fn read(path: &Path) -> Result<Self, String> {
-        Self::from_note(&note_of(path)?)
+        Self::read_within(path, &Limits::of_this_process())
+    }
+
+    /// The same with limits of one's own.
+    pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, String> {
+        Self::from_note(&note_of(path, limits.note_bytes)?)
     }
 
     /// The text of the note.
@@ -253,9 +259,10 @@ fn options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
-/// The text of the note.
-fn note_of(path: &Path) -> Result<String, String> {
-    let file = std::fs::File::open(path).map_err(|error| format!("cannot be read: {}", super::plain_io(&error)))?;
+/// The text of the note, which may take `most` bytes.
+fn note_of(path: &Path, most: u64) -> Result<String, String> {
+    let file = open_file(path).map_err(|error| format!("cannot be read: {}", super::plain_io(&error)))?;
+    let most = usize::try_from(most).unwrap_or(usize::MAX);
     let mut reader = BufReader::new(file);
     let mut start = [0; 8];
     let n = reader.read(&mut start).map_err(|error| format!("cannot be read: {error}"))?;
@@ -263,9 +270,12 @@ fn note_of(path: &Path) -> Result<String, String> {
     if start[..n] == *b"\x89PNG\r\n\x1a\n" {
         reader.seek_relative(-(n as i64)).map_err(|error| format!("cannot be read: {error}"))?;
         let unreadable = |error: png::DecodingError| format!("cannot be read: {error}");
-        let decoder = png::Decoder::new(reader).read_info().map_err(unreadable)?;
+        let limits = png::Limits { bytes: most };
+        let decoder = png::Decoder::new_with_limits(reader, limits).read_info().map_err(unreadable)?;
         let info = decoder.info();
-        let chunk = info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(none)?;
+        let mut chunk = info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(none)?.clone();
+        // A few kilobytes may claim to unpack to gigabytes.
+        chunk.decompress_text_with_limit(most).map_err(unreadable)?;
         return chunk.get_text().map_err(unreadable);
     }
     if start[..n.min(4)] == [0x76, 0x2f, 0x31, 0x01] {

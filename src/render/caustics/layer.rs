@@ -81,13 +81,26 @@ impl LightLayer {
 
     /// Samples of the picture that some of the paths belong to, more than are complete when it was stopped.
     pub fn begun(&self) -> u32 {
-        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
-        n_done.div_ceil(u64::from(self.batches.per_sample)) as u32
+        self.n_done().div_ceil(u64::from(self.batches.per_sample)) as u32
+    }
+
+    /// Samples of the picture whose paths are all there; what [`Self::spp`] should be.
+    pub fn complete(&self) -> u32 {
+        (self.n_done() / u64::from(self.batches.per_sample)) as u32
+    }
+
+    /// How many batches the samples below `sample` have.
+    pub fn batches_before(&self, sample: u32) -> u64 {
+        self.batches.of_sample(sample)
+    }
+
+    fn n_done(&self) -> u64 {
+        self.done.iter().map(|range| range.end - range.start).sum()
     }
 
     /// Mean over the paths so far.
     pub fn mean(&self, pixel: usize) -> DVec3 {
-        match self.done.iter().map(|range| range.end - range.start).sum::<u64>() {
+        match self.n_done() {
             0 => DVec3::ZERO,
             n => self.sums[pixel].sum / (n as f64 * f64::from(self.batches.size)),
         }
@@ -96,7 +109,6 @@ impl LightLayer {
     /// Adds the paths of a layer of the same picture that has none of these.
     pub fn merge(&mut self, other: &Self) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
-        self.spp += other.spp;
         let last = self.done.last().map_or(0, |range| range.end);
         let mut done: Vec<Range<u64>> = self.done.iter().chain(&other.done).cloned().collect();
         done.retain(|range| !range.is_empty());
@@ -111,15 +123,15 @@ impl LightLayer {
         if self.done.is_empty() {
             self.done.push(last..last);
         }
+        self.spp = self.complete();
     }
 
     /// Traces paths until they are enough for `target_spp` samples of the picture, or until `stop` says so; what a
     /// batch had not finished is dropped.
     pub fn advance(&mut self, pass: &CausticPass, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> LayerReport {
         let mut report = LayerReport { completed: true, ..LayerReport::default() };
-        let Batches { per_sample, size } = self.batches;
-        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
-        let mut left = self.batches.of_sample(target_spp).saturating_sub(n_done);
+        let size = self.batches.size;
+        let mut left = self.batches.of_sample(target_spp).saturating_sub(self.n_done());
         let mut next = self.done.last().map_or(0, |range| range.end);
         // Enough at once to keep all workers busy, few enough for a stop to lose little.
         let at_once = 4 * rayon::current_num_threads() as u64;
@@ -147,8 +159,7 @@ impl LightLayer {
         if let Some(last) = self.done.last_mut() {
             last.end = next;
         }
-        let n_done: u64 = self.done.iter().map(|range| range.end - range.start).sum();
-        self.spp = (n_done / u64::from(per_sample)) as u32;
+        self.spp = self.complete();
         report
     }
 }
