@@ -4,7 +4,7 @@
 //! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
 //! so the same list of commands always leads to the same picture.
 
-use super::{Edit, Target};
+use super::{Bookmarks, Edit, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::scene::{Lens, Projection, View};
 use bevy_ecs::message::Message;
@@ -153,6 +153,8 @@ pub enum Command {
     GoToBookmark {
         slot: u8,
     },
+    /// All of them at once, as they were kept before.
+    SetBookmarks(Box<Bookmarks>),
     /// To where the camera rested before.
     PreviousView,
     NextView,

@@ -132,6 +132,7 @@ impl Desk<'_, '_> {
                 Some(rig) => self.set_rig(rig),
                 None => self.note(format!("no view is kept under {slot}: Ctrl+{slot} keeps this one")),
             },
+            Command::SetBookmarks(bookmarks) => drop(self.bookmarks.set_if_neq(*bookmarks)),
             Command::PreviousView => match self.trail.previous() {
                 Some(rig) => self.set_rig(rig),
                 None => self.note("no view before this one".to_owned()),

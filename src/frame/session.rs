@@ -19,7 +19,7 @@ use super::systems::{
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, Target};
-use crate::render::{Film, RenderSettings};
+use crate::render::{Film, RenderSettings, Snapshot};
 use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis};
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -214,6 +214,16 @@ impl Session {
     pub fn shot_draft(&mut self) -> ShotDraft {
         let current = self.world.get_resource::<CurrentScene>().map(|current| current.0.clone());
         ShotDraft::of(&mut self.world, current.as_deref())
+    }
+
+    /// What the workers render now, and how.
+    pub fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
+        self.world.resource::<Shown>().rendered()
+    }
+
+    /// How many scenes have taken their place so far.
+    pub fn n_adopted(&self) -> u64 {
+        self.world.resource::<Adopted>().0
     }
 
     /// Where the open scene is saved: where it was saved last, or else the scene file that was opened.

@@ -10,7 +10,7 @@ use super::status::{MessageKind, Picture, Status};
 use super::views::ViewTrail;
 use super::worker::{Job, Look, Worker};
 use super::{Target, navigation};
-use crate::render::{Display, Integrator, RenderSettings};
+use crate::render::{Display, Integrator, RenderSettings, Snapshot};
 use crate::scene::{
     CameraInput, Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal,
     Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
@@ -125,6 +125,10 @@ impl Shown {
     /// Of the picture that is rendered now.
     pub(super) fn generation(&self) -> u64 {
         self.generation
+    }
+
+    pub(super) fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
+        Some((self.extraction.as_ref()?.snapshot.clone(), self.settings))
     }
 
     pub(super) fn integrator(&self) -> Integrator {
