@@ -116,6 +116,25 @@ fn sheet(n: u32) -> Soup {
     soup
 }
 
+/// A cube whose sides are grids of squares: walls that lie in the faces of the tree's bounds.
+fn tiled_cube(n: u32) -> Soup {
+    let mut soup = Soup::default();
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
+        let first = soup.positions.len() as u32;
+        for (i, j) in (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+            let mut point = Vec3::splat(side);
+            point[(axis + 1) % 3] = i as f32 / n as f32 * 2.0 - 1.0;
+            point[(axis + 2) % 3] = j as f32 / n as f32 * 2.0 - 1.0;
+            soup.positions.push(point);
+        }
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let a = first + i * (n + 1) + j;
+            soup.triangles.extend([[a, a + 1, a + n + 1], [a + 1, a + n + 2, a + n + 1]]);
+        }
+    }
+    soup
+}
+
 /// Rays that start on surfaces and on split planes, run along axes and edges, with zeros of both signs.
 fn awkward_rays(seed: u64, soup: &Soup, n: usize) -> Vec<Ray> {
     let mut random = Random(seed ^ 0xABCD);
@@ -464,6 +483,46 @@ fn counted_visits_match_the_tree() {
     assert!(through.leaves >= 1 && through.blocks >= through.leaves && through.inner <= stats.inner_nodes);
     assert!(stats.references >= stats.primitives && stats.leaves + stats.empty_leaves == stats.inner_nodes + 1);
     assert!(stats.expected_leaf_visits > 1.0 && stats.expected_leaf_visits < stats.leaves as f64);
+}
+
+#[test]
+fn a_ray_through_an_empty_room_looks_at_its_end_only() {
+    let soup = tiled_cube(24);
+    let tree = soup.tree(BuildPreset::Best);
+    let mut random = Random(3);
+    let (mut blocks, n) = (0, 1000);
+    for _ in 0..n {
+        let ray = Ray::new(random.point() * 0.9, random.unit());
+        assert_eq!(tree.count_visits(&ray).leaves.min(1), 1, "{ray:?} leaves the room");
+        blocks += tree.count_visits(&ray).blocks;
+    }
+    // Where walls have no cells of their own, every cell beside one tests it: 7.9 blocks a ray.
+    assert!(blocks < 2 * n, "{blocks} blocks for {n} rays");
+}
+
+#[test]
+fn packets_agree_with_trying_every_triangle() {
+    // Bundles of all widths, from a point, from a patch and to a point, at vertices, edges and anything.
+    for (seed, soup) in [triangle_soup(40, 700), sheet(30), tiled_cube(12)].into_iter().enumerate() {
+        let scene = SceneTree::build(vec![mesh(&soup.tree(BuildPreset::Best), Affine3A::IDENTITY)]);
+        let mut random = Random(seed as u64 + 77);
+        let mut rays = Vec::new();
+        for bundle in 0..120 {
+            let (eye, at) = (random.point() * 3.0, random.point() * 0.7);
+            let width = [1e-4, 3e-3, 0.03, 0.2][bundle % 4];
+            for i in 0..16 {
+                let vertex = soup.positions[random.below(soup.positions.len())];
+                let target = if i % 5 == 4 { vertex } else { at + random.unit() * width };
+                let patch = eye + random.unit() * width;
+                rays.push(match bundle % 3 {
+                    0 => Ray::new(eye, target - eye),
+                    1 => Ray::new(patch, target - patch),
+                    _ => Ray { t_max: 1.0, ..Ray::new(target, eye - target) },
+                });
+            }
+        }
+        assert_agrees(&scene, &rays, &format!("bundles {seed}"));
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 mod animate;
 mod console;
+mod explain;
 mod info;
 mod merge;
 mod render;
@@ -45,6 +46,8 @@ enum Command {
     Stability(stability::StabilityArgs),
     /// Tell what is in a scene, what it uses and what is not modelled.
     Info(info::InfoArgs),
+    /// Tell why a pixel looks as it does: which lights reach it, after how many bounces, and along which paths.
+    Explain(explain::ExplainArgs),
     /// Write a model with fewer triangles, and measure how far it is from the original.
     Simplify(simplify::SimplifyArgs),
 }
@@ -154,6 +157,7 @@ pub fn main() -> ExitCode {
         Some(Command::Save(args)) => save::run(&args),
         Some(Command::Stability(args)) => stability::run(&args),
         Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Explain(args)) => explain::run(&args),
         Some(Command::Simplify(args)) => simplify::run(&args),
         None => show::run(&line.show),
     };

@@ -8,15 +8,17 @@ use bevy_ecs::prelude::World;
 use clap::Args;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
-    FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, write_film_file,
+    FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, render_region_until,
+    write_film_file,
 };
-use firstlight::render::{Display, Film, RenderSettings};
+use firstlight::render::{Display, Film, Region, RenderSettings};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::check_writable;
 use firstlight::scene::{
     Developing, Extraction, FilmSize, LoadedScene, Part, Rendering, SceneInputs, SceneSource, Shot, ShotDraft,
     ShotSamples,
 };
+use glam::UVec2;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::ops::Range;
@@ -51,6 +53,10 @@ pub struct RenderArgs {
     /// Once around what the camera looks at, in so many pictures: FILE-0001.png and so on.
     #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
+    /// Left, top, width and height of a part of the picture, pixels: it gets all samples but the first, with whole tiles
+    /// of 32 pixels around it, and what is left is as it was, with --resume too.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_region, conflicts_with_all = ["turntable", "bookmarks", "samples"])]
+    pub region: Option<[u32; 4]>,
     /// From bookmark to bookmark of the scene, by their numbers: 1,2,3.
     #[arg(long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
     pub bookmarks: Option<Vec<u8>>,
@@ -269,7 +275,15 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
     let asked = || stop.is_asked();
-    let report = render_offline_until(&job.extraction.snapshot, &job.settings, &mut film, target, &asked, |now| {
+    let region = args.region.map(|region| region_in(&film, region)).transpose()?;
+    if region.is_some() && film.spp() == 0 {
+        // A pixel without a sample shows nothing.
+        let once = Target { spp: Some(1), ..Target::default() };
+        render_offline_until(&job.extraction.snapshot, &job.settings, &mut film, once, &asked, |_| true);
+    }
+    let region = region.as_ref();
+    let Job { extraction, settings, .. } = &job;
+    let report = render_region_until(&extraction.snapshot, settings, &mut film, region, target, &asked, |now| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
         let by_error = target
@@ -283,7 +297,8 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     });
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     bar.finish_and_clear();
-    let reached = target.reached(film.spp(), report.seconds, film.error_estimate().map(|error| error.relative));
+    let error = film.error_estimate_in(region).map(|error| error.relative);
+    let reached = target.reached(film.spp_in(region), report.seconds, error);
     let stopped = stop.is_asked() && !reached;
     if film.spp() == 0 {
         let message = "stopped before every pixel had a sample: there is nothing to save";
@@ -348,6 +363,23 @@ fn parse_range(text: &str) -> Result<Range<u32>, String> {
     } else {
         Ok(range)
     }
+}
+
+/// `X,Y,W,H` as four numbers of pixels.
+fn parse_region(text: &str) -> Result<[u32; 4], String> {
+    let wrong = || format!("`{text}` is not a rectangle: write it as X,Y,W,H in pixels, such as 640,360,200,100");
+    let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let region = numbers.and_then(|numbers| <[u32; 4]>::try_from(numbers).ok()).ok_or_else(wrong)?;
+    if region[2] == 0 || region[3] == 0 { Err(wrong()) } else { Ok(region) }
+}
+
+/// The tiles around a rectangle, if the film has any.
+fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Failure> {
+    let start = UVec2::new(x, y);
+    film.region(start, start.saturating_add(UVec2::new(width, height))).ok_or_else(|| {
+        let (width, height) = (film.width(), film.height());
+        Failure::Usage(format!("--region: begins at {x},{y}, but the picture has {width} x {height} pixels"))
+    })
 }
 
 /// One line for machines.

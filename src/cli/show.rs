@@ -120,6 +120,7 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         samples: None,
         film: None,
         turntable: None,
+        region: None,
         bookmarks: None,
         frames: None,
         resume: false,

@@ -4,7 +4,7 @@
 //! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
 //! so the same list of commands always leads to the same picture.
 
-use super::{Edit, Target};
+use super::{Bookmarks, Edit, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::scene::{Lens, Projection, View};
 use bevy_ecs::message::Message;
@@ -134,6 +134,16 @@ pub enum Command {
     SetSharpZone {
         shown: bool,
     },
+    /// Tell why what is at this place in the picture looks as it does.
+    ExplainAt {
+        x: f64,
+        y: f64,
+    },
+    ForgetExplanation,
+    /// Give all samples to a part of the picture (left, top, right, bottom), or to all of it again.
+    SetRegion {
+        region: Option<[f64; 4]>,
+    },
     /// The focal plane stays with the point that was focused on last, or moves with the camera again.
     ToggleFocusLock,
     /// Keep the view under a number from 1 to 9.
@@ -143,6 +153,8 @@ pub enum Command {
     GoToBookmark {
         slot: u8,
     },
+    /// All of them at once, as they were kept before.
+    SetBookmarks(Box<Bookmarks>),
     /// To where the camera rested before.
     PreviousView,
     NextView,

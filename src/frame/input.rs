@@ -1,12 +1,13 @@
 //! Carries out what a person asks for: commands become changes of components and resources.
 
 use super::edit::EditQueue;
+use super::explain::Explaining;
 use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
 use super::saving::Saving;
 use super::selection::{Picked, Selection, pick};
 use super::status::{MessageKind, Status};
-use super::systems::{Around, Clock, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads};
+use super::systems::{Around, Brush, Clock, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads};
 use super::views::{Bookmarks, ViewTrail};
 use super::{Command, beside::Beside};
 use crate::render::ToneCurve;
@@ -38,6 +39,8 @@ pub struct Desk<'w, 's> {
     hidden: ResMut<'w, Hidden>,
     stop_at: ResMut<'w, StopAt>,
     looking: ResMut<'w, Looking>,
+    explaining: ResMut<'w, Explaining>,
+    brush: ResMut<'w, Brush>,
     focus: ResMut<'w, Focus>,
     bookmarks: ResMut<'w, Bookmarks>,
     trail: ResMut<'w, ViewTrail>,
@@ -114,6 +117,9 @@ impl Desk<'_, '_> {
                 let look = super::Look { sharp_zone: shown, ..self.looking.0 };
                 self.looking.set_if_neq(Looking(look));
             }
+            Command::ExplainAt { x, y } => self.explaining.wanted = Some((x, y)),
+            Command::ForgetExplanation => self.explaining.forget(),
+            Command::SetRegion { region } => drop(self.brush.set_if_neq(Brush(region))),
             Command::ToggleFocusLock => self.toggle_focus_lock(),
             Command::SetBookmark { slot } => {
                 if let Some(rig) = self.rig()
@@ -126,6 +132,7 @@ impl Desk<'_, '_> {
                 Some(rig) => self.set_rig(rig),
                 None => self.note(format!("no view is kept under {slot}: Ctrl+{slot} keeps this one")),
             },
+            Command::SetBookmarks(bookmarks) => drop(self.bookmarks.set_if_neq(*bookmarks)),
             Command::PreviousView => match self.trail.previous() {
                 Some(rig) => self.set_rig(rig),
                 None => self.note("no view before this one".to_owned()),

@@ -1,6 +1,6 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
-use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
+use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, Region, RenderSettings, Snapshot, advance_region};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
@@ -66,6 +66,19 @@ pub fn render_offline_until(
     film: &mut Film,
     target: Target,
     stop: &(dyn Fn() -> bool + Sync),
+    progress: impl FnMut(Progress) -> bool,
+) -> OfflineReport {
+    render_region_until(snapshot, settings, film, None, target, stop, progress)
+}
+
+/// The same for a region of the film, or all of it; samples, error and target are those of the region.
+pub fn render_region_until(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film: &mut Film,
+    region: Option<&Region>,
+    target: Target,
+    stop: &(dyn Fn() -> bool + Sync),
     mut progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
     /// Seconds between reports, about.
@@ -76,18 +89,18 @@ pub fn render_offline_until(
     let goal = target.spp.unwrap_or(u32::MAX);
     let mut report = OfflineReport::default();
     let mut step = 1;
-    while film.spp() < goal {
+    while film.spp_in(region) < goal {
         let slice_start = Instant::now();
-        let before = film.spp();
+        let before = film.spp_in(region);
         let late = || stop() || (before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline));
         let at_most = before.saturating_add(step).min(goal);
-        let next = target.error.map_or(at_most, |error| first_worth_a_look(film, error, at_most));
-        let pass = advance(snapshot, settings, film, next, &late);
+        let next = target.error.map_or(at_most, |error| first_worth_a_look(film, region, error, at_most));
+        let pass = advance_region(snapshot, settings, film, region, next, &late);
         report.rays += pass.rays;
         report.n_bad += pass.n_bad;
         report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));
         report.seconds = start.elapsed().as_secs_f64();
-        let (spp, seconds, error) = (film.spp(), report.seconds, film.error_estimate());
+        let (spp, seconds, error) = (film.spp_in(region), report.seconds, film.error_estimate_in(region));
         let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
         if !go_on || stop() || target.reached(spp, seconds, error.map(|error| error.relative)) {
             break;
@@ -102,11 +115,11 @@ pub fn render_offline_until(
 
 /// The first number of samples up to `at_most` at which the film could turn out to be good enough: where its error so
 /// far, extended, is down to `target`, or at the next power of two, where it is measured anew.
-fn first_worth_a_look(film: &Film, target: f64, at_most: u32) -> u32 {
-    let now = film.spp();
+fn first_worth_a_look(film: &Film, region: Option<&Region>, target: f64, at_most: u32) -> u32 {
+    let now = film.spp_in(region);
     let measured_next = (now + 1).checked_next_power_of_two().unwrap_or(u32::MAX);
     let last = at_most.min(measured_next);
-    let estimate = film.error_estimate();
+    let estimate = film.error_estimate_in(region);
     let is_enough = |spp: &u32| estimate.is_some_and(|estimate| estimate.relative_at(*spp) <= target);
     (now + 1..last).find(is_enough).unwrap_or(last)
 }
@@ -114,6 +127,7 @@ fn first_worth_a_look(film: &Film, target: f64, at_most: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::advance;
     use crate::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 
     /// Looks after every single sample, and finds no earlier one.

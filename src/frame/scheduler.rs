@@ -53,7 +53,7 @@ pub struct StepReport {
     /// Camera paths traced.
     pub paths: u64,
     pub seconds: f64,
-    /// Samples that every pixel of the film has now.
+    /// Samples that every pixel of the film has now, or of its region.
     pub spp: u32,
     /// Relative error of the picture, as far as it is known.
     pub error: Option<f64>,
@@ -74,10 +74,12 @@ pub struct Scheduler {
     restarted_at: Duration,
     /// Seconds spent at full resolution since the restart.
     spent: f64,
-    /// Samples that every pixel of the current film has.
+    /// Samples that every pixel of the current film has, or of its region.
     spp: u32,
-    /// Relative error of the current film.
+    /// Relative error of the current film, or of its region.
     error: Option<f64>,
+    /// Pixels of the part of the full film that gets all samples.
+    region: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,6 +106,7 @@ impl Scheduler {
             spent: 0.0,
             spp: 0,
             error: None,
+            region: None,
         };
         scheduler.restart(Duration::ZERO);
         scheduler
@@ -131,6 +134,15 @@ impl Scheduler {
     /// Keeps all samples.
     pub fn set_paused(&mut self, paused: bool) {
         self.paused = paused;
+    }
+
+    /// From now on only this many pixels of the full film get samples, or all of them again; they have `spp` so far,
+    /// and this error. Keeps all samples.
+    pub fn set_region(&mut self, n_pixels: Option<u64>, spp: u32, error: Option<f64>) {
+        self.region = n_pixels;
+        if self.phase == Phase::Full {
+            (self.spp, self.error) = (spp, error);
+        }
     }
 
     /// Another number of threads renders at another speed.
@@ -161,8 +173,9 @@ impl Scheduler {
             // Nothing can be shown before every pixel has a sample.
             Phase::Full if self.spp == 0 => Step::Render { divider: 1, target_spp: 1, at_most: None },
             Phase::Full => {
+                let n_pixels = self.region.map_or(self.pixels(1), |n| n.max(1) as f64);
                 let slice = (FIRST_SLICE + 0.1 * self.spent).min(LAST_SLICE);
-                let passes = (slice * self.speed() / self.pixels(1)).floor().clamp(1.0, 65_536.0) as u32;
+                let passes = (slice * self.speed() / n_pixels).floor().clamp(1.0, 65_536.0) as u32;
                 let goal = self.target.spp.unwrap_or(u32::MAX);
                 // A pass that takes longer than a slice is shown unfinished.
                 let at_most = Duration::from_secs_f64(1.5 * slice);

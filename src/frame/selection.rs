@@ -130,6 +130,22 @@ impl Projector {
         (depth > 0.0 && place.is_finite()).then_some(place)
     }
 
+    /// The part of a line between two points that is in front of the eye.
+    pub fn segment(&self, a: DVec3, b: DVec3) -> Option<[DVec2; 2]> {
+        /// A line that passes the eye is cut so far in front of it, as a part of the depth of its farther end: well
+        /// outside of any window.
+        const NEAR: f64 = 1.0 / 1024.0;
+        let depth = |point: DVec3| (point - self.eye).dot(self.forward);
+        let (depth_a, depth_b) = (depth(a), depth(b));
+        let near = NEAR * depth_a.max(depth_b);
+        let cut = |from: DVec3, depth_from: f64, to: DVec3, depth_to: f64| match depth_from >= near {
+            true => from,
+            false => from.lerp(to, (near - depth_from) / (depth_to - depth_from)),
+        };
+        let [a, b] = [cut(a, depth_a, b, depth_b), cut(b, depth_b, a, depth_a)];
+        Some([self.place(a)?, self.place(b)?])
+    }
+
     /// The direction, not unit, in which a place of the window is seen.
     pub fn direction(&self, place: DVec2) -> DVec3 {
         let offset = (place - self.middle) / self.scale;
@@ -177,5 +193,18 @@ mod tests {
             assert!((projector.place(point).unwrap() - place).length() < 1e-6);
         }
         assert_eq!(projector.place(view.eye - view.forward), None);
+    }
+
+    #[test]
+    fn a_line_is_cut_where_it_leaves_the_front() {
+        let projector = Projector::new(&Rig::default(), DVec2::new(800.0, 600.0));
+        let view = View::default();
+        let at = |right: f64, ahead: f64| view.eye + right * view.right() + ahead * view.forward;
+        let [a, b] = projector.segment(at(-1.0, 4.0), at(1.0, 4.0)).unwrap();
+        assert_eq!([a, b], [projector.place(at(-1.0, 4.0)).unwrap(), projector.place(at(1.0, 4.0)).unwrap()]);
+        // Straight past the eye, to the right of it: the near end is far outside, on the same line of the window.
+        let [a, b] = projector.segment(at(1.0, 4.0), at(1.0, -4.0)).unwrap();
+        assert!(a.x < 800.0 && b.x > 10_000.0 && (a.y - b.y).abs() < 1e-6, "{a} {b}");
+        assert_eq!(projector.segment(at(0.0, -1.0), at(1.0, -2.0)), None);
     }
 }

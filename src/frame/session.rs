@@ -2,6 +2,7 @@
 
 use super::beside::Beside;
 use super::edit::{EditQueue, edit_scene};
+use super::explain::{Explaining, explain_pixel};
 use super::focus::{Focus, hold_focus};
 use super::history::{History, notice, remember};
 use super::input::{CommandQueue, ModelUp, input};
@@ -12,13 +13,13 @@ use super::saving::{SavedAs, Saving, save};
 use super::selection::{OwnBox, Selection};
 use super::status::{Picture, Status};
 use super::systems::{
-    Adopted, Around, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt,
+    Adopted, Around, Brush, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt,
     Threads, accumulate, adopt, develop, edit, present, rebuild, reset,
 };
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, Target};
-use crate::render::{Film, RenderSettings};
+use crate::render::{Film, RenderSettings, Snapshot};
 use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis};
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -118,6 +119,8 @@ impl Session {
         world.init_resource::<ViewTrail>();
         world.init_resource::<Hidden>();
         world.init_resource::<Looking>();
+        world.init_resource::<Brush>();
+        world.init_resource::<Explaining>();
 
         let mut frame = Schedule::new(Frame);
         frame.configure_sets(
@@ -139,7 +142,7 @@ impl Session {
             (notice, remember).chain().after(Stage::Edit).before(Stage::Rebuild),
             rebuild.in_set(Stage::Rebuild),
             reset.in_set(Stage::Reset),
-            accumulate.in_set(Stage::Accumulate),
+            (accumulate, explain_pixel).chain().in_set(Stage::Accumulate),
             develop.in_set(Stage::Develop),
             present.in_set(Stage::Present),
         ));
@@ -213,6 +216,16 @@ impl Session {
         ShotDraft::of(&mut self.world, current.as_deref())
     }
 
+    /// What the workers render now, and how.
+    pub fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
+        self.world.resource::<Shown>().rendered()
+    }
+
+    /// How many scenes have taken their place so far.
+    pub fn n_adopted(&self) -> u64 {
+        self.world.resource::<Adopted>().0
+    }
+
     /// Where the open scene is saved: where it was saved last, or else the scene file that was opened.
     pub fn scene_file(&self) -> Option<PathBuf> {
         let saved = self.world.resource::<SavedAs>().path.clone();
@@ -249,7 +262,8 @@ impl Session {
         let asleep = renderer.is_asleep();
         let no_commands = self.world.resource::<CommandQueue>().0.is_empty();
         let saved = self.world.resource::<Saving>().is_idle();
-        asleep && nothing_to_show && no_commands && saved && self.world.resource::<Beside>().is_idle()
+        let explained = self.world.resource::<Explaining>().is_idle();
+        asleep && nothing_to_show && no_commands && saved && explained && self.world.resource::<Beside>().is_idle()
     }
 
     /// When [`update`](Self::update) should be called even if nothing calls the waker; `None` for never.

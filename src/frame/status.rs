@@ -1,7 +1,7 @@
 //! What a session has to show: the picture, and how it is getting on.
 
 use super::navigation::Rig;
-use crate::render::{BadSample, Display, Integrator, Legend, RayCounts};
+use crate::render::{BadSample, Display, Integrator, Legend, RayCounts, Region};
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -34,6 +34,8 @@ pub struct Status {
     pub integrator: Integrator,
     /// Samples per pixel.
     pub spp: u32,
+    /// What gets all samples now, pixels of the film, and how many it has.
+    pub region: Option<(Region, u32)>,
     /// Seconds of rendering since the restart.
     pub seconds: f64,
     /// Rays since the restart.
@@ -47,7 +49,7 @@ pub struct Status {
     pub film_height: u32,
     /// By what its sides are divided; 1 is full resolution.
     pub divider: u32,
-    /// Relative error of the whole picture, when it is known.
+    /// Relative error of the whole picture, or of the region, when it is known.
     pub estimated_error: Option<f64>,
     /// Why the samples were last dropped.
     pub restart_cause: String,

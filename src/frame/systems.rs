@@ -10,7 +10,7 @@ use super::status::{MessageKind, Picture, Status};
 use super::views::ViewTrail;
 use super::worker::{Job, Look, Worker};
 use super::{Target, navigation};
-use crate::render::{Display, RenderSettings};
+use crate::render::{Display, Integrator, RenderSettings, Snapshot};
 use crate::scene::{
     CameraInput, Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal,
     Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
@@ -63,6 +63,10 @@ pub struct Hidden(pub bool);
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Looking(pub Look);
 
+/// The part of the picture that gets all samples, in fractions of it: left, top, right, bottom.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Brush(pub Option<[f64; 4]>);
+
 /// The far end of the pipe.
 #[derive(Resource)]
 pub struct Renderer(pub Worker);
@@ -108,12 +112,28 @@ pub struct Shown {
     target: Option<Target>,
     threads: Option<usize>,
     paused: bool,
+    region: Option<[f64; 4]>,
     /// The world has changes that wait for a tree.
     waiting: bool,
     /// Drop all samples at the next frame, for this reason.
     pub(super) restart: Option<&'static str>,
     generation: u64,
     pictures: u64,
+}
+
+impl Shown {
+    /// Of the picture that is rendered now.
+    pub(super) fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    pub(super) fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
+        Some((self.extraction.as_ref()?.snapshot.clone(), self.settings))
+    }
+
+    pub(super) fn integrator(&self) -> Integrator {
+        self.settings.integrator
+    }
 }
 
 /// What this frame found to be different.
@@ -208,6 +228,7 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<ViewTrail>().forget();
     world.insert_resource(Focus::default());
     world.insert_resource(super::Selection::default());
+    world.resource_mut::<super::Explaining>().forget();
     let mut shown = world.resource_mut::<Shown>();
     shown.trees.extend(scene.trees.clone());
     shown.restart = Some(SCENE_OPENED);
@@ -333,6 +354,7 @@ pub fn accumulate(
     paused: Res<Paused>,
     hidden: Res<Hidden>,
     size: Res<PictureSize>,
+    brush: Res<Brush>,
     renderer: Res<Renderer>,
     mut shown: ResMut<Shown>,
     mut found: ResMut<Found>,
@@ -345,6 +367,11 @@ pub fn accumulate(
     if shown.target.replace(stop_at.0).is_some_and(|before| before != stop_at.0) {
         renderer.0.set_target(stop_at.0);
         found.0.add(Level::Reschedule, "target");
+    }
+    if shown.region != brush.0 {
+        renderer.0.set_region(brush.0);
+        shown.region = brush.0;
+        found.0.add(Level::Reschedule, "region");
     }
     let paused = paused.0 || hidden.0 || size.is_empty();
     if shown.paused != paused {
@@ -413,6 +440,7 @@ pub fn present(
         status.say(clock.0, MessageKind::Error, failure.clone());
     }
     status.spp = stats.spp;
+    status.region = stats.region;
     status.seconds = stats.seconds;
     status.rays = stats.rays;
     status.estimated_error = stats.error;

@@ -78,10 +78,10 @@ impl Prims {
         self.0[0] |= FOLLOWED;
     }
 
-    /// [`Self::len`] in two instructions.
+    /// The lanes that hold a primitive.
     #[inline(always)]
-    pub fn count<S: Simd>(&self, s: S) -> usize {
-        s.lt_u(s.load_u(&self.0), s.splat_u(u32::MAX)).count_ones() as usize
+    pub fn lanes<S: Simd>(&self, s: S) -> Mask {
+        s.lt_u(s.load_u(&self.0), s.splat_u(u32::MAX))
     }
 
     /// How many lanes hold a primitive.

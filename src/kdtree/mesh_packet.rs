@@ -32,6 +32,9 @@ pub(super) struct NearestLanes {
     pub found: Mask,
 }
 
+/// So few rays are tested one after the other, without asking which triangles they could hit.
+const FEW_RAYS: u32 = 2;
+
 /// What waits to be visited: node, lanes, and their intervals. Made once for many packets, for clearing it takes
 /// longer than tracing some of them.
 pub(super) struct PacketStack<S: Simd>([(u32, Mask, S::F, S::F); MAX_DEPTH]);
@@ -53,6 +56,75 @@ struct Group<S: Simd> {
     sx: S::F,
     sy: S::F,
     sz: S::F,
+    footprint: Footprint,
+}
+
+/// What the rays of a group have in common, as intervals.
+#[derive(Clone, Copy)]
+struct Footprint {
+    /// Of the origins, along the axes of the group.
+    origin: [[f32; 2]; 3],
+    sx: [f32; 2],
+    sy: [f32; 2],
+    down: bool,
+}
+
+impl Footprint {
+    /// Lanes of the block whose triangle one of the rays might hit.
+    ///
+    /// Rounding is monotone: the steps of the test done on intervals, in the order of the test, bound what it gets for every ray,
+    /// and a triangle whose sheared vertices all lie on one side of the rays, or behind them, is missed by all of them.
+    #[inline(always)]
+    fn may_hit<S: Simd>(&self, s: S, axes: [usize; 3], block: &TriangleBlock) -> Mask {
+        let zero = s.splat(0.0);
+        let [x, y, z] = axes;
+        let first = self.reach(s, &block.vertices[0], x, y, z);
+        let second = self.reach(s, &block.vertices[1], x, y, z);
+        let third = self.reach(s, &block.vertices[2], x, y, z);
+        let mut missed = 0;
+        for axis in 0..3 {
+            let low = s.min(first[axis][0], s.min(second[axis][0], third[axis][0]));
+            let high = s.max(first[axis][1], s.max(second[axis][1], third[axis][1]));
+            if axis < 2 {
+                missed |= s.lt(zero, low) | s.lt(high, zero);
+            } else {
+                missed |= if self.down { s.le(zero, low) } else { s.le(high, zero) };
+            }
+        }
+        !missed
+    }
+
+    /// Where sixteen vertices come to lie, at the least and at the most.
+    #[inline(always)]
+    fn reach<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3], x: usize, y: usize, z: usize) -> [[S::F; 2]; 3] {
+        let depth = less(s, s.load(&points[z]), self.origin[2]);
+        [
+            self.across(s, s.load(&points[x]), self.origin[0], self.sx, depth),
+            self.across(s, s.load(&points[y]), self.origin[1], self.sy, depth),
+            depth,
+        ]
+    }
+
+    #[inline(always)]
+    fn across<S: Simd>(&self, s: S, at: S::F, origin: [f32; 2], slope: [f32; 2], depth: [S::F; 2]) -> [S::F; 2] {
+        let [flat, steep] = [s.splat(slope[0]), s.splat(slope[1])];
+        let [a, b] = [s.mul(flat, depth[0]), s.mul(flat, depth[1])];
+        let [c, d] = [s.mul(steep, depth[0]), s.mul(steep, depth[1])];
+        let moved = less(s, at, origin);
+        let low = s.sub(moved[0], s.max(s.max(a, b), s.max(c, d)));
+        [low, s.sub(moved[1], s.min(s.min(a, b), s.min(c, d)))]
+    }
+}
+
+#[inline(always)]
+fn less<S: Simd>(s: S, at: S::F, from: [f32; 2]) -> [S::F; 2] {
+    [s.sub(at, s.splat(from[1])), s.sub(at, s.splat(from[0]))]
+}
+
+/// The least and the most of the lanes in the mask.
+#[inline(always)]
+fn interval<S: Simd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
+    [s.least(mask, a), -s.least(mask, s.sub(s.splat(0.0), a))]
 }
 
 impl<S: Simd> MeshPacket<S> {
@@ -92,14 +164,25 @@ impl<S: Simd> MeshPacket<S> {
         let (shorter, longer) = (s.splat(1.0 - WIDEN), s.splat(1.0 + WIDEN));
         let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
         let sz = inv[kz];
+        let (sx, sy) = (s.div(self.dir[axes[0]], self.dir[kz]), s.div(self.dir[axes[1]], self.dir[kz]));
         let group = Group::<S> {
             inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
             inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
             slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
             axes,
-            sx: s.div(self.dir[axes[0]], self.dir[kz]),
-            sy: s.div(self.dir[axes[1]], self.dir[kz]),
+            sx,
+            sy,
             sz,
+            footprint: Footprint {
+                origin: [
+                    interval(s, lanes, self.origin[axes[0]]),
+                    interval(s, lanes, self.origin[axes[1]]),
+                    interval(s, lanes, self.origin[kz]),
+                ],
+                sx: interval(s, lanes, sx),
+                sy: interval(s, lanes, sy),
+                down: octant >> kz & 1 != 0,
+            },
         };
         let bounds = [tree.nodes.bounds.min, tree.nodes.bounds.max];
         let (mut t0, mut t1) = (s.splat(0.0), s.load(&self.nearest.t));
@@ -162,13 +245,17 @@ impl<S: Simd> MeshPacket<S> {
 
     #[inline(always)]
     fn test_leaf(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mask: Mask) {
-        let n_triangles = block.prims.count(s);
-        if (mask.count_ones() as usize) < n_triangles {
-            self.test_by_ray(s, group, block, mask);
-        } else {
-            for lane in 0..n_triangles {
-                self.test_triangle(s, group, block, lane, mask);
-            }
+        let n_rays = mask.count_ones();
+        if n_rays <= FEW_RAYS {
+            return self.test_by_ray(s, group, block, mask);
+        }
+        let mut triangles = group.footprint.may_hit(s, group.axes, block) & block.prims.lanes(s);
+        if n_rays < triangles.count_ones() {
+            return self.test_by_ray(s, group, block, mask);
+        }
+        while triangles != 0 {
+            self.test_triangle(s, group, block, triangles.trailing_zeros() as usize, mask);
+            triangles &= triangles - 1;
         }
     }
 

@@ -20,6 +20,7 @@ pub(super) fn find_split(references: &[Reference], cell: &Aabb, config: &BuildCo
     } else {
         search.try_bins(references);
     }
+    search.try_walls(references);
     search.best
 }
 
@@ -75,6 +76,23 @@ impl<'a> Search<'a> {
         if cost < self.best_cost {
             self.best_cost = cost;
             self.best = Some(Split { axis, at });
+        }
+    }
+
+    /// References that lie flat in a face of the cell: all that a ray through the cell would test of a wall behind it.
+    ///
+    /// The plane next to the face leaves them a cell of their own without any thickness, which only rays that cross the wall visit.
+    fn try_walls(&mut self, references: &[Reference]) {
+        for axis in 0..3 {
+            let (lo, hi) = (self.cell.min[axis], self.cell.max[axis]);
+            let is_flat = |face: f32| references.iter().any(|r| r.min[axis] == face && r.max[axis] == face);
+            for (face, at) in [(lo, lo.next_up()), (hi, hi.next_down())] {
+                if is_flat(face) {
+                    let below = references.iter().filter(|r| r.is_below(axis, at)).count();
+                    let above = references.iter().filter(|r| r.is_above(axis, at)).count();
+                    self.offer(axis, at, below, above);
+                }
+            }
         }
     }
 

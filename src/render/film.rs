@@ -6,14 +6,15 @@
 use super::caustics::LightLayer;
 use super::estimate::{ErrorEstimate, TileConvergence};
 use super::exact_sum::ExactSum;
+use super::region::Region;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Sums and counts of one picture.
 ///
-/// A tile is always advanced as a whole, so all pixels of a tile have the same number of samples; after a pass that
-/// was stopped early, tiles may differ by the samples of that pass, and the next pass evens them out.
+/// A tile is always advanced as a whole, so all pixels of a tile have the same number of samples. After a pass that
+/// was stopped early, or one over a [`Region`] alone, tiles may differ, and the next pass over all evens them out.
 #[derive(Clone, Debug)]
 pub struct Film {
     width: u32,
@@ -97,8 +98,17 @@ impl Film {
 
     /// Samples that every pixel has at least.
     pub fn spp(&self) -> u32 {
+        self.spp_in(None)
+    }
+
+    /// Samples that every pixel of a region has at least, or of the whole film.
+    pub fn spp_in(&self, region: Option<&Region>) -> u32 {
         let from_lamps = self.light.as_ref().map(|light| light.spp);
-        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
+        self.tiles_in(region).map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
+    }
+
+    fn tiles_in<'a>(&'a self, region: Option<&'a Region>) -> impl Iterator<Item = &'a FilmTile> + Clone {
+        self.tiles.iter().filter(move |tile| region.is_none_or(|region| region.has(tile)))
     }
 
     /// Samples that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
@@ -148,7 +158,7 @@ impl Film {
             (light, Some(other)) => *light = Some(other.clone()),
             (_, None) => {}
         }
-        self.record_convergence();
+        self.record_convergence(|_| true);
         Ok(())
     }
 
@@ -186,7 +196,12 @@ impl Film {
 
     /// How wrong the picture still is, as far as its own samples tell; `None` before the fourth sample of a pixel.
     pub fn error_estimate(&self) -> Option<ErrorEstimate> {
-        ErrorEstimate::from_tiles(self.tiles.iter().map(|tile| &tile.convergence), self.spp())
+        self.error_estimate_in(None)
+    }
+
+    /// The same of a region alone. That of a whole film of which a region is ahead counts as if it were not.
+    pub fn error_estimate_in(&self, region: Option<&Region>) -> Option<ErrorEstimate> {
+        ErrorEstimate::from_tiles(self.tiles_in(region).map(|tile| &tile.convergence), self.spp_in(region))
     }
 
     /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
@@ -196,10 +211,11 @@ impl Film {
         tile.convergence.last_step(local)
     }
 
-    /// Tells every tile's part of the error estimate how far the picture is.
-    pub(super) fn record_convergence(&mut self) {
+    /// Tells the part of the error estimate of each tile that `is_news` chooses how far the picture is.
+    pub(super) fn record_convergence(&mut self, is_news: impl Fn(&FilmTile) -> bool + Sync) {
         let (light, width) = (self.light.as_ref(), self.width);
-        self.tiles.par_iter_mut().for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
+        let tiles = self.tiles.par_iter_mut().filter(|tile| is_news(tile));
+        tiles.for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
     }
 
     fn locate(&self, x: u32, y: u32) -> (&FilmTile, usize) {

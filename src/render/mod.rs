@@ -11,6 +11,7 @@ mod dielectric;
 mod environment;
 mod estimate;
 mod exact_sum;
+mod explain;
 mod film;
 mod film_record;
 mod filter;
@@ -22,6 +23,7 @@ mod medium;
 mod path;
 mod paths;
 mod phong;
+mod region;
 mod renderer;
 mod snapshot;
 mod surface;
@@ -33,13 +35,19 @@ pub use camera::Camera;
 pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
 pub use environment::Environment;
 pub use estimate::ErrorEstimate;
+pub use explain::{
+    Asked, Contribution, Explanation, FoundBy, LightSource, PathVertex, Place, TracedPath, explain, light_from_lamps,
+};
 pub use film::Film;
 pub use film_record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
 pub use filter::PixelFilter;
 pub use inspect::{Inspected, Inspection, Legend, depths, inspect, scale_color, tint_sharp_zone};
 pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
-pub use renderer::{BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, replay_sample};
+pub use region::Region;
+pub use renderer::{
+    BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, advance_region, replay_sample,
+};
 pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};
 pub use techniques::Techniques;
 pub use texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};

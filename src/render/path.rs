@@ -9,6 +9,7 @@
 
 use super::bsdf::Scatter;
 use super::caustics::{Bounce, CausticPass, Guided, Track};
+use super::explain::Record;
 use super::light::LightSample;
 use super::medium::MediumStack;
 use super::paths::{Path, PathBatch, ShadowBatch};
@@ -93,6 +94,8 @@ pub(super) struct PathWave {
     told: Vec<u32>,
     untold: Vec<u32>,
     shadows: ShadowBatch,
+    /// Looks on, when somebody wants to know.
+    pub record: Option<Box<Record>>,
 }
 
 /// Of hits, see [`SortedHits::of_kind`]; the others are one more than [`Material::kind`].
@@ -127,8 +130,17 @@ impl PathWave {
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            if let Some(record) = &mut self.record {
+                record.see_hits(&self.paths, &self.hits);
+            }
             self.shade(scene, depth, settings, caustics, radiance);
+            if let Some(record) = &mut self.record {
+                record.see_shaded(&self.paths, radiance);
+            }
             self.shadows.settle(radiance, |rays, occluded| tree.any_hits(rays, class, occluded));
+            if let Some(record) = &mut self.record {
+                record.see_settled(scene, &self.shadows, radiance);
+            }
             counts.shadow += self.shadows.rays.len() as u64;
             counts.bounce += self.next.len() as u64;
             std::mem::swap(&mut self.paths, &mut self.next);

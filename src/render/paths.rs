@@ -155,7 +155,7 @@ impl PathBatch {
 #[derive(Default)]
 pub(super) struct ShadowBatch {
     pub rays: RayBatch,
-    slot: Vec<u32>,
+    pub slot: Vec<u32>,
     light: [Vec<f32>; 3],
     occluded: Vec<bool>,
 }

@@ -1,11 +1,13 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
 use super::caustics::{CausticPass, LightLayer};
+use super::explain::{Record, TracedPath};
 use super::film::{Film, FilmTile};
 use super::filter::{FilterSampler, PixelFilter};
 use super::path::{CameraPath, PathWave};
 use super::paths::PathBatch;
 use super::phong::PhongWave;
+use super::region::Region;
 use super::wide::{Lens, Pixels};
 use super::{Snapshot, Techniques};
 use crate::geometry::Ray;
@@ -108,11 +110,23 @@ pub fn advance(
     target_spp: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
+    advance_region(snapshot, settings, film, None, target_spp, stop)
+}
+
+/// The same for the tiles of a region alone. Light from the lamps falls where it falls, so the others may get more of it.
+pub fn advance_region(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film: &mut Film,
+    region: Option<&Region>,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> PassReport {
     let size = UVec2::new(film.width(), film.height());
     let caustics = CausticPass::of(snapshot, settings, size);
     let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size };
     let Some(caustics) = &pass.caustics else {
-        return advance_tiles(&pass, film, target_spp, stop);
+        return advance_tiles(&pass, film, region, target_spp, stop);
     };
     if !caustics.prepare(stop) {
         return PassReport::default();
@@ -121,27 +135,35 @@ pub fn advance(
     film.light.get_or_insert_with(|| LightLayer::new(size, first));
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
-    while total.completed && film.spp() < target_spp {
-        let goal = (film.spp() + 1).checked_next_power_of_two().unwrap_or(u32::MAX).min(target_spp);
+    while total.completed && film.spp_in(region) < target_spp {
+        let next = (film.spp_in(region) + 1).checked_next_power_of_two();
+        let goal = next.unwrap_or(u32::MAX).min(target_spp);
         let mut layer = film.light.take().expect("made above");
         let (tiles, light) =
-            rayon::join(|| advance_tiles(&pass, film, goal, stop), || layer.advance(caustics, goal, stop));
+            rayon::join(|| advance_tiles(&pass, film, region, goal, stop), || layer.advance(caustics, goal, stop));
         film.light = Some(layer);
         total.completed = tiles.completed && light.completed;
         total.add(tiles);
         total.rays += light.rays;
         total.n_bad += light.n_bad;
         if total.completed {
-            film.record_convergence();
+            film.record_convergence(|tile| tile.spp == goal);
         }
     }
     total
 }
 
-fn advance_tiles(pass: &Pass, film: &mut Film, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> PassReport {
+fn advance_tiles(
+    pass: &Pass,
+    film: &mut Film,
+    region: Option<&Region>,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> PassReport {
     let reports: Vec<PassReport> = film
         .tiles
         .par_iter_mut()
+        .filter(|tile| region.is_none_or(|region| region.has(tile)))
         .map_init(Wave::default, |wave, tile| advance_tile(pass, tile, target_spp, stop, wave))
         .collect();
     let mut total = PassReport { completed: true, ..PassReport::default() };
@@ -176,6 +198,10 @@ struct Wave {
 }
 
 impl Wave {
+    fn of_pixel(pixel: UVec2) -> Self {
+        Self { pixels: Pixels { x: vec![pixel.x], y: vec![pixel.y], local: vec![0] }, ..Self::default() }
+    }
+
     /// Takes one sample of each of the pixels for each number in `samples`, and adds what they see to `radiance`: those
     /// of one sample follow each other, `stride` apart from those of the next.
     fn trace(
@@ -274,9 +300,35 @@ pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: 
         caustics.prepare(&|| false);
     }
     let mut radiance = [Vec3::ZERO];
-    let mut wave = Wave { pixels: Pixels { x: vec![at.x], y: vec![at.y], local: vec![0] }, ..Wave::default() };
+    let mut wave = Wave::of_pixel(UVec2::new(at.x, at.y));
     wave.trace(&pass, at.sample..at.sample + 1, 1, &mut radiance, &|| false);
     radiance[0]
+}
+
+/// Traces samples of one pixel as [`advance`] does, and writes down what their paths find.
+pub(super) fn trace_recorded(
+    snapshot: &Snapshot,
+    settings: &RenderSettings,
+    film_size: UVec2,
+    pixel: UVec2,
+    samples: Range<u32>,
+) -> Vec<TracedPath> {
+    let caustics = CausticPass::of(snapshot, settings, film_size);
+    let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size: film_size };
+    if let Some(caustics) = &pass.caustics {
+        caustics.prepare(&|| false);
+    }
+    let mut wave = Wave::of_pixel(pixel);
+    let mut paths = Vec::with_capacity(samples.len());
+    for first in samples.clone().step_by(WAVE_SIZE) {
+        let part = first..samples.end.min(first.saturating_add(WAVE_SIZE as u32));
+        let mut radiance = vec![Vec3::ZERO; part.len()];
+        wave.path.record = Some(Box::new(Record::new(part.clone())));
+        wave.trace(&pass, part, 1, &mut radiance, &|| false);
+        let record = wave.path.record.take().expect("it only looks on");
+        paths.extend(record.finish(&radiance));
+    }
+    paths
 }
 
 /// Bounces of the first sample of each pixel, the mean over blocks of 4 × 4; `None` when `stop` said so.

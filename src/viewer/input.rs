@@ -349,8 +349,13 @@ impl Input {
         }
     }
 
+    /// Of the window, physical pixels.
+    pub fn size(&self) -> [f64; 2] {
+        self.size
+    }
+
     /// The mouse as a fraction of the picture.
-    fn place(&self) -> [f64; 2] {
+    pub fn place(&self) -> [f64; 2] {
         [0, 1].map(|i| (self.cursor[i] / self.size[i].max(1.0)).clamp(0.0, 1.0))
     }
 }

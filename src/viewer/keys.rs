@@ -82,6 +82,11 @@ pub enum Action {
     PrintView,
     /// Shows this in place of the picture, or the picture again.
     Inspect(Inspection),
+    /// Why what is under the mouse looks as it does.
+    Explain,
+    /// The next drag is a rectangle that gets all samples.
+    Brush,
+    ClearRegion,
     ToggleSharpZone,
     /// Moves, turns or scales; then none.
     NextGizmo,
@@ -331,6 +336,10 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[inspect("8", Inspection::Bounces)], effect: "bounces of a path" },
             Binding { triggers: &[inspect("9", Inspection::Luminance)], effect: "false colour: brightness in stops" },
             Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "the picture" },
+            Binding {
+                triggers: &[text("j", Action::Explain)],
+                effect: "why the pixel under the mouse looks as it does: its paths, and what each light brings",
+            },
         ],
     },
     Group {
@@ -349,6 +358,14 @@ pub static BINDINGS: &[Group] = &[
                 effect: "path tracing or the classic Phong model",
             },
             Binding { triggers: &[text("p", Action::TogglePause)], effect: "pause, go on" },
+            Binding {
+                triggers: &[shifted(Typed::Text("b"), false, Action::Brush), Trigger::Mouse("then drag")],
+                effect: "give all samples to a rectangle",
+            },
+            Binding {
+                triggers: &[shifted(Typed::Text("b"), true, Action::ClearRegion)],
+                effect: "give them to the whole picture again",
+            },
             Binding { triggers: &[send("r", Command::Restart)], effect: "begin again" },
             Binding {
                 triggers: &[
@@ -393,7 +410,7 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen" },
             Binding {
                 triggers: &[named(NamedKey::Escape, Action::Leave)],
-                effect: "close this list, or select nothing, or close the window",
+                effect: "close this list or the explanation, or select nothing, or close the window",
             },
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],

@@ -12,12 +12,15 @@
 //! | `input` | keys and mouse to commands, independent of the frame rate |
 //! | `panel` | every setting and figure, answered with commands |
 //! | `handles` | what is selected: its box and its handles |
+//! | `story` | why a pixel looks as it does: paths and a table |
+//! | `brush` | the rectangle that gets all samples |
 //! | `reaction` | how long a person waits |
 //! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
 //! | `saver` | pictures to disk, on the side |
 //! | [`display`] | is there a display at all |
 
 mod app;
+mod brush;
 mod camera_text;
 pub mod display;
 mod handles;
@@ -29,6 +32,7 @@ mod presenter;
 mod reaction;
 mod saver;
 mod status;
+mod story;
 mod toasts;
 
 pub use app::{ViewerError, ViewerOptions, run};

@@ -1,9 +1,12 @@
 //! Saves pictures on threads of their own, so that the window goes on.
 
-use crate::frame::{PictureFormat, Print, Waker};
-use crate::render::{Display, Film};
+use crate::frame::{PictureFormat, Print, Target, Waker, render_offline_until};
+use crate::render::{Display, Film, RenderSettings, Snapshot};
+use crate::scene::file::check_film_size;
 use crate::scene::{ShotDraft, ShotSamples};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
@@ -18,7 +21,19 @@ pub struct Kept {
     pub coarse: bool,
 }
 
+/// A picture to be rendered for itself.
+pub struct Larger {
+    pub snapshot: Snapshot,
+    pub settings: RenderSettings,
+    pub size: (u32, u32),
+    /// Samples of each pixel.
+    pub spp: u32,
+    pub threads: usize,
+}
+
 pub struct Saver {
+    /// The window has gone: what takes long ends now.
+    ending: Arc<AtomicBool>,
     folder: PathBuf,
     waker: Waker,
     sender: Sender<Saved>,
@@ -30,7 +45,8 @@ impl Saver {
     /// Saves into `folder`; `waker` is called when a picture is done.
     pub fn new(folder: &Path, waker: Waker) -> Self {
         let (sender, receiver) = channel();
-        Self { folder: folder.to_owned(), waker, sender, receiver, threads: Vec::new() }
+        let (ending, folder) = (Arc::default(), folder.to_owned());
+        Self { ending, folder, waker, sender, receiver, threads: Vec::new() }
     }
 
     /// Saves the film that will come, with what `draft` says of it, under the name of `scene` and the next free number; a PNG with `size` pixels.
@@ -44,22 +60,45 @@ impl Saver {
         format: PictureFormat,
     ) {
         let (folder, stem) = (self.folder.clone(), file_stem(scene));
+        self.spawn(move || {
+            let film = film.recv().map_err(|_| "there was no picture to be kept".to_owned())?;
+            print(&folder, &stem, &film, draft, &display, size, format)
+        });
+    }
+
+    /// Renders a picture beside the window, and saves it in the same way; what there is of it when the window goes is
+    /// saved too.
+    pub fn save_larger(
+        &mut self,
+        larger: Larger,
+        draft: Option<ShotDraft>,
+        display: Display,
+        scene: &str,
+        format: PictureFormat,
+    ) {
+        let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
+        self.spawn(move || {
+            let Larger { snapshot, settings, size, spp, threads } = larger;
+            let failed = |reason: String| format!("the picture was not saved: {reason}");
+            check_film_size(size.0, size.1).map_err(failed)?;
+            // Threads of its own: those of the window belong to what is seen, and must not wait for this.
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.map_err(|error| failed(format!("no threads can be started: {error}")))?;
+            let mut film = Film::new(size.0, size.1);
+            let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
+            pool.install(|| render_offline_until(&snapshot, &settings, &mut film, target, &stop, |_| true));
+            if film.spp() == 0 {
+                return Err(failed("the window was closed before each of its pixels had a sample".to_owned()));
+            }
+            print(&folder, &stem, &film, draft, &display, size, format)
+        });
+    }
+
+    fn spawn(&mut self, work: impl FnOnce() -> Saved + Send + 'static) {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
-            let saved = match film.recv() {
-                Ok(film) => {
-                    let coarse = (film.width(), film.height()) != size;
-                    let uneven = coarse || film.max_spp() > film.spp();
-                    let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven };
-                    // Paths in the note count from the folder, whatever the picture will be called.
-                    let note = draft.map(|draft| draft.note(&folder.join(&stem), size, samples, display.into()));
-                    let print = Print { film: &film, display: &display, size, note: note.as_deref() };
-                    print.write_new(&folder, &stem, format).map(|path| Kept { path, coarse })
-                }
-                Err(_) => Err("there was no picture to be kept".to_owned()),
-            };
             // The window may be gone, and then nobody needs the news.
-            let _ = sender.send(saved);
+            let _ = sender.send(work());
             waker();
         };
         match std::thread::Builder::new().name("save".to_owned()).spawn(work) {
@@ -79,12 +118,32 @@ impl Saver {
 
     /// Waits for the pictures that are still being written.
     pub fn finish(&mut self) -> Vec<Saved> {
+        self.ending.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
             // A panic has been printed by the thread itself.
             let _ = thread.join();
         }
         self.finished()
     }
+}
+
+/// Writes a film with its note, under the next free number.
+fn print(
+    folder: &Path,
+    stem: &str,
+    film: &Film,
+    draft: Option<ShotDraft>,
+    display: &Display,
+    size: (u32, u32),
+    format: PictureFormat,
+) -> Saved {
+    let coarse = (film.width(), film.height()) != size;
+    let uneven = coarse || film.max_spp() > film.spp();
+    let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven };
+    // Paths in the note count from the folder, whatever the picture will be called.
+    let note = draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into()));
+    let print = Print { film, display, size, note: note.as_deref() };
+    print.write_new(folder, stem, format).map(|path| Kept { path, coarse })
 }
 
 /// A scene file in `folder` that is not there yet, for what is open: `NAME-0001.ron`.

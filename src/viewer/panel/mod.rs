@@ -24,7 +24,6 @@ use egui::{Context, RichText, Ui};
 use glam::DVec3;
 
 /// What the panel itself remembers.
-#[derive(Default)]
 pub struct PanelState {
     pub shown: bool,
     /// The handles over what is selected.
@@ -33,8 +32,16 @@ pub struct PanelState {
     ratio: Option<(Entity, f64)>,
     /// A file to be added.
     mesh_path: String,
+    /// Pictures that are kept are so many times as wide and high as the window.
+    pub scale: u32,
     /// The mouse went down in here and has not come up.
     pressed: bool,
+}
+
+impl Default for PanelState {
+    fn default() -> Self {
+        Self { shown: false, gizmo: None, ratio: None, mesh_path: String::new(), scale: 1, pressed: false }
+    }
 }
 
 /// What is shown besides the session.
@@ -44,6 +51,10 @@ pub struct Around<'a> {
     pub spinning: bool,
     /// Bytes of the process, where that can be known.
     pub memory: Option<u64>,
+    /// The next drag is a rectangle.
+    pub brush: bool,
+    /// What was opened last comes first.
+    pub recent: &'a [String],
 }
 
 /// What a click in the panel asks of the window itself.
@@ -53,6 +64,7 @@ pub struct Asked {
     pub speed: Option<f64>,
     pub toggle_spin: bool,
     pub screenshot: Option<bool>,
+    pub toggle_brush: bool,
 }
 
 impl Asked {
@@ -85,12 +97,13 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Beside the scroll bar.
             ui.set_width(ui.available_width() - 8.0);
-            section(ui, "Render", true, |ui| picture::render(ui, session, asked));
+            section(ui, "Render", true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
             section(ui, "View", false, |ui| camera::view(ui, session, around, asked));
             section(ui, "Lens", true, |ui| camera::lens(ui, session, asked));
             section(ui, "Display", false, |ui| picture::display(ui, session, asked));
             section(ui, "Selected", true, |ui| selected::selected(ui, state, session, asked));
             section(ui, "Objects", true, |ui| scene::objects(ui, session, asked));
+            section(ui, "Recent", false, |ui| scene::recent(ui, session, around.recent, asked));
             section(ui, "Add", false, |ui| scene::add(ui, &mut state.mesh_path, asked));
             section(ui, "Sky", false, |ui| scene::sky(ui, session, asked));
             section(ui, "Statistics", true, |ui| statistics::statistics(ui, session, around));

@@ -1,12 +1,12 @@
 //! How the picture is made and shown.
 
-use super::{Asked, number, row, rows, slider};
+use super::{Around, Asked, number, row, rows, slider};
 use crate::frame::{Command, Looking, Session, StopAt, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::viewer::status::tone_curve;
 use egui::Ui;
 
-pub fn render(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, asked: &mut Asked) {
     let status = session.status();
     rows(ui, "render", |ui| {
         row(ui, "light", |ui| {
@@ -51,12 +51,23 @@ pub fn render(ui: &mut Ui, session: &Session, asked: &mut Asked) {
         if ui.button("Begin again").clicked() {
             asked.send(Command::Restart);
         }
+        if ui.selectable_label(around.brush, "Region").on_hover_text("drag a rectangle that gets all samples").clicked()
+        {
+            asked.toggle_brush = true;
+        }
+        if status.region.is_some() && ui.button("All").on_hover_text("samples for the whole picture").clicked() {
+            asked.send(Command::SetRegion { region: None });
+        }
+    });
+    ui.horizontal(|ui| {
         if ui.button("Keep PNG").clicked() {
             asked.screenshot = Some(false);
         }
-        if ui.button("EXR").clicked() {
+        if ui.button("Keep EXR").clicked() {
             asked.screenshot = Some(true);
         }
+        let drag = egui::DragValue::new(scale).speed(0.03).range(1..=16).prefix("× ").update_while_editing(false);
+        ui.add(drag).on_hover_text("so many times as wide and high as the window, rendered beside it");
     });
 }
 

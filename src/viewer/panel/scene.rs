@@ -1,12 +1,13 @@
 //! What is in the scene: the list of things, new ones, and the sky.
 
 use super::{Asked, color, row, rows};
-use crate::frame::{Edit, NewThing, Property, Selection, Session};
+use crate::frame::{Command, Edit, NewThing, Property, Selection, Session};
 use crate::render::Environment;
 use crate::scene::Shape;
 use crate::scene::file::MeshSourcePart;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
+use std::path::Path;
 
 pub fn objects(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     let (inputs, selection) = (session.inputs(), session.world().resource::<Selection>());
@@ -43,6 +44,20 @@ fn kind(shape: &Shape) -> &'static str {
         Shape::Triangle { .. } => "triangle",
         Shape::Mesh(_) => "mesh",
         Shape::Spheres(_) => "balls",
+    }
+}
+
+/// What was opened before; a click opens it again.
+pub fn recent(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
+    let mut others = recent.iter().filter(|name| **name != session.status().scene).take(8).peekable();
+    if others.peek().is_none() {
+        ui.weak("nothing else so far: drop a file on the window");
+    }
+    for name in others {
+        let short = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
+        if ui.selectable_label(false, short).on_hover_text(name).clicked() {
+            asked.send(Command::Open { path: name.into() });
+        }
     }
 }
 

@@ -1,0 +1,178 @@
+//! `firstlight explain SCENE --pixel X,Y`: why a pixel looks as it does, without a window.
+
+use super::console::{print, remark};
+use super::stop::Stop;
+use super::{Failure, SceneArgs, parse_size};
+use clap::Args;
+use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
+use firstlight::render::{Integrator, RenderSettings, explain, light_from_lamps};
+use firstlight::scene::{Extraction, FilmSize, Rendering, SceneInputs};
+use glam::{DVec3, UVec2};
+use std::fmt::Write as _;
+
+#[derive(Args, Clone, Debug)]
+pub struct ExplainArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The pixel, from the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
+    pixel: UVec2,
+    /// Width and height of the picture that it is a pixel of; the scene's own when not given.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// How many of its samples are told, from the first.
+    #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    spp: u32,
+    /// Another number, other samples; the scene's own when not given.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    seed: Option<u32>,
+    /// Print one JSON object, with every vertex of every path.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
+    let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
+    let scene = args.scene.load(aspect, &|_| ())?;
+    let mut world = bevy_ecs::world::World::new();
+    scene.spawn(&mut world);
+    let FilmSize { width, height } = *world.resource();
+    let size = args.size.map_or(UVec2::new(width, height), UVec2::from);
+    if args.pixel.cmpge(size).any() {
+        let UVec2 { x, y } = args.pixel;
+        return Err(Failure::Usage(format!(
+            "--pixel: there is no pixel {x},{y} in a picture of {} x {}: the last one is {},{}",
+            size.x,
+            size.y,
+            size.x - 1,
+            size.y - 1
+        )));
+    }
+    let inputs = SceneInputs::of(&mut world);
+    let extraction = Extraction::new(&inputs, &scene.trees);
+    for problem in &extraction.problems {
+        remark(format_args!("warning: {problem}"));
+    }
+    let of_scene = world.resource::<Rendering>().0;
+    // The classic model has no paths; what light there is does not depend on how it is drawn.
+    let settings =
+        RenderSettings { integrator: Integrator::Path, seed: args.seed.unwrap_or(of_scene.seed), ..of_scene };
+    let snapshot = &extraction.snapshot;
+    let stop = Stop::on_interrupt();
+    let explanation = explain(snapshot, &settings, size, args.pixel, 0..args.spp).expect("path tracing has paths");
+    let from_lamps = light_from_lamps(snapshot, &settings, size, args.pixel, 0..args.spp, &|| stop.is_asked());
+    if stop.is_asked() {
+        return Err(Failure::Stopped("stopped".to_owned()));
+    }
+    let story = PixelStory::new(&explanation, from_lamps, &SnapshotNames::of(&extraction, &inputs));
+    if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
+}
+
+/// For people; luminance, since a table of three channels is hard to read.
+fn text(title: &str, story: &PixelStory) -> String {
+    let mut out = String::new();
+    let mut line = |text: String| writeln!(out, "{text}").expect("a string takes all");
+    let (UVec2 { x, y }, size) = (story.pixel, story.film_size);
+    let last = story.samples.end - 1;
+    line(format!("{title}: pixel {x},{y} of {} x {}, samples {} to {last}", size.x, size.y, story.samples.start));
+    if story.n_bad > 0 {
+        line(format!("{} of them are not finite and are left out", story.n_bad));
+    }
+    let from_lamps = story.from_lamps.unwrap_or_default();
+    let all = brightness(story.total());
+    let share = |part: f64| if all > 0.0 { format!("{:.1} %", 100.0 * part / all) } else { "–".to_owned() };
+    let width = story.lights.iter().map(|light| light.name.chars().count()).max().unwrap_or(0).max(22);
+    let columns = |name: &str, cells: [String; 5]| {
+        let cells: String = cells.iter().map(|cell| format!("{cell:>13}")).collect();
+        format!("  {name:width$}{cells}").trim_end().to_owned()
+    };
+    let row = |name: &str, parts: [DVec3; 3]| {
+        let [seen, direct, indirect] = parts.map(brightness);
+        let total = seen + direct + indirect;
+        let figures = [seen, direct, indirect, total].map(|figure| format!("{figure:.5}"));
+        let [a, b, c, d] = figures;
+        columns(name, [a, b, c, d, share(total)])
+    };
+    line(columns("light", ["seen", "direct", "indirect", "together", "share"].map(str::to_owned)));
+    for light in &story.lights {
+        line(row(&light.name, light.parts()));
+    }
+    if from_lamps != DVec3::ZERO {
+        let total = brightness(from_lamps);
+        let empty = String::new;
+        let cells = [empty(), empty(), empty(), format!("{total:.5}"), share(total)];
+        line(columns("by paths from the lamps", cells));
+    }
+    let [seen, direct, indirect] = story.parts().map(brightness);
+    let cells = [seen, direct, indirect, all].map(|figure| format!("{figure:.5}"));
+    let [a, b, c, d] = cells;
+    line(columns("all", [a, b, c, d, share(all)]));
+    let bounces: Vec<String> = (story.by_bounces.iter().enumerate())
+        .map(|(bounces, radiance)| format!("{bounces}: {}", share(brightness(*radiance))))
+        .collect();
+    line(format!("  by bounces   {}", bounces.join("   ")));
+    let (itself, asked) = (share(brightness(story.by_itself)), share(brightness(story.by_asking)));
+    line(format!("  found by     running into it: {itself}   asking for it: {asked}"));
+    let DVec3 { x: r, y: g, z: b } = story.total();
+    line(format!("  radiance     {r:.5} {g:.5} {b:.5}, ± {:.5} in brightness", brightness(story.deviation)));
+    out.trim_end().to_owned()
+}
+
+/// For machines.
+fn json(title: &str, story: &PixelStory) -> serde_json::Value {
+    let rgb = |radiance: &DVec3| radiance.to_array();
+    let all = |list: &[DVec3]| list.iter().map(rgb).collect::<Vec<_>>();
+    let end = |end: &End| match end {
+        End::At { point, what } => serde_json::json!({ "at": point.to_array(), "object": what }),
+        End::Sky { direction } => serde_json::json!({ "sky": direction.to_array() }),
+    };
+    let lights: Vec<_> = (story.lights.iter())
+        .map(|light| {
+            let by_bounces = all(&light.by_bounces);
+            serde_json::json!({ "name": light.name, "radiance": rgb(&light.total()), "by_bounces": by_bounces })
+        })
+        .collect();
+    let paths: Vec<_> = (story.ways.iter())
+        .map(|way| {
+            let vertices: Vec<_> = (way.stops.iter())
+                .map(|stop| {
+                    let asked = stop.asked.as_ref().map(|(place, radiance)| {
+                        serde_json::json!({ "light": end(place), "radiance": rgb(radiance) })
+                    });
+                    serde_json::json!({
+                        "place": end(&stop.end),
+                        "throughput": rgb(&stop.throughput),
+                        "radiance": rgb(&stop.radiance),
+                        "asked": asked,
+                    })
+                })
+                .collect();
+            serde_json::json!({
+                "sample": way.sample, "radiance": rgb(&way.radiance), "origin": way.origin.to_array(), "vertices": vertices,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "scene": title,
+        "pixel": story.pixel.to_array(),
+        "size": story.film_size.to_array(),
+        "samples": [story.samples.start, story.samples.end],
+        "bad_samples": story.n_bad,
+        "radiance": rgb(&story.total()),
+        "deviation": rgb(&story.deviation),
+        "lights": lights,
+        "by_bounces": all(&story.by_bounces),
+        "by_running_into_it": rgb(&story.by_itself),
+        "by_asking": rgb(&story.by_asking),
+        "by_paths_from_the_lamps": story.from_lamps.as_ref().map(rgb),
+        "paths": paths,
+    })
+}
+
+/// `640,360` as a pixel.
+fn parse_pixel(text: &str) -> Result<UVec2, String> {
+    let wrong = || format!("`{text}` is not a pixel: write it as X,Y, such as 640,360");
+    let (x, y) = text.split_once(',').ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
+    Ok(UVec2::new(number(x)?, number(y)?))
+}

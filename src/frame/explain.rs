@@ -1,0 +1,285 @@
+//! Why a pixel looks as it does, in the scene's own words and frame: asked for by a command, answered by the workers.
+//!
+//! The story stays until another is asked for, so that one can fly around its paths.
+
+use super::status::{MessageKind, Status};
+use super::systems::{Clock, Renderer, Shown};
+use super::worker::{Answer, Question};
+use crate::render::{Explanation, FoundBy, Integrator, LightSource, Place};
+use crate::scene::{Extraction, SceneInputs, Shape};
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use glam::{DVec3, UVec2};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, TryRecvError};
+
+/// What made a pixel what it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PixelStory {
+    pub pixel: UVec2,
+    pub film_size: UVec2,
+    pub samples: Range<u32>,
+    /// Samples that were not finite, and are in none of the figures.
+    pub n_bad: usize,
+    /// The brightest first.
+    pub lights: Vec<LightRow>,
+    /// All lights together: seen, after one bounce, after two…
+    pub by_bounces: Vec<DVec3>,
+    /// What paths ran into, and what their vertices asked for.
+    pub by_itself: DVec3,
+    pub by_asking: DVec3,
+    /// What the paths found: all lights together.
+    pub mean: DVec3,
+    /// Standard deviation of `mean`.
+    pub deviation: DVec3,
+    /// What paths from the lamps brought beside that, as far as it is known.
+    pub from_lamps: Option<DVec3>,
+    pub ways: Vec<Way>,
+}
+
+/// One light's part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightRow {
+    pub name: String,
+    /// Seen, after one bounce, after two… W·m⁻²·sr⁻¹.
+    pub by_bounces: Vec<DVec3>,
+}
+
+/// One path, in the world, metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Way {
+    pub sample: u32,
+    pub radiance: DVec3,
+    /// On the lens.
+    pub origin: DVec3,
+    pub stops: Vec<Stop>,
+}
+
+/// The end of a segment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stop {
+    pub end: End,
+    /// Of light that arrives here, the share that reaches the pixel.
+    pub throughput: DVec3,
+    /// What the pixel got of light that shines from here.
+    pub radiance: DVec3,
+    /// Where light was asked for from here, and what the pixel got of it.
+    pub asked: Option<(End, DVec3)>,
+}
+
+/// A place or a direction, and what is there.
+#[derive(Clone, Debug, PartialEq)]
+pub enum End {
+    At { point: DVec3, what: String },
+    Sky { direction: DVec3 },
+}
+
+impl LightRow {
+    pub fn total(&self) -> DVec3 {
+        self.by_bounces.iter().sum()
+    }
+
+    /// Seen directly, after one bounce, after more.
+    pub fn parts(&self) -> [DVec3; 3] {
+        parts(&self.by_bounces)
+    }
+}
+
+/// Seen directly, after one bounce, after more.
+fn parts(by_bounces: &[DVec3]) -> [DVec3; 3] {
+    let at = |bounces: usize| by_bounces.get(bounces).copied().unwrap_or_default();
+    [at(0), at(1), by_bounces.iter().skip(2).sum()]
+}
+
+/// How the objects of a snapshot are called, and where its frame is.
+#[derive(Clone, Debug, Default)]
+pub struct SnapshotNames {
+    origin: DVec3,
+    names: Vec<String>,
+}
+
+impl SnapshotNames {
+    pub fn of(extraction: &Extraction, inputs: &SceneInputs) -> Self {
+        let objects: BTreeMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
+        let lights: BTreeMap<_, _> = inputs.lights.iter().map(|light| (light.entity, light)).collect();
+        let name = |(i, entity): (usize, _)| match (objects.get(entity), lights.get(entity)) {
+            (Some(object), _) => object.name.clone().unwrap_or_else(|| format!("{} {i}", kind(&object.shape))),
+            (_, Some(light)) => light.name.clone().unwrap_or_else(|| format!("point light {i}")),
+            _ => format!("object {i}"),
+        };
+        Self { origin: extraction.origin, names: extraction.entities.iter().enumerate().map(name).collect() }
+    }
+
+    fn object(&self, object: u32) -> String {
+        self.names.get(object as usize).cloned().unwrap_or_else(|| "the rim of a lamp".to_owned())
+    }
+
+    fn source(&self, source: LightSource) -> String {
+        match source {
+            LightSource::Object(object) => self.object(object),
+            LightSource::Sky => "sky".to_owned(),
+            LightSource::Rim => self.object(u32::MAX),
+        }
+    }
+
+    fn end(&self, place: Place) -> End {
+        match place {
+            Place::Surface { position, object } => {
+                End::At { point: self.origin + position.as_dvec3(), what: self.object(object) }
+            }
+            Place::Sky { direction } => End::Sky { direction: direction.as_dvec3() },
+        }
+    }
+}
+
+fn kind(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Sphere { .. } => "sphere",
+        Shape::Plane { .. } => "plane",
+        Shape::Quad { .. } => "quad",
+        Shape::Triangle { .. } => "triangle",
+        Shape::Mesh(_) => "mesh",
+        Shape::Spheres(_) => "cloud",
+    }
+}
+
+impl PixelStory {
+    pub fn new(explanation: &Explanation, from_lamps: Option<DVec3>, names: &SnapshotNames) -> Self {
+        let contributions = explanation.contributions();
+        let mut by_light: BTreeMap<LightSource, Vec<DVec3>> = BTreeMap::new();
+        let (mut by_bounces, mut by_itself, mut by_asking) = (Vec::new(), DVec3::ZERO, DVec3::ZERO);
+        for part in &contributions {
+            let bounces = part.bounces as usize;
+            for row in [by_light.entry(part.source).or_default(), &mut by_bounces] {
+                row.resize(row.len().max(bounces + 1), DVec3::ZERO);
+                row[bounces] += part.radiance;
+            }
+            match part.found_by {
+                FoundBy::Itself => by_itself += part.radiance,
+                FoundBy::Asking => by_asking += part.radiance,
+            }
+        }
+        let row = |(source, by_bounces): (&LightSource, &Vec<DVec3>)| LightRow {
+            name: names.source(*source),
+            by_bounces: by_bounces.clone(),
+        };
+        let mut lights: Vec<LightRow> = by_light.iter().map(row).collect();
+        lights.sort_by(|a, b| brightness(b.total()).total_cmp(&brightness(a.total())));
+        let ways = explanation.paths.iter().map(|path| Way {
+            sample: path.sample,
+            radiance: path.radiance.as_dvec3(),
+            origin: names.origin + path.origin.as_dvec3(),
+            stops: (path.vertices.iter())
+                .map(|vertex| Stop {
+                    end: names.end(vertex.place),
+                    throughput: vertex.throughput.as_dvec3(),
+                    radiance: vertex.radiance,
+                    asked: vertex.asked.map(|asked| (names.end(asked.place), asked.radiance)),
+                })
+                .collect(),
+        });
+        Self {
+            pixel: explanation.pixel,
+            film_size: explanation.film_size,
+            samples: explanation.samples.clone(),
+            n_bad: explanation.n_bad(),
+            lights,
+            by_bounces,
+            by_itself,
+            by_asking,
+            mean: explanation.mean(),
+            deviation: explanation.deviation(),
+            from_lamps,
+            ways: ways.collect(),
+        }
+    }
+
+    /// With what paths from the lamps brought.
+    pub fn total(&self) -> DVec3 {
+        self.mean + self.from_lamps.unwrap_or_default()
+    }
+
+    /// Seen directly, after one bounce, after more.
+    pub fn parts(&self) -> [DVec3; 3] {
+        parts(&self.by_bounces)
+    }
+}
+
+/// Luminance of linear Rec. 709.
+pub fn brightness(radiance: DVec3) -> f64 {
+    radiance.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// What is being explained.
+#[derive(Resource, Default)]
+pub struct Explaining {
+    /// A place that is to be explained: fractions of the picture.
+    pub(super) wanted: Option<(f64, f64)>,
+    waiting: Option<Waiting>,
+    pub story: Option<PixelStory>,
+}
+
+/// A question that is under way.
+struct Waiting {
+    // A receiver cannot be shared between threads by itself, and a resource must be.
+    answer: Mutex<Receiver<Answer>>,
+    generation: u64,
+    names: SnapshotNames,
+    place: (f64, f64),
+}
+
+impl Explaining {
+    /// How many samples of a pixel are told.
+    pub const SAMPLES: u32 = 64;
+
+    pub(super) fn is_idle(&self) -> bool {
+        self.wanted.is_none() && self.waiting.is_none()
+    }
+
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// Asks the workers, and takes their answer.
+///
+/// Reads [`Shown`]; writes [`Explaining`], [`Status`], and to the [`Renderer`]. Runs after they got their job.
+pub fn explain_pixel(
+    shown: Res<Shown>,
+    renderer: Res<Renderer>,
+    clock: Res<Clock>,
+    mut explaining: ResMut<Explaining>,
+    mut status: ResMut<Status>,
+) {
+    if explaining.wanted.is_none() && explaining.waiting.is_none() {
+        return;
+    }
+    let explaining = &mut *explaining;
+    if let Some(waiting) = &explaining.waiting {
+        let answer = waiting.answer.lock().map_or(Err(TryRecvError::Disconnected), |answer| answer.try_recv());
+        match answer {
+            Ok(Answer { explanation, from_lamps }) => {
+                explaining.story = Some(PixelStory::new(&explanation, from_lamps, &waiting.names));
+                explaining.waiting = None;
+            }
+            Err(TryRecvError::Empty) => {}
+            Err(TryRecvError::Disconnected) => {
+                // The view has changed in between: the same place in the new one.
+                let outdated = waiting.generation != shown.generation();
+                explaining.wanted = explaining.wanted.or(outdated.then_some(waiting.place));
+                explaining.waiting = None;
+            }
+        }
+    }
+    let (Some(place), Some(extraction)) = (explaining.wanted.take(), &shown.extraction) else { return };
+    if shown.integrator() != Integrator::Path {
+        status.say(clock.0, MessageKind::Note, "the classic model has no paths that could be told of");
+        return;
+    }
+    let generation = shown.generation();
+    let question = Question { generation, x: place.0, y: place.1, n_samples: Explaining::SAMPLES };
+    let names = SnapshotNames::of(extraction, &shown.inputs);
+    let answer = Mutex::new(renderer.0.ask(question));
+    explaining.waiting = Some(Waiting { answer, generation, names, place });
+}

@@ -1,0 +1,281 @@
+//! The thread that renders: it owns the film and a pool of workers, does what the [`Scheduler`](super::Scheduler)
+//! says, and hands over finished pictures. It never touches the world, and nobody ever waits for it longer than a lock
+//! is held.
+//!
+//! A new job raises a flag that the workers look at all the time, so that they drop what they are at within
+//! milliseconds. Every job has a generation; a picture carries the one of its job.
+//!
+//! Here is the near end; `thread` is the far one, and `show` what it hands over.
+
+mod show;
+mod thread;
+
+use super::{Picture, Target};
+use crate::render::{
+    BadSample, Display, Explanation, Film, Inspection, Legend, RayCounts, Region, RenderSettings, Snapshot,
+};
+use glam::DVec3;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Called whenever there is something new to be looked at.
+pub type Waker = Arc<dyn Fn() + Send + Sync>;
+
+/// What to render from now on.
+#[derive(Clone)]
+pub struct Job {
+    pub generation: u64,
+    pub snapshot: Snapshot,
+    pub settings: RenderSettings,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// What is shown of it; no sample depends on this.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Look {
+    pub inspection: Inspection,
+    /// Tint what is sharp, and draw the focal plane.
+    pub sharp_zone: bool,
+}
+
+/// A pixel to be explained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Question {
+    /// Of the job that the place belongs to; the question is void when another one has come.
+    pub generation: u64,
+    /// Fractions of the picture from its upper left corner.
+    pub x: f64,
+    pub y: f64,
+    pub n_samples: u32,
+}
+
+/// Why the pixel looks as it does, and what the film has there.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    pub explanation: Explanation,
+    /// What paths from the lamps have brought there so far; `None` where the film is not at full resolution.
+    pub from_lamps: Option<DVec3>,
+}
+
+/// How far the current job is.
+#[derive(Clone, Debug, Default)]
+pub struct Stats {
+    pub generation: u64,
+    /// Of the film that the picture was developed from.
+    pub film_width: u32,
+    pub film_height: u32,
+    pub divider: u32,
+    /// Samples that every pixel of that film has.
+    pub spp: u32,
+    /// What gets all samples now, in pixels of that film, and how many it has.
+    pub region: Option<(Region, u32)>,
+    /// Seconds of rendering since the restart.
+    pub seconds: f64,
+    /// Relative error of the whole picture, or of the region, when it is known.
+    pub error: Option<f64>,
+    /// Rays of the last steps, and the seconds that they took.
+    pub recent_rays: RayCounts,
+    pub recent_seconds: f64,
+    /// Since the restart.
+    pub rays: RayCounts,
+    pub n_bad: u64,
+    pub bad: Vec<BadSample>,
+    pub threads: usize,
+    /// Nothing is left to do: the target is reached, or it is paused.
+    pub asleep: bool,
+    /// The target is reached.
+    pub done: bool,
+    /// Of the inspection that is shown.
+    pub legend: Option<Legend>,
+    /// What went wrong in the renderer itself.
+    pub failure: Option<String>,
+}
+
+/// Messages to the thread; a later one of a kind takes the place of an earlier one.
+#[derive(Default)]
+struct Inbox {
+    job: Option<Job>,
+    display: Option<Display>,
+    look: Option<Look>,
+    target: Option<Target>,
+    paused: Option<bool>,
+    threads: Option<usize>,
+    /// In fractions of the picture: left, top, right, bottom.
+    region: Option<Option<[f64; 4]>>,
+    question: Option<(Question, Sender<Answer>)>,
+    film_wanted: Vec<Sender<Film>>,
+    to_keep: Vec<Sender<Film>>,
+    quit: bool,
+}
+
+/// What the thread has to show.
+#[derive(Default)]
+struct Outbox {
+    picture: Picture,
+    /// The picture has not been taken yet.
+    fresh: bool,
+    stats: Stats,
+}
+
+struct Shared {
+    inbox: Mutex<Inbox>,
+    arrived: Condvar,
+    /// Something lies in the inbox: come and look.
+    interrupt: AtomicBool,
+    /// The thread waits for a message.
+    sleeping: AtomicBool,
+    outbox: Mutex<Outbox>,
+    pool: Mutex<Arc<rayon::ThreadPool>>,
+    waker: Option<Waker>,
+}
+
+/// The near end of the thread.
+pub struct Worker {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    /// `threads`: 0 is one a processor.
+    pub fn start(threads: usize, target: Target, waker: Option<Waker>) -> Result<Self, String> {
+        let shared = Arc::new(Shared {
+            inbox: Mutex::default(),
+            arrived: Condvar::new(),
+            interrupt: AtomicBool::new(false),
+            sleeping: AtomicBool::new(false),
+            outbox: Mutex::default(),
+            pool: Mutex::new(make_pool(threads)?),
+            waker,
+        });
+        let thread = std::thread::Builder::new()
+            .name("firstlight render".to_owned())
+            .spawn({
+                let shared = shared.clone();
+                move || thread::Loop::new(&shared, target).run()
+            })
+            .map_err(|error| format!("the render thread cannot be started: {error}"))?;
+        Ok(Self { shared, thread: Some(thread) })
+    }
+
+    pub fn set_job(&self, job: Job) {
+        self.post(|inbox| inbox.job = Some(job));
+    }
+
+    /// Keeps all samples.
+    pub fn set_display(&self, display: Display) {
+        self.post(|inbox| inbox.display = Some(display));
+    }
+
+    /// Keeps all samples.
+    pub fn set_look(&self, look: Look) {
+        self.post(|inbox| inbox.look = Some(look));
+    }
+
+    /// Keeps all samples.
+    pub fn set_target(&self, target: Target) {
+        self.post(|inbox| inbox.target = Some(target));
+    }
+
+    /// Keeps all samples.
+    pub fn set_paused(&self, paused: bool) {
+        self.post(|inbox| inbox.paused = Some(paused));
+    }
+
+    /// Keeps all samples; 0 is one a processor.
+    pub fn set_threads(&self, threads: usize) {
+        self.post(|inbox| inbox.threads = Some(threads));
+    }
+
+    /// Keeps all samples; what gets the next ones, in fractions of the picture: left, top, right, bottom.
+    pub fn set_region(&self, region: Option<[f64; 4]>) {
+        self.post(|inbox| inbox.region = Some(region));
+    }
+
+    /// Why a pixel looks as it does; never waits. When the answer cannot come any more, the other end is closed.
+    pub fn ask(&self, question: Question) -> Receiver<Answer> {
+        let (sender, receiver) = channel();
+        self.post(|inbox| inbox.question = Some((question, sender)));
+        receiver
+    }
+
+    /// The pool that renders, for work beside it such as building trees.
+    pub fn pool(&self) -> Arc<rayon::ThreadPool> {
+        lock(&self.shared.pool).clone()
+    }
+
+    /// A copy of the film as it is now; waits until the workers have dropped what they are at, some milliseconds.
+    pub fn film(&self) -> Option<Film> {
+        let (sender, receiver) = channel();
+        self.post(|inbox| inbox.film_wanted.push(sender));
+        receiver.recv_timeout(Duration::from_secs(5)).ok()
+    }
+
+    /// The film of what is seen now, worth keeping: see [`Session::keep_film`](super::Session::keep_film).
+    pub fn keep_film(&self) -> Receiver<Film> {
+        let (sender, receiver) = channel();
+        self.post(|inbox| inbox.to_keep.push(sender));
+        receiver
+    }
+
+    /// Takes the newest picture, if there is a new one, in exchange for an old one's memory.
+    pub fn take(&self, picture: &mut Picture) -> bool {
+        let mut outbox = lock(&self.shared.outbox);
+        if !outbox.fresh {
+            return false;
+        }
+        outbox.fresh = false;
+        std::mem::swap(picture, &mut outbox.picture);
+        true
+    }
+
+    pub fn stats(&self) -> Stats {
+        lock(&self.shared.outbox).stats.clone()
+    }
+
+    /// Whether a picture lies ready that nobody has taken.
+    pub fn has_picture(&self) -> bool {
+        lock(&self.shared.outbox).fresh
+    }
+
+    /// Whether there is nothing to do, and no message that could change that.
+    pub fn is_asleep(&self) -> bool {
+        self.shared.sleeping.load(Ordering::Acquire) && !self.shared.interrupt.load(Ordering::Acquire)
+    }
+
+    fn post(&self, write: impl FnOnce(&mut Inbox)) {
+        let mut inbox = lock(&self.shared.inbox);
+        write(&mut inbox);
+        // Under the lock, or the thread could look at the flag, then miss the call, then wait for ever.
+        self.shared.interrupt.store(true, Ordering::Release);
+        drop(inbox);
+        self.shared.arrived.notify_all();
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.post(|inbox| inbox.quit = true);
+        if let Some(thread) = self.thread.take() {
+            // A panic over there has been reported already.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn make_pool(threads: usize) -> Result<Arc<rayon::ThreadPool>, String> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|i| format!("firstlight {i}"))
+        .build()
+        .map(Arc::new)
+        .map_err(|error| format!("{threads} worker threads cannot be started: {error}"))
+}
+
+/// The data behind a lock is whole at every moment at which a thread could panic.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,324 @@
+//! The far end: takes over what has arrived, does the scheduler's next step, hands over, and sleeps.
+
+use super::show::Views;
+use super::{Answer, Job, Look, Question, Shared, Stats, lock, make_pool};
+use crate::frame::scheduler::{Scheduler, Step, StepReport};
+use crate::frame::{Picture, Target};
+use crate::render::{Display, Film, Region, advance_region, explain};
+use glam::{DVec2, UVec2};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::Sender;
+use std::time::Instant;
+
+/// What the thread itself holds.
+pub struct Loop<'a> {
+    pub(super) shared: &'a Shared,
+    clock: Instant,
+    pub(super) scheduler: Scheduler,
+    pub(super) display: Display,
+    pub(super) look: Look,
+    pub(super) views: Views,
+    /// What gets all samples, in fractions of the picture.
+    region: Option<[f64; 4]>,
+    /// The film has tiles that are ahead because they were asked to be.
+    is_uneven: bool,
+    question: Option<(Question, Sender<Answer>)>,
+    pub(super) job: Option<Job>,
+    pub(super) film: Option<(u32, Film)>,
+    /// The film before it, as long as the new one has pixels without a sample.
+    pub(super) previous: Option<(u32, Film)>,
+    pub(super) stats: Stats,
+    /// Developed pictures that are not shared, for their memory.
+    pub(super) spare: Picture,
+    /// The picture that was shown last is not of these settings.
+    pub(super) redraw: bool,
+    /// Who waits for a film worth keeping.
+    to_keep: Vec<Sender<Film>>,
+}
+
+impl<'a> Loop<'a> {
+    pub fn new(shared: &'a Shared, target: Target) -> Self {
+        Self {
+            shared,
+            clock: Instant::now(),
+            scheduler: Scheduler::new(1, 1, target),
+            display: Display::default(),
+            look: Look::default(),
+            views: Views::default(),
+            region: None,
+            is_uneven: false,
+            question: None,
+            job: None,
+            film: None,
+            previous: None,
+            stats: Stats { asleep: true, ..Stats::default() },
+            spare: Picture::default(),
+            redraw: false,
+            to_keep: Vec::new(),
+        }
+    }
+
+    pub fn run(mut self) {
+        while self.read_inbox() {
+            let step = match &self.job {
+                Some(_) => self.scheduler.next(self.clock.elapsed()),
+                None => Step::Sleep,
+            };
+            match step {
+                Step::Render { .. } => self.render(step),
+                Step::Sleep => self.sleep(),
+            }
+        }
+    }
+
+    /// Takes over what has arrived; false when it is time to go.
+    fn read_inbox(&mut self) -> bool {
+        let inbox = {
+            let mut inbox = lock(&self.shared.inbox);
+            self.shared.sleeping.store(false, Ordering::Release);
+            self.shared.interrupt.store(false, Ordering::Release);
+            std::mem::take(&mut *inbox)
+        };
+        if inbox.quit {
+            return false;
+        }
+        if let Some(threads) = inbox.threads {
+            self.set_threads(threads);
+        }
+        if let Some(target) = inbox.target {
+            self.scheduler.set_target(target);
+        }
+        if let Some(paused) = inbox.paused {
+            self.scheduler.set_paused(paused);
+        }
+        if let Some(look) = inbox.look {
+            self.redraw |= look != self.look;
+            self.look = look;
+        }
+        if let Some(display) = inbox.display {
+            self.redraw |= display != self.display;
+            self.display = display;
+        }
+        for sender in inbox.film_wanted {
+            if let Some((_, film)) = self.visible() {
+                // Whoever asked may have gone.
+                let _ = sender.send(film.clone());
+            }
+        }
+        self.to_keep.extend(inbox.to_keep);
+        // What is seen now is about to go.
+        self.hand_out(inbox.job.is_some());
+        if let Some(question) = inbox.question {
+            self.question = Some(question);
+        }
+        let region_before = self.region;
+        if let Some(region) = inbox.region {
+            self.region = region;
+        }
+        if let Some(job) = inbox.job {
+            let size = (job.width, job.height);
+            self.scheduler.resize(size.0, size.1, self.clock.elapsed());
+            let threads = lock(&self.shared.pool).current_num_threads();
+            self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
+            self.job = Some(job);
+            (self.film, self.previous) = (None, None);
+            self.redraw = false;
+            self.scheduler.set_region(None, 0, None);
+        } else if self.region != region_before {
+            self.scheduler_sees_region();
+            self.redraw = true;
+        }
+        // A place in another picture.
+        let generation = self.job.as_ref().map(|job| job.generation);
+        self.question.take_if(|(question, _)| Some(question.generation) != generation);
+        self.answer(false);
+        true
+    }
+
+    /// The region in pixels of the film, once every pixel has a sample at full resolution.
+    pub(super) fn active_region(&self) -> Option<Region> {
+        let (divider, film) = self.film.as_ref()?;
+        (*divider == 1 && film.spp() > 0).then(|| film.region_of(self.region?)).flatten()
+    }
+
+    /// Tells the scheduler what there is to be rendered, and how far that is.
+    fn scheduler_sees_region(&mut self) {
+        let Some((1, film)) = &self.film else { return };
+        let region = self.active_region();
+        let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
+        let spp = film.spp_in(region.as_ref());
+        self.stats.error = error;
+        self.scheduler.set_region(region.map(|region| region.n_pixels()), spp, error);
+    }
+
+    /// Answers what was asked for, as soon as the film can tell its part, or without it if there will be `no_better`
+    /// one.
+    fn answer(&mut self, no_better: bool) {
+        let (Some((question, _)), Some(job)) = (&self.question, &self.job) else { return };
+        let film = self.film.as_ref().filter(|(divider, film)| *divider == 1 && film.spp() > 0);
+        if film.is_none() && !no_better {
+            return;
+        }
+        let size = UVec2::new(job.width, job.height);
+        let place = DVec2::new(question.x, question.y).clamp(DVec2::ZERO, DVec2::ONE) * size.as_dvec2();
+        let pixel = place.as_uvec2().min(size - 1);
+        let from_lamps = film.map(|(_, film)| film.light_from_lamps(pixel.x, pixel.y));
+        let first = film.map_or(0, |(_, film)| film.first_sample());
+        let samples = first..first.saturating_add(question.n_samples);
+        let pool = lock(&self.shared.pool).clone();
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            pool.install(|| explain(&job.snapshot, &job.settings, size, pixel, samples))
+        }));
+        let sender = self.question.take().map(|(_, sender)| sender);
+        match (result, sender) {
+            (Ok(Some(explanation)), Some(sender)) => {
+                // Whoever asked may have gone.
+                let _ = sender.send(Answer { explanation, from_lamps });
+            }
+            (Err(panic), _) => self.fail(panic.as_ref()),
+            _ => {}
+        }
+        self.wake();
+    }
+
+    fn set_threads(&mut self, threads: usize) {
+        match make_pool(threads) {
+            Ok(pool) => {
+                self.stats.threads = pool.current_num_threads();
+                *lock(&self.shared.pool) = pool;
+                self.scheduler.forget_speed();
+            }
+            Err(error) => self.stats.failure = Some(error),
+        }
+    }
+
+    /// One step of the scheduler, and the picture that comes of it.
+    fn render(&mut self, step: Step) {
+        let Step::Render { divider, mut target_spp, mut at_most } = step else { return };
+        let Some(job) = &self.job else { return };
+        if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
+            let film = Film::new(job.width.div_ceil(divider), job.height.div_ceil(divider));
+            if let Some(old) = self.film.replace((divider, film)).filter(|(_, old)| old.spp() > 0) {
+                self.previous = Some(old);
+            }
+            self.stats.n_bad = 0;
+            self.stats.bad.clear();
+            self.is_uneven = false;
+        }
+        let region = self.active_region();
+        self.is_uneven |= region.is_some();
+        let Some((_, film)) = &mut self.film else { return };
+        if divider == 1 && !self.to_keep.is_empty() && !self.is_uneven {
+            // Who keeps a picture wants to be able to make it again, so all pixels get as many samples.
+            (target_spp, at_most) = (film.max_spp().max(1), None);
+        }
+        let pool = lock(&self.shared.pool).clone();
+        let start = Instant::now();
+        let interrupt = &self.shared.interrupt;
+        let stop = || interrupt.load(Ordering::Relaxed) || at_most.is_some_and(|limit| start.elapsed() >= limit);
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            pool.install(|| advance_region(&job.snapshot, &job.settings, film, region.as_ref(), target_spp, &stop))
+        }));
+        let seconds = start.elapsed().as_secs_f64();
+        let pass = match result {
+            Ok(pass) => pass,
+            Err(panic) => return self.fail(panic.as_ref()),
+        };
+        let stats = &mut self.stats;
+        // Speed is that of the last half second or so.
+        if stats.recent_seconds > 0.5 {
+            stats.recent_seconds *= 0.5;
+            for rays in [&mut stats.recent_rays.camera, &mut stats.recent_rays.bounce, &mut stats.recent_rays.shadow] {
+                *rays /= 2;
+            }
+        }
+        stats.recent_rays += pass.rays;
+        stats.recent_seconds += seconds;
+        stats.rays += pass.rays;
+        stats.seconds += seconds;
+        stats.n_bad += pass.n_bad;
+        stats.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(stats.bad.len())));
+        let interrupted = !pass.completed && interrupt.load(Ordering::Relaxed);
+        let replaced = interrupted && lock(&self.shared.inbox).job.is_some();
+        let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
+        stats.error = error.filter(|_| divider == 1);
+        let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp_in(region.as_ref()), error };
+        let can_be_seen = film.spp() > 0;
+        self.is_uneven &= region.is_some() || film.max_spp() > film.spp();
+        self.scheduler.finished(step, report, self.clock.elapsed());
+        if can_be_seen {
+            self.previous = None;
+        }
+        if region.is_none() && self.region.is_some() {
+            // From now on there may be one.
+            self.scheduler_sees_region();
+        }
+        self.hand_out(false);
+        self.answer(false);
+        if !replaced && (self.redraw || self.previous.is_none()) {
+            self.show(false);
+        }
+    }
+
+    /// Gives the film to who wants to keep it: at full resolution, or as it is if there will be `no_better` one.
+    fn hand_out(&mut self, no_better: bool) {
+        if self.to_keep.is_empty() {
+            return;
+        }
+        if let Some((divider, film)) = self.visible()
+            && ((*divider == 1 && (self.is_uneven || film.max_spp() == film.spp())) || no_better)
+        {
+            let film = film.clone();
+            for sender in self.to_keep.drain(..) {
+                // Whoever asked may have gone.
+                let _ = sender.send(film.clone());
+            }
+        }
+    }
+
+    /// The newest film of which every pixel has a sample.
+    pub(super) fn visible(&self) -> Option<&(u32, Film)> {
+        self.film.as_ref().filter(|(_, film)| film.spp() > 0).or(self.previous.as_ref())
+    }
+
+    /// Shows the final state and waits for the next message.
+    fn sleep(&mut self) {
+        self.hand_out(true);
+        self.answer(true);
+        // Without a film, asking in vain beats waiting in vain.
+        self.to_keep.clear();
+        self.question = None;
+        let shown = {
+            let outbox = lock(&self.shared.outbox);
+            outbox.stats.asleep && outbox.stats.generation == self.stats.generation
+        };
+        if self.film.is_some() && (!shown || self.redraw) {
+            self.show(true);
+        } else if !shown {
+            lock(&self.shared.outbox).stats = Stats { asleep: true, ..self.stats.clone() };
+            self.wake();
+        }
+        let mut inbox = lock(&self.shared.inbox);
+        while !self.shared.interrupt.load(Ordering::Acquire) {
+            self.shared.sleeping.store(true, Ordering::Release);
+            inbox = self.shared.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// A bug in the renderer must not take the window down: say so, and render nothing until something changes.
+    fn fail(&mut self, panic: &(dyn std::any::Any + Send)) {
+        let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+        self.stats.failure = Some(format!("the renderer failed: {}", text.unwrap_or("no reason given")));
+        (self.job, self.film, self.previous) = (None, None, None);
+        lock(&self.shared.outbox).stats = Stats { asleep: true, ..self.stats.clone() };
+        self.wake();
+    }
+
+    pub(super) fn wake(&self) {
+        if let Some(waker) = &self.shared.waker {
+            waker();
+        }
+    }
+}

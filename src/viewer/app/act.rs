@@ -1,0 +1,169 @@
+//! What keys and the panel ask for.
+
+use super::App;
+use crate::frame::{Command, Edit, Explaining, Looking, PictureFormat, Selection, gizmo};
+use crate::render::{Inspection, Integrator};
+use crate::viewer::keys::Action;
+use crate::viewer::saver::{Larger, Saved, new_scene_file};
+use crate::viewer::toasts::Tone;
+use crate::viewer::{camera_text, panel};
+use std::io::Write as _;
+use std::time::Instant;
+use winit::event_loop::ActiveEventLoop;
+use winit::window::Fullscreen;
+
+impl App {
+    /// What was asked for in the panel.
+    pub(super) fn carry_out(&mut self, asked: panel::Asked, now: Instant) {
+        if !asked.commands.is_empty() {
+            self.reaction.asked(now);
+            self.stirred = true;
+        }
+        for command in asked.commands {
+            self.session.send(command);
+        }
+        if let Some(speed) = asked.speed {
+            self.input.set_speed(speed, now);
+        }
+        if asked.toggle_spin {
+            self.input.toggle_spin(now);
+            self.stirred = true;
+        }
+        if asked.toggle_brush {
+            self.toggle_brush(now);
+        }
+        if let Some(linear) = asked.screenshot {
+            self.screenshot(linear);
+        }
+    }
+
+    /// The mouse in points, as overlays count.
+    pub(super) fn mouse(&self) -> glam::DVec2 {
+        let scale = self.presenter.as_ref().map_or(1.0, |presenter| f64::from(presenter.pixels_per_point()));
+        glam::DVec2::from_array(self.input.cursor_place()) / scale
+    }
+
+    pub(super) fn act(&mut self, action: Action, event_loop: &ActiveEventLoop) {
+        let now = Instant::now();
+        match action {
+            Action::Send(command) => self.session.send(command),
+            Action::TogglePause => {
+                let paused = self.session.status().paused;
+                self.session.send(if paused { Command::Resume } else { Command::Pause });
+            }
+            Action::ToggleIntegrator => {
+                let other = match self.session.status().integrator {
+                    Integrator::Path => Integrator::Phong,
+                    Integrator::Phong => Integrator::Path,
+                };
+                self.session.send(Command::SetIntegrator(other));
+            }
+            Action::Screenshot { linear } => self.screenshot(linear),
+            Action::SaveScene { new } => {
+                let known = self.session.scene_file().filter(|_| !new);
+                let path = known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene));
+                self.session.send(Command::SaveScene { path });
+            }
+            Action::PrintView => {
+                let text = camera_text::camera_text(&self.session.status().rig);
+                // Standard output may be closed; the window goes on.
+                match writeln!(std::io::stdout(), "{text}") {
+                    Ok(()) => self.toasts.add(Tone::News, "camera printed to the terminal", now),
+                    Err(error) => self.toasts.add(Tone::Problem, format!("the camera was not printed: {error}"), now),
+                }
+            }
+            Action::Explain => {
+                let [x, y] = self.input.place();
+                self.session.send(Command::ExplainAt { x, y });
+            }
+            Action::Brush => self.toggle_brush(now),
+            Action::ClearRegion => self.session.send(Command::SetRegion { region: None }),
+            Action::Inspect(inspection) => {
+                let shown = self.session.world().resource::<Looking>().0.inspection;
+                let wanted = if shown == inspection { Inspection::Picture } else { inspection };
+                self.session.send(Command::SetInspection(wanted));
+            }
+            Action::ToggleSharpZone => {
+                let shown = !self.session.world().resource::<Looking>().0.sharp_zone;
+                self.session.send(Command::SetSharpZone { shown });
+                if shown && !self.session.status().rig.lens.enabled {
+                    self.toasts.add(Tone::News, "all is sharp: O opens the lens", now);
+                }
+            }
+            Action::NextGizmo => {
+                let modes = gizmo::Mode::ALL;
+                self.panel.gizmo = match self.panel.gizmo {
+                    None => Some(modes[0]),
+                    Some(mode) => modes.into_iter().skip_while(|other| *other != mode).nth(1),
+                };
+                let name = self.panel.gizmo.map_or("no handles", gizmo::Mode::label);
+                let hint =
+                    if self.session.world().resource::<Selection>().0.is_empty() { ": click on something" } else { "" };
+                self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
+            }
+            Action::ToggleSpin => self.input.toggle_spin(now),
+            Action::TogglePanel => self.panel.shown = !self.panel.shown,
+            Action::ToggleHelp => self.help.toggle(),
+            Action::ToggleOverlays => self.overlays = !self.overlays,
+            Action::ToggleFullscreen => {
+                if let Some(window) = &self.window {
+                    let full = window.fullscreen().is_some();
+                    window.set_fullscreen((!full).then_some(Fullscreen::Borderless(None)));
+                }
+            }
+            Action::Leave if self.help.open => self.help.open = false,
+            Action::Leave if self.brush.is_armed() => drop(self.brush.toggle()),
+            Action::Leave if self.session.world().resource::<Explaining>().story.is_some() => {
+                self.session.send(Command::ForgetExplanation);
+            }
+            Action::Leave if !self.session.world().resource::<Selection>().0.is_empty() => {
+                self.session.send(Command::Edit(Edit::SelectNone));
+            }
+            Action::Leave | Action::Quit => event_loop.exit(),
+        }
+        self.repaint_at = Some(now);
+    }
+
+    fn toggle_brush(&mut self, now: Instant) {
+        if self.brush.toggle() {
+            self.toasts.add(Tone::News, "region: drag a rectangle that gets all samples", now);
+        }
+    }
+
+    pub(super) fn screenshot(&mut self, linear: bool) {
+        let format = if linear { PictureFormat::Exr } else { PictureFormat::Png };
+        let status = self.session.status();
+        let picture = self.session.picture();
+        let size = (picture.width.max(1), picture.height.max(1));
+        let (display, scene) = (status.display, status.scene.clone());
+        let spp = status.spp.max(1);
+        let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
+        if self.panel.scale > 1
+            && let Some((snapshot, settings)) = self.session.rendered()
+        {
+            let size = (size.0.saturating_mul(self.panel.scale), size.1.saturating_mul(self.panel.scale));
+            let larger = Larger { snapshot, settings, size, spp, threads: self.session.status().threads };
+            let news = format!("rendering {} × {} at {spp} spp beside the window", size.0, size.1);
+            self.toasts.add(Tone::News, news, Instant::now());
+            self.saver.save_larger(larger, draft, display, &scene, format);
+            return;
+        }
+        self.saver.save(self.session.keep_film(), draft, display, size, &scene, format);
+    }
+
+    pub(super) fn tell_saved(&mut self, saved: Saved) {
+        let now = Instant::now();
+        match saved {
+            Ok(kept) => {
+                let coarse = if kept.coarse { ", coarse because the view changed at once" } else { "" };
+                let news = format!("saved {}{coarse}", kept.path.display());
+                eprintln!("{news}");
+                self.toasts.add(Tone::News, news, now);
+            }
+            Err(error) => {
+                eprintln!("error: {error}");
+                self.toasts.add(Tone::Problem, error, now);
+            }
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Picture and overlays onto the window.
+
+use super::App;
+use crate::frame::{Around, Explaining, Looking, Projector};
+use crate::render::Inspection;
+use crate::viewer::presenter::{PresentError, Presenter};
+use crate::viewer::{overlay, panel, status, story};
+use std::time::{Duration, Instant};
+use winit::event_loop::ActiveEventLoop;
+
+impl App {
+    pub(super) fn figures(&self) -> String {
+        let status = self.session.status();
+        format!("{}\n{}", status::figures(status), status::settings(status))
+    }
+
+    fn draw(&mut self, now: Instant) -> Result<(), PresentError> {
+        let figures = self.figures();
+        let (Some(presenter), Some(window)) = (&mut self.presenter, &self.window) else { return Ok(()) };
+        let picture = self.session.picture();
+        if self.shown_picture != Some(picture.number) {
+            presenter.set_picture(picture)?;
+            tracing::debug!("picture {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
+            self.shown_picture = Some(picture.number);
+        }
+        let scale = f64::from(presenter.pixels_per_point());
+        let size = window.inner_size();
+        let size = glam::DVec2::new(f64::from(size.width), f64::from(size.height)) / scale;
+        self.handles.update(&mut self.session, self.panel.gizmo, size);
+        let projector = Projector::new(&self.session.status().rig, size);
+        let (session, handles, brush, panel) = (&self.session, &self.handles, &self.brush, &mut self.panel);
+        let around = panel::Around {
+            reaction: &self.reaction,
+            speed: self.input.speed(),
+            spinning: self.input.is_spinning(),
+            memory: panel.shown.then(memory_of_process).flatten(),
+            brush: brush.is_armed(),
+            recent: self.memory.recent(),
+        };
+        let mut asked = panel::Asked::default();
+        let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
+        let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
+        let presented = presenter.present(|context| {
+            if overlays {
+                if let Some(story) = &session.world().resource::<Explaining>().story {
+                    story::draw(context, story, &projector, session.world().resource::<Around>().extent.radius);
+                }
+                handles.draw(context);
+                brush.draw(context, session.status());
+                if panel.shown {
+                    panel::show(context, panel, session, &around, &mut asked);
+                }
+                let inspection = session.world().resource::<Looking>().0.inspection;
+                if inspection != Inspection::Picture {
+                    overlay::legend(context, inspection.label(), session.status().legend);
+                }
+                overlay::status_line(context, left, right);
+                overlay::toasts(context, toasts);
+            }
+            if help.open {
+                overlay::help(context, help);
+            }
+        })?;
+        self.reaction.shown(self.session.picture().generation, Instant::now());
+        tracing::trace!("drawn in {:.1} ms", now.elapsed().as_secs_f64() * 1e3);
+        if presented.again {
+            window.request_redraw();
+        }
+        self.repaint_at = now.checked_add(presented.repaint_after).filter(|_| presented.repaint_after < Duration::MAX);
+        self.last_draw = Some(now);
+        self.shown_figures = figures;
+        // The overlays may have asked for a time that the last tick did not know.
+        self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
+        self.carry_out(asked, now);
+        Ok(())
+    }
+
+    /// Draws; if the graphics device is lost, makes a new one; if that fails too, keeps the light and gives up.
+    pub(super) fn draw_or_leave(&mut self, event_loop: &ActiveEventLoop) {
+        let now = Instant::now();
+        let Err(error) = self.draw(now) else { return };
+        log::error!("{error}");
+        self.presenter = None;
+        self.shown_picture = None;
+        let again = self.window.clone().map(Presenter::new);
+        match again {
+            Some(Ok(presenter)) => {
+                overlay::style(presenter.egui_context());
+                self.presenter = Some(presenter);
+                if self.draw(now).is_ok() {
+                    return;
+                }
+            }
+            Some(Err(error)) => log::error!("{error}"),
+            None => {}
+        }
+        self.screenshot(true);
+        self.failure = Some(error.into());
+        event_loop.exit();
+    }
+}
+
+/// Bytes that the process holds, where the system tells.
+fn memory_of_process() -> Option<u64> {
+    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
+    Some(pages * PAGE)
+}
+
+/// Linux on the processors that we know counts memory in pages of this many bytes.
+const PAGE: u64 = 4096;

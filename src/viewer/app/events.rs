@@ -1,0 +1,159 @@
+//! What winit tells: most of it is only noted, and carried out by the next tick.
+
+use super::{App, FRAME, Wake};
+use crate::frame::{Command, Edit};
+use crate::viewer::toasts::Tone;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+use winit::application::ApplicationHandler;
+use winit::event::{MouseButton, MouseScrollDelta, StartCause, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow};
+use winit::keyboard::{Key, NamedKey};
+use winit::window::WindowId;
+
+/// Pixels of a touchpad that count as a notch of a wheel.
+const PIXELS_A_NOTCH: f64 = 40.0;
+
+impl ApplicationHandler<Wake> for App {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.window.is_none()
+            && let Err(error) = self.open_window(event_loop)
+        {
+            self.failure = Some(error);
+            event_loop.exit();
+        }
+    }
+
+    fn user_event(&mut self, _: &ActiveEventLoop, _: Wake) {
+        self.pending.store(false, Ordering::Release);
+        self.stirred = true;
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let now = Instant::now();
+        if event == WindowEvent::RedrawRequested {
+            self.draw_or_leave(event_loop);
+            return;
+        }
+        let Some(presenter) = &mut self.presenter else { return };
+        let response = presenter.on_window_event(&event);
+        // Overlays take the keyboard only while somebody types into them; they always want Tab, which is ours.
+        let typing = presenter.egui_context().wants_keyboard_input();
+        let has_widgets = self.help.open || self.panel.shown && self.overlays;
+        if response.repaint && has_widgets && !self.input.is_dragging() {
+            self.repaint_at = Some(now);
+        }
+        self.stirred = true;
+        match event {
+            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.resized(),
+            WindowEvent::Occluded(occluded) => {
+                self.occluded = occluded;
+                self.session.send(Command::SetHidden { hidden: occluded });
+                self.repaint_at = Some(now);
+            }
+            WindowEvent::Focused(false) => self.input.release_all(now),
+            WindowEvent::DroppedFile(path) => self.session.send(Command::Open { path }),
+            WindowEvent::ModifiersChanged(modifiers) => {
+                self.input.set_modifiers(modifiers.state(), now);
+            }
+            WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
+                let pressed = event.state.is_pressed();
+                // Typing into the list of keys must not keep a person in it.
+                let leaves = event.logical_key == Key::Named(NamedKey::Escape);
+                if pressed && typing && !(leaves && self.help.open) {
+                    return;
+                }
+                if pressed {
+                    self.reaction.asked(now);
+                }
+                if let Some(action) = self.input.key(event.physical_key, &event.logical_key, pressed, event.repeat, now)
+                {
+                    self.act(action, event_loop);
+                }
+            }
+            WindowEvent::CursorMoved { position, .. } => {
+                self.input.cursor(position.x, position.y);
+                if self.input.is_dragging() || self.handles.is_grabbed() {
+                    self.reaction.asked(now);
+                }
+                if self.brush.mouse_at(self.input.place()) {
+                    self.repaint_at = Some(now);
+                }
+                let (mouse, snap) = (self.mouse(), self.input.modifiers().control_key());
+                let (command, news) = self.handles.mouse_at(mouse, snap);
+                if let Some(command) = command {
+                    self.session.send(command);
+                }
+                if news {
+                    self.repaint_at = Some(now);
+                }
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
+                if state.is_pressed() && !response.consumed && self.brush.press(self.input.place()) =>
+            {
+                self.repaint_at = Some(now);
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
+                if !state.is_pressed() && self.brush.is_drawing() =>
+            {
+                if let Some(region) = self.brush.release(self.input.size()).flatten() {
+                    self.session.send(Command::SetRegion { region: Some(region) });
+                }
+                self.repaint_at = Some(now);
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
+                if !state.is_pressed() && self.handles.release() =>
+            {
+                self.session.send(Command::Edit(Edit::End));
+                self.repaint_at = Some(now);
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. }
+                if state.is_pressed() && !response.consumed && self.handles.grab(self.mouse()) =>
+            {
+                self.session.send(Command::Edit(Edit::Begin));
+            }
+            WindowEvent::MouseInput { state, button, .. } if !(state.is_pressed() && response.consumed) => {
+                self.input.button(button, state.is_pressed(), now);
+                self.reaction.asked(now);
+                // What is selected is drawn, and changes no picture.
+                self.repaint_at = Some(now);
+            }
+            WindowEvent::MouseWheel { delta, .. } if !response.consumed => {
+                // Shift turns a vertical wheel into a horizontal one on some systems.
+                let notches = match delta {
+                    MouseScrollDelta::LineDelta(x, y) => f64::from(x + y),
+                    MouseScrollDelta::PixelDelta(by) => (by.x + by.y) / PIXELS_A_NOTCH,
+                };
+                if self.input.wheel(notches, now) {
+                    self.toasts.add(Tone::News, format!("speed ×{:.2}", self.input.speed()), now);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn new_events(&mut self, _: &ActiveEventLoop, cause: StartCause) {
+        if let StartCause::ResumeTimeReached { .. } = cause {
+            self.wake_at = None;
+            self.stirred = true;
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        let now = Instant::now();
+        if self.stirred {
+            match self.last_tick.map(|then| then + FRAME).filter(|soon| *soon > now) {
+                Some(soon) => self.wake_at = Some(soon),
+                None => self.tick(now, event_loop),
+            }
+        }
+        event_loop.set_control_flow(self.wake_at.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        // The device goes before the display does.
+        self.presenter = None;
+        self.window = None;
+    }
+}

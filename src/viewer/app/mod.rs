@@ -1,0 +1,331 @@
+//! The event loop: who is asked when, and when to sleep.
+//!
+//! Three things happen, each as seldom as it may. *Events* only note what a person did. A *tick* hands that to the
+//! session, lets it go on, and finds out whether there is anything new to see; it runs after events, when a worker has
+//! news, and while a key is held. *Drawing* follows a tick that found something new. Nothing else runs, so a finished
+//! picture costs nothing.
+//!
+//! | file | about |
+//! |---|---|
+//! | here | opening, ticking, going to sleep |
+//! | `events` | what winit tells |
+//! | `draw` | picture and overlays onto the window |
+//! | `act` | what keys and the panel ask for |
+//! | `memory` | what is kept from one run to the next |
+
+mod act;
+mod draw;
+mod events;
+mod memory;
+
+use super::brush::Brush;
+use super::display::{self, Display};
+use super::handles::Handles;
+use super::input::Input;
+use super::overlay::{self, Help};
+use super::panel::PanelState;
+use super::presenter::{PresentError, Presenter};
+use super::reaction::Reaction;
+use super::saver::Saver;
+use super::toasts::{Toasts, Tone};
+use crate::frame::{Command, MessageKind, Session, SessionOptions, Target, Waker};
+use crate::scene::{SceneSource, UpAxis};
+use memory::Memory;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+use winit::dpi::LogicalSize;
+use winit::event_loop::{ActiveEventLoop, EventLoop};
+use winit::window::Window;
+
+/// How to open the window.
+#[derive(Clone, Debug)]
+pub struct ViewerOptions {
+    pub source: SceneSource,
+    /// Of the window, logical pixels.
+    pub width: u32,
+    pub height: u32,
+    /// One for each processor when not given.
+    pub threads: Option<usize>,
+    pub seed: u32,
+    /// Which axis of models points up; guessed when not given.
+    pub up: Option<UpAxis>,
+    /// Where kept pictures go.
+    pub folder: PathBuf,
+    /// Where to write down what is done.
+    pub record: Option<PathBuf>,
+}
+
+/// Why the window could not be opened, or closed by itself.
+#[derive(Debug, Error)]
+pub enum ViewerError {
+    #[error(
+        "no window can be opened: the display does not answer; check DISPLAY or WAYLAND_DISPLAY, or render without a window: firstlight render SCENE -o out.png"
+    )]
+    NoDisplay,
+    #[error("no window can be opened: {0}")]
+    NoWindow(winit::error::OsError),
+    #[error("the event loop ended by itself: {0}")]
+    EventLoop(winit::error::EventLoopError),
+    #[error("{0}")]
+    Session(String),
+    #[error("{0}")]
+    Scene(String),
+    #[error(transparent)]
+    Present(#[from] PresentError),
+}
+
+/// A worker has news.
+#[derive(Clone, Copy, Debug)]
+struct Wake;
+
+/// Ticks and frames come no faster: more would only cost the workers their processors.
+const FRAME: Duration = Duration::from_micros(8_000);
+/// So long a movement waits for the picture of the one before it.
+const LATEST: Duration = Duration::from_millis(250);
+/// Figures that change by themselves are shown again so often.
+const FIGURES: Duration = Duration::from_millis(250);
+/// What a window stops at by itself, so that nothing runs hot for ever: an error that nobody sees.
+const GOOD_ENOUGH: Target = Target { spp: None, seconds: None, error: Some(0.005) };
+
+/// Opens a window and stays until it is closed.
+pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
+    let mut builder = EventLoop::<Wake>::with_user_event();
+    match display::find() {
+        Display::Default => {}
+        Display::None => return Err(ViewerError::NoDisplay),
+        Display::ForceX11 => {
+            #[cfg(all(unix, not(target_os = "macos")))]
+            winit::platform::x11::EventLoopBuilderExtX11::with_x11(&mut builder);
+        }
+    }
+    // The text of the library's own error is a path into its source.
+    let event_loop = builder.build().map_err(|_| ViewerError::NoDisplay)?;
+    let pending = Arc::new(AtomicBool::new(false));
+    let waker: Waker = {
+        let (proxy, pending) = (event_loop.create_proxy(), pending.clone());
+        Arc::new(move || {
+            // One event wakes the window; more would only queue up.
+            if !pending.swap(true, Ordering::AcqRel) {
+                // The loop may be over, and then nobody needs waking.
+                let _ = proxy.send_event(Wake);
+            }
+        })
+    };
+    let mut app = App::new(options, pending, waker)?;
+    event_loop.run_app(&mut app).map_err(ViewerError::EventLoop)?;
+    app.session.end_record();
+    if let Some(trouble) = app.memory.keep_window(app.window_size) {
+        log::warn!("{trouble}");
+    }
+    for saved in app.saver.finish() {
+        app.tell_saved(saved);
+    }
+    app.failure.map_or(Ok(()), Err)
+}
+
+struct App {
+    options: ViewerOptions,
+    /// The session's clock counts from here.
+    start: Instant,
+    /// A wake-up is on its way.
+    pending: Arc<AtomicBool>,
+    session: Session,
+    saver: Saver,
+    input: Input,
+    toasts: Toasts,
+    help: Help,
+    panel: PanelState,
+    handles: Handles,
+    brush: Brush,
+    memory: Memory,
+    reaction: Reaction,
+    overlays: bool,
+    // Before the window, so that the device goes before the display.
+    presenter: Option<Presenter>,
+    window: Option<Arc<Window>>,
+    title: String,
+    /// Logical pixels.
+    window_size: (u32, u32),
+    occluded: bool,
+    /// Something happened since the last tick.
+    stirred: bool,
+    /// The picture on the window.
+    shown_picture: Option<u64>,
+    shown_figures: String,
+    last_tick: Option<Instant>,
+    /// When a movement was last handed over.
+    steered_at: Instant,
+    last_draw: Option<Instant>,
+    /// When to tick again even if nothing happens.
+    wake_at: Option<Instant>,
+    /// When the overlays want to be drawn again.
+    repaint_at: Option<Instant>,
+    failure: Option<ViewerError>,
+}
+
+impl App {
+    fn new(options: ViewerOptions, pending: Arc<AtomicBool>, waker: Waker) -> Result<Self, ViewerError> {
+        let mut session = Session::new(SessionOptions {
+            width: options.width,
+            height: options.height,
+            threads: options.threads,
+            seed: options.seed,
+            target: GOOD_ENOUGH,
+            up: options.up,
+            waker: Some(waker.clone()),
+        })
+        .map_err(ViewerError::Session)?;
+        if let Some(path) = &options.record {
+            session.record(path, &options.source, options.up).map_err(ViewerError::Session)?;
+        }
+        session.open(options.source.clone());
+        let start = Instant::now();
+        Ok(Self {
+            start,
+            steered_at: start,
+            pending,
+            session,
+            saver: Saver::new(&options.folder, waker),
+            input: Input::new(options.width, options.height),
+            toasts: Toasts::default(),
+            help: Help::default(),
+            panel: PanelState::default(),
+            handles: Handles::default(),
+            brush: Brush::default(),
+            memory: Memory::of_platform(),
+            reaction: Reaction::default(),
+            overlays: true,
+            presenter: None,
+            window: None,
+            title: String::new(),
+            window_size: (options.width, options.height),
+            occluded: false,
+            stirred: true,
+            shown_picture: None,
+            shown_figures: String::new(),
+            last_tick: None,
+            last_draw: None,
+            wake_at: None,
+            repaint_at: None,
+            failure: None,
+            options,
+        })
+    }
+
+    fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
+        let size = LogicalSize::new(self.options.width, self.options.height);
+        self.title = title(&self.options.source.title());
+        let attributes = Window::default_attributes().with_title(&self.title).with_inner_size(size);
+        let window = Arc::new(event_loop.create_window(attributes).map_err(ViewerError::NoWindow)?);
+        let presenter = Presenter::new(window.clone())?;
+        overlay::style(presenter.egui_context());
+        (self.window, self.presenter) = (Some(window), Some(presenter));
+        self.resized();
+        self.toasts.add(Tone::News, "H shows the keys, N the panel", Instant::now());
+        Ok(())
+    }
+
+    /// The window may have another size, or another scale.
+    fn resized(&mut self) {
+        let (Some(window), Some(presenter)) = (&self.window, &self.presenter) else { return };
+        let size = window.inner_size();
+        let logical = size.to_logical::<u32>(window.scale_factor());
+        if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
+            self.window_size = (logical.width, logical.height);
+        }
+        let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
+        self.input.resize(width, height);
+        self.session.send(Command::Resize { width, height });
+        self.stirred = true;
+        window.request_redraw();
+    }
+
+    /// Hands over what was asked for, lets the session go on, and looks for something new.
+    fn tick(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
+        self.stirred = false;
+        self.last_tick = Some(now);
+        let clock = now - self.start;
+        let restarts = self.session.status().restarts;
+        self.session.update(clock);
+        // A movement that came before the last one was seen would only take its place: it waits, and adds up.
+        let answered = self.is_answered(now);
+        if answered {
+            self.steer(now, clock);
+            let generation = self.session.status().restarts;
+            self.reaction.carried_out((generation != restarts).then_some(generation));
+        }
+        for trouble in self.memory.follow(&mut self.session) {
+            self.toasts.add(Tone::Problem, trouble, now);
+        }
+        let status = self.session.status();
+        for message in status.messages.iter().filter(|message| message.at == clock) {
+            let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
+            self.toasts.add(tone, message.text.clone(), now);
+        }
+        // Without a first scene there is nothing to stay for, and the terminal is where the name was typed.
+        if status.scene.is_empty()
+            && status.loading.is_none()
+            && status.messages.iter().any(|message| message.kind == MessageKind::Error)
+        {
+            let errors = status.messages.iter().filter(|message| message.kind == MessageKind::Error);
+            let lines: Vec<&str> = errors.map(|message| message.text.as_str()).collect();
+            self.failure = Some(ViewerError::Scene(lines.join("\n")));
+            event_loop.exit();
+            return;
+        }
+        for saved in self.saver.finished() {
+            self.tell_saved(saved);
+        }
+        let title = title(&self.session.status().scene);
+        let n_toasts = self.toasts.len();
+        self.toasts.at(now);
+        let Some(window) = &self.window else { return };
+        // Until the first scene is there, the window is called after what it will show.
+        if title != self.title && !self.session.status().scene.is_empty() {
+            window.set_title(&title);
+            self.title = title;
+        }
+        let new_picture = self.shown_picture != Some(self.session.picture().number);
+        let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES);
+        let new_figures = self.overlays && self.figures() != self.shown_figures;
+        let repaint = self.repaint_at.is_some_and(|at| now >= at) || self.toasts.len() != n_toasts;
+        if !self.occluded && (new_picture || repaint || (new_figures && figures_due)) {
+            window.request_redraw();
+        }
+        let moving = match answered {
+            true => self.input.is_moving().then(|| now + FRAME),
+            false => Some(self.steered_at + LATEST),
+        };
+        let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
+        let repaint_at = self.repaint_at.filter(|at| *at > now);
+        let session = self.session.next_wake(clock).map(|at| self.start + at);
+        self.wake_at = [session, self.toasts.next_change(), moving, figures, repaint_at].into_iter().flatten().min();
+    }
+
+    /// The last change of the view has been rendered, or that takes too long to wait for.
+    fn is_answered(&self, now: Instant) -> bool {
+        let rendered = self.session.picture().generation >= self.session.status().restarts;
+        rendered || now >= self.steered_at + LATEST
+    }
+
+    /// Hands over how keys and mouse moved.
+    fn steer(&mut self, now: Instant, clock: Duration) {
+        let commands = self.input.take(now);
+        if commands.is_empty() {
+            return;
+        }
+        for command in commands {
+            self.session.send(command);
+        }
+        self.session.update(clock);
+        self.steered_at = now;
+    }
+}
+
+fn title(scene: &str) -> String {
+    let name = Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy());
+    if name.is_empty() { "firstlight".to_owned() } else { format!("firstlight — {name}") }
+}

@@ -1,0 +1,112 @@
+//! The region brush: a rectangle that is dragged over the picture and gets all samples.
+
+use super::overlay::GLASS;
+use crate::frame::Status;
+use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke, StrokeKind};
+
+const COLOR: Color32 = Color32::from_rgb(120, 220, 255);
+/// Pixels of the window that a rectangle must span to be meant.
+const LEAST: f64 = 4.0;
+
+/// Places are fractions of the picture from its upper left corner.
+#[derive(Debug, Default)]
+pub struct Brush {
+    /// The next drag is a rectangle.
+    armed: bool,
+    drag: Option<[[f64; 2]; 2]>,
+}
+
+impl Brush {
+    /// The next drag is a rectangle, or is not after all.
+    pub fn toggle(&mut self) -> bool {
+        self.drag = None;
+        self.armed = !self.armed;
+        self.armed
+    }
+
+    pub fn is_armed(&self) -> bool {
+        self.armed
+    }
+
+    pub fn is_drawing(&self) -> bool {
+        self.drag.is_some()
+    }
+
+    /// The mouse went down: whether a rectangle begins.
+    pub fn press(&mut self, at: [f64; 2]) -> bool {
+        if self.armed {
+            self.drag = Some([at, at]);
+        }
+        self.armed
+    }
+
+    /// The mouse is here: whether there is another rectangle to be drawn.
+    pub fn mouse_at(&mut self, at: [f64; 2]) -> bool {
+        self.drag.as_mut().is_some_and(|drag| std::mem::replace(&mut drag[1], at) != at)
+    }
+
+    /// The mouse came up: whether it had drawn, and the rectangle (left, top, right, bottom), if it was meant.
+    ///
+    /// - `size`: of the window, pixels.
+    pub fn release(&mut self, size: [f64; 2]) -> Option<Option<[f64; 4]>> {
+        let [a, b] = self.drag.take()?;
+        let meant = (0..2).all(|axis| (a[axis] - b[axis]).abs() * size[axis] >= LEAST);
+        let rectangle = [a[0].min(b[0]), a[1].min(b[1]), a[0].max(b[0]), a[1].max(b[1])];
+        self.armed = !meant;
+        Some(meant.then_some(rectangle))
+    }
+
+    /// The rectangle under way, or the one that gets the samples.
+    pub fn draw(&self, context: &Context, status: &Status) {
+        let painter = context.layer_painter(egui::LayerId::background());
+        let screen = context.content_rect();
+        let at = |x: f64, y: f64| -> Pos2 { screen.min + egui::vec2(x as f32, y as f32) * screen.size() };
+        let outline = |rect: Rect, stroke: f32| {
+            painter.rect_stroke(
+                rect,
+                0.0,
+                Stroke::new(stroke + 2.0, Color32::from_black_alpha(110)),
+                StrokeKind::Middle,
+            );
+            painter.rect_stroke(rect, 0.0, Stroke::new(stroke, COLOR), StrokeKind::Middle);
+        };
+        if let Some([a, b]) = self.drag {
+            outline(Rect::from_two_pos(at(a[0], a[1]), at(b[0], b[1])), 1.0);
+        }
+        let Some((region, spp)) = status.region else { return };
+        let size = [f64::from(status.film_width.max(1)), f64::from(status.film_height.max(1))];
+        let corner = |x: u32, y: u32| at(f64::from(x) / size[0], f64::from(y) / size[1]);
+        let rect = Rect::from_two_pos(corner(region.start.x, region.start.y), corner(region.end.x, region.end.y));
+        outline(rect, 1.5);
+        let galley = painter.layout_no_wrap(format!("{spp} spp"), FontId::proportional(12.5), COLOR);
+        let label = Align2::LEFT_BOTTOM.anchor_size(rect.left_top() + egui::vec2(2.0, -3.0), galley.size());
+        let label = label.translate(egui::vec2(0.0, (screen.top() + 2.0 - label.top()).max(0.0)));
+        painter.rect_filled(label.expand2(egui::vec2(4.0, 1.0)), 2.0, GLASS);
+        painter.galley(label.min, galley, COLOR);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drag_is_a_rectangle_whichever_way_it_went() {
+        let mut brush = Brush::default();
+        assert!(!brush.press([0.5, 0.5]) && brush.release([800.0, 400.0]).is_none(), "a drag looks about unless asked");
+        assert!(brush.toggle() && brush.press([0.75, 0.25]));
+        assert!(brush.mouse_at([0.5, 0.5]) && !brush.mouse_at([0.5, 0.5]));
+        assert_eq!(brush.release([800.0, 400.0]), Some(Some([0.5, 0.25, 0.75, 0.5])));
+        assert!(!brush.is_armed(), "one drag, one rectangle");
+    }
+
+    #[test]
+    fn a_slip_is_no_rectangle_and_the_brush_stays() {
+        let mut brush = Brush::default();
+        brush.toggle();
+        brush.press([0.5, 0.5]);
+        brush.mouse_at([0.502, 0.9]);
+        assert_eq!(brush.release([800.0, 400.0]), Some(None));
+        assert!(brush.is_armed() && !brush.toggle());
+    }
+}
