@@ -373,7 +373,7 @@ impl Pass<'_> {
     #[inline]
     fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
         let Techniques { even_samples, .. } = self.settings.techniques;
-        let new_sampler = if even_samples { Sampler::new } else { Sampler::independent };
+        let new_sampler = if even_samples { Sampler::of_pixel } else { Sampler::independent };
         let sampler = new_sampler(self.settings.seed, pixel.x, pixel.y, sample);
         let (offset, weight) = self.filter.sample(sampler.pair(0));
         let film = pixel.as_vec2() + offset;

@@ -494,12 +494,12 @@ fn light_points<S: Simd>(
         }
     }
     let (positions, normals) = (place.position.to_arrays(), place.normal.to_arrays());
-    let (streams, reversed) = (sampler.stream.to_array(), sampler.reversed_index.to_array());
+    let parts = [sampler.stream, sampler.reversed_index, sampler.screen].map(|part| part.to_array());
     let mut arrays = [[0.0; LANES]; 10];
     let (mut found, mut infinite) = (0, 0);
     for lane in lanes_of(mask) {
         let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
-        let sampler = Sampler::from_parts([streams[lane], reversed[lane]]);
+        let sampler = Sampler::from_parts([0, 1, 2].map(|part: usize| parts[part][lane]));
         let point = choose_light_point(scene, techniques, at(&positions), at(&normals), &sampler, dimension);
         if let Some((target, sample)) = point {
             found |= 1 << lane;
