@@ -12,6 +12,7 @@ mod extent;
 mod extract;
 pub mod file;
 mod fingerprint;
+mod front;
 mod inputs;
 pub(crate) mod limits;
 mod load;
