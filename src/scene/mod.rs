@@ -49,5 +49,6 @@ pub use placement::{Linear, Placement};
 pub use relative::{absolute, relative_path};
 pub use save::{SavedScene, save_scene};
 pub use shot::{Shot, ShotDraft, ShotSamples, ShotScene};
+pub(crate) use spawn::texture_of;
 pub use stamp::{Stamp, stamp};
 pub use view::{Lens, Projection, View, ViewError};
