@@ -121,7 +121,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         style(ui);
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Beside the scroll bar.
-            ui.set_width(ui.available_width() - 8.0);
+            ui.set_width((ui.available_width() - 8.0).max(0.0));
             let [render, view, lens, display, selected, objects, open, add, sky, statistics] = SECTIONS;
             section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
             section(ui, view, false, |ui| camera::view(ui, session, around, asked));
