@@ -121,13 +121,11 @@ impl Desk<'_, '_> {
             Command::ForgetExplanation => self.explaining.forget(),
             Command::SetRegion { region } => drop(self.brush.set_if_neq(Brush(region))),
             Command::ToggleFocusLock => self.toggle_focus_lock(),
-            Command::FocusFollows { x, y } => {
-                if x.is_finite() && y.is_finite() {
-                    if !matches!(self.focus.target, FocusTarget::Cursor(_)) {
-                        self.note("focus follows the mouse".to_owned());
-                    }
-                    self.focus.target = FocusTarget::Cursor([x, y]);
+            Command::FocusFollows { x, y } if x.is_finite() && y.is_finite() => {
+                if !matches!(self.focus.target, FocusTarget::Cursor(_)) {
+                    self.note("focus follows the mouse".to_owned());
                 }
+                self.focus.target = FocusTarget::Cursor([x, y]);
             }
             Command::SetBookmark { slot } => {
                 if let Some(rig) = self.rig()
