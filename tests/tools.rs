@@ -44,6 +44,9 @@ fn open<'a>(desktop: &'a Desktop, scene: &str) -> Program<'a> {
         let first = *picture.get_pixel(320, 180);
         (picture.pixels().filter(|pixel| **pixel != first).count() > 5000).then_some(())
     });
+    // Until the scene is read, the window has the camera of an empty one.
+    let empty = DVec3::new(0.0, 0.0, 5.0);
+    until("the camera of the scene", || (camera(&program).eye != empty).then_some(()));
     program
 }
 

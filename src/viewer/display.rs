@@ -1,5 +1,7 @@
 //! Is there a display, and which? Decided before the event loop is made, because a process can make only one.
 
+use std::any::Any;
+
 /// What the environment offers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Display {
@@ -31,6 +33,26 @@ pub fn find() -> Display {
     Display::Default
 }
 
+/// From now on, panics over a lost display print nothing: who catches them tells people what happened.
+///
+/// The window library unwraps the answers of the X server, also in calls that cannot report an error.
+pub(super) fn say_nothing_of_its_loss() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !is_loss(info.payload()) {
+            usual(info);
+        }
+    }));
+}
+
+/// Is this what the window library panics with when the display's server no longer answers?
+pub(super) fn is_loss(panic: &(dyn Any + Send)) -> bool {
+    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    text.is_some_and(|text| {
+        text.contains("an `Err` value: Connection(") || text.contains("an `Err` value: ConnectionError(")
+    })
+}
+
 /// `wayland`: announced, and whether somebody listens; `x11`: announced.
 #[cfg_attr(not(all(unix, not(target_os = "macos"))), allow(dead_code))]
 fn choose(wayland: Option<bool>, x11: bool) -> Display {
@@ -45,6 +67,14 @@ fn choose(wayland: Option<bool>, x11: bool) -> Display {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_a_lost_connection_is_taken_for_one() {
+        let lost = "called `Result::unwrap()` on an `Err` value: Connection(IoError(UnknownError))".to_owned();
+        assert!(is_loss(&lost));
+        assert!(!is_loss(&"index out of bounds"));
+        assert!(!is_loss(&7));
+    }
 
     #[test]
     fn a_dead_wayland_socket_leads_to_x11_or_to_none() {

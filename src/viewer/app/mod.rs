@@ -34,6 +34,7 @@ use crate::scene::{SceneSource, UpAxis};
 use memory::Memory;
 use serde_json::json;
 use std::io::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,6 +71,8 @@ pub enum ViewerError {
         "no window can be opened: the display does not answer; check DISPLAY or WAYLAND_DISPLAY, or render without a window: firstlight render SCENE -o out.png"
     )]
     NoDisplay,
+    #[error("the connection to the display is lost; settings and bookmarks are kept")]
+    DisplayLost,
     #[error("no window can be opened: {0}")]
     NoWindow(winit::error::OsError),
     #[error("the event loop ended by itself: {0}")]
@@ -122,7 +125,12 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
         })
     };
     let mut app = App::new(options, pending, waker)?;
-    let ended = event_loop.run_app(&mut app).map_err(ViewerError::EventLoop);
+    display::say_nothing_of_its_loss();
+    let ended = match catch_unwind(AssertUnwindSafe(|| event_loop.run_app(&mut app))) {
+        Ok(ended) => ended.map_err(ViewerError::EventLoop),
+        Err(panic) if display::is_loss(panic.as_ref()) => Err(ViewerError::DisplayLost),
+        Err(panic) => resume_unwind(panic),
+    };
     // Also when the display is gone.
     app.session.end_record();
     app.keep_window_size();
@@ -132,7 +140,12 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     if app.options.print_figures {
         app.print_figures();
     }
-    ended.and(app.failure.map_or(Ok(()), Err))
+    let ended = ended.and(app.failure.take().map_or(Ok(()), Err));
+    if matches!(ended, Err(ViewerError::DisplayLost)) {
+        // Its window and surface can no longer be given back.
+        std::mem::forget(app);
+    }
+    ended
 }
 
 struct App {
