@@ -1,7 +1,8 @@
 //! Time and error of simplification: `cargo bench --no-default-features --bench simplify -- [MODEL.obj]... [--ratio R]`.
 //!
 //! Without a model, the serpent knot. Our two methods and meshoptimizer (by the crate `meshopt`) take turns; each
-//! figure is the median of several runs with their range, and the error is that of the last run's result.
+//! figure is the median of several runs with their range, and the error is that of the last run's result. CPU seconds
+//! are those of all threads, the median as well.
 //!
 //! `--other NAME RESULT.obj SECONDS` adds a row for another program's result of the first model: its error is measured
 //! here, its time is what it says. `scripts/compare_simplify.sh` does so for `fast-simplification`.
@@ -9,6 +10,7 @@
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::mesh::simplify::{Method, Target, simplify};
 use firstlight::mesh::{Deviation, Mesh, Topology};
+use firstlight::report::cpu_seconds;
 use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
 use glam::Vec3;
 use meshopt::{SimplifyOptions, VertexDataAdapter};
@@ -31,8 +33,8 @@ fn main() {
         meshes.push(("serpent knot".to_owned(), serpent_knot(&SerpentKnot::default())));
     }
     println!("threads: {}", rayon::current_num_threads());
-    println!("| mesh | method | triangles | kept | seconds (range) | mean | RMS | Hausdorff | closed |");
-    println!("|---|---|---:|---:|---:|---:|---:|---:|---|");
+    println!("| mesh | method | triangles | kept | seconds (range) | CPU s | mean | RMS | Hausdorff | closed |");
+    println!("|---|---|---:|---:|---:|---:|---:|---:|---:|---|");
     for (name, mesh) in &meshes {
         let ways: [(&str, usize, fn(&Mesh, f64) -> Mesh); 3] = [
             ("firstlight, quadric", 15, |mesh, ratio| ours(mesh, Method::Quadric, ratio)),
@@ -40,24 +42,29 @@ fn main() {
             ("meshoptimizer", 15, meshoptimizer),
         ];
         let mut seconds: [Vec<f64>; 3] = Default::default();
+        let mut cpu: [Vec<f64>; 3] = Default::default();
         let mut results = [const { None }; 3];
         for run in 0..15 {
             for (k, (_, _, way)) in ways.iter().enumerate().filter(|(_, way)| run < way.1) {
-                let start = Instant::now();
+                let (start, before) = (Instant::now(), cpu_seconds());
                 let result = way(mesh, ratio);
                 seconds[k].push(start.elapsed().as_secs_f64());
+                cpu[k].push(cpu_seconds().zip(before).map_or(f64::NAN, |(after, before)| after - before));
                 results[k] = Some(result);
             }
         }
-        for ((way, ..), (mut seconds, result)) in ways.iter().zip(seconds.into_iter().zip(results)) {
+        for (k, ((way, ..), result)) in ways.iter().zip(results).enumerate() {
+            let (seconds, cpu) = (&mut seconds[k], &mut cpu[k]);
             seconds.sort_unstable_by(f64::total_cmp);
+            cpu.sort_unstable_by(f64::total_cmp);
             let (median, least, most) = (seconds[seconds.len() / 2], seconds[0], seconds[seconds.len() - 1]);
-            row(name, way, mesh, &result.expect("every way has a run"), &format!("{median:.3} ({least:.3}–{most:.3})"));
+            let times = format!("{median:.3} ({least:.3}–{most:.3}) | {:.3}", cpu[cpu.len() / 2]);
+            row(name, way, mesh, &result.expect("every way has a run"), &times);
         }
     }
     let (name, mesh) = &meshes[0];
     for (way, result, seconds) in &others {
-        row(name, way, mesh, result, seconds);
+        row(name, way, mesh, result, &format!("{seconds} | "));
     }
 }
 
@@ -81,11 +88,12 @@ fn meshoptimizer(mesh: &Mesh, ratio: f64) -> Mesh {
     Mesh { triangles, positions: mesh.positions.clone(), center: mesh.center, ..Mesh::default() }
 }
 
-fn row(name: &str, way: &str, mesh: &Mesh, result: &Mesh, seconds: &str) {
+/// - `times`: wall and CPU seconds, two cells.
+fn row(name: &str, way: &str, mesh: &Mesh, result: &Mesh, times: &str) {
     let deviation = Deviation::between(mesh, result, 200_000);
     let percent = 100.0 / mesh.bounds().size().as_dvec3().length();
     println!(
-        "| {name} | {way} | {} | {} | {seconds} | {:.4} % | {:.4} % | {:.3} % | {} |",
+        "| {name} | {way} | {} | {} | {times} | {:.4} % | {:.4} % | {:.3} % | {} |",
         mesh.triangles.len(),
         result.triangles.len(),
         deviation.mean() * percent,

@@ -7,9 +7,9 @@ use firstlight::frame::{
     SessionOptions, Target,
 };
 use firstlight::render::Inspection;
-use firstlight::scene::file::{MeshShadingPart, MeshSourcePart};
-use firstlight::scene::{Material, MaterialSlots, MeshOrigin, Placement, PointLight, SceneSource, Shape};
-use glam::{DVec3, Vec3};
+use firstlight::scene::file::{MeshShadingPart, MeshSourcePart, Rgb, TexturePart, WrapPart};
+use firstlight::scene::{Material, MaterialSlots, MeshOrigin, Paint, Placement, PointLight, SceneSource, Shape};
+use glam::{DVec2, DVec3, Vec3};
 use std::time::{Duration, Instant};
 
 struct Driver {
@@ -268,4 +268,93 @@ fn focus_stays_with_a_thing_and_views_can_be_come_back_to() {
     let ball: Placement = driver.get("red ball");
     assert!((rig.view.pivot() - ball.translation).length() < 0.1, "{rig:?}");
     assert!(rig.view.pivot_distance < 3.0);
+}
+
+#[test]
+fn focus_follows_a_place_of_the_picture_wherever_the_camera_goes() {
+    let mut driver = Driver::open("gallery");
+    let follow = |driver: &mut Driver, x: f64, y: f64| {
+        driver.session.send(Command::FocusFollows { x, y });
+        driver.frame();
+        driver.session.status().rig.lens.focus_distance
+    };
+    let ball = follow(&mut driver, 0.2, 0.42);
+    driver.session.send(Command::FocusAt { x: 0.2, y: 0.42 });
+    driver.frame();
+    assert!((driver.session.status().rig.lens.focus_distance / ball - 1.0).abs() < 1e-5, "as a click would");
+    let floor = follow(&mut driver, 0.5, 0.95);
+    assert!(floor < ball, "{floor} {ball}");
+    assert_eq!(follow(&mut driver, 0.5, 0.02), floor, "the sky has no distance");
+    follow(&mut driver, 0.5, 0.95);
+    let before = driver.session.status().rig;
+    driver.session.send(Command::Turn { yaw_deg: 0.0, pitch_deg: -10.0 });
+    driver.frame();
+    let lower = driver.session.status().rig.lens.focus_distance;
+    assert!(lower < floor, "the same place of the picture is nearer now: {lower} {floor}");
+    driver.session.send(Command::ToggleFocusLock);
+    driver.session.send(Command::SetView(before.view));
+    driver.frame();
+    assert_eq!(driver.session.status().rig.lens.focus_distance, lower, "let go, it stays");
+    assert_eq!(driver.session.world().resource::<Focus>().target, FocusTarget::Camera);
+}
+
+#[test]
+fn colours_become_textures_and_textures_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("stripes.png");
+    image::RgbImage::from_fn(4, 4, |x, _| image::Rgb([if x % 2 == 0 { 200 } else { 20 }; 3])).save(&file).unwrap();
+    let mut driver = Driver::open("gallery");
+    let id = driver.named("red").to_bits();
+    let checker = |squares: f64| TexturePart::Checker {
+        a: Rgb(Vec3::splat(0.7)),
+        b: Rgb(Vec3::splat(0.1)),
+        squares: DVec2::splat(squares),
+        offset: DVec2::ZERO,
+        rotate: 0.0,
+    };
+    let texture = |driver: &Driver| match driver.get::<Material>("red") {
+        Material::Diffuse { albedo: Paint::Texture(texture) }
+        | Material::Phong { diffuse: Paint::Texture(texture), .. } => {
+            Some((texture.name.clone(), texture.part.clone()))
+        }
+        _ => None,
+    };
+    let plain: Material = driver.get("red");
+    driver.edit([Edit::Paint { id, part: checker(8.0) }]);
+    assert_eq!(texture(&driver), Some(("checker".to_owned(), checker(8.0))));
+    let restarts = driver.session.status().restarts;
+    driver.edit([Edit::Paint { id, part: checker(3.0) }]);
+    assert_eq!(texture(&driver), Some(("checker".to_owned(), checker(3.0))), "it keeps its name");
+    assert_eq!(driver.session.status().restarts, restarts + 1, "and the picture shows it");
+    // A picture is read beside.
+    let picture = TexturePart::Image {
+        file: file.to_string_lossy().into_owned(),
+        repeat: DVec2::ONE,
+        offset: DVec2::ZERO,
+        rotate: 0.0,
+        wrap: WrapPart::Repeat,
+        smooth: true,
+    };
+    driver.edit([Edit::Paint { id, part: picture.clone() }]);
+    driver.until(Session::is_idle);
+    assert_eq!(texture(&driver), Some(("stripes".to_owned(), picture)));
+    // It is saved, and all of it can be taken back.
+    driver.session.send(Command::SaveScene { path: folder.path().join("painted.ron") });
+    driver.until(|session| session.is_idle() && folder.path().join("painted.ron").exists());
+    let text = std::fs::read_to_string(folder.path().join("painted.ron")).unwrap();
+    assert!(text.contains("\"stripes.png\""), "{text}");
+    driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
+    assert_eq!(driver.get::<Material>("red"), plain);
+    // What cannot be read is told, and changes nothing.
+    let missing = TexturePart::Image {
+        file: "nowhere.png".to_owned(),
+        repeat: DVec2::ONE,
+        offset: DVec2::ZERO,
+        rotate: 0.0,
+        wrap: WrapPart::Repeat,
+        smooth: true,
+    };
+    driver.edit([Edit::Paint { id, part: missing }]);
+    driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));
+    assert_eq!(driver.get::<Material>("red"), plain);
 }

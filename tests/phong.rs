@@ -179,6 +179,47 @@ fn a_white_furnace_stays_white() {
     assert!((mean - 1.0).abs() < 0.01 + 4.0 * error, "highlight: {mean} ± {error}");
 }
 
+/// A highlight narrower than the lamp in it was found by chance alone: most samples were black, and a few very bright.
+#[test]
+fn polished_metal_shows_a_large_lamp_without_speckles() {
+    let metal = |alpha: f32| Material::Metal {
+        alpha: ScalarInput::Constant(alpha),
+        reflectance: ColorInput::Constant(Vec3::ONE),
+        fresnel: Fresnel::Constant,
+        compensate: false,
+    };
+    // The mirror image of the lamp is far wider than the view and the lobe.
+    let shapes = vec![
+        (quad(Vec3::new(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::Z * -2.0), 0),
+        (sphere(Vec3::new(0.0, 6.0, -6.0), 4.0), 1),
+    ];
+    let view = camera(Vec3::new(0.0, 2.0, 2.0), Vec3::ZERO, 4.0);
+    for alpha in [0.005, 0.02, 0.05] {
+        let scene = scene(shapes.clone(), vec![metal(alpha), emissive(3.0)], Environment::Black, view);
+        let (film, _) = render(&scene, &PHONG, 12, 12, 4);
+        // What one way brings where the other is as good is half of the lamp at most.
+        let off: Vec<f32> = film.means().iter().map(|found| (found.x / 3.0 - 1.0).abs()).collect();
+        let rms = (off.iter().map(|off| off * off).sum::<f32>() / off.len() as f32).sqrt();
+        let most = off.iter().copied().fold(0.0, f32::max);
+        assert!(rms < 0.1 && most <= 0.5, "alpha {alpha}: rms {rms}, most {most}");
+    }
+    // Dull metal reaches beyond the lamp's rim: both ways of finding it agree with much of one of them.
+    let dull = |lamps: usize| {
+        let mut shapes = shapes.clone();
+        // So many lamps that one of them is asked at a time.
+        shapes.extend((1..lamps).map(|i| (sphere(Vec3::new(40.0 + i as f32, 0.2, 0.0), 0.1), 1)));
+        let scene = scene(shapes, vec![metal(0.3), emissive(3.0)], Environment::Black, view);
+        picture_mean(&render(&scene, &PHONG, 8, 8, 1024).0)
+    };
+    let ((one, error), (many, error_many)) = (dull(1), dull(20));
+    assert!((one - many).abs() < 4.0 * error.hypot(error_many) + 1e-3, "{one} ± {error}, {many} ± {error_many}");
+    // ∫ over the lamp of (n + 1) / 2π · cosⁿ, with n = (1 / 0.09 − 1) / 2, about its centre's direction.
+    let n = 0.5 / 0.09 - 0.5;
+    let cos_rim = (1.0 - 16.0 / 72.0_f64).sqrt();
+    let expected = 3.0 * (1.0 - cos_rim.powf(n + 1.0));
+    assert!((one / expected - 1.0).abs() < 0.02, "{one} ± {error} for {expected}");
+}
+
 #[test]
 fn air_absorbs_by_distance_in_both_models() {
     let shapes = vec![(quad(Vec3::new(-50.0, -50.0, -5.0), Vec3::X * 100.0, Vec3::Y * 100.0), 0)];

@@ -196,6 +196,57 @@ fn a_new_mesh_is_prepared_beside_the_old_picture() {
 }
 
 #[test]
+fn a_hasty_tree_gives_way_to_a_better_one_and_no_sample_is_lost() {
+    let source = SceneSource::Builtin("gallery".to_owned());
+    let hasty = load(&source, &LoadOptions { hasty: true, ..LoadOptions::default() }).unwrap();
+    let best = load(&source, &LoadOptions::default()).unwrap();
+    assert_eq!((hasty.trees.hasty().len(), best.trees.hasty().len()), (1, 0), "the serpent is large");
+    assert_ne!(hasty.trees.bytes(), best.trees.bytes());
+
+    let mut driver = Driver::new(64, 48, spp(24));
+    driver.session.adopt(hasty);
+    driver.frame();
+    let (bytes, restarts) = (driver.session.tree_bytes(), driver.session.status().restarts);
+    driver.run_until(|session| session.tree_bytes() != bytes);
+    driver.run_until(|session| session.status().done && session.is_idle());
+    assert_eq!(driver.session.tree_bytes(), best.trees.bytes());
+    assert_eq!(driver.session.status().restarts, restarts, "{}", driver.session.status().restart_cause);
+
+    let mut world = bevy_ecs::world::World::new();
+    best.spawn(&mut world);
+    let extraction = Extraction::new(&SceneInputs::of(&mut world), &best.trees);
+    let mut film = Film::new(64, 48);
+    let settings = world.resource::<Rendering>().0;
+    render_offline(&extraction.snapshot, &settings, &mut film, spp(24), |_| true);
+    assert_eq!(driver.session.film_snapshot().unwrap().means(), film.means(), "the hits are the same");
+    // What has its better tree keeps it.
+    driver.session.send(Command::Orbit { yaw_deg: 3.0, pitch_deg: 0.0 });
+    driver.run_until(|session| session.status().done && session.is_idle());
+    assert_eq!(driver.session.tree_bytes(), best.trees.bytes());
+}
+
+#[test]
+fn the_number_of_threads_changes_live_and_nothing_else_does() {
+    let mut driver = Driver::new(48, 48, spp(32));
+    driver.open("cornell-balls");
+    driver.run_until(|session| session.picture().number > 0);
+    let restarts = driver.session.status().restarts;
+    for threads in [1, 3, 2] {
+        driver.session.send(Command::SetThreads { threads });
+        driver.run_until(|session| {
+            session.status().threads == threads && session.pool().current_num_threads() == threads
+        });
+    }
+    driver.run_until(|session| session.status().done && session.is_idle());
+    assert_eq!(driver.session.status().restarts, restarts);
+    let shown = driver.session.film_snapshot().unwrap().means();
+    let mut other = Driver::new(48, 48, spp(32));
+    other.open("cornell-balls");
+    other.run_until(|session| session.status().done && session.is_idle());
+    assert_eq!(other.session.film_snapshot().unwrap().means(), shown);
+}
+
+#[test]
 fn broken_components_are_left_out_with_a_message_and_never_a_panic() {
     let mut driver = Driver::new(16, 16, spp(1));
     driver.open("cornell");

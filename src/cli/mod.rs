@@ -118,7 +118,7 @@ impl SceneArgs {
     /// Loads the scene, or says why it cannot be had.
     fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
-        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), known: None };
+        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
         for warning in &scene.warnings {
             remark(format_args!("warning: {warning}"));

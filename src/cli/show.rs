@@ -35,6 +35,10 @@ pub struct ShowArgs {
     /// Samples per pixel of that picture; as many as when it was recorded when not given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..), requires = "replay")]
     spp: Option<u32>,
+    /// Print at the end how promptly the window reacted and how many paths it traced, as one JSON object.
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    figures: bool,
     /// Where the pictures go that are kept from the window.
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FOLDER", default_value = ".")]
@@ -79,6 +83,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
         up: args.scene.up(),
         folder,
         record: args.record.clone(),
+        print_figures: args.figures,
     };
     run(options).map_err(|error| Failure::Failed(error.to_string()))
 }

@@ -2,15 +2,29 @@
 
 use super::Waker;
 use super::remesh::{ForWhom, Remade, Remake};
-use crate::scene::{LoadOptions, LoadedScene, MeshBase, SceneError, SceneSource, Shape, Trees, UpAxis, load};
-use bevy_ecs::prelude::Resource;
+use crate::render::ImageTexture;
+use crate::scene::file::TexturePart;
+use crate::scene::{
+    LoadOptions, LoadedScene, MeshBase, SceneError, SceneSource, Shape, Trees, UpAxis, load, read_picture,
+};
+use bevy_ecs::prelude::{Entity, Resource};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What has come of it.
 pub enum Finished {
-    Scene { source: SceneSource, result: Result<Box<LoadedScene>, SceneError> },
+    Scene {
+        source: SceneSource,
+        result: Result<Box<LoadedScene>, SceneError>,
+    },
     Trees(Trees),
     Mesh(Box<Remade>),
+    /// For a material.
+    Picture {
+        entity: Entity,
+        part: TexturePart,
+        result: Result<ImageTexture, String>,
+    },
 }
 
 #[derive(Default)]
@@ -24,6 +38,8 @@ struct Board {
     /// Meshes that are being made: what for, and their numbers. A newer one for the same takes the place of an older.
     remaking: Vec<(ForWhom, u64, String)>,
     newest_remake: u64,
+    /// Pictures that are being read for materials.
+    reading: usize,
     /// What the last mesh was made from.
     base: Option<MeshBase>,
 }
@@ -57,7 +73,7 @@ impl Beside {
                 });
                 this.wake();
             };
-            let options = LoadOptions { up, aspect: Some(aspect), progress: Some(&say), known: None };
+            let options = LoadOptions { up, aspect: Some(aspect), hasty: true, progress: Some(&say), known: None };
             let result = guarded(|| pool.install(|| load(&source, &options)))
                 .unwrap_or_else(|panic| Err(SceneError::in_file(source.title(), panic)));
             this.with(|board| {
@@ -77,14 +93,15 @@ impl Beside {
         });
     }
 
-    /// Builds the trees of shapes that have none.
-    pub fn build(&self, shapes: Vec<Shape>, pool: Arc<rayon::ThreadPool>) {
+    /// Builds the trees of shapes that have none; with `hasty`, those of large meshes in a hurry.
+    pub fn build(&self, shapes: Vec<Shape>, hasty: bool, pool: Arc<rayon::ThreadPool>) {
         self.with(|board| board.building += 1);
         let this = self.clone();
         let work = move || {
             let mut trees = Trees::default();
             for shape in &shapes {
-                let built = guarded(|| pool.install(|| trees.add(shape)));
+                let build = || if hasty { trees.add_hastily(shape) } else { trees.add(shape) };
+                let built = guarded(|| pool.install(build));
                 if let Err(reason) | Ok(Err(reason)) = built {
                     trees.mark_unfit(shape, reason);
                 }
@@ -130,6 +147,30 @@ impl Beside {
         self.spawn("firstlight mesh", work, move |board, _| board.remaking.retain(|(_, other, _)| *other != number));
     }
 
+    /// Reads a picture for a material.
+    pub fn read_picture(&self, entity: Entity, part: TexturePart, path: PathBuf) {
+        self.with(|board| board.reading += 1);
+        let this = self.clone();
+        let work = move || {
+            let result = guarded(|| read_picture(&path)).and_then(|read| read);
+            let result = result.map(|(picture, _)| picture).map_err(|reason| format!("{}: {reason}", path.display()));
+            this.with(|board| {
+                board.reading -= 1;
+                board.finished.push(Finished::Picture { entity, part, result });
+            });
+            this.wake();
+        };
+        self.spawn("firstlight picture", work, |board, _| board.reading -= 1);
+    }
+
+    /// A mesh or a picture that was asked for by an edit is under way.
+    pub fn is_editing(&self) -> bool {
+        self.with(|board| {
+            let waits = |finished: &Finished| matches!(finished, Finished::Mesh(_) | Finished::Picture { .. });
+            board.reading > 0 || !board.remaking.is_empty() || board.finished.iter().any(waits)
+        })
+    }
+
     /// What has come in since the last call.
     pub fn take(&self) -> Vec<Finished> {
         self.with(|board| std::mem::take(&mut board.finished))
@@ -147,7 +188,8 @@ impl Beside {
     /// Nothing is under way and nothing waits to be taken.
     pub fn is_idle(&self) -> bool {
         self.with(|board| {
-            board.progress.is_none() && board.building == 0 && board.remaking.is_empty() && board.finished.is_empty()
+            let rests = board.progress.is_none() && board.building == 0 && board.remaking.is_empty();
+            rests && board.reading == 0 && board.finished.is_empty()
         })
     }
 

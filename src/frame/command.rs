@@ -146,6 +146,11 @@ pub enum Command {
     },
     /// The focal plane stays with the point that was focused on last, or moves with the camera again.
     ToggleFocusLock,
+    /// The focal plane goes to what is at this place in the picture, and stays with whatever comes there.
+    FocusFollows {
+        x: f64,
+        y: f64,
+    },
     /// Keep the view under a number from 1 to 9.
     SetBookmark {
         slot: u8,

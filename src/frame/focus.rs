@@ -1,7 +1,9 @@
 //! What is sharp: the zone of a lens, and a focal plane that stays with what was focused on.
 
 use super::navigation::focus_at;
-use crate::scene::{Lens, Placement, Projection, View};
+use super::selection::pick_along;
+use super::systems::{PictureSize, Shown};
+use crate::scene::{Lens, Ordinal, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
 
@@ -53,6 +55,8 @@ pub enum FocusTarget {
     Point(DVec3),
     /// A point of an object, in the object's own space.
     Object(Entity, DVec3),
+    /// Whatever is at this place of the picture, in fractions of it: the mouse.
+    Cursor([f64; 2]),
 }
 
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
@@ -64,10 +68,15 @@ pub struct Focus {
 
 /// Moves the focal plane to where its target is.
 ///
-/// Reads [`Focus`] and placements; writes the lens of the first camera.
+/// Reads [`Focus`], placements and what is rendered; writes the lens of the first camera.
 pub fn hold_focus(world: &mut World) {
     let point = match world.resource::<Focus>().target {
         FocusTarget::Camera => return,
+        FocusTarget::Cursor(place) => match under(world, place) {
+            Some(point) => point,
+            // The sky has no distance: what was sharp stays so.
+            None => return,
+        },
         FocusTarget::Point(point) => point,
         FocusTarget::Object(entity, local) => match world.get::<Placement>(entity) {
             Some(placement) => placement.affine().transform_point3(local),
@@ -88,6 +97,16 @@ pub fn hold_focus(world: &mut World) {
             world.entity_mut(entity).insert(held);
         }
     }
+}
+
+/// The point at this place of the picture, as the camera is now.
+fn under(world: &mut World, [x, y]: [f64; 2]) -> Option<DVec3> {
+    let aspect = world.resource::<PictureSize>().aspect();
+    let mut cameras = world.query::<(Entity, Option<&Ordinal>, &View, &Projection)>();
+    let first = cameras.iter(world).min_by_key(|(entity, rank, ..)| (rank.map_or(u32::MAX, |rank| rank.0), *entity));
+    let (view, projection) = first.map(|(_, _, view, projection)| (*view, *projection))?;
+    let scene = world.resource::<Shown>().extraction.as_ref()?;
+    pick_along(scene, &view, &projection, x, y, aspect).map(|picked| picked.point)
 }
 
 #[cfg(test)]

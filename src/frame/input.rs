@@ -121,6 +121,12 @@ impl Desk<'_, '_> {
             Command::ForgetExplanation => self.explaining.forget(),
             Command::SetRegion { region } => drop(self.brush.set_if_neq(Brush(region))),
             Command::ToggleFocusLock => self.toggle_focus_lock(),
+            Command::FocusFollows { x, y } if x.is_finite() && y.is_finite() => {
+                if !matches!(self.focus.target, FocusTarget::Cursor(_)) {
+                    self.note("focus follows the mouse".to_owned());
+                }
+                self.focus.target = FocusTarget::Cursor([x, y]);
+            }
             Command::SetBookmark { slot } => {
                 if let Some(rig) = self.rig()
                     && self.bookmarks.set(slot, rig)
@@ -258,6 +264,7 @@ impl Desk<'_, '_> {
             FocusTarget::Camera => "focus moves with the camera".to_owned(),
             FocusTarget::Point(_) => "focus stays with a point".to_owned(),
             FocusTarget::Object(..) => "focus stays with the object".to_owned(),
+            FocusTarget::Cursor(_) => "focus follows the mouse".to_owned(),
         });
     }
 

@@ -37,6 +37,7 @@ mod settings;
 mod status;
 mod systems;
 mod views;
+mod waits;
 mod watch;
 mod worker;
 
@@ -60,4 +61,5 @@ pub use settings::{SceneBookmarks, Settings, SettingsStore};
 pub use status::{Message, MessageKind, Picture, Status};
 pub use systems::{Around, Brush, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, StopAt, Threads};
 pub use views::{Bookmarks, ViewTrail};
+pub use waits::Waits;
 pub use worker::{Look, Waker};

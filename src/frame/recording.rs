@@ -5,6 +5,7 @@
 //! reason. Commands depend on no clock and sums on no order, so playing them again leads to the same picture, bit for
 //! bit, with any number of threads; times are kept for people.
 
+use super::beside::Beside;
 use super::input::CommandQueue;
 use super::systems::{Adopted, Clock, CurrentScene, PictureSize, Shown, StopAt};
 use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
@@ -263,6 +264,11 @@ impl Player {
     fn update(&mut self) {
         self.session.world_mut().insert_resource(StopAt(Target { spp: Some(1), ..Target::default() }));
         self.session.update(self.clock);
+        // What was asked for beside the picture comes before what is asked for next.
+        while self.session.world().resource::<Beside>().is_editing() {
+            std::thread::sleep(Duration::from_millis(2));
+            self.session.update(self.clock);
+        }
     }
 
     /// Runs frames until the scene with this number is there.

@@ -4,7 +4,7 @@ use super::navigation::Rig;
 use super::systems::Shown;
 use crate::geometry::Ray;
 use crate::render::Camera;
-use crate::scene::{Extraction, Placement, PointLight};
+use crate::scene::{Extraction, Placement, PointLight, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
@@ -44,8 +44,31 @@ pub struct Picked {
 
 /// What lies at this place of the picture (0..1 from the upper left), through the middle of the lens.
 pub fn pick(scene: &Extraction, x: f64, y: f64, aspect: f64) -> Option<Picked> {
-    let camera = scene.snapshot.camera;
-    let dir = direction(&camera, x, y, aspect)?;
+    hit(scene, &scene.snapshot.camera, x, y, aspect)
+}
+
+/// The same for a camera that the scene has not been told of yet.
+pub fn pick_along(
+    scene: &Extraction,
+    view: &View,
+    projection: &Projection,
+    x: f64,
+    y: f64,
+    aspect: f64,
+) -> Option<Picked> {
+    let camera = Camera {
+        eye: (view.eye - scene.origin).as_vec3(),
+        right: view.right().as_vec3(),
+        up: view.up.as_vec3(),
+        forward: view.forward.as_vec3(),
+        tan_half_vfov: projection.tan_half_vfov() as f32,
+        ..scene.snapshot.camera
+    };
+    hit(scene, &camera, x, y, aspect)
+}
+
+fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Picked> {
+    let dir = direction(camera, x, y, aspect)?;
     let hit = scene.snapshot.geometry.tree.closest_hit(&Ray::new(camera.eye, dir))?;
     let depth = f64::from(hit.t * dir.dot(camera.forward));
     let point = scene.origin + (camera.eye + hit.t * dir).as_dvec3();

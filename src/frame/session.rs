@@ -18,7 +18,7 @@ use super::systems::{
 };
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
-use super::{Command, Target};
+use super::{Command, Target, Waits};
 use crate::render::{Film, RenderSettings, Snapshot};
 use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis};
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
@@ -238,6 +238,11 @@ impl Session {
     /// The workers' threads.
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {
         self.world.resource::<Renderer>().0.pool()
+    }
+
+    /// How long the workers took to drop what a change had made worthless, the latest times.
+    pub fn cancels(&self) -> Waits {
+        self.world.resource::<Renderer>().0.cancels()
     }
 
     /// The scene as the picture shows it.

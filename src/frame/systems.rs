@@ -115,6 +115,10 @@ pub struct Shown {
     region: Option<[f64; 4]>,
     /// The world has changes that wait for a tree.
     waiting: bool,
+    /// Better trees of what is shown are there.
+    better_trees: bool,
+    /// Meshes whose better trees are being built, by address.
+    improving: Vec<Shape>,
     /// Drop all samples at the next frame, for this reason.
     pub(super) restart: Option<&'static str>,
     generation: u64,
@@ -199,9 +203,12 @@ pub fn edit(world: &mut World) {
     for finished in world.resource::<Beside>().take() {
         match finished {
             Finished::Mesh(remade) => super::remesh::take(world, *remade),
+            Finished::Picture { entity, part, result } => super::edit::take_picture(world, entity, part, result),
             Finished::Trees(trees) => {
                 let mut shown = world.resource_mut::<Shown>();
+                let hasty = shown.trees.hasty().len();
                 shown.trees.extend(trees);
+                shown.better_trees |= shown.trees.hasty().len() < hasty;
                 shown.waiting = true;
             }
             Finished::Scene { result: Ok(scene), .. } => adopt(world, *scene, now),
@@ -272,7 +279,7 @@ pub fn rebuild(
         let missing = missing_trees(&inputs, &mut shown.trees);
         if !missing.is_empty() {
             // The old picture stays until the trees are there, and the camera keeps moving in it.
-            beside.build(missing, renderer.0.pool());
+            beside.build(missing, true, renderer.0.pool());
             inputs = SceneInputs { camera: inputs.camera, ..shown.inputs.clone() };
         }
         let differences = compare(&shown.inputs, &inputs);
@@ -303,7 +310,28 @@ pub fn rebuild(
             }
         }
     }
+    if std::mem::take(&mut shown.better_trees)
+        && let Shown { extraction: Some(extraction), trees, generation, .. } = &mut *shown
+    {
+        // The same hits, sooner: no sample is lost, and no restart is told. After a restart it comes with the job.
+        extraction.take_trees(trees);
+        if !changes.restarts() {
+            renderer.0.set_snapshot(*generation, extraction.snapshot.clone());
+        }
+    }
+    improve_trees(&mut shown, &beside, &renderer);
     found.0 = changes;
+}
+
+/// What has been built in a hurry is built again at leisure, once it is seen.
+fn improve_trees(shown: &mut Shown, beside: &Beside, renderer: &Renderer) {
+    let hasty = shown.trees.hasty();
+    shown.improving.retain(|shape| hasty.contains(shape));
+    let new: Vec<Shape> = hasty.into_iter().filter(|shape| !shown.improving.contains(shape)).collect();
+    if !new.is_empty() {
+        shown.improving.extend(new.iter().cloned());
+        beside.build(new, false, renderer.0.pool());
+    }
 }
 
 /// Trees that have yet to be built. Small ones are built at once: that takes less than the frame has.

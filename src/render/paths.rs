@@ -35,6 +35,7 @@ pub(super) struct PathBatch {
     pub normal: [Vec<f32>; 3],
     pub stream: Vec<u32>,
     pub reversed_index: Vec<u32>,
+    pub screen: Vec<u32>,
     pub slot: Vec<u32>,
     /// Kept only where some surface lets light through.
     pub media: Option<Vec<MediumStack>>,
@@ -70,7 +71,7 @@ impl PathBatch {
         if self.slot.len() < least {
             let floats = self.throughput.iter_mut().chain(&mut self.position).chain(&mut self.normal);
             floats.chain([&mut self.pdf]).for_each(|array| array.resize(least, 0.0));
-            for array in [&mut self.stream, &mut self.reversed_index, &mut self.slot] {
+            for array in [&mut self.stream, &mut self.reversed_index, &mut self.screen, &mut self.slot] {
                 array.resize(least, 0);
             }
         }
@@ -85,7 +86,7 @@ impl PathBatch {
         self.pdf[i] = path.pdf;
         set(&mut self.position, i, path.position);
         set(&mut self.normal, i, path.normal);
-        [self.stream[i], self.reversed_index[i]] = path.sampler.parts();
+        [self.stream[i], self.reversed_index[i], self.screen[i]] = path.sampler.parts();
         self.slot[i] = path.slot;
         if let Some(media) = &mut self.media {
             media.push(path.media);
@@ -117,7 +118,7 @@ impl PathBatch {
 
     #[inline]
     pub fn sampler(&self, i: usize) -> Sampler {
-        Sampler::from_parts([self.stream[i], self.reversed_index[i]])
+        Sampler::from_parts([self.stream[i], self.reversed_index[i], self.screen[i]])
     }
 
     #[inline]
@@ -133,7 +134,8 @@ impl PathBatch {
     #[inline(always)]
     pub fn sampler_lanes<S: Simd>(&self, at: Bits<S>) -> SamplerLanes<S> {
         let (stream, reversed_index) = (Bits::gather(&self.stream, at), Bits::gather(&self.reversed_index, at));
-        SamplerLanes { stream, reversed_index }
+        let screen = Bits::gather(&self.screen, at);
+        SamplerLanes { stream, reversed_index, screen }
     }
 
     /// Appends the lanes of `mask`, without their media and tracks.
@@ -146,6 +148,7 @@ impl PathBatch {
         append_vector(&mut self.normal, at, mask, path.normal);
         append_bits(&mut self.stream, at, mask, path.sampler.stream);
         append_bits(&mut self.reversed_index, at, mask, path.sampler.reversed_index);
+        append_bits(&mut self.screen, at, mask, path.sampler.screen);
         append_bits(&mut self.slot, at, mask, path.slot);
         self.rays.append(mask, origin, dir, path.pdf.all(f32::INFINITY));
     }

@@ -221,23 +221,21 @@ impl Wave {
                 CameraPath { ray, sampler, slot: slot(sample) + pixels.local[i], weight }
             })
         });
-        match pass.settings.integrator {
-            Integrator::Phong => phong.trace(pass.snapshot, pass.settings.max_depth, camera_paths, radiance, stop),
-            Integrator::Path => {
-                let lens = pass.lens();
-                let start = |paths: &mut PathBatch| {
-                    if let Some(set) = pass.settings.lanes
-                        && lens.is_plain()
-                    {
-                        for sample in samples.clone() {
-                            lens.start_paths(set, pixels, sample, slot(sample), paths);
-                        }
-                    } else {
-                        camera_paths.for_each(|camera| paths.push(&{ camera.ray }, &camera.into()));
-                    }
-                };
-                path.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), start, radiance, stop)
+        let lens = pass.lens();
+        let start = |paths: &mut PathBatch| {
+            if let Some(set) = pass.settings.lanes
+                && lens.is_plain()
+            {
+                for sample in samples.clone() {
+                    lens.start_paths(set, pixels, sample, slot(sample), paths);
+                }
+            } else {
+                camera_paths.for_each(|camera| paths.push(&{ camera.ray }, &camera.into()));
             }
+        };
+        match pass.settings.integrator {
+            Integrator::Phong => phong.trace(pass.snapshot, pass.settings.max_depth, start, radiance, stop),
+            Integrator::Path => path.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), start, radiance, stop),
         }
     }
 }
@@ -373,7 +371,7 @@ impl Pass<'_> {
     #[inline]
     fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
         let Techniques { even_samples, .. } = self.settings.techniques;
-        let new_sampler = if even_samples { Sampler::new } else { Sampler::independent };
+        let new_sampler = if even_samples { Sampler::of_pixel } else { Sampler::independent };
         let sampler = new_sampler(self.settings.seed, pixel.x, pixel.y, sample);
         let (offset, weight) = self.filter.sample(sampler.pair(0));
         let film = pixel.as_vec2() + offset;

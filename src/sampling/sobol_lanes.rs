@@ -1,33 +1,98 @@
 //! The points of [`super::Sampler`], those of sixteen paths at a time, bit for bit.
 
 use super::hash::hash_u32;
-use crate::lanes::{Bits, Float, Simd};
+use super::sobol::{BLOCK_PIXELS, LOG_BLOCK, LOW, SCREEN_DIMENSIONS, SHIFTS};
+use crate::lanes::{Bits, Float, Mask, Simd};
 
 /// The random numbers of sixteen samples.
 #[derive(Clone, Copy)]
 pub(crate) struct SamplerLanes<S: Simd> {
     pub stream: Bits<S>,
     pub reversed_index: Bits<S>,
+    /// Either all lanes are pixels or none is.
+    pub screen: Bits<S>,
 }
 
 impl<S: Simd> SamplerLanes<S> {
+    /// Of pixels, see [`super::Sampler::of_pixel`].
+    #[inline(always)]
+    pub fn of_pixels(s: S, seed: u32, [x, y]: [Bits<S>; 2], sample: u32) -> Self {
+        let first = Bits::splat(s, hash_u32(seed));
+        let block = first.hash_combine(x.shr(LOG_BLOCK)).hash_combine(y.shr(LOG_BLOCK));
+        let z = spread_bits(x & LOW) | spread_bits(y & LOW).shl(1);
+        Self {
+            stream: first.hash_combine(x).hash_combine(y),
+            reversed_index: Bits::splat(s, sample.reverse_bits()),
+            screen: (block | BLOCK_PIXELS) & !(BLOCK_PIXELS - 1) | z,
+        }
+    }
+
+    /// See [`super::Sampler::independent`].
+    #[inline(always)]
+    pub fn independent(s: S, seed: u32, [x, y]: [Bits<S>; 2], sample: u32) -> Self {
+        let stream = Bits::splat(s, hash_u32(seed)).hash_combine(x).hash_combine(y);
+        let zero = Bits::splat(s, 0);
+        Self { stream: stream.hash_combine(Bits::splat(s, sample)), reversed_index: zero, screen: zero }
+    }
+
     /// See [`super::Sampler::pair`].
     #[inline(always)]
     pub fn pair(&self, dimension: u32) -> [Float<S>; 2] {
-        let seed = hash_combine(self.stream, dimension);
-        let index = reverse(scramble(self.reversed_index, seed));
-        let x = scramble(index, hash(seed ^ 0x68bc_21eb));
-        let y = scramble(sobol_second_reversed(index), hash(seed ^ 0x02e5_be93));
+        let [x, y] = if self.is_on_screen(dimension) {
+            let shared = sobol_pair(self.reversed_index, self.screen_seed(dimension));
+            let (shifts, at) = (&*SHIFTS, self.shift_at(dimension));
+            [shared[0] ^ Bits::gather(&shifts[0], at), shared[1] ^ Bits::gather(&shifts[1], at)]
+        } else {
+            sobol_pair(self.reversed_index, hash_combine(self.stream, dimension))
+        };
         [to_unit(reverse(x)), to_unit(reverse(y))]
     }
 
     /// See [`super::Sampler::single`].
     #[inline(always)]
     pub fn single(&self, dimension: u32) -> Float<S> {
-        let seed = hash_combine(self.stream, dimension);
-        let index = reverse(scramble(self.reversed_index, seed));
-        to_unit(reverse(scramble(index, hash(seed ^ 0x68bc_21eb))))
+        let x = if self.is_on_screen(dimension) {
+            let shared = van_der_corput(self.reversed_index, self.screen_seed(dimension));
+            shared ^ Bits::gather(&SHIFTS[0], self.shift_at(dimension))
+        } else {
+            van_der_corput(self.reversed_index, hash_combine(self.stream, dimension))
+        };
+        to_unit(reverse(x))
     }
+
+    #[inline(always)]
+    fn is_on_screen(&self, dimension: u32) -> bool {
+        dimension < SCREEN_DIMENSIONS && self.screen.equals(0) != Mask::MAX
+    }
+
+    #[inline(always)]
+    fn screen_seed(&self, dimension: u32) -> Bits<S> {
+        hash_combine(self.screen.shr(2 * LOG_BLOCK), dimension)
+    }
+
+    #[inline(always)]
+    fn shift_at(&self, dimension: u32) -> Bits<S> {
+        self.screen & (BLOCK_PIXELS - 1) | (dimension << (2 * LOG_BLOCK))
+    }
+}
+
+#[inline(always)]
+fn spread_bits<S: Simd>(x: Bits<S>) -> Bits<S> {
+    let x = (x | x.shl(4)) & 0x0f0f;
+    let x = (x | x.shl(2)) & 0x3333;
+    (x | x.shl(1)) & 0x5555
+}
+
+#[inline(always)]
+fn sobol_pair<S: Simd>(reversed_index: Bits<S>, seed: Bits<S>) -> [Bits<S>; 2] {
+    let index = reverse(scramble(reversed_index, seed));
+    let x = scramble(index, hash(seed ^ 0x68bc_21eb));
+    [x, scramble(sobol_second_reversed(index), hash(seed ^ 0x02e5_be93))]
+}
+
+#[inline(always)]
+fn van_der_corput<S: Simd>(reversed_index: Bits<S>, seed: Bits<S>) -> Bits<S> {
+    scramble(reverse(scramble(reversed_index, seed)), hash(seed ^ 0x68bc_21eb))
 }
 
 #[inline(always)]
@@ -90,9 +155,8 @@ mod tests {
 
     #[inline(always)]
     fn draw<S: Simd>(s: S, samplers: &[Sampler; LANES], dimension: u32, out: &mut [[f32; LANES]; 3]) {
-        let stream = Bits::load(s, &samplers.map(|sampler| sampler.parts()[0]));
-        let reversed_index = Bits::load(s, &samplers.map(|sampler| sampler.parts()[1]));
-        let lanes = SamplerLanes { stream, reversed_index };
+        let part = |k: usize| Bits::load(s, &samplers.map(|sampler| sampler.parts()[k]));
+        let lanes = SamplerLanes { stream: part(0), reversed_index: part(1), screen: part(2) };
         let [x, y] = lanes.pair(dimension);
         x.store(&mut out[0]);
         y.store(&mut out[1]);
@@ -102,15 +166,46 @@ mod tests {
     #[test]
     fn lanes_draw_the_same_bits() {
         for i in 0..1000 {
-            let samplers: [Sampler; LANES] =
-                std::array::from_fn(|k| Sampler::new(5, i, k as u32, hash_u32(i) >> (k % 32)));
+            let make = if i % 2 == 0 { Sampler::new } else { Sampler::of_pixel };
+            let samplers: [Sampler; LANES] = std::array::from_fn(|k| make(5, i, k as u32, hash_u32(i) >> (k % 32)));
             for set in InstructionSet::available() {
+                let dimension = i / 2 % 16;
                 let mut out = [[0.0; LANES]; 3];
                 let (samplers, to) = (&samplers, &mut out);
-                dispatch!(set, draw(samplers: &[Sampler; LANES], i: u32, to: &mut [[f32; LANES]; 3]));
+                dispatch!(set, draw(samplers: &[Sampler; LANES], dimension: u32, to: &mut [[f32; LANES]; 3]));
                 for (k, sampler) in samplers.iter().enumerate() {
-                    let pair = sampler.pair(i);
-                    assert_eq!([pair.x, pair.y, sampler.single(i)], out.map(|numbers| numbers[k]), "{set:?}");
+                    let pair = sampler.pair(dimension);
+                    assert_eq!([pair.x, pair.y, sampler.single(dimension)], out.map(|numbers| numbers[k]), "{set:?}");
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn start<S: Simd>(s: S, first: [u32; 2], sample: u32, out: &mut [[u32; LANES]; 6]) {
+        let x = Bits::load(s, &std::array::from_fn(|k| first[0] + 37 * k as u32));
+        let y = Bits::load(s, &std::array::from_fn(|k| first[1] + 11 * k as u32));
+        let (even, other) =
+            (SamplerLanes::of_pixels(s, 6, [x, y], sample), SamplerLanes::independent(s, 6, [x, y], sample));
+        for (k, sampler) in [even, other].into_iter().enumerate() {
+            sampler.stream.store(&mut out[3 * k]);
+            sampler.reversed_index.store(&mut out[3 * k + 1]);
+            sampler.screen.store(&mut out[3 * k + 2]);
+        }
+    }
+
+    #[test]
+    fn lanes_begin_with_the_same_bits() {
+        for (first, sample) in [([0, 0], 0), ([250, 1000], 7), ([70_000, 3], 64)] {
+            for set in InstructionSet::available() {
+                let mut out = [[0; LANES]; 6];
+                let to = &mut out;
+                dispatch!(set, start(first: [u32; 2], sample: u32, to: &mut [[u32; LANES]; 6]));
+                for k in 0..LANES {
+                    let (x, y) = (first[0] + 37 * k as u32, first[1] + 11 * k as u32);
+                    let even = Sampler::of_pixel(6, x, y, sample).parts();
+                    let other = Sampler::independent(6, x, y, sample).parts();
+                    assert_eq!([even, other].concat(), out.map(|numbers| numbers[k]), "{set:?}");
                 }
             }
         }

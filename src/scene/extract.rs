@@ -14,7 +14,7 @@ use crate::render::{
 };
 use bevy_ecs::prelude::Entity;
 use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -35,6 +35,8 @@ pub struct Trees {
     balls: HashMap<usize, (Arc<Balls>, Arc<SphereTree>)>,
     /// What no tree can be built of, and why.
     unfit: HashMap<usize, (Shape, String)>,
+    /// Meshes whose tree was built in a hurry: the same hits, found more slowly.
+    hasty: HashSet<usize>,
 }
 
 impl Trees {
@@ -55,14 +57,33 @@ impl Trees {
     /// # Errors
     /// When the mesh has no triangles, an index out of range or a number that is not finite.
     pub fn add(&mut self, shape: &Shape) -> Result<(), String> {
+        self.add_by(shape, BuildPreset::Best)
+    }
+
+    /// The same in a hurry, for a first picture: a large mesh gets a tree that is built several times as fast, and
+    /// gives the same hits more slowly. [`Self::hasty`] names it.
+    ///
+    /// # Errors
+    /// As for [`Self::add`].
+    pub fn add_hastily(&mut self, shape: &Shape) -> Result<(), String> {
+        /// The best tree of fewer triangles is there within a frame or two.
+        const LARGE: usize = 10_000;
+        let is_large = matches!(shape, Shape::Mesh(mesh) if mesh.triangles.len() >= LARGE);
+        self.add_by(shape, if is_large { BuildPreset::Quick } else { BuildPreset::Best })
+    }
+
+    fn add_by(&mut self, shape: &Shape, preset: BuildPreset) -> Result<(), String> {
         if self.has(shape) {
             return Ok(());
         }
         match shape {
             Shape::Mesh(mesh) => {
                 check_mesh(mesh)?;
-                let tree = MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best);
+                let tree = MeshTree::build(&mesh.positions, &mesh.triangles, preset);
                 self.meshes.insert(address(mesh), (mesh.clone(), Arc::new(tree)));
+                if preset == BuildPreset::Quick {
+                    self.hasty.insert(address(mesh));
+                }
             }
             Shape::Spheres(balls) => {
                 check_balls(balls)?;
@@ -72,6 +93,15 @@ impl Trees {
             _ => {}
         }
         Ok(())
+    }
+
+    /// What has a tree that was built in a hurry.
+    pub fn hasty(&self) -> Vec<Shape> {
+        let meshes = self.meshes.iter().filter(|(key, _)| self.hasty.contains(key));
+        let mut meshes: Vec<Arc<Mesh>> = meshes.map(|(_, (mesh, _))| mesh.clone()).collect();
+        // The largest is waited for the longest.
+        meshes.sort_by_key(|mesh| mesh.triangles.len());
+        meshes.into_iter().map(Shape::Mesh).collect()
     }
 
     /// Remembers that no tree can be built, so that nobody tries again.
@@ -93,10 +123,19 @@ impl Trees {
             + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()
     }
 
-    /// Takes over all trees of `other`.
+    /// Takes over all trees of `other`, but for hasty ones of what has a better one.
     pub fn extend(&mut self, other: Self) {
         self.unfit.extend(other.unfit);
-        self.meshes.extend(other.meshes);
+        for (key, tree) in other.meshes {
+            if !other.hasty.contains(&key) {
+                self.hasty.remove(&key);
+            } else if self.meshes.contains_key(&key) {
+                continue;
+            } else {
+                self.hasty.insert(key);
+            }
+            self.meshes.insert(key, tree);
+        }
         self.balls.extend(other.balls);
     }
 
@@ -106,6 +145,7 @@ impl Trees {
         self.meshes.retain(|key, _| used.contains(key));
         self.balls.retain(|key, _| used.contains(key));
         self.unfit.retain(|key, _| used.contains(key));
+        self.hasty.retain(|key| used.contains(key));
     }
 }
 
@@ -229,6 +269,22 @@ impl Extraction {
             ids: materials.ids,
             order: materials.order,
         }
+    }
+
+    /// Takes the trees of meshes as they are in `trees` now. Every tree of a mesh gives the same hits, so every sample
+    /// stays what it is.
+    pub fn take_trees(&mut self, trees: &Trees) {
+        let old = &self.snapshot.geometry;
+        let shapes = old.tree.shapes().iter().zip(&old.objects).map(|(shape, object)| {
+            let newer = object.mesh.as_ref().and_then(|mesh| trees.meshes.get(&address(mesh)));
+            match (shape, newer) {
+                (&kdtree::Shape::Mesh { world_from_object, .. }, Some((_, tree))) => {
+                    kdtree::Shape::Mesh { tree: tree.clone(), world_from_object }
+                }
+                _ => shape.clone(),
+            }
+        });
+        self.snapshot.geometry = Arc::new(Geometry::build(shapes.collect(), old.objects.clone()));
     }
 
     /// Renews one part and keeps the rest. A camera that has gone far takes the origin along, which renews all;

@@ -47,6 +47,8 @@ pub struct LoadOptions<'a> {
     pub up: Option<UpAxis>,
     /// Width over height of the picture that a model is framed for; 16:9 when not given.
     pub aspect: Option<f64>,
+    /// Large meshes get trees that are built in a hurry ([`Trees::hasty`]), for a first picture.
+    pub hasty: bool,
     /// What was read before: of it is taken what has not changed on disk.
     pub known: Option<&'a LoadedScene>,
     /// Told what is being done now.
@@ -406,7 +408,8 @@ impl LoadedScene {
                     _ => String::new(),
                 });
             }
-            self.trees.add(&shape).map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
+            let added = if options.hasty { self.trees.add_hastily(&shape) } else { self.trees.add(&shape) };
+            added.map_err(|reason| SceneError::in_file(self.source.title(), reason))?;
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use super::file::{
     CameraPart, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MaterialPart, MeshShadingPart, MeshSourcePart,
     Named, ObjectPart, Paint, Rgb, SceneFile, TransformPart,
 };
+use super::front::faces_away;
 use super::load::UpAxis;
 use super::meshes::LoadedMesh;
 use super::upright::guess_up;
@@ -15,7 +16,8 @@ const CLAY: &str = "clay";
 
 /// The scene of a model that is opened by itself.
 ///
-/// All sizes follow from the model's box, so that a model of any unit looks the same.
+/// All sizes follow from the model's box, so that a model of any unit looks the same. The camera stands in front of it,
+/// with the key light at its side.
 pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, aspect: f64) -> SceneFile {
     let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
     let (min, max) = bounds(&loaded.mesh, up);
@@ -34,9 +36,11 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
     if loaded.slots.is_empty() {
         materials.push((CLAY.to_owned(), material(Paint::rgb(0.72, 0.56, 0.45))));
     }
-    let key = center + 5.0 * radius * DVec3::new(-0.55, 0.75, 0.6).normalize();
+    // Half a turn about the vertical, if the model looks the other way.
+    let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
+    let key = center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize();
     SceneFile {
-        camera: camera(min, max, aspect),
+        camera: camera(min, max, side, aspect),
         film: FilmPart::default(),
         integrator: IntegratorPart::default(),
         max_depth: None,
@@ -78,13 +82,13 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
     }
 }
 
-/// A three-quarter view from slightly above, as near as the box allows.
-fn camera(min: DVec3, max: DVec3, aspect: f64) -> CameraPart {
+/// A three-quarter view from slightly above, as near as the box allows; `side` has the signs of where the front is.
+fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
     const VFOV_DEG: f64 = 35.0;
     /// Room around the box.
     const MARGIN: f64 = 1.12;
     let center = 0.5 * (min + max);
-    let back = DVec3::new(0.6, 0.38, 1.0).normalize();
+    let back = side * DVec3::new(0.6, 0.38, 1.0).normalize();
     let right = DVec3::Y.cross(back).normalize();
     let up = back.cross(right);
     let tan_v = (0.5 * VFOV_DEG).to_radians().tan() / MARGIN;

@@ -8,7 +8,7 @@ use super::file::{self, CameraPart, EnvironmentPart, LightPart, MaterialPart, Ob
 use super::load::LoadedScene;
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
-use crate::render::{Display, Environment, RenderSettings, Texture, TexturePattern};
+use crate::render::{Display, Environment, ImageTexture, RenderSettings, Texture, TexturePattern};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};
@@ -26,7 +26,7 @@ impl LoadedScene {
         let mut textures: HashMap<&str, Arc<SurfaceTexture>> = HashMap::new();
         let own_textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
         for (name, part) in self.file.textures.iter().chain(own_textures.map(|(name, part, _)| (name.as_str(), part))) {
-            if let Some(texture) = self.texture(part) {
+            if let Some(texture) = texture_of(part, |file| self.pictures.get(file).cloned()) {
                 let texture = SurfaceTexture { name: name.to_owned(), part: part.clone(), texture };
                 textures.entry(name).or_insert_with(|| Arc::new(texture));
             }
@@ -124,20 +124,6 @@ impl LoadedScene {
     }
 
     /// `None` when its picture could not be had.
-    fn texture(&self, part: &TexturePart) -> Option<Texture> {
-        let (pattern, scale, offset, rotate) = match part {
-            TexturePart::Checker { a, b, squares, offset, rotate } => {
-                (TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
-            }
-            TexturePart::Image { file, repeat, offset, rotate, wrap, smooth } => {
-                let image = self.pictures.get(file)?.clone();
-                (TexturePattern::Image { image, wrap: (*wrap).into(), smooth: *smooth }, *repeat, *offset, *rotate)
-            }
-        };
-        let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(rotate.to_radians() as f32);
-        Some(Texture { pattern, uv_matrix, uv_offset: as_vec2(offset) })
-    }
-
     fn shape(&self, i: usize, object: &ObjectPart) -> (Shape, Placement) {
         let placement = Placement::from_part(object.transform());
         // A shape that has a point of its own is stored about that point, so that turning it turns it in place.
@@ -161,6 +147,21 @@ impl LoadedScene {
             }
         }
     }
+}
+
+/// A texture as a scene file describes it; `None` where its `picture` cannot be had.
+pub fn texture_of(part: &TexturePart, picture: impl FnOnce(&str) -> Option<Arc<ImageTexture>>) -> Option<Texture> {
+    let (pattern, scale, offset, rotate) = match part {
+        TexturePart::Checker { a, b, squares, offset, rotate } => {
+            (TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
+        }
+        TexturePart::Image { file, repeat, offset, rotate, wrap, smooth } => {
+            let image = picture(file)?;
+            (TexturePattern::Image { image, wrap: (*wrap).into(), smooth: *smooth }, *repeat, *offset, *rotate)
+        }
+    };
+    let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(rotate.to_radians() as f32);
+    Some(Texture { pattern, uv_matrix, uv_offset: as_vec2(offset) })
 }
 
 /// Removes whatever belongs to a scene.

@@ -14,14 +14,18 @@
 //! | `handles` | what is selected: its box and its handles |
 //! | `story` | why a pixel looks as it does: paths and a table |
 //! | `brush` | the rectangle that gets all samples |
+//! | `change` | what simplifying a mesh does to the picture |
 //! | `reaction` | how long a person waits |
 //! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
 //! | `saver` | pictures to disk, on the side |
+//! | `dialog` | a file chosen in a dialog of the desktop |
 //! | [`display`] | is there a display at all |
 
 mod app;
 mod brush;
 mod camera_text;
+mod change;
+mod dialog;
 pub mod display;
 mod handles;
 mod input;

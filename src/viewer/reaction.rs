@@ -1,7 +1,8 @@
 //! How long a person waits: from an input that changes the picture to the first new pixels on the window.
 
+use crate::frame::Waits;
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 #[derive(Clone, Debug, Default)]
 pub struct Reaction {
@@ -9,14 +10,10 @@ pub struct Reaction {
     input: Option<Instant>,
     /// Inputs that wait for the picture of a generation.
     waiting: VecDeque<(u64, Instant)>,
-    /// The latest waits.
-    waits: VecDeque<Duration>,
+    waits: Waits,
 }
 
 impl Reaction {
-    /// As many as a minute of steady movement has, about.
-    const KEPT: usize = 1000;
-
     /// Something that may change the picture was asked for.
     pub fn asked(&mut self, now: Instant) {
         self.input.get_or_insert(now);
@@ -33,30 +30,20 @@ impl Reaction {
     /// A picture of `generation` is on the window.
     pub fn shown(&mut self, generation: u64, now: Instant) {
         while let Some((_, input)) = self.waiting.pop_front_if(|(wanted, _)| *wanted <= generation) {
-            self.waits.push_back(now.saturating_duration_since(input));
-            if self.waits.len() > Self::KEPT {
-                self.waits.pop_front();
-            }
+            self.waits.add(now.saturating_duration_since(input));
         }
     }
 
-    /// The wait that this share of all waits does not exceed; `None` before the first.
-    pub fn quantile(&self, share: f64) -> Option<Duration> {
-        let mut sorted: Vec<Duration> = self.waits.iter().copied().collect();
-        sorted.sort_unstable();
-        let last = sorted.len().checked_sub(1)?;
-        Some(sorted[((share * sorted.len() as f64) as usize).min(last)])
-    }
-
-    #[cfg(test)]
-    fn len(&self) -> usize {
-        self.waits.len()
+    /// From input to picture, of the latest inputs.
+    pub fn waits(&self) -> &Waits {
+        &self.waits
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
     fn waits_are_from_the_first_input_to_the_first_picture_that_has_seen_it() {
@@ -66,19 +53,19 @@ mod tests {
         reaction.asked(at(5));
         reaction.carried_out(Some(7));
         reaction.shown(6, at(10));
-        assert_eq!(reaction.quantile(0.5), None, "that picture was of before");
+        assert_eq!(reaction.waits.quantile(0.5), None, "that picture was of before");
         // A newer picture answers an older question too.
         reaction.asked(at(12));
         reaction.carried_out(Some(8));
         reaction.shown(8, at(20));
         assert_eq!(
-            (reaction.len(), reaction.quantile(0.0), reaction.quantile(0.99)),
+            (reaction.waits.len(), reaction.waits.quantile(0.0), reaction.waits.quantile(0.99)),
             (2, Some(Duration::from_millis(8)), Some(Duration::from_millis(20)))
         );
         // What changes no picture waits for none.
         reaction.asked(at(30));
         reaction.carried_out(None);
         reaction.shown(9, at(90));
-        assert_eq!(reaction.len(), 2);
+        assert_eq!(reaction.waits.len(), 2);
     }
 }

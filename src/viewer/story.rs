@@ -182,7 +182,7 @@ fn text(ui: &mut Ui, content: String, strong: bool) {
 
 fn figure(value: f64) -> String {
     match value {
-        v if v == 0.0 => "–".to_owned(),
+        0.0 => "–".to_owned(),
         v if v.abs() >= 100.0 => format!("{v:.0}"),
         v if v.abs() >= 0.01 => format!("{v:.3}"),
         v => format!("{v:.1e}"),

@@ -1,13 +1,18 @@
 //! A desktop without a screen: an X server in memory, a window manager, and a hand on keys and mouse.
 //!
 //! Whatever is started here is ended here, by its own handle; everything that could hang has a deadline.
+// No test needs all of it.
+#![allow(dead_code)]
 
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+
+mod drop;
 
 const TOOLS: &[&str] = &["Xvfb", "openbox", "xdotool", "wmctrl", "import"];
 /// Far more than anything here takes, even where other work holds the processors.
@@ -16,7 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(90);
 pub struct Desktop {
     // Ended in this order.
     _window_manager: Ended,
-    _server: Ended,
+    server: Mutex<Ended>,
     display: String,
     folder: TempDir,
 }
@@ -68,7 +73,7 @@ impl Desktop {
         let mut manager = Command::new("openbox");
         manager.arg("--startup").arg(format!("touch '{}'", ready_file.display()));
         let window_manager = quiet(&mut manager, &display, &folder).spawn().map(Ended).expect("openbox starts");
-        let desktop = Self { _window_manager: window_manager, _server: server, display, folder };
+        let desktop = Self { _window_manager: window_manager, server: Mutex::new(server), display, folder };
         until("openbox to be ready", || ready_file.exists().then_some(()));
         Some(desktop)
     }
@@ -76,6 +81,18 @@ impl Desktop {
     /// Where programs run, and keep their pictures.
     pub fn folder(&self) -> &Path {
         self.folder.path()
+    }
+
+    /// Where the program keeps its settings and bookmarks.
+    pub fn settings(&self) -> PathBuf {
+        self.folder().join("config/firstlight")
+    }
+
+    /// The screen is gone, as when a cable is pulled or a session ends.
+    pub fn lose(&self) {
+        let mut server = self.server.lock().expect("nobody else holds it");
+        server.0.kill().expect("the server can be ended");
+        server.0.wait().expect("it has ended");
     }
 
     /// Starts the program and waits for its window.
@@ -140,6 +157,29 @@ impl Program<'_> {
             let focused = self.desktop.tool("xdotool", &["getwindowfocus"])?;
             (focused.trim() == self.window).then_some(())
         });
+    }
+
+    /// Drops a file on the middle of the window.
+    pub fn drop_file(&self, path: &Path) {
+        drop::drop_file(&self.desktop.display, self.window.parse().expect("a window's number"), path);
+    }
+
+    /// Moves the mouse to this place of the window.
+    pub fn point_at(&self, x: i32, y: i32) {
+        self.xdotool(&format!("mousemove --window {} {x} {y}", self.window));
+    }
+
+    /// Types a text, as into a field.
+    pub fn type_text(&self, text: &str) {
+        assert!(self.desktop.tool("xdotool", &["type", "--delay", "20", text]).is_some(), "{}", self.errors());
+    }
+
+    /// Names of its threads.
+    pub fn threads(&self) -> Vec<String> {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.child.0.id())).expect("a live process");
+        // A thread may end while it is looked at.
+        let names = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("comm")).ok());
+        names.map(|name| name.trim_end().to_owned()).collect()
     }
 
     /// Runs xdotool with these words.
@@ -220,6 +260,12 @@ impl Program<'_> {
         ticks / 100.0
     }
 
+    /// Waits for it to leave for whatever reason; how, and all that it said.
+    pub fn left(mut self) -> (ExitStatus, String) {
+        let Some(status) = wait(&mut self.child.0, PATIENCE) else { panic!("it does not leave\n{}", self.errors()) };
+        (status, self.errors())
+    }
+
     /// Waits for it to leave by itself.
     pub fn ended(mut self) -> ExitStatus {
         let Some(status) = wait(&mut self.child.0, PATIENCE) else { panic!("it does not quit\n{}", self.errors()) };
@@ -234,6 +280,7 @@ fn quiet<'a>(command: &'a mut Command, display: &str, folder: &TempDir) -> &'a m
     command
         .env("DISPLAY", display)
         .env("XDG_RUNTIME_DIR", folder.path())
+        .env("XDG_CONFIG_HOME", folder.path().join("config"))
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("WAYLAND_SOCKET")
         .env_remove("RUST_LOG")

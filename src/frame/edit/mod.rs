@@ -8,23 +8,27 @@
 //! |---|---|
 //! | `mod` | the list of edits, and the system that empties the queue |
 //! | `property` | numbers of materials, lights, shapes and sky |
+//! | `texture` | textures in the place of colours |
 //! | `place` | moving, turning and scaling what is selected |
 //! | `add` | new things, copies, removal |
 
 mod add;
 mod place;
 mod property;
+mod texture;
 
 pub use add::NewThing;
 pub(super) use add::{clay, spawn};
-pub use property::{MaterialKind, Property, paint_of, textures};
+pub use property::{MaterialKind, Property, paint_of};
+pub(super) use texture::take as take_picture;
+pub use texture::textures;
 
 use super::history::History;
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
 use super::systems::{Clock, PictureSize, Shown};
 use crate::scene::MaterialSlots;
-use crate::scene::file::MeshShadingPart;
+use crate::scene::file::{MeshShadingPart, TexturePart};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
@@ -88,6 +92,11 @@ pub enum Edit {
     SetTexture {
         id: Id,
         name: String,
+    },
+    /// Puts a texture of this description in the place of a material's colour; a picture is read beside the picture.
+    Paint {
+        id: Id,
+        part: TexturePart,
     },
     /// Gives an object a material that the scene has.
     Assign {
@@ -177,7 +186,8 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         }
         Edit::Set { id, property, value } => property::set(world, Entity::try_from_bits(id), property, value)?,
         Edit::SetKind { id, kind } => property::set_kind(world, existing(world, id)?, kind)?,
-        Edit::SetTexture { id, name } => property::set_texture(world, existing(world, id)?, &name)?,
+        Edit::SetTexture { id, name } => texture::set_texture(world, existing(world, id)?, &name)?,
+        Edit::Paint { id, part } => texture::paint(world, existing(world, id)?, part)?,
         Edit::Assign { id, material } => {
             let (object, material) = (thing(world, id)?, existing(world, material)?);
             if let Some(mut slots) = world.get_mut::<MaterialSlots>(object) {

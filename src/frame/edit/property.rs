@@ -2,11 +2,10 @@
 
 use crate::render::{Environment, Fresnel};
 use crate::scene::file::{EnvironmentPart, Rgb};
-use crate::scene::{Amount, Linear, Material, Paint, Placement, PointLight, SceneEnvironment, Shape, SurfaceTexture};
+use crate::scene::{Amount, Linear, Material, Paint, Placement, PointLight, SceneEnvironment, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// What [`super::Edit::Set`] sets. A number is the first of the three values, and `x` is all that counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -93,7 +92,7 @@ pub fn paint_of(material: &Material) -> Option<&Paint> {
     }
 }
 
-fn paint_mut(material: &mut Material) -> Option<&mut Paint> {
+pub(super) fn paint_mut(material: &mut Material) -> Option<&mut Paint> {
     match material {
         Material::Diffuse { albedo: paint }
         | Material::Mirror { reflectance: paint }
@@ -143,7 +142,11 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
     Ok(())
 }
 
-fn set_if_different<T: bevy_ecs::component::Component + PartialEq>(world: &mut World, entity: Entity, value: T) {
+pub(super) fn set_if_different<T: bevy_ecs::component::Component + PartialEq>(
+    world: &mut World,
+    entity: Entity,
+    value: T,
+) {
     if world.get::<T>(entity) != Some(&value) {
         world.entity_mut(entity).insert(value);
     }
@@ -228,29 +231,6 @@ pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result
         },
         MaterialKind::Emissive => Material::Emissive { radiance: color },
     });
-    Ok(())
-}
-
-/// All textures that materials of the world use, by name.
-pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
-    let mut found: Vec<Arc<SurfaceTexture>> = Vec::new();
-    for material in world.query::<&Material>().iter(world) {
-        if let Some(Paint::Texture(texture)) = paint_of(material)
-            && !found.iter().any(|known| Arc::ptr_eq(known, texture))
-        {
-            found.push(texture.clone());
-        }
-    }
-    found.sort_by(|a, b| a.name.cmp(&b.name));
-    found
-}
-
-pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), String> {
-    let texture = textures(world).into_iter().find(|texture| texture.name == name);
-    let texture = texture.ok_or_else(|| format!("no material uses a texture `{name}`"))?;
-    let mut material = world.get::<Material>(entity).cloned().ok_or("this is not a material")?;
-    *paint_mut(&mut material).ok_or("this material has no colour")? = Paint::Texture(texture);
-    set_if_different(world, entity, material);
     Ok(())
 }
 

@@ -10,7 +10,7 @@
 mod show;
 mod thread;
 
-use super::{Picture, Target};
+use super::{Picture, Target, Waits};
 use crate::render::{
     BadSample, Display, Explanation, Film, Inspection, Legend, RayCounts, Region, RenderSettings, Snapshot,
 };
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Called whenever there is something new to be looked at.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -99,6 +99,10 @@ pub struct Stats {
 #[derive(Default)]
 struct Inbox {
     job: Option<Job>,
+    /// When the first job that has not been taken over was posted, if the thread was at work then.
+    posted: Option<Instant>,
+    /// Of the job of this generation: gives the same samples.
+    snapshot: Option<(u64, Snapshot)>,
     display: Option<Display>,
     look: Option<Look>,
     target: Option<Target>,
@@ -130,6 +134,7 @@ struct Shared {
     sleeping: AtomicBool,
     outbox: Mutex<Outbox>,
     pool: Mutex<Arc<rayon::ThreadPool>>,
+    cancels: Mutex<Waits>,
     waker: Option<Waker>,
 }
 
@@ -149,6 +154,7 @@ impl Worker {
             sleeping: AtomicBool::new(false),
             outbox: Mutex::default(),
             pool: Mutex::new(make_pool(threads)?),
+            cancels: Mutex::default(),
             waker,
         });
         let thread = std::thread::Builder::new()
@@ -162,7 +168,16 @@ impl Worker {
     }
 
     pub fn set_job(&self, job: Job) {
-        self.post(|inbox| inbox.job = Some(job));
+        let works = !self.shared.sleeping.load(Ordering::Acquire);
+        self.post(|inbox| {
+            inbox.job = Some(job);
+            inbox.posted = inbox.posted.or(works.then(Instant::now));
+        });
+    }
+
+    /// Keeps all samples: the snapshot of the job of this generation that gives the same ones, sooner.
+    pub fn set_snapshot(&self, generation: u64, snapshot: Snapshot) {
+        self.post(|inbox| inbox.snapshot = Some((generation, snapshot)));
     }
 
     /// Keeps all samples.
@@ -200,6 +215,11 @@ impl Worker {
         let (sender, receiver) = channel();
         self.post(|inbox| inbox.question = Some((question, sender)));
         receiver
+    }
+
+    /// How long the thread took to drop what it was at when a job came, the latest times.
+    pub fn cancels(&self) -> Waits {
+        lock(&self.shared.cancels).clone()
     }
 
     /// The pool that renders, for work beside it such as building trees.

@@ -84,6 +84,9 @@ impl<'a> Loop<'a> {
         if inbox.quit {
             return false;
         }
+        if let Some(posted) = inbox.posted {
+            lock(&self.shared.cancels).add(posted.elapsed());
+        }
         if let Some(threads) = inbox.threads {
             self.set_threads(threads);
         }
@@ -129,6 +132,14 @@ impl<'a> Loop<'a> {
         } else if self.region != region_before {
             self.scheduler_sees_region();
             self.redraw = true;
+        }
+        if let (Some((generation, snapshot)), Some(job)) = (inbox.snapshot, &mut self.job)
+            && generation == job.generation
+        {
+            job.snapshot = snapshot;
+            // How many nodes a ray visits is another number now.
+            self.views = Views::default();
+            self.redraw |= !self.look.inspection.is_of_film();
         }
         // A place in another picture.
         let generation = self.job.as_ref().map(|job| job.generation);

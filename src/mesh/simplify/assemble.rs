@@ -25,9 +25,14 @@ pub(super) struct Original<'a> {
 
 /// Triangles in the order of the mesh they come from, vertices in the order of their use.
 pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedge], original: &Original) -> Mesh {
-    let mut order: Vec<(u32, u32)> = remaining.sources.iter().copied().zip(0..).collect();
-    order.sort_unstable();
+    // Each source is there once, so that a table of all of them is a sort.
+    let sources = remaining.sources.iter().max().map_or(0, |&last| last as usize + 1);
+    let mut place_of = vec![Numbers::NONE; sources];
+    remaining.sources.iter().zip(0..).for_each(|(&source, t)| place_of[source as usize] = t);
+    let order = place_of.into_iter().enumerate().filter(|&(_, t)| t != Numbers::NONE);
     let mut mesh = Mesh { center: original.center, ..Mesh::default() };
+    mesh.triangles.reserve(remaining.triangles.len());
+    mesh.positions.reserve(remaining.triangles.len() / 2);
     let unscale = original.scale.recip();
     let mut numbers = Numbers::new(positions.len(), wedges.len());
     for (source, t) in order {
@@ -51,7 +56,7 @@ pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedg
             }
         }
         mesh.triangles.push(corners);
-        if let Some(&slot) = original.slots.get(source as usize) {
+        if let Some(&slot) = original.slots.get(source) {
             mesh.slots.push(slot);
         }
     }

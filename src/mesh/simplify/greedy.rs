@@ -2,10 +2,11 @@
 //!
 //! An edge costs the sum of its ends' quadrics at their common minimum. Adding quadrics never makes an edge cheaper,
 //! so a queued cost is a lower bound: it is checked when the edge comes up, and an edge whose ends have changed goes
-//! back with its true cost. This gives the order of an eager priority queue for a fraction of the evaluations.
+//! back with its true cost, unless that is of the same level. This gives the order of an eager priority queue, but for
+//! the order within a level, for a fraction of the evaluations.
 
 use super::quadric::Quadric;
-use super::queue::MonotoneQueue;
+use super::queue::LevelQueue;
 use super::surface::{Kind, NONE, Surface, WedgeJoin};
 use glam::Vec3;
 
@@ -29,6 +30,13 @@ pub(super) struct Log {
     pub joins: Vec<WedgeJoin>,
 }
 
+impl Log {
+    pub fn append(&mut self, later: Self) {
+        self.collapses.extend(later.collapses);
+        self.joins.extend(later.joins);
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     ends: [u32; 2],
@@ -48,7 +56,7 @@ const LISTED: [u32; 2] = [2, 4];
 pub(super) struct Greedy {
     pub surface: Surface,
     pub quadrics: Vec<Quadric>,
-    queue: MonotoneQueue,
+    queue: LevelQueue,
     edges: Vec<Edge>,
     /// Where a vertex went; itself while alive.
     went_to: Vec<u32>,
@@ -80,7 +88,7 @@ impl Greedy {
         let mut greedy = Self {
             surface,
             quadrics,
-            queue: MonotoneQueue::new(),
+            queue: LevelQueue::new(edges.len()),
             went_to: (0..count as u32).collect(),
             versions: vec![0; count],
             sleepers: vec![NONE; count],
@@ -100,12 +108,11 @@ impl Greedy {
     /// Collapses edges in order of cost until a limit is reached or no edge is left.
     pub fn run(&mut self, limits: Limits) {
         while self.surface.face_count > limits.faces {
-            let Some((key, e)) = self.queue.pop() else { break };
-            self.last_key = key;
-            if key > limits.cost {
-                self.queue.push(key, e);
+            if self.queue.least_key().is_none_or(|key| key > limits.cost) {
                 break;
             }
+            let Some((key, e)) = self.queue.pop() else { break };
+            self.last_key = key;
             let edge = self.edges[e as usize];
             let ends = edge.ends.map(|end| self.find(end));
             if ends[0] == ends[1] {
@@ -119,7 +126,7 @@ impl Greedy {
             if version != edge.version {
                 let edge = &mut self.edges[e as usize];
                 (edge.version, edge.ends) = (version, ends);
-                if cost > key {
+                if LevelQueue::floor(cost) > key {
                     self.queue.push(cost, e);
                     continue;
                 }
@@ -142,7 +149,7 @@ impl Greedy {
     }
 
     /// A lower bound on the cost of the next collapse, if any edge is left.
-    pub fn next_cost(&self) -> Option<f32> {
+    pub fn next_cost(&mut self) -> Option<f32> {
         self.queue.least_key()
     }
 

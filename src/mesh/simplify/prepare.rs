@@ -33,13 +33,13 @@ impl Prepared {
         let welding = Welding::of(&mesh.positions);
         let positions: Vec<Vec3> =
             welding.first.par_iter().map(|&vertex| mesh.positions[vertex as usize] * scale).collect();
-        let keep = |t: &usize| {
-            let [a, b, c] = welding.places(mesh.triangles[*t]);
-            a != b && b != c && c != a
-        };
-        let sources: Vec<u32> = (0..mesh.triangles.len()).filter(keep).map(|t| t as u32).collect();
-        let triangles: Vec<[u32; 3]> =
-            sources.par_iter().map(|&t| welding.places(mesh.triangles[t as usize])).collect();
+        let mut triangles: Vec<[u32; 3]> = mesh.triangles.par_iter().map(|&t| welding.places(t)).collect();
+        let mut sources: Vec<u32> = (0..triangles.len() as u32).collect();
+        let is_triangle = |[a, b, c]: [u32; 3]| a != b && b != c && c != a;
+        if !triangles.par_iter().all(|&t| is_triangle(t)) {
+            sources.retain(|&t| is_triangle(triangles[t as usize]));
+            triangles.retain(|&t| is_triangle(t));
+        }
         let mut prepared = Self {
             positions,
             kinds: Vec::new(),
@@ -63,6 +63,13 @@ impl Prepared {
             prepared.quadrics = prepared.find_quadrics(&around);
         }
         prepared
+    }
+
+    /// How many triangles each vertex has.
+    pub fn valences(&self) -> Vec<u32> {
+        let mut valences = vec![0; self.positions.len()];
+        self.triangles.as_flattened().iter().for_each(|&vertex| valences[vertex as usize] += 1);
+        valences
     }
 
     /// A wedge is a vertex of the mesh; with slots, a vertex as one slot's triangles see it.

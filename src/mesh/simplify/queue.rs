@@ -1,97 +1,142 @@
-//! A priority queue for keys that never fall below the last one taken out.
+//! A priority queue by levels of cost, for keys that do not fall below the last one taken out.
 
-/// Radix heap (Ahuja, Mehlhorn, Orlin and Tarjan 1990): a few array writes an entry, where a binary heap spends
-/// a cache miss a level. Entries with equal keys come out in an order that depends only on the calls made.
+use super::surface::NONE;
+
+/// A level is an octave: of two keys in one, the larger is less than twice the smaller. For squared distances that is a
+/// factor of √2, and narrower levels cost more time than their lower error is worth (docs/simplification.md).
+///
+/// An item is in at most once, so lists through an array of links do: two writes an entry, and no search. Those of a
+/// level come out in the order in which they went in, which also spreads steps of equal cost over the surface.
 #[derive(Debug)]
-pub(super) struct MonotoneQueue {
-    /// Bucket k > 0 holds keys whose highest bit different from `last` is bit k − 1; bucket 0 those equal to it.
-    buckets: Vec<Vec<(u32, u32)>>,
-    last: u32,
+pub(super) struct LevelQueue {
+    /// First and last item of each level.
+    ends: Vec<[u32; 2]>,
+    /// The item behind each item in its level.
+    next: Vec<u32>,
+    /// All levels below are empty.
+    level: usize,
 }
 
-impl MonotoneQueue {
-    pub fn new() -> Self {
-        Self { buckets: vec![Vec::new(); 33], last: 0 }
+/// The bits of non-negative floats are in the order of their values; those of the mantissa are dropped.
+const DROPPED_BITS: u32 = 23;
+const LEVELS: usize = (f32::INFINITY.to_bits() >> DROPPED_BITS) as usize + 1;
+
+impl LevelQueue {
+    /// For items below `items`.
+    pub fn new(items: usize) -> Self {
+        Self { ends: vec![[NONE; 2]; LEVELS], next: vec![NONE; items], level: 0 }
     }
 
-    /// Keys below the last one taken out count as equal to it.
+    /// The least key of the level of `key`, which must be a number and not negative.
+    #[inline]
+    pub fn floor(key: f32) -> f32 {
+        floor_of(level_of(key))
+    }
+
+    /// Keys below the level of the last one taken out count as of that level.
+    ///
+    /// - `item`: not in the queue.
     #[inline]
     pub fn push(&mut self, key: f32, item: u32) {
         debug_assert!(key >= 0.0, "keys must not be negative or NaN: {key}");
-        // The bits of non-negative floats are in the order of their values.
-        let key = key.to_bits().max(self.last);
-        self.buckets[bucket(key, self.last)].push((key, item));
+        let ends = &mut self.ends[level_of(key).max(self.level)];
+        self.next[item as usize] = NONE;
+        match ends[0] {
+            NONE => ends[0] = item,
+            _ => self.next[ends[1] as usize] = item,
+        }
+        ends[1] = item;
+    }
+
+    /// An item of the lowest level, and the least key of that level.
+    #[inline]
+    pub fn pop(&mut self) -> Option<(f32, u32)> {
+        let key = self.least_key()?;
+        let ends = &mut self.ends[self.level];
+        let item = ends[0];
+        ends[0] = self.next[item as usize];
+        Some((key, item))
     }
 
     /// The key that [`Self::pop`] would give.
-    pub fn least_key(&self) -> Option<f32> {
-        let filled = self.buckets.iter().find(|bucket| !bucket.is_empty())?;
-        filled.iter().map(|entry| f32::from_bits(entry.0)).min_by(f32::total_cmp)
+    #[inline]
+    pub fn least_key(&mut self) -> Option<f32> {
+        self.level = (self.level..LEVELS).find(|&level| self.ends[level][0] != NONE)?;
+        Some(floor_of(self.level))
     }
 
-    /// The key in the middle of all entries.
+    /// The least key of the level in which the item in the middle is.
     pub fn median_key(&self) -> Option<f32> {
-        let mut keys: Vec<u32> = self.buckets.iter().flatten().map(|entry| entry.0).collect();
-        let middle = keys.len() / 2;
-        if keys.is_empty() { None } else { Some(f32::from_bits(*keys.select_nth_unstable(middle).1)) }
+        let counts: Vec<usize> = self.ends.iter().map(|ends| self.items_from(ends[0]).count()).collect();
+        let middle = counts.iter().sum::<usize>() / 2;
+        let mut below = 0;
+        let is_middle = |count: &usize| {
+            below += count;
+            below > middle
+        };
+        counts.iter().position(is_middle).map(floor_of)
     }
 
-    /// The entry with the least key.
-    pub fn pop(&mut self) -> Option<(f32, u32)> {
-        if self.buckets[0].is_empty() {
-            let filled = self.buckets.iter().position(|bucket| !bucket.is_empty())?;
-            let mut entries = std::mem::take(&mut self.buckets[filled]);
-            self.last = entries.iter().map(|entry| entry.0).min()?;
-            for entry in entries.drain(..) {
-                self.buckets[bucket(entry.0, self.last)].push(entry);
-            }
-            // Keep the memory for later.
-            self.buckets[filled] = entries;
-        }
-        self.buckets[0].pop().map(|(key, item)| (f32::from_bits(key), item))
+    fn items_from(&self, first: u32) -> impl Iterator<Item = u32> {
+        let some = |item: u32| Some(item).filter(|&item| item != NONE);
+        std::iter::successors(some(first), move |&item| some(self.next[item as usize]))
     }
 }
 
 #[inline]
-fn bucket(key: u32, last: u32) -> usize {
-    (u32::BITS - (key ^ last).leading_zeros()) as usize
+fn level_of(key: f32) -> usize {
+    (key.to_bits() >> DROPPED_BITS) as usize
+}
+
+#[inline]
+fn floor_of(level: usize) -> f32 {
+    f32::from_bits((level as u32) << DROPPED_BITS)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::cmp::Reverse;
-    use std::collections::BinaryHeap;
 
     #[test]
-    fn agrees_with_a_binary_heap_under_mixed_pushes_and_pops() {
-        let mut queue = MonotoneQueue::new();
-        let mut heap = BinaryHeap::new();
+    fn agrees_with_looking_at_every_entry_under_mixed_pushes_and_pops() {
+        let mut queue = LevelQueue::new(20_000);
+        let mut plain: Vec<(u32, usize, u32)> = Vec::new();
         let (mut state, mut last) = (7_u32, 0.0_f32);
         for i in 0..20_000 {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            if state >> 30 != 0 {
-                let key = (last + (state >> 12 & 0xfff) as f32 * 0.37).max(last);
+            if state >> 30 != 0 && i < 15_000 {
+                let key = last + (state >> 12 & 0xfff) as f32 * 0.37;
                 queue.push(key, i);
-                heap.push(Reverse(key.to_bits()));
+                plain.push((LevelQueue::floor(key).to_bits(), i as usize, i));
             } else {
-                let expected = heap.pop().map(|Reverse(bits)| f32::from_bits(bits));
-                let found = queue.pop().map(|(key, _)| key);
-                assert_eq!(found, expected);
-                last = found.unwrap_or(last);
+                // Least level first, and in it the one that came first.
+                let expected = plain.iter().min().copied();
+                plain.retain(|entry| Some(*entry) != expected);
+                let found = queue.pop();
+                assert_eq!(found, expected.map(|(bits, _, item)| (f32::from_bits(bits), item)));
+                last = found.map_or(last, |(key, _)| key);
             }
         }
     }
 
     #[test]
     fn a_key_below_the_last_comes_out_next() {
-        let mut queue = MonotoneQueue::new();
+        let mut queue = LevelQueue::new(3);
         queue.push(5.0, 0);
         queue.push(9.0, 1);
-        assert_eq!(queue.pop(), Some((5.0, 0)));
+        assert_eq!(queue.median_key(), Some(8.0));
+        assert_eq!(queue.pop(), Some((4.0, 0)));
         queue.push(1.0, 2);
-        assert_eq!(queue.pop(), Some((5.0, 2)));
-        assert_eq!(queue.pop(), Some((9.0, 1)));
+        assert_eq!(queue.pop(), Some((4.0, 2)));
+        assert_eq!(queue.pop(), Some((8.0, 1)));
         assert_eq!(queue.pop(), None);
+    }
+
+    #[test]
+    fn a_level_is_less_than_an_octave_wide() {
+        for key in [0.0, f32::MIN_POSITIVE, 1e-9, 0.3, 1.0, 1.9999, 7e20, f32::MAX] {
+            let floor = LevelQueue::floor(key);
+            assert!(floor <= key && (key == 0.0 || key / floor < 2.0), "{key}: {floor}");
+        }
     }
 }

@@ -55,6 +55,8 @@ pub(super) struct Surface {
     stamp: u32,
     /// Wedges that the checked collapse would join: from, to.
     joins: Vec<(u32, u32)>,
+    /// The triangles around both ends of the checked collapse, see [`Self::fan`].
+    fans: [Vec<(u32, u32, u32)>; 2],
     scratch: Vec<u32>,
 }
 
@@ -105,6 +107,7 @@ impl Surface {
             marks: vec![0; count],
             stamp: 0,
             joins: Vec::new(),
+            fans: Default::default(),
             scratch: Vec::new(),
         }
     }
@@ -114,6 +117,11 @@ impl Surface {
         let wedges = self.corner_wedge.as_chunks::<3>().0;
         let live = self.corner_vertex.as_chunks::<3>().0.iter().enumerate().filter(|(_, t)| t[0] != NONE);
         live.map(|(t, &vertices)| (t, vertices, wedges.get(t).copied()))
+    }
+
+    /// How many live triangles a vertex has.
+    pub fn valence(&self, vertex: usize) -> u32 {
+        self.valence[vertex]
     }
 
     /// Whether a vertex has too many triangles to collapse.
@@ -148,7 +156,7 @@ impl Surface {
         self.marks = marks;
     }
 
-    /// Whether `from` may go into `to` and both be at `position`; leaves the wedge joins for [`Self::collapse`].
+    /// Whether `from` may go into `to` and both be at `position`; keeps what [`Self::collapse`] needs to know.
     ///
     /// Refused: what would change the topology (Dey et al. 1999, link condition), move a border or seam off its
     /// line, fold or flatten a triangle, or tear shading data apart.
@@ -158,18 +166,37 @@ impl Surface {
         if self.valence[from as usize] + self.valence[to as usize] > MAX_VALENCE {
             return false;
         }
+        // Walked once: all else goes along these lists.
+        let mut fans = std::mem::take(&mut self.fans);
+        for (fan, vertex) in fans.iter_mut().zip([from, to]) {
+            fan.clear();
+            fan.extend(self.fan(vertex));
+        }
+        let shared = self.shared_if_linked(from, to, &fans);
+        let allowed = shared.is_some_and(|shared| {
+            (kind == Kind::Free || self.is_constraint(from, to, shared))
+                && (shared == 2 || kind == Kind::Curve)
+                && self.keeps_orientation(&fans[0], from, to, position)
+                && self.keeps_orientation(&fans[1], to, from, position)
+        });
+        self.fans = fans;
+        allowed && self.plan_wedges(from, to)
+    }
+
+    /// How many triangles lie at the edge, if the link condition holds.
+    fn shared_if_linked(&mut self, from: u32, to: u32, fans: &[Vec<(u32, u32, u32)>; 2]) -> Option<u32> {
         // Marks: `near` for neighbours of `from`, `common` for those of both.
         let near = self.new_stamps(2);
         let common = near + 1;
-        let mut marks = std::mem::take(&mut self.marks);
+        let marks = &mut self.marks;
         let mut shared = 0;
-        for (_, b, c) in self.fan(from) {
+        for &(_, b, c) in &fans[0] {
             marks[b as usize] = near;
             marks[c as usize] = near;
             shared += u32::from(b == to || c == to);
         }
         let mut both = 0;
-        for (_, b, c) in self.fan(to) {
+        for &(_, b, c) in &fans[1] {
             for other in [b, c] {
                 if marks[other as usize] == near && other != from {
                     marks[other as usize] = common;
@@ -178,19 +205,12 @@ impl Surface {
             }
         }
         // A triangle opposite the edge on both sides would become the same triangle twice.
-        let opposite = |vertex: u32, end: u32| {
-            self.fan(vertex)
-                .any(|(_, b, c)| b != end && c != end && marks[b as usize] == common && marks[c as usize] == common)
+        let opposite = |fan: &[(u32, u32, u32)], end: u32| {
+            fan.iter()
+                .any(|&(_, b, c)| marks[b as usize] == common && marks[c as usize] == common && b != end && c != end)
         };
         let linked = shared == both && (1..=2).contains(&shared);
-        let allowed = linked && !(shared == 2 && opposite(from, to) && opposite(to, from));
-        self.marks = marks;
-        allowed
-            && (kind == Kind::Free || self.is_constraint(from, to, shared))
-            && (shared == 2 || kind == Kind::Curve)
-            && self.keeps_orientation(from, to, position)
-            && self.keeps_orientation(to, from, position)
-            && self.plan_wedges(from, to)
+        (linked && !(shared == 2 && opposite(&fans[0], to) && opposite(&fans[1], from))).then_some(shared)
     }
 
     /// Whether the edge itself is border, seam or material edge; `shared` triangles lie at it.
@@ -214,11 +234,11 @@ impl Surface {
         })
     }
 
-    /// Whether the triangles at `vertex` and not at `other` keep an area and roughly their direction.
-    fn keeps_orientation(&self, vertex: u32, other: u32, position: Vec3) -> bool {
+    /// Whether the triangles around `vertex` that are not at `other` keep an area and roughly their direction.
+    fn keeps_orientation(&self, fan: &[(u32, u32, u32)], vertex: u32, other: u32, position: Vec3) -> bool {
         let old = self.positions[vertex as usize].as_dvec3();
         let new = position.as_dvec3();
-        self.fan(vertex).filter(|&(_, b, c)| b != other && c != other).all(|(_, b, c)| {
+        fan.iter().filter(|&&(_, b, c)| b != other && c != other).all(|&(_, b, c)| {
             let b = self.positions[b as usize].as_dvec3();
             let c = self.positions[c as usize].as_dvec3();
             let side = c - b;
@@ -266,33 +286,21 @@ impl Surface {
         let mut corners = std::mem::take(&mut self.scratch);
         corners.clear();
         let mut died = 0;
-        let first = self.first_corner[from as usize];
-        let mut corner = first;
-        loop {
-            let base = (corner - corner % 3) as usize;
-            let triangle = [0, 1, 2].map(|k| self.corner_vertex[base + k]);
-            if triangle[0] != NONE {
-                if triangle.contains(&to) {
-                    self.corner_vertex[base] = NONE;
-                    died += 1;
-                    for vertex in triangle {
-                        self.valence[vertex as usize] -= 1;
-                    }
-                } else {
-                    self.corner_vertex[corner as usize] = to;
-                    corners.push(corner);
-                    if !self.corner_wedge.is_empty() {
-                        let wedge = &mut self.corner_wedge[corner as usize];
-                        *wedge = self.joins.iter().find(|join| join.0 == *wedge).map_or(*wedge, |join| join.1);
-                    }
-                }
+        for &(corner, b, c) in &self.fans[0] {
+            if b == to || c == to {
+                self.corner_vertex[(corner - corner % 3) as usize] = NONE;
+                self.valence[if b == to { c } else { b } as usize] -= 1;
+                died += 1;
+                continue;
             }
-            corner = self.next_corner[corner as usize];
-            if corner == first {
-                break;
+            self.corner_vertex[corner as usize] = to;
+            corners.push(corner);
+            if !self.corner_wedge.is_empty() {
+                let wedge = &mut self.corner_wedge[corner as usize];
+                *wedge = self.joins.iter().find(|join| join.0 == *wedge).map_or(*wedge, |join| join.1);
             }
         }
-        corners.extend(self.fan(to).map(|(corner, ..)| corner));
+        corners.extend(self.fans[1].iter().filter(|&&(_, b, c)| b != from && c != from).map(|&(corner, ..)| corner));
         for (i, &corner) in corners.iter().enumerate() {
             self.next_corner[corner as usize] = corners[(i + 1) % corners.len()];
         }

@@ -193,9 +193,10 @@ impl LightTable {
         self.lights[id as usize].sample(textures, techniques, position, u, pmf)
     }
 
-    /// Tells `found` of one point on every light, or on one of them where there are many.
+    /// Tells `found` of one point on every light, or on one of them where there are many, and whether the light is a
+    /// point: those are points here.
     ///
-    /// Point lights are points. Uses [`EACH_DIMENSIONS`] dimensions of `sampler`, `dimension` being the first.
+    /// Uses [`EACH_DIMENSIONS`] dimensions of `sampler`, `dimension` being the first.
     #[inline]
     pub(super) fn sample_each(
         &self,
@@ -203,7 +204,7 @@ impl LightTable {
         position: Vec3,
         sampler: &Sampler,
         dimension: u32,
-        mut found: impl FnMut(LightSample),
+        mut found: impl FnMut(LightSample, bool),
     ) {
         let mut ask = |id: u32, pmf: f32, dimension: u32| {
             let light = &self.lights[id as usize];
@@ -214,7 +215,7 @@ impl LightTable {
                 _ => light.sample(textures, &Techniques::default(), position, sampler.pair(dimension), pmf),
             };
             if let Some(sample) = sample {
-                found(sample);
+                found(sample, light.is_point);
             }
         };
         if self.lights.len() <= selection::MAX_ESTIMATED {
@@ -224,6 +225,14 @@ impl LightTable {
         } else if let Some((id, pmf)) = self.selection.by_power(sampler.single(dimension)) {
             ask(id, pmf, dimension + 1);
         }
+    }
+
+    /// The density with which [`Self::sample_each`] at `position` finds the point of light `id`, not a point light, in
+    /// direction `wi`, `distance` metres away; per steradian.
+    #[inline]
+    pub(super) fn pdf_each(&self, id: u32, position: Vec3, wi: Vec3, distance: f32) -> f32 {
+        let by_angle = Techniques::default().solid_angle;
+        self.selection.pmf_each(&self.lights, id) * self.lights[id as usize].shape.pdf(position, by_angle, wi, distance)
     }
 
     #[inline]

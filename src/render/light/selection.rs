@@ -91,6 +91,12 @@ impl Selection {
         (pmf > 0.0).then_some((id, pmf))
     }
 
+    /// The probability that light `id` is asked where few are asked each and many by [`Self::by_power`].
+    #[inline]
+    pub fn pmf_each(&self, lights: &[Light], id: u32) -> f32 {
+        if lights.len() <= MAX_ESTIMATED { 1.0 } else { self.alias.pmf(id) }
+    }
+
     /// The probability that [`Self::sample`] picks light `id`.
     #[inline]
     pub fn pmf(&self, lights: &[Light], techniques: &Techniques, id: u32, position: Vec3, normal: Vec3) -> f32 {

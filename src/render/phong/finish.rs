@@ -5,8 +5,9 @@ use super::super::dielectric::fresnel;
 use super::super::medium::MediumStack;
 use super::super::surface::Vertex;
 use super::super::{Material, MaterialId, Snapshot};
+use super::{lobe_pdf, share};
 use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 
 /// A surface at a point, all inputs looked up.
 #[derive(Clone, Copy, Debug)]
@@ -25,18 +26,23 @@ pub(super) enum Shiny {
     /// A mirror that shows lights as they are.
     Mirror { tint: Vec3 },
     /// Lights as highlights, (n + 1) / 2π · cosⁿ about the mirrored direction, which sum up to `tint`; all else
-    /// mirrored, within the same lobe if it is `rough`, else sharply (Whitted 1980).
+    /// mirrored, within the same lobe if it is `rough`, else sharply (Whitted 1980). Rough ones find lights both ways.
     Gloss { tint: Vec3, exponent: f32, rough: bool },
     /// A smooth interface; `eta` as in [`fresnel`].
     Pane { share: f32, eta: f32, id: MaterialId },
 }
 
 impl Finish {
-    pub fn at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Self {
+    /// Black.
+    pub fn new() -> Self {
         let nothing = Shiny::Mirror { tint: Vec3::ZERO };
-        let mut finish = Self { ambient: Vec3::ZERO, diffuse: Vec3::ZERO, shiny: [nothing; MAX_LOBES], n_shiny: 0 };
-        finish.add(scene, id, vertex, media, 1.0);
-        finish
+        Self { ambient: Vec3::ZERO, diffuse: Vec3::ZERO, shiny: [nothing; MAX_LOBES], n_shiny: 0 }
+    }
+
+    /// Becomes what a material is at a vertex. One finish for many vertices: to make a new one takes longer than this.
+    pub fn look_up(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) {
+        (self.ambient, self.diffuse, self.n_shiny) = (Vec3::ZERO, Vec3::ZERO, 0);
+        self.add(scene, id, vertex, media, 1.0);
     }
 
     fn add(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack, weight: f32) {
@@ -107,17 +113,20 @@ impl Finish {
     /// Radiance towards `wo` from light that brings an irradiance of 1 at a right angle, from `wi`.
     ///
     /// - `mirrored`: unit, `wo` mirrored by the normal.
+    /// - `pdf`: per steradian, with which `wi` was found; `None` for light from a point, which no ray finds. Of rough
+    ///   highlights only the share is given that their own rays do not bring.
     #[inline]
-    pub fn reflected(&self, wi: Vec3, normal: Vec3, mirrored: Vec3) -> Vec3 {
+    pub fn reflected(&self, wi: Vec3, normal: Vec3, mirrored: Vec3, pdf: Option<f32>) -> Vec3 {
         let cos = normal.dot(wi);
         if cos <= 0.0 {
             return Vec3::ZERO;
         }
         let mut sum = self.diffuse * (FRAC_1_PI * cos);
         for shiny in self.shiny() {
-            if let Shiny::Gloss { tint, exponent, .. } = shiny {
-                let near = mirrored.dot(wi).max(0.0);
-                sum += *tint * ((exponent + 1.0) / TAU * near.powf(*exponent));
+            if let Shiny::Gloss { tint, exponent, rough } = shiny {
+                let lobe = lobe_pdf(*exponent, mirrored.dot(wi));
+                let part = pdf.filter(|_| *rough).map_or(1.0, |pdf| share(pdf, lobe));
+                sum += *tint * (lobe * part);
             }
         }
         sum

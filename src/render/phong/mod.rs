@@ -14,7 +14,8 @@ mod shadow;
 
 use super::dielectric::{fresnel, refract};
 use super::medium::MediumStack;
-use super::path::{CAMERA_DIMENSIONS, CameraPath};
+use super::path::CAMERA_DIMENSIONS;
+use super::paths::PathBatch;
 use super::renderer::RayCounts;
 use super::surface::{Vertex, material_of};
 use super::{MaterialId, Snapshot};
@@ -50,13 +51,48 @@ struct Walk {
     sampler: Sampler,
     slot: u32,
     media: MediumStack,
-    /// A highlight has stood in for the lights: what this ray meets of them counts no more.
-    lights_counted: bool,
+    lights: LightsMet,
+}
+
+/// What a ray may still bring of lights, which a highlight asks for by itself.
+#[derive(Clone, Copy)]
+enum LightsMet {
+    /// All of it: nothing else has asked.
+    Count,
+    /// Nothing: a highlight has stood in for them.
+    Counted,
+    /// A share: the ray lies within a lobe, with this density per steradian, and lights were asked from `position`.
+    Shared { pdf: f32, position: Vec3 },
+}
+
+impl LightsMet {
+    /// How much counts of a light that is asked for with the density that `asked` tells for a position.
+    #[inline]
+    fn share(self, asked: impl FnOnce(Vec3) -> f32) -> f32 {
+        match self {
+            Self::Count => 1.0,
+            Self::Counted => 0.0,
+            Self::Shared { pdf, position } => share(pdf, asked(position)),
+        }
+    }
+}
+
+/// Weight of light that was found with density `own` where another way finds it with density `other` (the power
+/// heuristic, Veach 1997, β = 2).
+#[inline]
+fn share(own: f32, other: f32) -> f32 {
+    if other == 0.0 {
+        return 1.0;
+    }
+    // By the ratio: squares of densities overflow for lights of a few pixels.
+    let ratio = other / own;
+    1.0 / (1.0 + ratio * ratio)
 }
 
 /// Scratch memory of one worker: cleared between waves, never given back.
 #[derive(Default)]
 pub(super) struct PhongWave {
+    starts: PathBatch,
     rays: RayBatch,
     walks: Vec<Walk>,
     next_rays: RayBatch,
@@ -66,7 +102,8 @@ pub(super) struct PhongWave {
 }
 
 impl PhongWave {
-    /// Follows `camera_paths` to their ends and adds what they find to `radiance`, indexed by slot.
+    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// slot.
     ///
     /// `max_depth` as for paths: a light seen in two mirrors is three segments away. `None` when `stop` said so; what
     /// is in `radiance` then is of no use.
@@ -74,17 +111,21 @@ impl PhongWave {
         &mut self,
         scene: &Snapshot,
         max_depth: u32,
-        camera_paths: impl Iterator<Item = CameraPath>,
+        start: impl FnOnce(&mut PathBatch),
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        self.rays.clear();
+        self.starts.start(radiance.len(), false, false);
+        start(&mut self.starts);
+        std::mem::swap(&mut self.rays, &mut self.starts.rays);
         self.walks.clear();
-        for CameraPath { ray, sampler, slot, weight } in camera_paths {
-            self.rays.push(&ray);
-            let media = MediumStack::default();
-            self.walks.push(Walk { weight: Vec3::splat(weight), sampler, slot, media, lights_counted: false });
-        }
+        self.walks.extend((0..self.rays.len()).map(|i| Walk {
+            weight: self.starts.throughput_of(i),
+            sampler: self.starts.sampler(i),
+            slot: self.starts.slot[i],
+            media: MediumStack::default(),
+            lights: LightsMet::Count,
+        }));
         let mut counts = RayCounts { camera: self.rays.len() as u64, ..RayCounts::default() };
         for depth in 1..=max_depth {
             if self.rays.is_empty() {
@@ -109,13 +150,16 @@ impl PhongWave {
         self.next_rays.clear();
         self.next_walks.clear();
         self.shadows.clear();
+        let mut finish = Finish::new();
         for i in 0..self.rays.len() {
             let mut walk = self.walks[i];
             let ray = self.rays.get(i);
             let slot = walk.slot as usize;
             let Some(hit) = self.hits.get(i) else {
-                if shading.features.environment && !(walk.lights_counted && shading.environment_sampler.is_some()) {
-                    radiance[slot] += walk.weight * shading.environment.radiance(ray.dir);
+                if shading.features.environment {
+                    let sampler = &shading.environment_sampler;
+                    let share = sampler.as_ref().map_or(1.0, |sampler| walk.lights.share(|_| sampler.pdf(ray.dir)));
+                    radiance[slot] += walk.weight * share * shading.environment.radiance(ray.dir);
                 }
                 continue;
             };
@@ -126,18 +170,22 @@ impl PhongWave {
             let vertex = Vertex::new(scene, &ray, &hit, material);
             if let Some(emission) = shading.emission[material as usize]
                 && vertex.front
-                && !shading.lights.light_of(hit.object, hit.prim).is_some_and(|id| {
-                    // A point shows to the eye alone: in a mirror its ball would be a speck that few samples meet.
-                    walk.lights_counted || depth > 1 && shading.lights.is_point(id)
-                })
             {
-                radiance[slot] += walk.weight * emission.scale * emission.radiance.eval(scene, vertex.uv);
+                let share = match shading.lights.light_of(hit.object, hit.prim) {
+                    None => 1.0,
+                    // A point shows to the eye alone: in a mirror its ball would be a speck that few samples meet.
+                    Some(id) if depth > 1 && shading.lights.is_point(id) => 0.0,
+                    Some(id) => walk
+                        .lights
+                        .share(|from| shading.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))),
+                };
+                radiance[slot] += walk.weight * share * emission.scale * emission.radiance.eval(scene, vertex.uv);
             }
             if depth == max_depth {
                 continue;
             }
             let step = Step { scene, walk: &walk, vertex: &vertex, depth };
-            let finish = Finish::at(scene, material, &vertex, &walk.media);
+            finish.look_up(scene, material, &vertex, &walk.media);
             if finish.is_lit() {
                 radiance[slot] += walk.weight * self.light(&step, &finish);
             }
@@ -153,27 +201,27 @@ impl PhongWave {
         let shading = &*scene.shading;
         let mirrored = vertex.mirrored();
         let mut ambient = Vec3::ZERO;
-        let mut direct = |radiance: Vec3, wi: Vec3, target: Option<Vec3>| {
+        let mut direct = |radiance: Vec3, wi: Vec3, target: Option<Vec3>, pdf: Option<f32>| {
             if !vertex.is_reached_from(wi) {
                 return;
             }
-            let light = walk.weight * finish.reflected(wi, vertex.normal, mirrored) * radiance;
+            let light = walk.weight * finish.reflected(wi, vertex.normal, mirrored, pdf) * radiance;
             if light != Vec3::ZERO {
                 self.shadows.push(walk.slot, light, vertex.leaving(wi), wi, target);
             }
         };
         let dimension = step.dimension();
-        shading.lights.sample_each(&shading.textures, vertex.position, &walk.sampler, dimension, |sample| {
+        shading.lights.sample_each(&shading.textures, vertex.position, &walk.sampler, dimension, |sample, is_point| {
             let mut arriving = sample.radiance / sample.pdf;
             if shading.features.media {
                 arriving *= walk.media.transmittance(scene, vertex.position.distance(sample.target));
             }
             ambient += finish.ambient * arriving * (AMBIENT_SHARE * FRAC_1_PI);
-            direct(arriving, sample.wi, Some(sample.target));
+            direct(arriving, sample.wi, Some(sample.target), (!is_point).then_some(sample.pdf));
         });
         if let Some(environment) = &shading.environment_sampler {
             if let Some((wi, pdf)) = environment.sample(walk.sampler.pair(dimension + DIM_ENVIRONMENT)) {
-                direct(shading.environment.radiance(wi) / pdf, wi, None);
+                direct(shading.environment.radiance(wi) / pdf, wi, None, Some(pdf));
             }
         } else if shading.features.environment {
             ambient += finish.ambient * shading.ambient.radiance(vertex.normal);
@@ -186,25 +234,32 @@ impl PhongWave {
         let Step { walk, vertex, .. } = *step;
         match *shiny {
             Shiny::Mirror { tint } => {
-                self.follow(step, walk.weight * tint, vertex.mirrored(), None, false, dimension);
+                self.follow(step, walk.weight * tint, vertex.mirrored(), None, LightsMet::Count, dimension);
             }
             Shiny::Gloss { tint, exponent, rough } => {
                 let mirrored = vertex.mirrored();
-                let wi =
-                    if rough { within_lobe(mirrored, exponent, walk.sampler.pair(dimension + 1)) } else { mirrored };
-                // Below the surface there is nothing to see: the middle of the lobe stands in.
-                let wi = if vertex.is_reached_from(wi) && wi.dot(vertex.normal) > 0.0 { wi } else { mirrored };
-                self.follow(step, walk.weight * tint, wi, None, true, dimension);
+                let weight = walk.weight * tint;
+                if rough {
+                    let wi = within_lobe(mirrored, exponent, walk.sampler.pair(dimension + 1));
+                    if vertex.is_reached_from(wi) && wi.dot(vertex.normal) > 0.0 {
+                        let pdf = lobe_pdf(exponent, mirrored.dot(wi));
+                        let lights = LightsMet::Shared { pdf, position: vertex.position };
+                        self.follow(step, weight, wi, None, lights, dimension);
+                        return;
+                    }
+                    // Below the surface there is nothing to see: the middle of the lobe stands in.
+                }
+                self.follow(step, weight, mirrored, None, LightsMet::Counted, dimension);
             }
             Shiny::Pane { share, eta, id } => {
                 let (reflectance, cos_t) = fresnel(vertex.normal.dot(vertex.wo).clamp(0.0, 1.0), eta);
                 let weight = walk.weight * share;
-                self.follow(step, weight * reflectance, vertex.mirrored(), None, false, dimension);
+                self.follow(step, weight * reflectance, vertex.mirrored(), None, LightsMet::Count, dimension);
                 if reflectance < 1.0 {
                     let wi = refract(vertex.wo, vertex.normal, eta, cos_t);
                     // Radiance is squeezed into a narrower cone where light is slower: the factor η².
                     let weight = weight * ((1.0 - reflectance) * eta * eta);
-                    self.follow(step, weight, wi, Some(id), false, dimension + 2);
+                    self.follow(step, weight, wi, Some(id), LightsMet::Count, dimension + 2);
                 }
             }
         }
@@ -217,7 +272,7 @@ impl PhongWave {
         mut weight: Vec3,
         wi: Vec3,
         through: Option<MaterialId>,
-        lights_counted: bool,
+        lights: LightsMet,
         dimension: u32,
     ) {
         let Step { scene, walk, vertex, depth } = *step;
@@ -240,7 +295,7 @@ impl PhongWave {
         }
         let origin = if through.is_some() { vertex.passing(wi) } else { vertex.leaving(wi) };
         self.next_rays.push(&Ray::new(origin, wi));
-        self.next_walks.push(Walk { weight, media, lights_counted, ..*walk });
+        self.next_walks.push(Walk { weight, media, lights, ..*walk });
     }
 }
 
@@ -261,7 +316,13 @@ impl Step<'_> {
     }
 }
 
-/// A unit direction with density (n + 1) / 2π · cosⁿ per steradian about `axis`.
+/// (n + 1) / 2π · cosⁿ about an axis, per steradian; `cos` may be negative.
+#[inline]
+fn lobe_pdf(exponent: f32, cos: f32) -> f32 {
+    (exponent + 1.0) / TAU * cos.max(0.0).powf(exponent)
+}
+
+/// A unit direction with density [`lobe_pdf`] about `axis`.
 #[inline]
 fn within_lobe(axis: Vec3, exponent: f32, u: Vec2) -> Vec3 {
     let cos = (1.0 - u.x).powf(1.0 / (exponent + 1.0));

@@ -5,7 +5,7 @@ use super::super::filter::FilterSampler;
 use super::super::paths::{PathBatch, PathLanes};
 use super::warp::uniform_disc;
 use crate::lanes::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
-use crate::sampling::{SamplerLanes, hash_u32};
+use crate::sampling::SamplerLanes;
 use glam::{UVec2, Vec3};
 
 /// Pixels whose camera rays are wanted, in the order of the rays.
@@ -52,11 +52,10 @@ fn start<S: Simd>(s: S, lens: Lens, pixels: &Pixels, sample: u32, slot: u32, to:
         let count = (pixels.local.len() - first).min(LANES);
         let mask = if count == LANES { Mask::MAX } else { (1 << count) - 1 };
         let (x, y) = (load_some(s, &pixels.x[first..]), load_some(s, &pixels.y[first..]));
-        let stream = Bits::splat(s, hash_u32(lens.seed)).hash_combine(x).hash_combine(y);
         let sampler = if lens.even_samples {
-            SamplerLanes { stream, reversed_index: Bits::splat(s, sample.reverse_bits()) }
+            SamplerLanes::of_pixels(s, lens.seed, [x, y], sample)
         } else {
-            SamplerLanes { stream: stream.hash_combine(Bits::splat(s, sample)), reversed_index: Bits::splat(s, 0) }
+            SamplerLanes::independent(s, lens.seed, [x, y], sample)
         };
         let [dx, dy] = lens.filter.sample_lanes(sampler.pair(0));
         let (x, y) = (x.to_float() + dx, y.to_float() + dy);

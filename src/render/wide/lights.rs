@@ -55,12 +55,12 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> Points<S> {
         }
     }
     let (positions, normals) = (place.position.to_arrays(), place.normal.to_arrays());
-    let (streams, reversed) = (sampler.stream.to_array(), sampler.reversed_index.to_array());
+    let parts = [sampler.stream.to_array(), sampler.reversed_index.to_array(), sampler.screen.to_array()];
     let mut arrays = [[0.0; LANES]; 10];
     let (mut found, mut infinite) = (0, 0);
     for lane in lanes_of(mask) {
         let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
-        let sampler = Sampler::from_parts([streams[lane], reversed[lane]]);
+        let sampler = Sampler::from_parts([parts[0][lane], parts[1][lane], parts[2][lane]]);
         let point = choose_light_point(scene, techniques, at(&positions), at(&normals), &sampler, dimension);
         if let Some((target, sample)) = point {
             found |= 1 << lane;

@@ -1,16 +1,18 @@
 //! What keys and the panel ask for.
 
 use super::App;
-use crate::frame::{Command, Edit, Explaining, Looking, PictureFormat, Selection, gizmo};
+use crate::frame::{Command, Edit, Explaining, Focus, FocusTarget, Looking, PictureFormat, Selection, gizmo};
 use crate::render::{Inspection, Integrator};
+use crate::viewer::dialog::Purpose;
 use crate::viewer::keys::Action;
 use crate::viewer::saver::{Larger, Saved, new_scene_file};
 use crate::viewer::toasts::Tone;
 use crate::viewer::{camera_text, panel};
 use std::io::Write as _;
+use std::path::Path;
 use std::time::Instant;
 use winit::event_loop::ActiveEventLoop;
-use winit::window::Fullscreen;
+use winit::window::{CursorGrabMode, Fullscreen};
 
 impl App {
     /// What was asked for in the panel.
@@ -31,6 +33,12 @@ impl App {
         }
         if asked.toggle_brush {
             self.toggle_brush(now);
+        }
+        if asked.toggle_drag {
+            self.toggle_drag(now);
+        }
+        if let Some(purpose) = asked.dialog {
+            self.ask_for_file(purpose, now);
         }
         if let Some(linear) = asked.screenshot {
             self.screenshot(linear);
@@ -102,6 +110,17 @@ impl App {
                 self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
             }
             Action::ToggleSpin => self.input.toggle_spin(now),
+            Action::ToggleDrag => self.toggle_drag(now),
+            Action::CaptureMouse => self.capture_mouse(!self.input.is_captured(), now),
+            Action::FocusFollows => {
+                let follows = self.session.world().resource::<Focus>().target;
+                let [x, y] = self.input.place();
+                self.session.send(match follows {
+                    FocusTarget::Cursor(_) => Command::ToggleFocusLock,
+                    _ => Command::FocusFollows { x, y },
+                });
+            }
+            Action::OpenDialog => self.ask_for_file(Purpose::Open, now),
             Action::TogglePanel => self.panel.shown = !self.panel.shown,
             Action::ToggleHelp => self.help.toggle(),
             Action::ToggleOverlays => self.overlays = !self.overlays,
@@ -111,6 +130,7 @@ impl App {
                     window.set_fullscreen((!full).then_some(Fullscreen::Borderless(None)));
                 }
             }
+            Action::Leave if self.input.is_captured() => self.capture_mouse(false, now),
             Action::Leave if self.help.open => self.help.open = false,
             Action::Leave if self.brush.is_armed() => drop(self.brush.toggle()),
             Action::Leave if self.session.world().resource::<Explaining>().story.is_some() => {
@@ -122,6 +142,53 @@ impl App {
             Action::Leave | Action::Quit => event_loop.exit(),
         }
         self.repaint_at = Some(now);
+    }
+
+    fn toggle_drag(&mut self, now: Instant) {
+        let orbits = self.input.toggle_orbits();
+        self.toasts.add(Tone::News, if orbits { "a drag moves around the pivot" } else { "a drag looks about" }, now);
+    }
+
+    /// The mouse turns the view without a button from now on, or points again.
+    pub(super) fn capture_mouse(&mut self, wanted: bool, now: Instant) {
+        let Some(window) = self.window.clone().filter(|_| wanted != self.input.is_captured()) else { return };
+        if !wanted {
+            // A window that cannot let go of it is about to close.
+            let _ = window.set_cursor_grab(CursorGrabMode::None);
+        } else if let Err(error) =
+            window.set_cursor_grab(CursorGrabMode::Locked).or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined))
+        {
+            self.toasts.add(Tone::Problem, format!("the mouse cannot be captured here: {error}"), now);
+            return;
+        }
+        window.set_cursor_visible(!wanted);
+        self.input.set_captured(wanted);
+        if wanted {
+            self.toasts.add(Tone::News, "the mouse moves the view: Enter or Esc lets it go", now);
+        }
+    }
+
+    /// Shows a dialog; the answer comes to [`Self::take_files`].
+    fn ask_for_file(&mut self, purpose: Purpose, now: Instant) {
+        let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
+        let folder = folder.unwrap_or_else(|| self.options.folder.clone());
+        if let Err(reason) = self.dialog.ask(purpose, &folder) {
+            self.toasts.add(Tone::Problem, reason, now);
+        }
+    }
+
+    /// Carries out what was chosen in a dialog.
+    pub(super) fn take_files(&mut self, now: Instant) {
+        for answer in self.dialog.answers() {
+            match answer {
+                Ok((purpose, path)) => {
+                    self.reaction.asked(now);
+                    self.session.send(purpose.command(path));
+                    self.stirred = true;
+                }
+                Err(reason) => self.toasts.add(Tone::Problem, reason, now),
+            }
+        }
     }
 
     fn toggle_brush(&mut self, now: Instant) {

@@ -33,6 +33,8 @@ impl App {
             reaction: &self.reaction,
             speed: self.input.speed(),
             spinning: self.input.is_spinning(),
+            orbits: self.input.orbits(),
+            place: self.input.place(),
             memory: panel.shown.then(memory_of_process).flatten(),
             brush: brush.is_armed(),
             recent: self.memory.recent(),

@@ -6,7 +6,7 @@ use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 use winit::application::ApplicationHandler;
-use winit::event::{MouseButton, MouseScrollDelta, StartCause, WindowEvent};
+use winit::event::{DeviceEvent, DeviceId, MouseButton, MouseScrollDelta, StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{Key, NamedKey};
 use winit::window::WindowId;
@@ -52,7 +52,10 @@ impl ApplicationHandler<Wake> for App {
                 self.session.send(Command::SetHidden { hidden: occluded });
                 self.repaint_at = Some(now);
             }
-            WindowEvent::Focused(false) => self.input.release_all(now),
+            WindowEvent::Focused(false) => {
+                self.capture_mouse(false, now);
+                self.input.release_all(now);
+            }
             WindowEvent::DroppedFile(path) => self.session.send(Command::Open { path }),
             WindowEvent::ModifiersChanged(modifiers) => {
                 self.input.set_modifiers(modifiers.state(), now);
@@ -73,6 +76,7 @@ impl ApplicationHandler<Wake> for App {
                 }
             }
             WindowEvent::CursorMoved { position, .. } => {
+                self.input.set_focuses(self.focus_follows() && !response.consumed);
                 self.input.cursor(position.x, position.y);
                 if self.input.is_dragging() || self.handles.is_grabbed() {
                     self.reaction.asked(now);
@@ -130,6 +134,16 @@ impl ApplicationHandler<Wake> for App {
                 }
             }
             _ => {}
+        }
+    }
+
+    fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
+        if let DeviceEvent::MouseMotion { delta: (x, y) } = event
+            && self.input.is_captured()
+        {
+            self.input.mouse_moved(x, y);
+            self.reaction.asked(Instant::now());
+            self.stirred = true;
         }
     }
 

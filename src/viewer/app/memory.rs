@@ -99,7 +99,7 @@ mod tests {
         let memory = || Memory::of(SettingsStore::in_folder(folder.path()));
         let mut session = Session::new(SessionOptions::default()).unwrap();
         let mut first = memory();
-        let mut follow = |session: &mut Session, memory: &mut Memory| {
+        let follow = |session: &mut Session, memory: &mut Memory| {
             session.update(Duration::ZERO);
             assert_eq!(memory.follow(session), Vec::<String>::new());
             session.update(Duration::ZERO);

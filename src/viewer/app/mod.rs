@@ -19,6 +19,7 @@ mod events;
 mod memory;
 
 use super::brush::Brush;
+use super::dialog::Dialog;
 use super::display::{self, Display};
 use super::handles::Handles;
 use super::input::Input;
@@ -28,9 +29,11 @@ use super::presenter::{PresentError, Presenter};
 use super::reaction::Reaction;
 use super::saver::Saver;
 use super::toasts::{Toasts, Tone};
-use crate::frame::{Command, MessageKind, Session, SessionOptions, Target, Waker};
+use crate::frame::{Command, Focus, FocusTarget, MessageKind, Session, SessionOptions, Target, Waits, Waker};
 use crate::scene::{SceneSource, UpAxis};
 use memory::Memory;
+use serde_json::json;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -56,6 +59,8 @@ pub struct ViewerOptions {
     pub folder: PathBuf,
     /// Where to write down what is done.
     pub record: Option<PathBuf>,
+    /// Print at the end how prompt and how fast it was, one JSON object.
+    pub print_figures: bool,
 }
 
 /// Why the window could not be opened, or closed by itself.
@@ -87,6 +92,8 @@ const FRAME: Duration = Duration::from_micros(8_000);
 const LATEST: Duration = Duration::from_millis(250);
 /// Figures that change by themselves are shown again so often.
 const FIGURES: Duration = Duration::from_millis(250);
+/// So long after the last change of its size a window has come to rest.
+const AT_REST: Duration = Duration::from_millis(500);
 /// What a window stops at by itself, so that nothing runs hot for ever: an error that nobody sees.
 const GOOD_ENOUGH: Target = Target { spp: None, seconds: None, error: Some(0.005) };
 
@@ -115,15 +122,17 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
         })
     };
     let mut app = App::new(options, pending, waker)?;
-    event_loop.run_app(&mut app).map_err(ViewerError::EventLoop)?;
+    let ended = event_loop.run_app(&mut app).map_err(ViewerError::EventLoop);
+    // Also when the display is gone.
     app.session.end_record();
-    if let Some(trouble) = app.memory.keep_window(app.window_size) {
-        log::warn!("{trouble}");
-    }
+    app.keep_window_size();
     for saved in app.saver.finish() {
         app.tell_saved(saved);
     }
-    app.failure.map_or(Ok(()), Err)
+    if app.options.print_figures {
+        app.print_figures();
+    }
+    ended.and(app.failure.map_or(Ok(()), Err))
 }
 
 struct App {
@@ -134,6 +143,7 @@ struct App {
     pending: Arc<AtomicBool>,
     session: Session,
     saver: Saver,
+    dialog: Dialog,
     input: Input,
     toasts: Toasts,
     help: Help,
@@ -149,6 +159,8 @@ struct App {
     title: String,
     /// Logical pixels.
     window_size: (u32, u32),
+    /// When the window's size is to be kept, since it has come to rest.
+    keep_size_at: Option<Instant>,
     occluded: bool,
     /// Something happened since the last tick.
     stirred: bool,
@@ -158,6 +170,8 @@ struct App {
     last_tick: Option<Instant>,
     /// When a movement was last handed over.
     steered_at: Instant,
+    /// When the last restart was.
+    restarted_at: Instant,
     last_draw: Option<Instant>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
@@ -186,9 +200,11 @@ impl App {
         Ok(Self {
             start,
             steered_at: start,
+            restarted_at: start,
             pending,
             session,
-            saver: Saver::new(&options.folder, waker),
+            saver: Saver::new(&options.folder, waker.clone()),
+            dialog: Dialog::new(waker),
             input: Input::new(options.width, options.height),
             toasts: Toasts::default(),
             help: Help::default(),
@@ -202,6 +218,7 @@ impl App {
             window: None,
             title: String::new(),
             window_size: (options.width, options.height),
+            keep_size_at: None,
             occluded: false,
             stirred: true,
             shown_picture: None,
@@ -235,12 +252,42 @@ impl App {
         let logical = size.to_logical::<u32>(window.scale_factor());
         if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
             self.window_size = (logical.width, logical.height);
+            self.keep_size_at = Some(Instant::now() + AT_REST);
         }
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
         self.input.resize(width, height);
         self.session.send(Command::Resize { width, height });
         self.stirred = true;
         window.request_redraw();
+    }
+
+    /// How long people waited (milliseconds), and the paths since the last restart with the seconds since then, in which
+    /// the window did all that it does.
+    fn print_figures(&self) {
+        let milliseconds = |waits: &Waits| {
+            let of = |share| waits.quantile(share).map(|wait| wait.as_secs_f64() * 1e3);
+            json!({ "count": waits.len(), "p50": of(0.5), "p99": of(0.99), "longest": of(1.0) })
+        };
+        let status = self.session.status();
+        let figures = json!({
+            "scene": status.scene,
+            "width": status.film_width * status.divider,
+            "height": status.film_height * status.divider,
+            "reaction_ms": milliseconds(self.reaction.waits()),
+            "cancel_ms": milliseconds(&self.session.cancels()),
+            "camera_rays": status.rays.camera,
+            "seconds": self.restarted_at.elapsed().as_secs_f64(),
+        });
+        // Standard output may be closed, and then nobody reads it.
+        let _ = writeln!(std::io::stdout(), "{figures}");
+    }
+
+    /// The next window is as large. Not only at the end: X11 ends the program itself when the display goes.
+    fn keep_window_size(&mut self) {
+        self.keep_size_at = None;
+        if let Some(trouble) = self.memory.keep_window(self.window_size) {
+            log::warn!("{trouble}");
+        }
     }
 
     /// Hands over what was asked for, lets the session go on, and looks for something new.
@@ -256,6 +303,9 @@ impl App {
             self.steer(now, clock);
             let generation = self.session.status().restarts;
             self.reaction.carried_out((generation != restarts).then_some(generation));
+        }
+        if self.session.status().restarts != restarts {
+            self.restarted_at = now;
         }
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
@@ -278,6 +328,10 @@ impl App {
         }
         for saved in self.saver.finished() {
             self.tell_saved(saved);
+        }
+        self.take_files(now);
+        if self.keep_size_at.is_some_and(|at| now >= at) {
+            self.keep_window_size();
         }
         let title = title(&self.session.status().scene);
         let n_toasts = self.toasts.len();
@@ -302,7 +356,16 @@ impl App {
         let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
         let session = self.session.next_wake(clock).map(|at| self.start + at);
-        self.wake_at = [session, self.toasts.next_change(), moving, figures, repaint_at].into_iter().flatten().min();
+        self.wake_at = [session, self.toasts.next_change(), moving, figures, repaint_at, self.keep_size_at]
+            .into_iter()
+            .flatten()
+            .min();
+    }
+
+    /// What is under the mouse is to be sharp, and the mouse is not in the panel.
+    fn focus_follows(&self) -> bool {
+        let follows = matches!(self.session.world().resource::<Focus>().target, FocusTarget::Cursor(_));
+        follows && self.presenter.as_ref().is_some_and(|presenter| !presenter.egui_context().is_pointer_over_area())
     }
 
     /// The last change of the view has been rendered, or that takes too long to wait for.

@@ -1,6 +1,6 @@
 //! Where the camera stands, what its lens makes sharp, and the views that were kept.
 
-use super::{Around, Asked, number, row, rows, slider, vector};
+use super::{Around, Asked, number, row, rows, slider, vector, whole};
 use crate::frame::{Bookmarks, Command, Focus, FocusTarget, Looking, Session, f_stop, radius_of_f_stop, sharp_zone};
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::status::metres;
@@ -28,6 +28,15 @@ pub fn view(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
             }
         });
         row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
+        row(ui, "a drag", |ui| {
+            ui.horizontal(|ui| {
+                for (label, orbits) in [("looks about", false), ("orbits", true)] {
+                    if ui.selectable_label(around.orbits == orbits, label).clicked() {
+                        asked.toggle_drag |= around.orbits != orbits;
+                    }
+                }
+            })
+        });
     });
     ui.horizontal_wrapped(|ui| {
         for (label, command) in [
@@ -58,7 +67,7 @@ pub fn view(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
     });
 }
 
-pub fn lens(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     let rig = session.status().rig;
     let lens = rig.lens;
     let set = |asked: &mut Asked, lens: Lens| asked.send(Command::SetLens(lens));
@@ -82,11 +91,36 @@ pub fn lens(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 if let Some(distance) = number(ui, distance, 0.005 * distance, 1e-6..=1e9, " m") {
                     asked.send(Command::SetFocus { distance });
                 }
-                let target = session.world().resource::<Focus>().target;
-                let mut stays = target != FocusTarget::Camera;
-                let hint = "stays with what was focused on last, however the camera moves";
-                if ui.checkbox(&mut stays, "stays").on_hover_text(hint).changed() {
-                    asked.send(Command::ToggleFocusLock);
+            })
+        });
+        row(ui, "stays with", |ui| {
+            ui.horizontal(|ui| {
+                let kind = match session.world().resource::<Focus>().target {
+                    FocusTarget::Camera => 0,
+                    FocusTarget::Point(_) | FocusTarget::Object(..) => 1,
+                    FocusTarget::Cursor(_) => 2,
+                };
+                let [x, y] = around.place;
+                for (i, (label, hint)) in [
+                    ("camera", "the distance stays as it is"),
+                    ("thing", "with what was focused on last, however it and the camera move"),
+                    ("mouse", "with whatever is under the mouse"),
+                ]
+                .into_iter()
+                .enumerate()
+                {
+                    if !ui.selectable_label(kind == i, label).on_hover_text(hint).clicked() || kind == i {
+                        continue;
+                    }
+                    // From one to another by way of the camera.
+                    if kind != 0 {
+                        asked.send(Command::ToggleFocusLock);
+                    }
+                    match i {
+                        1 => asked.send(Command::ToggleFocusLock),
+                        2 => asked.send(Command::FocusFollows { x, y }),
+                        _ => {}
+                    }
                 }
             })
         });
@@ -110,8 +144,8 @@ pub fn lens(ui: &mut Ui, session: &Session, asked: &mut Asked) {
         });
         row(ui, "blades", |ui| {
             ui.horizontal(|ui| {
-                if let Some(blades) = number(ui, f64::from(lens.blades), 0.05, 0.0..=16.0, "") {
-                    set(asked, Lens { blades: blades.round() as u32, ..lens });
+                if let Some(blades) = whole(ui, lens.blades, 0..=16) {
+                    set(asked, Lens { blades, ..lens });
                 }
                 if lens.blades >= 3 {
                     if let Some(turn) = number(ui, lens.blade_rotation_deg, 0.5, -360.0..=360.0, "°") {

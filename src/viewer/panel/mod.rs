@@ -9,6 +9,7 @@
 //! | `camera` | pose, lens, kept views |
 //! | `scene` | the list of things, adding, sky |
 //! | `selected` | place, material, light and mesh of what is selected |
+//! | `texture` | the texture of a material |
 //! | `statistics` | figures |
 
 mod camera;
@@ -16,7 +17,10 @@ mod picture;
 mod scene;
 mod selected;
 mod statistics;
+mod texture;
 
+use super::change::PictureChange;
+use super::dialog::Purpose;
 use super::reaction::Reaction;
 use crate::frame::{Command, Edit, Session, gizmo};
 use bevy_ecs::prelude::Entity;
@@ -30,6 +34,7 @@ pub struct PanelState {
     pub gizmo: Option<gizmo::Mode>,
     /// The ratio that the slider asks for while it is dragged.
     ratio: Option<(Entity, f64)>,
+    change: PictureChange,
     /// A file to be added.
     mesh_path: String,
     /// Pictures that are kept are so many times as wide and high as the window.
@@ -40,7 +45,15 @@ pub struct PanelState {
 
 impl Default for PanelState {
     fn default() -> Self {
-        Self { shown: false, gizmo: None, ratio: None, mesh_path: String::new(), scale: 1, pressed: false }
+        Self {
+            shown: false,
+            gizmo: None,
+            ratio: None,
+            change: PictureChange::default(),
+            mesh_path: String::new(),
+            scale: 1,
+            pressed: false,
+        }
     }
 }
 
@@ -49,6 +62,10 @@ pub struct Around<'a> {
     pub reaction: &'a Reaction,
     pub speed: f64,
     pub spinning: bool,
+    /// A drag moves around the pivot.
+    pub orbits: bool,
+    /// The mouse, in fractions of the picture.
+    pub place: [f64; 2],
     /// Bytes of the process, where that can be known.
     pub memory: Option<u64>,
     /// The next drag is a rectangle.
@@ -63,8 +80,11 @@ pub struct Asked {
     pub commands: Vec<Command>,
     pub speed: Option<f64>,
     pub toggle_spin: bool,
+    pub toggle_drag: bool,
     pub screenshot: Option<bool>,
     pub toggle_brush: bool,
+    /// A dialog for a file, and what it is for.
+    pub dialog: Option<Purpose>,
 }
 
 impl Asked {
@@ -76,6 +96,10 @@ impl Asked {
         self.commands.push(Command::Edit(edit));
     }
 }
+
+/// The parts of the panel, from above; the list of keys tells of each.
+pub const SECTIONS: [&str; 10] =
+    ["Render", "View", "Lens", "Display", "Selected", "Objects", "Open", "Add", "Sky", "Statistics"];
 
 const WIDTH: f32 = 288.0;
 /// Room for the status line.
@@ -90,23 +114,25 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         bottom: FOOT,
     });
     let before = asked.commands.len();
+    state.change.follow(session);
     let width = WIDTH.min(0.6 * context.content_rect().width());
     let panel = egui::SidePanel::right("panel").frame(frame).resizable(false).exact_width(width);
     let response = panel.show(context, |ui| {
         style(ui);
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Beside the scroll bar.
-            ui.set_width(ui.available_width() - 8.0);
-            section(ui, "Render", true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
-            section(ui, "View", false, |ui| camera::view(ui, session, around, asked));
-            section(ui, "Lens", true, |ui| camera::lens(ui, session, asked));
-            section(ui, "Display", false, |ui| picture::display(ui, session, asked));
-            section(ui, "Selected", true, |ui| selected::selected(ui, state, session, asked));
-            section(ui, "Objects", true, |ui| scene::objects(ui, session, asked));
-            section(ui, "Recent", false, |ui| scene::recent(ui, session, around.recent, asked));
-            section(ui, "Add", false, |ui| scene::add(ui, &mut state.mesh_path, asked));
-            section(ui, "Sky", false, |ui| scene::sky(ui, session, asked));
-            section(ui, "Statistics", true, |ui| statistics::statistics(ui, session, around));
+            ui.set_width((ui.available_width() - 8.0).max(0.0));
+            let [render, view, lens, display, selected, objects, open, add, sky, statistics] = SECTIONS;
+            section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
+            section(ui, view, false, |ui| camera::view(ui, session, around, asked));
+            section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));
+            section(ui, display, false, |ui| picture::display(ui, session, asked));
+            section(ui, selected, true, |ui| selected::selected(ui, state, session, asked));
+            section(ui, objects, true, |ui| scene::objects(ui, session, asked));
+            section(ui, open, false, |ui| scene::open(ui, session, around.recent, asked));
+            section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
+            section(ui, sky, false, |ui| scene::sky(ui, session, asked));
+            section(ui, statistics, true, |ui| statistics::statistics(ui, session, around));
         });
     });
     // From pressing a button of the mouse to letting go is one step to undo.
@@ -156,6 +182,13 @@ fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f
         .suffix(suffix)
         .max_decimals(4)
         .update_while_editing(false);
+    ui.add(drag).changed().then_some(new)
+}
+
+/// A whole number, in the same way.
+fn whole(ui: &mut Ui, value: u32, range: std::ops::RangeInclusive<u32>) -> Option<u32> {
+    let mut new = value;
+    let drag = egui::DragValue::new(&mut new).speed(0.05).range(range).update_while_editing(false);
     ui.add(drag).changed().then_some(new)
 }
 

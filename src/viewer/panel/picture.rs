@@ -1,6 +1,6 @@
 //! How the picture is made and shown.
 
-use super::{Around, Asked, number, row, rows, slider};
+use super::{Around, Asked, number, row, rows, slider, whole};
 use crate::frame::{Command, Looking, Session, StopAt, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::viewer::status::tone_curve;
@@ -39,8 +39,8 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
             });
         });
         row(ui, "threads", |ui| {
-            if let Some(threads) = number(ui, status.threads as f64, 0.05, 1.0..=256.0, "") {
-                asked.send(Command::SetThreads { threads: threads.round() as usize });
+            if let Some(threads) = whole(ui, status.threads as u32, 1..=256) {
+                asked.send(Command::SetThreads { threads: threads as usize });
             }
         });
     });

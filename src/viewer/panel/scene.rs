@@ -5,6 +5,7 @@ use crate::frame::{Command, Edit, NewThing, Property, Selection, Session};
 use crate::render::Environment;
 use crate::scene::Shape;
 use crate::scene::file::MeshSourcePart;
+use crate::viewer::dialog::Purpose;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use std::path::Path;
@@ -47,8 +48,11 @@ fn kind(shape: &Shape) -> &'static str {
     }
 }
 
-/// What was opened before; a click opens it again.
-pub fn recent(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
+/// A file by dialog, or what was opened before, which a click opens again.
+pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
+    if ui.button("File …").on_hover_text("a scene, a model, or a picture that was kept (Ctrl+O)").clicked() {
+        asked.dialog = Some(Purpose::Open);
+    }
     let mut others = recent.iter().filter(|name| **name != session.status().scene).take(8).peekable();
     if others.peek().is_none() {
         ui.weak("nothing else so far: drop a file on the window");
@@ -85,6 +89,9 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
         });
         let field = ui.add(egui::TextEdit::singleline(path).hint_text("model.obj").desired_width(96.0));
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if ui.button("…").on_hover_text("choose a file").clicked() {
+            asked.dialog = Some(Purpose::AddMesh);
+        }
         if (ui.button("Add").clicked() || entered) && !path.trim().is_empty() {
             asked.edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path.trim().to_owned()))));
         }

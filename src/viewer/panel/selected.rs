@@ -1,11 +1,12 @@
 //! Place, material, light and mesh of what is selected.
 
-use super::{Asked, PanelState, color, number, row, rows, slider, vector};
+use super::{Asked, PanelState, color, number, row, rows, slider, texture, vector};
 use crate::frame::{Edit, MaterialKind, MeshMeasure, Property, Selection, Session, gizmo, paint_of};
 use crate::render::Fresnel;
 use crate::scene::file::MeshShadingPart;
 use crate::scene::{Amount, Linear, Material, MeshOrigin, Paint, Placement, Shape};
-use crate::viewer::status::metres;
+use crate::viewer::change::Difference;
+use crate::viewer::status::{metres, percent};
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
 use glam::DVec3;
@@ -151,6 +152,7 @@ fn shape(ui: &mut Ui, state: &mut PanelState, session: &Session, entity: Entity,
                 if response.changed() {
                     let ratio = (percent / 100.0).clamp(0.01, 1.0);
                     state.ratio = Some((entity, ratio));
+                    state.change.begin(entity, origin.simplify.is_none(), session);
                     asked.edit(Edit::Remesh { id, shading: origin.shading, ratio });
                 } else if !response.dragged() && session.status().loading.is_none() {
                     state.ratio = None;
@@ -165,6 +167,17 @@ fn shape(ui: &mut Ui, state: &mut PanelState, session: &Session, entity: Entity,
                         let hint = "between the two surfaces, measured at 20,000 points of each, before scaling";
                         let text = format!("mean {}, largest {}", metres(deviation.mean()), metres(deviation.max()));
                         ui.label(text).on_hover_text(hint);
+                    });
+                    row(ui, "picture", |ui| match state.change.of(entity) {
+                        Some(Difference { mean, plain, spp: [before, now] }) => {
+                            let hint = format!(
+                                "difference to the picture with the whole mesh ({before} samples, now {now}), noise \
+                                 included: mean, and pixels that differ by more than a twentieth of white"
+                            );
+                            let text = format!("{} mean, {} of pixels", percent(mean), percent(plain));
+                            ui.label(text).on_hover_text(hint);
+                        }
+                        None => drop(ui.weak("–").on_hover_text("the whole mesh was not seen from here")),
                     });
                 }
             }
@@ -226,17 +239,14 @@ fn properties(ui: &mut Ui, session: &Session, id: u64, material: &Material, aske
                             asked.edit(Edit::Set { id, property: Property::Color, value });
                         }
                     }
-                    Paint::Texture(texture) => {
-                        ui.label(&texture.name);
-                        if ui.small_button("plain").on_hover_text("a colour in its place").clicked() {
-                            let value = DVec3::splat(0.5);
-                            asked.edit(Edit::Set { id, property: Property::Color, value });
-                        }
-                    }
+                    Paint::Texture(texture) => drop(ui.label(&texture.name)),
                 }
-                textures(ui, session, id, asked);
+                texture::menu(ui, session, id, paint, asked);
             })
         });
+        if let Paint::Texture(texture) = paint {
+            texture::numbers(ui, id, &texture.part, asked);
+        }
     }
     let mut amount = |ui: &mut Ui, name: &str, property: Property, value: f64, range: std::ops::RangeInclusive<f64>| {
         let logarithmic = *range.end() > 10.0 || property == Property::Alpha;
@@ -284,29 +294,6 @@ fn properties(ui: &mut Ui, session: &Session, id: u64, material: &Material, aske
         }
         Material::Diffuse { .. } | Material::Mirror { .. } | Material::Emissive { .. } => {}
     }
-}
-
-/// A menu of the textures that the scene has, where it has any.
-fn textures(ui: &mut Ui, session: &Session, id: u64, asked: &mut Asked) {
-    let mut names: Vec<&str> = (session.inputs().materials.iter())
-        .filter_map(|material| match paint_of(&material.material)? {
-            Paint::Texture(texture) => Some(texture.name.as_str()),
-            Paint::Rgb(_) => None,
-        })
-        .collect();
-    names.sort_unstable();
-    names.dedup();
-    if names.is_empty() {
-        return;
-    }
-    ui.menu_button("texture", |ui| {
-        for name in names {
-            if ui.button(name).clicked() {
-                asked.edit(Edit::SetTexture { id, name: name.to_owned() });
-                ui.close();
-            }
-        }
-    });
 }
 
 /// 1234567 as 1,234,567.

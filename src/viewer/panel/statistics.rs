@@ -2,7 +2,7 @@
 
 use super::selected::thousands;
 use super::{Around, row, rows};
-use crate::frame::{History, Session};
+use crate::frame::{History, Session, Waits};
 use crate::scene::Shape;
 use crate::viewer::status::{bytes, percent, seconds};
 use egui::Ui;
@@ -17,10 +17,13 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("", format!("{camera:.2} eye, {bounce:.2} bounce, {shadow:.2} light"));
         figure("error", status.estimated_error.map_or("–".to_owned(), percent));
         figure("left out", format!("{} samples not finite", status.n_bad));
-        let milliseconds = |share| {
-            around.reaction.quantile(share).map_or("–".to_owned(), |wait| format!("{:.0}", wait.as_secs_f64() * 1e3))
+        let milliseconds = |waits: &Waits| {
+            let of =
+                |share| waits.quantile(share).map_or("–".to_owned(), |w| format!("{:.0}", w.as_secs_f64() * 1e3));
+            format!("{} ms; {} ms in 99 of 100", of(0.5), of(0.99))
         };
-        figure("reaction", format!("{} ms; {} ms in 99 of 100", milliseconds(0.5), milliseconds(0.99)));
+        figure("reaction", milliseconds(around.reaction.waits()));
+        figure("to cancel", milliseconds(&session.cancels()));
         let faces: usize = (session.inputs().objects.iter())
             .map(|object| if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 0 })
             .sum();

@@ -1,105 +1,9 @@
-//! Every key and mouse gesture, in one table.
-//!
-//! The window obeys [`BINDINGS`], the overlay on H shows it, and `docs/keys.md` is written from it, so the three
-//! cannot disagree. Keys that move are physical (WASD is the same block of keys on every layout); all others are
-//! what the key types.
+//! The table of keys and gestures.
 
+use super::{Action, Binding, Chord, Group, Motion, Trigger, Typed};
 use crate::frame::{Command, Edit};
 use crate::render::Inspection;
-use std::fmt::Write as _;
-use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
-
-/// A line of the table: what to press and what it does.
-pub struct Binding {
-    pub triggers: &'static [Trigger],
-    pub effect: &'static str,
-}
-
-/// A heading and its lines.
-pub struct Group {
-    pub title: &'static str,
-    pub bindings: &'static [Binding],
-}
-
-pub enum Trigger {
-    /// Moves for as long as the key is down.
-    Hold(KeyCode, Motion),
-    /// Happens once a press, and again as the keyboard repeats.
-    Press(Chord, Action),
-    /// One of the keys 1 to 9, whatever it types.
-    Digit { ctrl: bool, shift: bool, action: fn(u8) -> Action },
-    /// A gesture, told in words; `input` knows how.
-    Mouse(&'static str),
-}
-
-/// A key with its modifiers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Chord {
-    pub key: Typed,
-    pub ctrl: bool,
-    /// `None` where typing the character may need Shift or not.
-    pub shift: Option<bool>,
-}
-
-/// What a key types.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Typed {
-    Text(&'static str),
-    Named(NamedKey),
-}
-
-/// What a held key does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
-    Forward,
-    Back,
-    Left,
-    Right,
-    Up,
-    Down,
-    OrbitLeft,
-    OrbitRight,
-    OrbitUp,
-    OrbitDown,
-    RollLeft,
-    RollRight,
-}
-
-/// What a pressed key does.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Action {
-    Send(Command),
-    TogglePause,
-    ToggleIntegrator,
-    /// As seen (PNG), or the linear light (EXR).
-    Screenshot {
-        linear: bool,
-    },
-    /// As a scene file: the one that is open, or a new one.
-    SaveScene {
-        new: bool,
-    },
-    PrintView,
-    /// Shows this in place of the picture, or the picture again.
-    Inspect(Inspection),
-    /// Why what is under the mouse looks as it does.
-    Explain,
-    /// The next drag is a rectangle that gets all samples.
-    Brush,
-    ClearRegion,
-    ToggleSharpZone,
-    /// Moves, turns or scales; then none.
-    NextGizmo,
-    /// The camera goes around by itself.
-    ToggleSpin,
-    TogglePanel,
-    ToggleHelp,
-    ToggleOverlays,
-    ToggleFullscreen,
-    /// Closes the help, or lets go of what is selected, or closes the window.
-    Leave,
-    Quit,
-}
+use winit::keyboard::{KeyCode, NamedKey};
 
 const fn hold(key: KeyCode, motion: Motion) -> Trigger {
     Trigger::Hold(key, motion)
@@ -147,7 +51,7 @@ const EXPOSURE_STEP: f32 = 1.0 / 3.0;
 const NEARER: Command = Command::ScaleFocus { factor: 1.0 / LENS_STEP };
 const FARTHER: Command = Command::ScaleFocus { factor: LENS_STEP };
 const NARROWER: Command = Command::ScaleAperture { factor: 1.0 / LENS_STEP };
-const WIDER: Command = Command::ScaleAperture { factor: LENS_STEP };
+pub(super) const WIDER: Command = Command::ScaleAperture { factor: LENS_STEP };
 const DOLLY_IN: Command = Command::Dolly { factor: 1.0 / ZOOM_STEP };
 const DOLLY_OUT: Command = Command::Dolly { factor: ZOOM_STEP };
 const ZOOM_IN: Command = Command::Zoom { factor: 1.0 / ZOOM_STEP };
@@ -173,6 +77,14 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[Trigger::Mouse("Shift")], effect: "four times as fast, while held" },
             Binding { triggers: &[Trigger::Mouse("Wheel")], effect: "flying speed" },
             Binding { triggers: &[Trigger::Mouse("Drag")], effect: "look about" },
+            Binding {
+                triggers: &[named(NamedKey::Space, Action::ToggleDrag)],
+                effect: "a drag moves around the pivot, or looks about again",
+            },
+            Binding {
+                triggers: &[named(NamedKey::Enter, Action::CaptureMouse)],
+                effect: "capture the mouse, which then needs no button; Esc or again lets it go",
+            },
         ],
     },
     Group {
@@ -277,8 +189,12 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding { triggers: &[Trigger::Mouse("Double click")], effect: "focus there, and orbit at that depth" },
             Binding {
-                triggers: &[send("l", Command::ToggleFocusLock)],
+                triggers: &[shifted(Typed::Text("l"), false, Action::Send(Command::ToggleFocusLock))],
                 effect: "focus stays with what was focused on, or moves with the camera",
+            },
+            Binding {
+                triggers: &[shifted(Typed::Text("l"), true, Action::FocusFollows)],
+                effect: "focus follows the mouse, or stays where it is",
             },
             Binding {
                 triggers: &[text("y", Action::ToggleSharpZone)],
@@ -310,14 +226,6 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding { triggers: &[edit("z", Some(false), Edit::Undo)], effect: "undo" },
             Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "do again" },
-            Binding {
-                triggers: &[Trigger::Mouse("Panel: Add")],
-                effect: "add a sphere, a plane, a cube, a light, a mesh",
-            },
-            Binding {
-                triggers: &[Trigger::Mouse("Panel: Selected")],
-                effect: "place, material, light and mesh of what is selected, by numbers",
-            },
         ],
     },
     Group {
@@ -390,6 +298,10 @@ pub static BINDINGS: &[Group] = &[
                 effect: "save the scene as a new scene file",
             },
             Binding {
+                triggers: &[ctrl("o", Action::OpenDialog)],
+                effect: "ask for a file to open, where the system has a dialog (zenity or kdialog)",
+            },
+            Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
                 effect: "open a scene (.ron), a model (.obj) or a picture that was kept (.png, .exr)",
             },
@@ -415,172 +327,40 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
     },
+    Group {
+        title: "In the panel",
+        bindings: &[
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Render")],
+                effect: "light model, when to stop (error, time, samples), threads, size of pictures that are kept",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: View")],
+                effect: "eye, pivot, field of view, fly speed, what a drag does, kept views",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Lens")],
+                effect: "focus distance and what it stays with, f-stop, radius, blades of the aperture",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Display")],
+                effect: "exposure, tone curve, what is shown in place of the picture",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Selected")],
+                effect: "name, place, turn, scale, material, texture, light, smooth or flat, simplified, by numbers",
+            },
+            Binding { triggers: &[Trigger::Mouse("Panel: Objects")], effect: "select by name" },
+            Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "a file by dialog, or what was open before" },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Add")],
+                effect: "a sphere, a plane, a cube, a light, a built-in mesh or an OBJ file",
+            },
+            Binding { triggers: &[Trigger::Mouse("Panel: Sky")], effect: "colours of the surroundings" },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Statistics")],
+                effect: "samples, rays, error, samples left out, reaction, triangles, memory, undo, last restart",
+            },
+        ],
+    },
 ];
-
-fn triggers() -> impl Iterator<Item = &'static Trigger> {
-    BINDINGS.iter().flat_map(|group| group.bindings).flat_map(|binding| binding.triggers)
-}
-
-/// What holding this key moves.
-pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
-    triggers().find_map(|trigger| match trigger {
-        Trigger::Hold(code, motion) if key == PhysicalKey::Code(*code) => Some(*motion),
-        _ => None,
-    })
-}
-
-/// What pressing this key does; digits count where they are on the keyboard, since Shift types something else there.
-pub fn action_of(physical: PhysicalKey, key: &Key, modifiers: ModifiersState) -> Option<Action> {
-    let digit = digit_of(physical).filter(|_| !modifiers.super_key() && !modifiers.alt_key());
-    triggers().find_map(|trigger| match trigger {
-        Trigger::Press(chord, action) if chord.matches(key, modifiers) => Some(action.clone()),
-        Trigger::Digit { ctrl, shift, action }
-            if (*ctrl, *shift) == (modifiers.control_key(), modifiers.shift_key()) =>
-        {
-            digit.map(action)
-        }
-        _ => None,
-    })
-}
-
-/// 1 to 9.
-fn digit_of(key: PhysicalKey) -> Option<u8> {
-    use KeyCode::{Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7, Digit8, Digit9};
-    let keys = [Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7, Digit8, Digit9];
-    (1..).zip(keys).find_map(|(digit, code)| (key == PhysicalKey::Code(code)).then_some(digit))
-}
-
-impl Chord {
-    fn matches(&self, key: &Key, modifiers: ModifiersState) -> bool {
-        let same_key = match (self.key, key) {
-            // With Shift or Caps Lock the same letter comes as a capital.
-            (Typed::Text(text), Key::Character(typed)) => text.eq_ignore_ascii_case(typed),
-            (Typed::Named(name), Key::Named(typed)) => name == *typed,
-            _ => false,
-        };
-        same_key
-            && self.ctrl == modifiers.control_key()
-            && self.shift.is_none_or(|shift| shift == modifiers.shift_key())
-            && !modifiers.super_key()
-    }
-
-    fn label(&self) -> String {
-        let key = match self.key {
-            Typed::Text(text) => text.to_uppercase(),
-            Typed::Named(NamedKey::Escape) => "Esc".to_owned(),
-            Typed::Named(NamedKey::PageUp) => "Page Up".to_owned(),
-            Typed::Named(NamedKey::PageDown) => "Page Down".to_owned(),
-            Typed::Named(name) => format!("{name:?}"),
-        };
-        let ctrl = if self.ctrl { "Ctrl+" } else { "" };
-        let shift = if self.shift == Some(true) { "Shift+" } else { "" };
-        format!("{ctrl}{shift}{key}")
-    }
-}
-
-impl Binding {
-    /// The keys as the user reads them.
-    pub fn keys(&self) -> String {
-        let labels: Vec<String> = self
-            .triggers
-            .iter()
-            .map(|trigger| match trigger {
-                Trigger::Hold(code, _) => match code {
-                    KeyCode::ArrowLeft => "⬅".to_owned(),
-                    KeyCode::ArrowRight => "➡".to_owned(),
-                    KeyCode::ArrowUp => "⬆".to_owned(),
-                    KeyCode::ArrowDown => "⬇".to_owned(),
-                    _ => format!("{code:?}").replace("Key", ""),
-                },
-                Trigger::Press(chord, _) => chord.label(),
-                Trigger::Digit { ctrl, .. } => if *ctrl { "Ctrl+1…9" } else { "Shift+1…9" }.to_owned(),
-                Trigger::Mouse(gesture) => (*gesture).to_owned(),
-            })
-            .collect();
-        labels.join("  ")
-    }
-}
-
-/// The whole of `docs/keys.md`.
-pub fn markdown() -> String {
-    let mut page = String::from(
-        "# Keys and mouse\n\n\
-         H shows this list in the window. It is written from the table in `src/viewer/keys.rs`, which the window obeys;\n\
-         after a change there, `FIRSTLIGHT_BLESS=1 cargo test keys_page` writes it again.\n",
-    );
-    for group in BINDINGS {
-        write!(page, "\n## {}\n\n| keys | what they do |\n|---|---|\n", group.title).expect("a string takes all");
-        for binding in group.bindings {
-            let keys = binding.keys();
-            let keys: Vec<String> = keys.split("  ").map(|key| format!("`{key}`")).collect();
-            writeln!(page, "| {} | {} |", keys.join(" "), binding.effect).expect("a string takes all");
-        }
-    }
-    page
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn keys_page_says_what_the_window_obeys() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/keys.md");
-        if std::env::var_os("FIRSTLIGHT_BLESS").is_some() {
-            std::fs::write(path, markdown()).expect("docs/keys.md can be written");
-        }
-        let page = std::fs::read_to_string(path).expect("docs/keys.md is there");
-        assert!(page == markdown(), "docs/keys.md is out of date: run FIRSTLIGHT_BLESS=1 cargo test keys_page");
-    }
-
-    #[test]
-    fn no_press_means_two_things() {
-        let all: Vec<&Trigger> = triggers().collect();
-        for (i, one) in all.iter().enumerate() {
-            for other in &all[i + 1..] {
-                match (one, other) {
-                    (Trigger::Hold(a, _), Trigger::Hold(b, _)) => assert_ne!(a, b),
-                    (Trigger::Press(a, _), Trigger::Press(b, _)) => {
-                        let apart = a.shift.is_some() && b.shift.is_some() && a.shift != b.shift;
-                        assert!(a.key != b.key || a.ctrl != b.ctrl || apart, "{a:?} is there twice");
-                    }
-                    _ => {}
-                }
-            }
-        }
-        // A held letter must not type a command as well.
-        for trigger in &all {
-            let Trigger::Press(Chord { key: Typed::Text(text), ctrl: false, .. }, _) = trigger else { continue };
-            let label = text.to_uppercase();
-            assert!(
-                !all.iter()
-                    .any(|t| matches!(t, Trigger::Hold(code, _) if format!("{code:?}") == format!("Key{label}")))
-            );
-        }
-    }
-
-    #[test]
-    fn presses_find_their_actions() {
-        let none = ModifiersState::empty();
-        let key = |text: &str| Key::Character(text.into());
-        let pressed = |key: Key, modifiers| action_of(PhysicalKey::Code(KeyCode::F24), &key, modifiers);
-        let digit = |modifiers, typed: &str| action_of(PhysicalKey::Code(KeyCode::Digit3), &key(typed), modifiers);
-        assert_eq!(digit(none, "3"), Some(Action::Inspect(Inspection::Albedo)));
-        assert_eq!(digit(ModifiersState::CONTROL, "3"), Some(Action::Send(Command::SetBookmark { slot: 3 })));
-        assert_eq!(digit(ModifiersState::SHIFT, "§"), Some(Action::Send(Command::GoToBookmark { slot: 3 })));
-        assert_eq!(
-            pressed(key("Z"), ModifiersState::CONTROL | ModifiersState::SHIFT),
-            Some(Action::Send(Command::Edit(Edit::Redo)))
-        );
-        assert_eq!(pressed(key("z"), ModifiersState::CONTROL), Some(Action::Send(Command::Edit(Edit::Undo))));
-        assert_eq!(pressed(key("O"), ModifiersState::SHIFT), Some(Action::Send(Command::ToggleDepthOfField)));
-        assert_eq!(pressed(key("k"), none), Some(Action::Screenshot { linear: false }));
-        assert_eq!(pressed(key("K"), ModifiersState::SHIFT), Some(Action::Screenshot { linear: true }));
-        assert_eq!(pressed(key("q"), none), None, "Q alone flies");
-        assert_eq!(pressed(key("q"), ModifiersState::CONTROL), Some(Action::Quit));
-        assert_eq!(pressed(key("}"), ModifiersState::SHIFT), Some(Action::Send(WIDER)));
-        assert_eq!(pressed(Key::Named(NamedKey::Escape), none), Some(Action::Leave));
-        assert_eq!(motion_of(PhysicalKey::Code(KeyCode::KeyW)), Some(Motion::Forward));
-        assert_eq!(motion_of(PhysicalKey::Code(KeyCode::KeyH)), None);
-    }
-}

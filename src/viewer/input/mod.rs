@@ -3,9 +3,14 @@
 //! Nothing depends on how often [`Input::take`] is called: a held key moves by the time it was down, a drag by the
 //! distance it went, and whatever happens between two calls is added up into one command of a kind.
 
+mod sum;
+#[cfg(test)]
+mod tests;
+
 use super::keys::{Action, Motion, action_of, motion_of};
 use crate::frame::{Command, Edit};
 use std::time::{Duration, Instant};
+use sum::{Sum, add};
 use winit::event::MouseButton;
 use winit::keyboard::{Key, ModifiersState, PhysicalKey};
 
@@ -48,6 +53,12 @@ pub struct Input {
     speed: f64,
     /// Since when the camera goes around by itself and has not been counted.
     spin: Option<Instant>,
+    /// A drag with the left button moves around the pivot, not the eye's direction.
+    orbits: bool,
+    /// The mouse moves the view without a button.
+    captured: bool,
+    /// What is under the mouse is focused on.
+    focuses: bool,
     sum: Sum,
 }
 
@@ -78,22 +89,6 @@ struct Drag {
     add: bool,
 }
 
-/// Movement not yet sent, and the commands that must keep their order behind it.
-#[derive(Debug, Default)]
-struct Sum {
-    turn: [f64; 2],
-    orbit: [f64; 2],
-    pan: [f64; 2],
-    fly: [f64; 3],
-    roll: f64,
-    dolly: f64,
-    zoom: f64,
-    pace: Option<[f64; 2]>,
-    pick: Option<([f64; 2], bool)>,
-    focus: Option<[f64; 2]>,
-    pivot: Option<[f64; 2]>,
-}
-
 impl Input {
     /// For a window of this size, physical pixels.
     pub fn new(width: u32, height: u32) -> Self {
@@ -106,6 +101,9 @@ impl Input {
             cursor: [0.0; 2],
             speed: 1.0,
             spin: None,
+            orbits: false,
+            captured: false,
+            focuses: false,
             sum: Sum::default(),
         }
     }
@@ -138,6 +136,49 @@ impl Input {
 
     pub fn is_spinning(&self) -> bool {
         self.spin.is_some()
+    }
+
+    /// A plain drag moves around the pivot from now on, or looks about again; true for the first.
+    pub fn toggle_orbits(&mut self) -> bool {
+        self.orbits = !self.orbits;
+        self.orbits
+    }
+
+    pub fn orbits(&self) -> bool {
+        self.orbits
+    }
+
+    /// From now on the mouse moves the view by itself, as told by [`Self::mouse_moved`], or only with a button again.
+    pub fn set_captured(&mut self, captured: bool) {
+        self.captured = captured;
+        self.drag = None;
+    }
+
+    pub fn is_captured(&self) -> bool {
+        self.captured
+    }
+
+    /// Whether to focus on what is under the mouse, wherever it goes.
+    pub fn set_focuses(&mut self, focuses: bool) {
+        self.focuses = focuses;
+    }
+
+    /// A captured mouse was moved, pixels.
+    pub fn mouse_moved(&mut self, x: f64, y: f64) {
+        if self.captured {
+            let height = self.size[1].max(1.0);
+            self.turn([x / height, y / height], self.orbits);
+        }
+    }
+
+    /// Heights of the picture, downwards positive.
+    fn turn(&mut self, [dx, dy]: [f64; 2], orbits: bool) {
+        // The view goes where the mouse goes; what is orbited sticks to the mouse.
+        if orbits {
+            add(&mut self.sum.orbit, [-dx * ORBIT_DRAG_DEG, dy * ORBIT_DRAG_DEG]);
+        } else {
+            add(&mut self.sum.turn, [dx * LOOK_DRAG_DEG, -dy * LOOK_DRAG_DEG]);
+        }
     }
 
     /// A mouse button that turns, moves or focuses is down.
@@ -216,6 +257,9 @@ impl Input {
 
     /// A mouse button went down or up.
     pub fn button(&mut self, button: MouseButton, pressed: bool, now: Instant) {
+        if self.captured {
+            return;
+        }
         if !pressed {
             if let Some(drag) = self.drag.take_if(|drag| drag.button == button)
                 && drag.kind == DragKind::Look
@@ -257,8 +301,12 @@ impl Input {
 
     /// The mouse is at this place of the window, physical pixels.
     pub fn cursor(&mut self, x: f64, y: f64) {
+        let moved = self.cursor != [x, y];
         self.cursor = [x, y];
         let place = self.place();
+        if self.focuses && moved && !self.captured {
+            self.sum.follow = Some(place);
+        }
         let height = self.size[1].max(1.0);
         let Some(drag) = &mut self.drag else { return };
         if !drag.moved {
@@ -269,10 +317,11 @@ impl Input {
         }
         let [dx, dy] = [(x - drag.last[0]) / height, (y - drag.last[1]) / height];
         drag.last = self.cursor;
-        match drag.kind {
-            // The view goes where the mouse goes; what is orbited or panned sticks to the mouse.
-            DragKind::Look => add(&mut self.sum.turn, [dx * LOOK_DRAG_DEG, -dy * LOOK_DRAG_DEG]),
-            DragKind::Orbit => add(&mut self.sum.orbit, [-dx * ORBIT_DRAG_DEG, dy * ORBIT_DRAG_DEG]),
+        let kind = drag.kind;
+        match kind {
+            DragKind::Look => self.turn([dx, dy], self.orbits),
+            DragKind::Orbit => self.turn([dx, dy], true),
+            // What is panned sticks to the mouse.
             DragKind::Pan => add(&mut self.sum.pan, [-dx, dy]),
             DragKind::Focus => self.sum.focus = Some(place),
         }
@@ -360,248 +409,6 @@ impl Input {
     }
 }
 
-impl Sum {
-    fn into_commands(self) -> Vec<Command> {
-        let mut commands = Vec::new();
-        let mut push = |wanted: bool, command| {
-            if wanted {
-                commands.push(command);
-            }
-        };
-        let zero = [0.0; 2];
-        push(self.turn != zero, Command::Turn { yaw_deg: self.turn[0], pitch_deg: self.turn[1] });
-        push(self.orbit != zero, Command::Orbit { yaw_deg: self.orbit[0], pitch_deg: self.orbit[1] });
-        push(self.pan != zero, Command::Pan { right: self.pan[0], up: self.pan[1] });
-        if let Some([x, y]) = self.pace {
-            commands.push(Command::PaceAt { x, y });
-        }
-        let mut push = |wanted: bool, command| {
-            if wanted {
-                commands.push(command);
-            }
-        };
-        let [right, up, forward] = self.fly;
-        push(self.fly != [0.0; 3], Command::Fly { right, up, forward });
-        push(self.roll != 0.0, Command::Roll { angle_deg: self.roll });
-        push(self.dolly != 0.0, Command::Dolly { factor: self.dolly.exp() });
-        push(self.zoom != 0.0, Command::Zoom { factor: self.zoom.exp() });
-        if let Some(([x, y], add)) = self.pick {
-            commands.push(Command::Edit(Edit::PickAt { x, y, add }));
-        }
-        if let Some([x, y]) = self.focus {
-            commands.push(Command::FocusAt { x, y });
-        }
-        if let Some([x, y]) = self.pivot {
-            commands.push(Command::PivotAt { x, y });
-        }
-        commands
-    }
-}
-
-fn add(sum: &mut [f64; 2], amount: [f64; 2]) {
-    sum[0] += amount[0];
-    sum[1] += amount[1];
-}
-
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use winit::keyboard::KeyCode;
-
-    const NONE: ModifiersState = ModifiersState::empty();
-
-    fn input() -> (Input, Instant) {
-        (Input::new(800, 400), Instant::now())
-    }
-
-    fn after(start: Instant, ms: u64) -> Instant {
-        start + Duration::from_millis(ms)
-    }
-
-    fn press(input: &mut Input, code: KeyCode, text: &str, down: bool, now: Instant) -> Option<Action> {
-        input.key(PhysicalKey::Code(code), &Key::Character(text.into()), down, false, now)
-    }
-
-    #[test]
-    fn how_far_a_key_flies_does_not_depend_on_the_frame_rate() {
-        for frame_ms in [1, 7, 16, 100, 2000] {
-            let (mut input, start) = input();
-            press(&mut input, KeyCode::KeyW, "w", true, start);
-            let mut flown = 0.0;
-            let mut collect = |input: &mut Input, now| {
-                for command in input.take(now) {
-                    if let Command::PaceAt { .. } = command {
-                        continue;
-                    }
-                    let Command::Fly { right: 0.0, up: 0.0, forward } = command else { panic!("{command:?}") };
-                    flown += forward;
-                }
-            };
-            let mut ms = 0;
-            while ms + frame_ms < 1000 {
-                ms += frame_ms;
-                collect(&mut input, after(start, ms));
-            }
-            press(&mut input, KeyCode::KeyW, "w", false, after(start, 1000));
-            collect(&mut input, after(start, 5000));
-            assert!((flown - 1.0).abs() < 1e-9, "{frame_ms} ms: {flown}");
-            assert!(!input.is_moving());
-        }
-    }
-
-    #[test]
-    fn speed_and_shift_count_from_when_they_change() {
-        let (mut input, start) = input();
-        press(&mut input, KeyCode::KeyW, "w", true, start);
-        input.wheel(1.0, after(start, 1000));
-        input.set_modifiers(ModifiersState::SHIFT, after(start, 2000));
-        let [Command::PaceAt { .. }, Command::Fly { forward, .. }] = input.take(after(start, 3000))[..] else {
-            panic!()
-        };
-        assert!((forward - (1.0 + SPEED_NOTCH + FAST * SPEED_NOTCH)).abs() < 1e-9, "{forward}");
-    }
-
-    #[test]
-    fn a_tap_moves_and_opposite_keys_stand_still() {
-        let (mut input, start) = input();
-        press(&mut input, KeyCode::KeyD, "d", true, start);
-        press(&mut input, KeyCode::KeyD, "d", false, start);
-        let pace = Command::PaceAt { x: 0.0, y: 0.0 };
-        assert_eq!(input.take(start), [pace.clone(), Command::Fly { right: TAP, up: 0.0, forward: 0.0 }]);
-        press(&mut input, KeyCode::KeyA, "a", true, start);
-        press(&mut input, KeyCode::KeyD, "d", true, start);
-        assert_eq!(input.take(after(start, 500)), [pace]);
-    }
-
-    #[test]
-    fn shift_flies_faster_and_turns_orbiting_into_panning() {
-        let (mut input, start) = input();
-        input.set_modifiers(ModifiersState::SHIFT, start);
-        press(&mut input, KeyCode::KeyE, "E", true, start);
-        press(&mut input, KeyCode::ArrowLeft, "", true, start);
-        let commands = input.take(after(start, 1000));
-        assert_eq!(
-            commands,
-            [
-                Command::Pan { right: -PAN_RATE, up: 0.0 },
-                Command::PaceAt { x: 0.0, y: 0.0 },
-                Command::Fly { right: 0.0, up: FAST, forward: 0.0 }
-            ]
-        );
-    }
-
-    #[test]
-    fn ctrl_letters_do_not_fly() {
-        let (mut input, start) = input();
-        input.set_modifiers(ModifiersState::CONTROL, start);
-        assert_eq!(press(&mut input, KeyCode::KeyQ, "q", true, start), Some(Action::Quit));
-        assert_eq!(press(&mut input, KeyCode::KeyW, "w", true, start), None);
-        assert!(!input.is_moving());
-    }
-
-    #[test]
-    fn losing_the_keyboard_lets_everything_go() {
-        let (mut input, start) = input();
-        press(&mut input, KeyCode::KeyW, "w", true, start);
-        input.button(MouseButton::Middle, true, start);
-        input.release_all(after(start, 100));
-        input.cursor(300.0, 300.0);
-        let commands = input.take(after(start, 900));
-        assert_eq!(commands[1..], [Command::Fly { right: 0.0, up: 0.0, forward: 0.1 }]);
-    }
-
-    #[test]
-    fn drags_follow_the_mouse_and_add_up() {
-        let (mut input, start) = input();
-        input.cursor(100.0, 100.0);
-        input.button(MouseButton::Left, true, start);
-        input.cursor(102.0, 100.0);
-        assert_eq!(input.take(start), [], "a trembling mouse turns nothing");
-        input.cursor(150.0, 100.0);
-        input.cursor(200.0, 60.0);
-        let commands = input.take(start);
-        assert_eq!(commands, [Command::Turn { yaw_deg: 0.25 * LOOK_DRAG_DEG, pitch_deg: 0.1 * LOOK_DRAG_DEG }]);
-        input.button(MouseButton::Left, false, start);
-        input.cursor(400.0, 400.0);
-        assert_eq!(input.take(start), []);
-
-        input.button(MouseButton::Middle, true, start);
-        input.cursor(440.0, 400.0);
-        assert_eq!(input.take(start), [Command::Orbit { yaw_deg: -0.1 * ORBIT_DRAG_DEG, pitch_deg: 0.0 }]);
-        input.button(MouseButton::Middle, false, start);
-        input.button(MouseButton::Right, true, start);
-        input.cursor(440.0, 440.0);
-        assert_eq!(input.take(start), [Command::Pan { right: 0.0, up: 0.1 }]);
-    }
-
-    #[test]
-    fn clicks_focus() {
-        let (mut input, start) = input();
-        input.cursor(200.0, 100.0);
-        input.button(MouseButton::Left, true, start);
-        input.button(MouseButton::Left, false, start);
-        let picked = |add| Command::Edit(Edit::PickAt { x: 0.25, y: 0.25, add });
-        assert_eq!(input.take(start), [picked(false)], "one click selects");
-        input.button(MouseButton::Left, true, after(start, 200));
-        input.button(MouseButton::Left, false, after(start, 250));
-        assert_eq!(input.take(start), [Command::FocusAt { x: 0.25, y: 0.25 }, Command::PivotAt { x: 0.25, y: 0.25 }]);
-        input.button(MouseButton::Left, true, after(start, 300));
-        input.button(MouseButton::Left, false, after(start, 310));
-        assert_eq!(input.take(start), [picked(false)], "a third click is not a second double click");
-        input.set_modifiers(ModifiersState::CONTROL, start);
-        input.button(MouseButton::Left, true, after(start, 1300));
-        input.button(MouseButton::Left, false, after(start, 1310));
-        assert_eq!(input.take(start), [picked(true)]);
-
-        input.set_modifiers(ModifiersState::SHIFT, start);
-        input.button(MouseButton::Left, true, after(start, 2000));
-        assert_eq!(input.take(start), [Command::FocusAt { x: 0.25, y: 0.25 }]);
-        input.cursor(900.0, 300.0);
-        assert_eq!(input.take(start), [Command::FocusAt { x: 1.0, y: 0.75 }], "and a drag pulls it along");
-    }
-
-    #[test]
-    fn the_wheel_does_three_things() {
-        let (mut input, start) = input();
-        assert!(input.wheel(2.0, start));
-        assert_eq!(input.speed(), SPEED_NOTCH * SPEED_NOTCH);
-        input.set_modifiers(ModifiersState::CONTROL, start);
-        assert!(!input.wheel(1.0, start));
-        input.set_modifiers(ModifiersState::SHIFT, start);
-        assert!(!input.wheel(-1.0, start));
-        let [Command::Dolly { factor: dolly }, Command::Zoom { factor: zoom }] = input.take(start)[..] else {
-            panic!()
-        };
-        assert!((dolly * ZOOM_NOTCH - 1.0).abs() < 1e-12 && (zoom / ZOOM_NOTCH - 1.0).abs() < 1e-12);
-        input.set_modifiers(NONE, start);
-        for _ in 0..1000 {
-            input.wheel(1.0, start);
-        }
-        assert_eq!(input.speed(), SPEED_RANGE.1);
-    }
-
-    #[test]
-    fn a_turntable_goes_around_by_itself_until_it_is_stopped() {
-        let (mut input, start) = input();
-        input.toggle_spin(start);
-        assert!(input.is_moving());
-        assert_eq!(input.take(after(start, 1500)), [Command::Orbit { yaw_deg: 1.5 * SPIN_RATE_DEG, pitch_deg: 0.0 }]);
-        input.toggle_spin(after(start, 2000));
-        assert_eq!(input.take(after(start, 9000)), [Command::Orbit { yaw_deg: 0.5 * SPIN_RATE_DEG, pitch_deg: 0.0 }]);
-        assert!(!input.is_moving());
-    }
-
-    #[test]
-    fn steps_repeat_and_toggles_do_not() {
-        let (mut input, start) = input();
-        let mut repeat =
-            |code, text: &str| input.key(PhysicalKey::Code(code), &Key::Character(text.into()), true, true, start);
-        assert!(repeat(KeyCode::BracketLeft, "[").is_some());
-        assert_eq!(repeat(KeyCode::KeyO, "o"), None);
-        assert_eq!(repeat(KeyCode::KeyK, "k"), None);
-    }
 }

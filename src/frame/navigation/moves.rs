@@ -1,16 +1,11 @@
-//! How a person moves a camera: pure functions from one view to the next.
-//!
-//! Each keeps the axes of the view orthonormal to rounding, without drift over millions of steps, and answers
-//! amounts that make no sense (not finite, a factor of zero) with the view it was given. All is f64 in the scene's
-//! own frame, so a camera a million metres from the origin moves as smoothly as one at it.
+//! The steps of a view: turning, orbiting, flying, and what frames a scene.
 //!
 //! Two ways of turning: on a turntable, where the horizon keeps its lean and the view stops short of straight up and
-//! down, and freely about the picture's own axes. Start reading at [`steer`].
+//! down, and freely about the picture's own axes.
 
-use super::Command;
-use crate::scene::{Lens, Projection, View};
+use super::Turning;
+use crate::scene::{Projection, View};
 use glam::{DQuat, DVec3};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
 /// The direction that a turntable turns about: scenes are Y up.
@@ -21,84 +16,6 @@ const MAX_ELEVATION: f64 = 89.0 * (FRAC_PI_2 / 90.0);
 
 /// The field of view that zooming stays within, degrees: a strong telescope, and the widest flat picture of any use.
 const VFOV_RANGE_DEG: (f64, f64) = (0.1, 150.0);
-
-/// The aperture that a lens without one opens to, as a part of the focus distance: a blur that is seen, not more.
-const FIRST_APERTURE: f64 = 0.01;
-
-/// All that a person steers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Rig {
-    pub view: View,
-    pub projection: Projection,
-    pub lens: Lens,
-}
-
-/// What turning keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Turning {
-    /// Yaw is about the vertical and the horizon keeps its lean.
-    #[default]
-    Turntable,
-    /// Yaw and pitch are about the picture's own axes, without limits.
-    Free,
-}
-
-/// What the amounts of a command are measured by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surroundings {
-    /// A sphere around everything finite in the scene; radius 0 when there is nothing.
-    pub center: DVec3,
-    pub radius: f64,
-    /// Where [`Command::Home`] leads.
-    pub home: Rig,
-    /// Width of the picture by its height.
-    pub aspect: f64,
-    pub turning: Turning,
-    /// Metres to what a person flies towards, if that is known.
-    pub pace: Option<f64>,
-}
-
-/// Carries out a command that needs nothing but the camera and its surroundings; `None` for every other command.
-pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig> {
-    let Rig { view, projection, lens } = *rig;
-    let with_view = |view| Some(Rig { view, ..*rig });
-    let with_lens = |lens| Some(Rig { lens, ..*rig });
-    match *command {
-        Command::Turn { yaw_deg, pitch_deg } => {
-            with_view(turn(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
-        }
-        Command::Fly { right, up, forward } => {
-            with_view(fly(&view, DVec3::new(right, up, forward) * stride(&view, around.radius, around.pace)))
-        }
-        Command::Orbit { yaw_deg, pitch_deg } => {
-            with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
-        }
-        Command::Pan { right, up } => with_view(pan(&view, &projection, right, up)),
-        Command::Dolly { factor } => with_view(dolly(&view, factor)),
-        Command::Zoom { factor } => Some(Rig { projection: zoom(&projection, factor), ..*rig }),
-        Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),
-        Command::Level => with_view(level(&view)),
-        Command::Home => Some(around.home),
-        Command::SetView(view) => with_view(view),
-        Command::SetProjection(projection) => Some(Rig { projection, ..*rig }),
-        Command::SetLens(lens) => with_lens(lens),
-        Command::ScaleFocus { factor } => with_lens(scale_focus(&lens, factor, view.pivot_distance)),
-        Command::SetFocus { distance } => with_lens(focus_at(&lens, distance)),
-        Command::ScaleAperture { factor } => with_lens(scale_aperture(&lens, factor)),
-        Command::SetAperture { radius } => with_lens(set_aperture(&lens, radius)),
-        Command::ToggleDepthOfField => with_lens(toggle_depth_of_field(&lens)),
-        _ => None,
-    }
-}
-
-/// How far a person flies in a second at speed 1, metres: half of the way to what they fly towards. Where that is not
-/// known, half of the smaller of the distance looked at and the scene's radius, so that neither a room seen from inside
-/// nor a model seen from afar is left in one step.
-pub fn stride(view: &View, scene_radius: f64, pace: Option<f64>) -> f64 {
-    let size = if scene_radius > 0.0 { scene_radius.min(view.pivot_distance) } else { view.pivot_distance };
-    // Right before a wall a person still gets away from it, and the horizon is not reached in a second.
-    0.5 * pace.map_or(size, |pace| pace.clamp(0.02 * size, 4.0 * size))
-}
 
 /// Looks about from the eye; radians to the right and upwards in the picture.
 pub fn turn(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
@@ -190,53 +107,6 @@ pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &
     finite_or(view, View { eye, pivot_distance: -depth, ..*view })
 }
 
-/// Puts the focal plane at `distance` metres, if that is a distance.
-pub fn focus_at(lens: &Lens, distance: f64) -> Lens {
-    if distance > 0.0 { Lens { focus_distance: distance, ..*lens } } else { *lens }
-}
-
-/// Multiplies the focus distance; from infinity the plane comes back to `near`, metres.
-pub fn scale_focus(lens: &Lens, factor: f64, near: f64) -> Lens {
-    if lens.focus_distance.is_infinite() {
-        return if factor < 1.0 { focus_at(lens, near) } else { *lens };
-    }
-    let distance = lens.focus_distance * factor;
-    if distance.is_normal() { focus_at(lens, distance) } else { *lens }
-}
-
-/// Multiplies the aperture and switches depth of field on; a closed aperture opens first.
-pub fn scale_aperture(lens: &Lens, factor: f64) -> Lens {
-    let open = with_aperture(lens);
-    if !lens.enabled {
-        return open;
-    }
-    let radius = open.radius * factor;
-    if radius.is_normal() { set_aperture(&open, radius) } else { *lens }
-}
-
-/// Sets the radius of the aperture, metres, and switches depth of field on; 0 switches it off.
-pub fn set_aperture(lens: &Lens, radius: f64) -> Lens {
-    if !(radius.is_finite() && radius >= 0.0) {
-        return *lens;
-    }
-    Lens { radius, enabled: radius > 0.0, ..*lens }
-}
-
-pub fn toggle_depth_of_field(lens: &Lens) -> Lens {
-    if lens.enabled { Lens { enabled: false, ..*lens } } else { with_aperture(lens) }
-}
-
-/// Depth of field on, with an aperture that shows.
-fn with_aperture(lens: &Lens) -> Lens {
-    let radius = match (lens.radius > 0.0, lens.focus_distance.is_finite()) {
-        (true, _) => lens.radius,
-        (false, true) => FIRST_APERTURE * lens.focus_distance,
-        // Nothing else to measure by: 1 cm.
-        (false, false) => FIRST_APERTURE,
-    };
-    Lens { radius, enabled: true, ..*lens }
-}
-
 /// The view turned on the spot by radians to the right and upwards in the picture.
 fn rotated(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
     let rotation = match turning {
@@ -276,17 +146,6 @@ mod tests {
 
     fn start() -> View {
         View::look_at(DVec3::new(3.0, 2.0, 4.0), DVec3::new(0.5, 0.25, -0.5), DVec3::Y).unwrap()
-    }
-
-    fn around(turning: Turning) -> Surroundings {
-        Surroundings {
-            center: DVec3::new(1.0, 0.0, 2.0),
-            radius: 3.0,
-            home: Rig::default(),
-            aspect: 1.5,
-            turning,
-            pace: None,
-        }
     }
 
     fn close(a: DVec3, b: DVec3, tolerance: f64) -> bool {
@@ -446,38 +305,6 @@ mod tests {
     }
 
     #[test]
-    fn strides_fit_the_scene() {
-        let view = start();
-        assert_eq!(stride(&view, 0.0, None), 0.5 * view.pivot_distance);
-        assert_eq!(stride(&view, 1e9, None), 0.5 * view.pivot_distance);
-        assert_eq!(stride(&view, 0.5, None), 0.25);
-        assert_eq!(stride(&view, 0.5, Some(0.7)), 0.35, "half of the way to what is under the mouse");
-        assert_eq!(stride(&view, 0.5, Some(1e9)), 1.0, "and the horizon stays where it is");
-    }
-
-    #[test]
-    fn focus_and_aperture_go_by_factors_and_survive_the_ends() {
-        let lens = Lens::pinhole(4.0);
-        assert_eq!(scale_focus(&lens, 1.5, 1.0).focus_distance, 6.0);
-        let far = focus_at(&lens, f64::INFINITY);
-        assert_eq!(scale_focus(&far, 2.0, 3.0), far);
-        assert_eq!(scale_focus(&far, 0.5, 3.0).focus_distance, 3.0);
-        let on = toggle_depth_of_field(&lens);
-        assert!(on.enabled && on.effective_radius() > 0.0, "a pinhole opens: {on:?}");
-        assert_eq!(toggle_depth_of_field(&on).effective_radius(), 0.0);
-        assert_eq!(toggle_depth_of_field(&toggle_depth_of_field(&on)), on);
-        assert_eq!(scale_aperture(&lens, 2.0), on, "the first press shows the blur");
-        assert_eq!(scale_aperture(&on, 2.0).radius, 2.0 * on.radius);
-        assert!(!set_aperture(&on, 0.0).enabled);
-        for nonsense in [f64::NAN, -1.0, 0.0, f64::INFINITY] {
-            assert_eq!(scale_aperture(&on, nonsense), on);
-            assert_eq!(scale_focus(&lens, nonsense, 1.0), lens);
-            assert_eq!(zoom(&Projection::default(), nonsense), Projection::default());
-            assert_eq!(dolly(&start(), nonsense), start());
-        }
-    }
-
-    #[test]
     fn amounts_that_are_not_numbers_change_nothing() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for turning in [Turning::Turntable, Turning::Free] {
@@ -488,28 +315,15 @@ mod tests {
             assert_eq!(roll(&start(), bad), start());
             assert_eq!(pan(&start(), &Projection::default(), bad, 0.0), start());
         }
+        for nonsense in [f64::NAN, -1.0, 0.0, f64::INFINITY] {
+            assert_eq!(zoom(&Projection::default(), nonsense), Projection::default());
+            assert_eq!(dolly(&start(), nonsense), start());
+        }
         let (mut near, mut far) = (start(), start());
         for _ in 0..5000 {
             near = dolly(&near, 0.5);
             far = dolly(&far, 2.0);
             assert!(near.pivot_distance > 0.0 && near.is_finite() && far.is_finite());
         }
-    }
-
-    #[test]
-    fn commands_reach_the_right_part_of_the_rig() {
-        let rig = Rig { view: start(), ..Rig::default() };
-        let around = around(Turning::Turntable);
-        let go = |command| steer(&rig, &command, &around).unwrap();
-        assert_eq!(
-            go(Command::Turn { yaw_deg: 90.0, pitch_deg: 0.0 }).view,
-            turn(&rig.view, FRAC_PI_2, 0.0, Turning::Turntable)
-        );
-        assert_eq!(go(Command::Home), around.home);
-        let flown = go(Command::Fly { right: 0.0, up: 0.0, forward: 2.0 }).view;
-        assert!(((flown.eye - rig.view.eye).length() - 2.0 * stride(&rig.view, 3.0, None)).abs() < 1e-14);
-        assert_eq!(go(Command::ScaleFocus { factor: 2.0 }).view, rig.view);
-        assert_eq!(steer(&rig, &Command::Restart, &around), None);
-        assert_eq!(steer(&rig, &Command::FocusAt { x: 0.5, y: 0.5 }, &around), None);
     }
 }

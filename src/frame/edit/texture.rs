@@ -1,0 +1,108 @@
+//! Textures in the place of a material's colour: those that the scene has, a new checker, a picture from a file.
+
+use super::property::{paint_mut, paint_of, set_if_different};
+use crate::frame::beside::Beside;
+use crate::frame::status::{MessageKind, Status};
+use crate::frame::systems::{Clock, CurrentScene};
+use crate::render::{ImageTexture, TexturePattern};
+use crate::scene::file::TexturePart;
+use crate::scene::{Material, Paint, SurfaceTexture, texture_of};
+use bevy_ecs::prelude::{Entity, World};
+use std::path::Path;
+use std::sync::Arc;
+
+/// All textures that materials of the world use, by name.
+pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
+    let mut found: Vec<Arc<SurfaceTexture>> = Vec::new();
+    for material in world.query::<&Material>().iter(world) {
+        if let Some(Paint::Texture(texture)) = paint_of(material)
+            && !found.iter().any(|known| Arc::ptr_eq(known, texture))
+        {
+            found.push(texture.clone());
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    found
+}
+
+/// One that the scene has, by name.
+pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), String> {
+    let texture = textures(world).into_iter().find(|texture| texture.name == name);
+    let texture = texture.ok_or_else(|| format!("no material uses a texture `{name}`"))?;
+    put(world, entity, texture)
+}
+
+/// One of this description. A picture that the scene has is shared, another one is read beside the picture.
+pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(), String> {
+    let colored = world.get::<Material>(entity).is_some_and(|material| paint_of(material).is_some());
+    if !colored {
+        return Err("this has no colour".to_owned());
+    }
+    let known = match &part {
+        TexturePart::Image { file, .. } => textures(world).into_iter().find_map(|texture| {
+            let TexturePattern::Image { image, .. } = &texture.texture.pattern else { return None };
+            let same = matches!(&texture.part, TexturePart::Image { file: other, .. } if other == file);
+            same.then(|| image.clone())
+        }),
+        TexturePart::Checker { .. } => None,
+    };
+    if let (TexturePart::Image { file, .. }, None) = (&part, &known) {
+        let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
+        let path = folder.join(file);
+        world.resource::<Beside>().read_picture(entity, part, path);
+        return Ok(());
+    }
+    make(world, entity, part, known)
+}
+
+/// A picture for this entity has been read.
+pub fn take(world: &mut World, entity: Entity, part: TexturePart, result: Result<ImageTexture, String>) {
+    let put = result.and_then(|picture| make(world, entity, part, Some(Arc::new(picture))));
+    if let Err(problem) = put {
+        let now = world.resource::<Clock>().0;
+        world.resource_mut::<Status>().say(now, MessageKind::Error, problem);
+    }
+}
+
+fn make(
+    world: &mut World,
+    entity: Entity,
+    part: TexturePart,
+    picture: Option<Arc<ImageTexture>>,
+) -> Result<(), String> {
+    let texture = texture_of(&part, |_| picture).ok_or("the picture is not there")?;
+    // A texture that is only changed keeps its name.
+    let old = world.get::<Material>(entity).and_then(paint_of);
+    let name = match (old, &part) {
+        (Some(Paint::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
+        (_, TexturePart::Checker { .. }) => free_name(world, "checker"),
+        (_, TexturePart::Image { file, .. }) => {
+            let stem = Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+            free_name(world, &stem.unwrap_or_else(|| "picture".to_owned()))
+        }
+    };
+    put(world, entity, Arc::new(SurfaceTexture { name, part, texture }))
+}
+
+fn same_source(a: &TexturePart, b: &TexturePart) -> bool {
+    match (a, b) {
+        (TexturePart::Checker { .. }, TexturePart::Checker { .. }) => true,
+        (TexturePart::Image { file: a, .. }, TexturePart::Image { file: b, .. }) => a == b,
+        _ => false,
+    }
+}
+
+fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
+    let mut material = world.get::<Material>(entity).cloned().ok_or("this is not a material")?;
+    *paint_mut(&mut material).ok_or("this material has no colour")? = Paint::Texture(texture);
+    set_if_different(world, entity, material);
+    Ok(())
+}
+
+/// `name`, or the first of `name 2`, `name 3`, … that no texture of a material has.
+fn free_name(world: &mut World, name: &str) -> String {
+    let taken = textures(world);
+    let numbered = (2..).map(|i| format!("{name} {i}"));
+    let mut names = std::iter::once(name.to_owned()).chain(numbered);
+    names.find(|name| taken.iter().all(|texture| texture.name != *name)).expect("numbers go on")
+}

@@ -1,0 +1,142 @@
+//! How a person moves a camera: pure functions from one view to the next.
+//!
+//! Each keeps the axes of the view orthonormal to rounding, without drift over millions of steps, and answers
+//! amounts that make no sense (not finite, a factor of zero) with the view it was given. All is f64 in the scene's
+//! own frame, so a camera a million metres from the origin moves as smoothly as one at it.
+//!
+//! Here is what commands mean; [`moves`] has the steps of a view, [`lens`] those of what is sharp. Start reading at
+//! [`steer`].
+
+mod lens;
+mod moves;
+
+pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth_of_field};
+pub use moves::{VERTICAL, dolly, fly, frame_points, level, orbit, pan, roll, turn, zoom};
+
+use super::Command;
+use crate::scene::{Lens, Projection, View};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// All that a person steers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rig {
+    pub view: View,
+    pub projection: Projection,
+    pub lens: Lens,
+}
+
+/// What turning keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Turning {
+    /// Yaw is about the vertical and the horizon keeps its lean.
+    #[default]
+    Turntable,
+    /// Yaw and pitch are about the picture's own axes, without limits.
+    Free,
+}
+
+/// What the amounts of a command are measured by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// A sphere around everything finite in the scene; radius 0 when there is nothing.
+    pub center: DVec3,
+    pub radius: f64,
+    /// Where [`Command::Home`] leads.
+    pub home: Rig,
+    /// Width of the picture by its height.
+    pub aspect: f64,
+    pub turning: Turning,
+    /// Metres to what a person flies towards, if that is known.
+    pub pace: Option<f64>,
+}
+
+/// Carries out a command that needs nothing but the camera and its surroundings; `None` for every other command.
+pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig> {
+    let Rig { view, projection, lens } = *rig;
+    let with_view = |view| Some(Rig { view, ..*rig });
+    let with_lens = |lens| Some(Rig { lens, ..*rig });
+    match *command {
+        Command::Turn { yaw_deg, pitch_deg } => {
+            with_view(turn(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
+        }
+        Command::Fly { right, up, forward } => {
+            with_view(fly(&view, DVec3::new(right, up, forward) * stride(&view, around.radius, around.pace)))
+        }
+        Command::Orbit { yaw_deg, pitch_deg } => {
+            with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
+        }
+        Command::Pan { right, up } => with_view(pan(&view, &projection, right, up)),
+        Command::Dolly { factor } => with_view(dolly(&view, factor)),
+        Command::Zoom { factor } => Some(Rig { projection: zoom(&projection, factor), ..*rig }),
+        Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),
+        Command::Level => with_view(level(&view)),
+        Command::Home => Some(around.home),
+        Command::SetView(view) => with_view(view),
+        Command::SetProjection(projection) => Some(Rig { projection, ..*rig }),
+        Command::SetLens(lens) => with_lens(lens),
+        Command::ScaleFocus { factor } => with_lens(scale_focus(&lens, factor, view.pivot_distance)),
+        Command::SetFocus { distance } => with_lens(focus_at(&lens, distance)),
+        Command::ScaleAperture { factor } => with_lens(scale_aperture(&lens, factor)),
+        Command::SetAperture { radius } => with_lens(set_aperture(&lens, radius)),
+        Command::ToggleDepthOfField => with_lens(toggle_depth_of_field(&lens)),
+        _ => None,
+    }
+}
+
+/// How far a person flies in a second at speed 1, metres: half of the way to what they fly towards. Where that is not
+/// known, half of the smaller of the distance looked at and the scene's radius, so that neither a room seen from inside
+/// nor a model seen from afar is left in one step.
+pub fn stride(view: &View, scene_radius: f64, pace: Option<f64>) -> f64 {
+    let size = if scene_radius > 0.0 { scene_radius.min(view.pivot_distance) } else { view.pivot_distance };
+    // Right before a wall a person still gets away from it, and the horizon is not reached in a second.
+    0.5 * pace.map_or(size, |pace| pace.clamp(0.02 * size, 4.0 * size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn start() -> View {
+        View::look_at(DVec3::new(3.0, 2.0, 4.0), DVec3::new(0.5, 0.25, -0.5), DVec3::Y).unwrap()
+    }
+
+    fn around(turning: Turning) -> Surroundings {
+        Surroundings {
+            center: DVec3::new(1.0, 0.0, 2.0),
+            radius: 3.0,
+            home: Rig::default(),
+            aspect: 1.5,
+            turning,
+            pace: None,
+        }
+    }
+
+    #[test]
+    fn strides_fit_the_scene() {
+        let view = start();
+        assert_eq!(stride(&view, 0.0, None), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 1e9, None), 0.5 * view.pivot_distance);
+        assert_eq!(stride(&view, 0.5, None), 0.25);
+        assert_eq!(stride(&view, 0.5, Some(0.7)), 0.35, "half of the way to what is under the mouse");
+        assert_eq!(stride(&view, 0.5, Some(1e9)), 1.0, "and the horizon stays where it is");
+    }
+
+    #[test]
+    fn commands_reach_the_right_part_of_the_rig() {
+        let rig = Rig { view: start(), ..Rig::default() };
+        let around = around(Turning::Turntable);
+        let go = |command| steer(&rig, &command, &around).unwrap();
+        assert_eq!(
+            go(Command::Turn { yaw_deg: 90.0, pitch_deg: 0.0 }).view,
+            turn(&rig.view, FRAC_PI_2, 0.0, Turning::Turntable)
+        );
+        assert_eq!(go(Command::Home), around.home);
+        let flown = go(Command::Fly { right: 0.0, up: 0.0, forward: 2.0 }).view;
+        assert!(((flown.eye - rig.view.eye).length() - 2.0 * stride(&rig.view, 3.0, None)).abs() < 1e-14);
+        assert_eq!(go(Command::ScaleFocus { factor: 2.0 }).view, rig.view);
+        assert_eq!(steer(&rig, &Command::Restart, &around), None);
+        assert_eq!(steer(&rig, &Command::FocusAt { x: 0.5, y: 0.5 }, &around), None);
+    }
+}

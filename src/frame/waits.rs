@@ -1,0 +1,53 @@
+//! How long something took, the latest times that it happened.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// The latest thousand waits, and what most of them do not exceed.
+#[derive(Clone, Debug, Default)]
+pub struct Waits(VecDeque<Duration>);
+
+impl Waits {
+    /// As many as a minute of steady movement has, about.
+    const KEPT: usize = 1000;
+
+    pub fn add(&mut self, wait: Duration) {
+        self.0.push_back(wait);
+        if self.0.len() > Self::KEPT {
+            self.0.pop_front();
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The wait that this share of all waits does not exceed; `None` before the first.
+    pub fn quantile(&self, share: f64) -> Option<Duration> {
+        let mut sorted: Vec<Duration> = self.0.iter().copied().collect();
+        sorted.sort_unstable();
+        let last = sorted.len().checked_sub(1)?;
+        Some(sorted[((share * sorted.len() as f64) as usize).min(last)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_of_the_latest() {
+        let mut waits = Waits::default();
+        assert!(waits.is_empty() && waits.quantile(0.5).is_none());
+        for ms in 0..3000 {
+            waits.add(Duration::from_millis(ms));
+        }
+        assert_eq!(waits.len(), 1000);
+        let ms = |share| waits.quantile(share).unwrap().as_millis();
+        assert_eq!([ms(0.0), ms(0.5), ms(0.99), ms(1.0)], [2000, 2500, 2990, 2999]);
+    }
+}

@@ -1,0 +1,201 @@
+//! A file chosen in a dialog of the desktop.
+//!
+//! The dialog is a program of its own, zenity or kdialog, whichever is there: toolkits and message buses would be more
+//! code than the whole window, for something that a drop on the window does as well. It is waited for on a thread, so
+//! the picture goes on.
+
+use crate::frame::{Command, Edit, Id, NewThing, Waker};
+use crate::scene::file::{MeshSourcePart, TexturePart, WrapPart};
+use glam::DVec2;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command as Program, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+/// What the file is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    Open,
+    AddMesh,
+    /// In the place of the colour of this material.
+    Texture {
+        id: Id,
+    },
+}
+
+impl Purpose {
+    fn title(self) -> &'static str {
+        match self {
+            Self::Open => "Open a scene, a model or a picture",
+            Self::AddMesh => "Add a model",
+            Self::Texture { .. } => "A picture as a texture",
+        }
+    }
+
+    /// Patterns of names, as shells write them.
+    fn patterns(self) -> &'static str {
+        match self {
+            Self::Open => "*.ron *.obj *.png *.exr",
+            Self::AddMesh => "*.obj",
+            Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr",
+        }
+    }
+
+    /// What follows from the choice.
+    pub fn command(self, path: PathBuf) -> Command {
+        match self {
+            Self::Open => Command::Open { path },
+            Self::AddMesh => {
+                let path = path.to_string_lossy().into_owned();
+                Command::Edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path))))
+            }
+            Self::Texture { id } => {
+                let part = TexturePart::Image {
+                    file: path.to_string_lossy().into_owned(),
+                    repeat: DVec2::ONE,
+                    offset: DVec2::ZERO,
+                    rotate: 0.0,
+                    wrap: WrapPart::default(),
+                    smooth: true,
+                };
+                Command::Edit(Edit::Paint { id, part })
+            }
+        }
+    }
+}
+
+type Answer = Result<(Purpose, PathBuf), String>;
+
+pub struct Dialog {
+    waker: Waker,
+    /// One at a time is enough.
+    open: Arc<AtomicBool>,
+    sender: Sender<Answer>,
+    receiver: Receiver<Answer>,
+}
+
+impl Dialog {
+    /// `waker` is called when there is an answer.
+    pub fn new(waker: Waker) -> Self {
+        let (sender, receiver) = channel();
+        Self { waker, open: Arc::default(), sender, receiver }
+    }
+
+    /// Shows a dialog that begins in `folder`.
+    ///
+    /// # Errors
+    /// When this system has none, in words for people.
+    pub fn ask(&self, purpose: Purpose, folder: &Path) -> Result<(), String> {
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let found = find(&path).ok_or("no file dialog here (zenity or kdialog): drop a file on the window")?;
+        if self.open.swap(true, Ordering::AcqRel) {
+            return Ok(());
+        }
+        let arguments = arguments(found.1, purpose, folder);
+        let (sender, waker, open) = (self.sender.clone(), self.waker.clone(), self.open.clone());
+        let work = move || {
+            let answer = run(&found.0, &arguments);
+            open.store(false, Ordering::Release);
+            // The window may be gone, and then nobody needs the answer.
+            if let Some(answer) = answer.transpose() {
+                let _ = sender.send(answer.map(|path| (purpose, path)));
+            }
+            waker();
+        };
+        let spawned = std::thread::Builder::new().name("dialog".to_owned()).spawn(work);
+        spawned.map(drop).map_err(|error| {
+            self.open.store(false, Ordering::Release);
+            format!("no dialog can be shown: {error}")
+        })
+    }
+
+    /// What was chosen since the last call.
+    pub fn answers(&self) -> Vec<Answer> {
+        self.receiver.try_iter().collect()
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Zenity,
+    Kdialog,
+}
+
+/// The first dialog in the folders of `path`.
+fn find(path: &std::ffi::OsStr) -> Option<(PathBuf, Kind)> {
+    [("zenity", Kind::Zenity), ("kdialog", Kind::Kdialog)].into_iter().find_map(|(name, kind)| {
+        let file = std::env::split_paths(path).map(|folder| folder.join(name)).find(|file| file.is_file())?;
+        Some((file, kind))
+    })
+}
+
+fn arguments(kind: Kind, purpose: Purpose, folder: &Path) -> Vec<OsString> {
+    // Ends in a separator, or the folder itself would be offered.
+    let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()).join("");
+    match kind {
+        Kind::Zenity => {
+            let mut start = OsString::from("--filename=");
+            start.push(folder);
+            let title = format!("--title={}", purpose.title());
+            let filter = format!("--file-filter={0} | {0}", purpose.patterns());
+            vec!["--file-selection".into(), title.into(), start, filter.into(), "--file-filter=* | *".into()]
+        }
+        Kind::Kdialog => {
+            let title = ["--title".into(), purpose.title().into()];
+            let rest = ["--getopenfilename".into(), folder.into(), purpose.patterns().into()];
+            title.into_iter().chain(rest).collect()
+        }
+    }
+}
+
+/// What was chosen; `None` where nothing was.
+fn run(program: &Path, arguments: &[OsString]) -> Result<Option<PathBuf>, String> {
+    let output = Program::new(program).args(arguments).stdin(Stdio::null()).stderr(Stdio::null()).output();
+    let output = output.map_err(|error| format!("{}: {error}", program.display()))?;
+    // One line; a name may end in blanks.
+    let text = String::from_utf8_lossy(&output.stdout);
+    let line = text.lines().next().unwrap_or_default();
+    Ok((output.status.success() && !line.is_empty()).then(|| PathBuf::from(line)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dialogs_are_asked_in_their_own_words() {
+        let folder = Path::new("/home/somebody");
+        let words = |kind, purpose| {
+            arguments(kind, purpose, folder).into_iter().map(|word| word.into_string().unwrap()).collect::<Vec<_>>()
+        };
+        let zenity = words(Kind::Zenity, Purpose::Open);
+        assert!(zenity.contains(&"--file-selection".to_owned()), "{zenity:?}");
+        assert!(zenity.contains(&"--filename=/home/somebody/".to_owned()), "{zenity:?}");
+        assert!(zenity.iter().any(|word| word.contains("*.ron")), "{zenity:?}");
+        assert_eq!(
+            words(Kind::Kdialog, Purpose::AddMesh),
+            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj"]
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_choice_comes_back_and_a_cancelled_one_does_not() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("kdialog");
+        let write = |text: &str| {
+            std::fs::write(&program, text).unwrap();
+            std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        };
+        write("#!/bin/sh\necho '/tmp/my model.obj'\n");
+        assert_eq!(find(folder.path().as_os_str()), Some((program.clone(), Kind::Kdialog)));
+        assert_eq!(run(&program, &[]), Ok(Some("/tmp/my model.obj".into())));
+        write("#!/bin/sh\nexit 1\n");
+        assert_eq!(run(&program, &[]), Ok(None));
+        assert!(find(std::ffi::OsStr::new("/nowhere")).is_none());
+        assert!(run(Path::new("/nowhere/zenity"), &[]).is_err());
+    }
+}

@@ -1,0 +1,227 @@
+use super::*;
+use winit::keyboard::KeyCode;
+
+const NONE: ModifiersState = ModifiersState::empty();
+
+fn input() -> (Input, Instant) {
+    (Input::new(800, 400), Instant::now())
+}
+
+fn after(start: Instant, ms: u64) -> Instant {
+    start + Duration::from_millis(ms)
+}
+
+fn press(input: &mut Input, code: KeyCode, text: &str, down: bool, now: Instant) -> Option<Action> {
+    input.key(PhysicalKey::Code(code), &Key::Character(text.into()), down, false, now)
+}
+
+#[test]
+fn how_far_a_key_flies_does_not_depend_on_the_frame_rate() {
+    for frame_ms in [1, 7, 16, 100, 2000] {
+        let (mut input, start) = input();
+        press(&mut input, KeyCode::KeyW, "w", true, start);
+        let mut flown = 0.0;
+        let mut collect = |input: &mut Input, now| {
+            for command in input.take(now) {
+                if let Command::PaceAt { .. } = command {
+                    continue;
+                }
+                let Command::Fly { right: 0.0, up: 0.0, forward } = command else { panic!("{command:?}") };
+                flown += forward;
+            }
+        };
+        let mut ms = 0;
+        while ms + frame_ms < 1000 {
+            ms += frame_ms;
+            collect(&mut input, after(start, ms));
+        }
+        press(&mut input, KeyCode::KeyW, "w", false, after(start, 1000));
+        collect(&mut input, after(start, 5000));
+        assert!((flown - 1.0).abs() < 1e-9, "{frame_ms} ms: {flown}");
+        assert!(!input.is_moving());
+    }
+}
+
+#[test]
+fn speed_and_shift_count_from_when_they_change() {
+    let (mut input, start) = input();
+    press(&mut input, KeyCode::KeyW, "w", true, start);
+    input.wheel(1.0, after(start, 1000));
+    input.set_modifiers(ModifiersState::SHIFT, after(start, 2000));
+    let [Command::PaceAt { .. }, Command::Fly { forward, .. }] = input.take(after(start, 3000))[..] else { panic!() };
+    assert!((forward - (1.0 + SPEED_NOTCH + FAST * SPEED_NOTCH)).abs() < 1e-9, "{forward}");
+}
+
+#[test]
+fn a_tap_moves_and_opposite_keys_stand_still() {
+    let (mut input, start) = input();
+    press(&mut input, KeyCode::KeyD, "d", true, start);
+    press(&mut input, KeyCode::KeyD, "d", false, start);
+    let pace = Command::PaceAt { x: 0.0, y: 0.0 };
+    assert_eq!(input.take(start), [pace.clone(), Command::Fly { right: TAP, up: 0.0, forward: 0.0 }]);
+    press(&mut input, KeyCode::KeyA, "a", true, start);
+    press(&mut input, KeyCode::KeyD, "d", true, start);
+    assert_eq!(input.take(after(start, 500)), [pace]);
+}
+
+#[test]
+fn shift_flies_faster_and_turns_orbiting_into_panning() {
+    let (mut input, start) = input();
+    input.set_modifiers(ModifiersState::SHIFT, start);
+    press(&mut input, KeyCode::KeyE, "E", true, start);
+    press(&mut input, KeyCode::ArrowLeft, "", true, start);
+    let commands = input.take(after(start, 1000));
+    assert_eq!(
+        commands,
+        [
+            Command::Pan { right: -PAN_RATE, up: 0.0 },
+            Command::PaceAt { x: 0.0, y: 0.0 },
+            Command::Fly { right: 0.0, up: FAST, forward: 0.0 }
+        ]
+    );
+}
+
+#[test]
+fn ctrl_letters_do_not_fly() {
+    let (mut input, start) = input();
+    input.set_modifiers(ModifiersState::CONTROL, start);
+    assert_eq!(press(&mut input, KeyCode::KeyQ, "q", true, start), Some(Action::Quit));
+    assert_eq!(press(&mut input, KeyCode::KeyW, "w", true, start), None);
+    assert!(!input.is_moving());
+}
+
+#[test]
+fn losing_the_keyboard_lets_everything_go() {
+    let (mut input, start) = input();
+    press(&mut input, KeyCode::KeyW, "w", true, start);
+    input.button(MouseButton::Middle, true, start);
+    input.release_all(after(start, 100));
+    input.cursor(300.0, 300.0);
+    let commands = input.take(after(start, 900));
+    assert_eq!(commands[1..], [Command::Fly { right: 0.0, up: 0.0, forward: 0.1 }]);
+}
+
+#[test]
+fn drags_follow_the_mouse_and_add_up() {
+    let (mut input, start) = input();
+    input.cursor(100.0, 100.0);
+    input.button(MouseButton::Left, true, start);
+    input.cursor(102.0, 100.0);
+    assert_eq!(input.take(start), [], "a trembling mouse turns nothing");
+    input.cursor(150.0, 100.0);
+    input.cursor(200.0, 60.0);
+    let commands = input.take(start);
+    assert_eq!(commands, [Command::Turn { yaw_deg: 0.25 * LOOK_DRAG_DEG, pitch_deg: 0.1 * LOOK_DRAG_DEG }]);
+    input.button(MouseButton::Left, false, start);
+    input.cursor(400.0, 400.0);
+    assert_eq!(input.take(start), []);
+
+    input.button(MouseButton::Middle, true, start);
+    input.cursor(440.0, 400.0);
+    assert_eq!(input.take(start), [Command::Orbit { yaw_deg: -0.1 * ORBIT_DRAG_DEG, pitch_deg: 0.0 }]);
+    input.button(MouseButton::Middle, false, start);
+    input.button(MouseButton::Right, true, start);
+    input.cursor(440.0, 440.0);
+    assert_eq!(input.take(start), [Command::Pan { right: 0.0, up: 0.1 }]);
+}
+
+#[test]
+fn clicks_focus() {
+    let (mut input, start) = input();
+    input.cursor(200.0, 100.0);
+    input.button(MouseButton::Left, true, start);
+    input.button(MouseButton::Left, false, start);
+    let picked = |add| Command::Edit(Edit::PickAt { x: 0.25, y: 0.25, add });
+    assert_eq!(input.take(start), [picked(false)], "one click selects");
+    input.button(MouseButton::Left, true, after(start, 200));
+    input.button(MouseButton::Left, false, after(start, 250));
+    assert_eq!(input.take(start), [Command::FocusAt { x: 0.25, y: 0.25 }, Command::PivotAt { x: 0.25, y: 0.25 }]);
+    input.button(MouseButton::Left, true, after(start, 300));
+    input.button(MouseButton::Left, false, after(start, 310));
+    assert_eq!(input.take(start), [picked(false)], "a third click is not a second double click");
+    input.set_modifiers(ModifiersState::CONTROL, start);
+    input.button(MouseButton::Left, true, after(start, 1300));
+    input.button(MouseButton::Left, false, after(start, 1310));
+    assert_eq!(input.take(start), [picked(true)]);
+
+    input.set_modifiers(ModifiersState::SHIFT, start);
+    input.button(MouseButton::Left, true, after(start, 2000));
+    assert_eq!(input.take(start), [Command::FocusAt { x: 0.25, y: 0.25 }]);
+    input.cursor(900.0, 300.0);
+    assert_eq!(input.take(start), [Command::FocusAt { x: 1.0, y: 0.75 }], "and a drag pulls it along");
+}
+
+#[test]
+fn the_wheel_does_three_things() {
+    let (mut input, start) = input();
+    assert!(input.wheel(2.0, start));
+    assert_eq!(input.speed(), SPEED_NOTCH * SPEED_NOTCH);
+    input.set_modifiers(ModifiersState::CONTROL, start);
+    assert!(!input.wheel(1.0, start));
+    input.set_modifiers(ModifiersState::SHIFT, start);
+    assert!(!input.wheel(-1.0, start));
+    let [Command::Dolly { factor: dolly }, Command::Zoom { factor: zoom }] = input.take(start)[..] else { panic!() };
+    assert!((dolly * ZOOM_NOTCH - 1.0).abs() < 1e-12 && (zoom / ZOOM_NOTCH - 1.0).abs() < 1e-12);
+    input.set_modifiers(NONE, start);
+    for _ in 0..1000 {
+        input.wheel(1.0, start);
+    }
+    assert_eq!(input.speed(), SPEED_RANGE.1);
+}
+
+#[test]
+fn a_turntable_goes_around_by_itself_until_it_is_stopped() {
+    let (mut input, start) = input();
+    input.toggle_spin(start);
+    assert!(input.is_moving());
+    assert_eq!(input.take(after(start, 1500)), [Command::Orbit { yaw_deg: 1.5 * SPIN_RATE_DEG, pitch_deg: 0.0 }]);
+    input.toggle_spin(after(start, 2000));
+    assert_eq!(input.take(after(start, 9000)), [Command::Orbit { yaw_deg: 0.5 * SPIN_RATE_DEG, pitch_deg: 0.0 }]);
+    assert!(!input.is_moving());
+}
+
+#[test]
+fn steps_repeat_and_toggles_do_not() {
+    let (mut input, start) = input();
+    let mut repeat =
+        |code, text: &str| input.key(PhysicalKey::Code(code), &Key::Character(text.into()), true, true, start);
+    assert!(repeat(KeyCode::BracketLeft, "[").is_some());
+    assert_eq!(repeat(KeyCode::KeyO, "o"), None);
+    assert_eq!(repeat(KeyCode::KeyK, "k"), None);
+}
+
+#[test]
+fn a_drag_looks_or_orbits_and_a_captured_mouse_needs_no_button() {
+    let (mut input, start) = input();
+    assert!(input.toggle_orbits());
+    input.button(MouseButton::Left, true, start);
+    input.cursor(40.0, 0.0);
+    assert_eq!(input.take(start), [Command::Orbit { yaw_deg: -0.1 * ORBIT_DRAG_DEG, pitch_deg: 0.0 }]);
+    input.button(MouseButton::Left, false, start);
+    assert!(!input.toggle_orbits());
+    input.mouse_moved(40.0, 40.0);
+    assert_eq!(input.take(start), [], "a free mouse points, and turns nothing");
+    input.set_captured(true);
+    input.mouse_moved(30.0, 0.0);
+    input.mouse_moved(10.0, 40.0);
+    input.button(MouseButton::Left, true, start);
+    input.cursor(300.0, 300.0);
+    let turned = Command::Turn { yaw_deg: 0.1 * LOOK_DRAG_DEG, pitch_deg: -0.1 * LOOK_DRAG_DEG };
+    assert_eq!(input.take(start), [turned], "and no button drags it");
+    input.set_captured(false);
+    input.mouse_moved(30.0, 0.0);
+    assert_eq!(input.take(start), []);
+}
+
+#[test]
+fn a_focus_that_follows_goes_where_the_mouse_goes() {
+    let (mut input, start) = input();
+    input.cursor(10.0, 10.0);
+    assert_eq!(input.take(start), []);
+    input.set_focuses(true);
+    input.cursor(200.0, 100.0);
+    input.cursor(400.0, 100.0);
+    assert_eq!(input.take(start), [Command::FocusFollows { x: 0.5, y: 0.25 }]);
+    input.cursor(400.0, 100.0);
+    assert_eq!(input.take(start), [], "a mouse that stands still asks for nothing");
+}

@@ -1,0 +1,104 @@
+//! The texture of a material: which one, and its numbers.
+
+use super::{Asked, color, number, row};
+use crate::frame::{Edit, Property, Session, paint_of};
+use crate::scene::Paint;
+use crate::scene::file::{Rgb, TexturePart, WrapPart};
+use crate::viewer::dialog::Purpose;
+use egui::Ui;
+use glam::{DVec2, DVec3, Vec3};
+
+/// What can take the place of a colour.
+pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &Paint, asked: &mut Asked) {
+    let mut names: Vec<&str> = (session.inputs().materials.iter())
+        .filter_map(|material| match paint_of(&material.material)? {
+            Paint::Texture(texture) => Some(texture.name.as_str()),
+            Paint::Rgb(_) => None,
+        })
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    ui.menu_button("texture", |ui| {
+        for name in names {
+            if ui.button(name).clicked() {
+                asked.edit(Edit::SetTexture { id, name: name.to_owned() });
+                ui.close();
+            }
+        }
+        ui.separator();
+        if ui.button("new checker").clicked() {
+            let a = if let Paint::Rgb(rgb) = paint { rgb.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::splat(0.7) };
+            let (squares, offset) = (DVec2::splat(8.0), DVec2::ZERO);
+            let part = TexturePart::Checker { a: Rgb(a), b: Rgb(0.2 * a), squares, offset, rotate: 0.0 };
+            asked.edit(Edit::Paint { id, part });
+            ui.close();
+        }
+        if ui.button("picture …").clicked() {
+            asked.dialog = Some(Purpose::Texture { id });
+            ui.close();
+        }
+        if matches!(paint, Paint::Texture(_)) && ui.button("plain colour").clicked() {
+            let value = DVec3::splat(0.5);
+            asked.edit(Edit::Set { id, property: Property::Color, value });
+            ui.close();
+        }
+    });
+}
+
+/// How the texture lies on the surface, and its colours.
+pub fn numbers(ui: &mut Ui, id: u64, part: &TexturePart, asked: &mut Asked) {
+    let mut new = part.clone();
+    match &mut new {
+        TexturePart::Checker { a, b, squares, offset, rotate } => {
+            row(ui, "squares of", |ui| {
+                ui.horizontal(|ui| {
+                    for paint in [a, b] {
+                        if let Some(value) = color(ui, paint.0, false) {
+                            *paint = Rgb(value.as_vec3());
+                        }
+                    }
+                })
+            });
+            lie(ui, "squares", squares, offset, rotate);
+        }
+        TexturePart::Image { repeat, offset, rotate, wrap, smooth, .. } => {
+            lie(ui, "repeated", repeat, offset, rotate);
+            row(ui, "beyond", |ui| {
+                ui.horizontal(|ui| {
+                    let kinds =
+                        [(WrapPart::Repeat, "again"), (WrapPart::Mirror, "mirrored"), (WrapPart::Clamp, "edge")];
+                    for (kind, label) in kinds {
+                        if ui.selectable_label(*wrap == kind, label).clicked() {
+                            *wrap = kind;
+                        }
+                    }
+                    ui.checkbox(smooth, "smooth");
+                })
+            });
+        }
+    }
+    if new != *part {
+        asked.edit(Edit::Paint { id, part: new });
+    }
+}
+
+fn lie(ui: &mut Ui, name: &str, scale: &mut DVec2, offset: &mut DVec2, rotate: &mut f64) {
+    let two = |ui: &mut Ui, name: &str, value: &mut DVec2, speed: f64| {
+        row(ui, name, |ui| {
+            ui.horizontal(|ui| {
+                for axis in 0..2 {
+                    if let Some(new) = number(ui, value[axis], speed, -1e6..=1e6, "") {
+                        value[axis] = new;
+                    }
+                }
+            })
+        });
+    };
+    two(ui, name, scale, 0.05);
+    two(ui, "moved", offset, 0.01);
+    row(ui, "turned", |ui| {
+        if let Some(new) = number(ui, *rotate, 0.5, -360.0..=360.0, "°") {
+            *rotate = new;
+        }
+    });
+}
