@@ -130,7 +130,7 @@ impl LightTable {
         mut u: [Float<S>; 2],
     ) -> Option<LightLanes<S>> {
         let wide = self.wide.as_ref()?;
-        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, position, normal, u_select, &mut u[0]);
+        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, [position, normal], u_select, &mut u[0]);
         let mut sample = wide.points(techniques.solid_angle, id, mask, position, u);
         sample.pdf = sample.pdf * pmf;
         sample.radiance = Vector::gather(&wide.radiance, id);
@@ -154,8 +154,7 @@ impl LightTable {
         techniques: &Techniques,
         mask: Mask,
         id: Bits<S>,
-        position: Vector<S>,
-        normal: Vector<S>,
+        [position, normal]: [Vector<S>; 2],
         wi: Vector<S>,
         distance: Float<S>,
     ) -> Float<S> {
@@ -187,8 +186,7 @@ impl LightTable {
         wide: &WideLights,
         techniques: &Techniques,
         mask: Mask,
-        position: Vector<S>,
-        normal: Vector<S>,
+        [position, normal]: [Vector<S>; 2],
         u_select: Float<S>,
         u: &mut Float<S>,
     ) -> (Bits<S>, Float<S>, Mask) {

@@ -42,9 +42,9 @@ fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
                     known |= 1 << lane;
                 }
             }
-            let (position, normal) = (Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index));
+            let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
             let id = Bits::load(s, &id);
-            let other = shading.lights.pdf_lanes(techniques, known, id, position, normal, -place.wo, distance);
+            let other = shading.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
             let by_bounce = if techniques.mis {
                 light_weight(techniques, pdf, other)
             } else {
