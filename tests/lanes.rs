@@ -3,11 +3,11 @@
 mod common;
 
 use common::*;
-use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape};
-use firstlight::mesh::procedural;
+use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
+use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, ColorInput, Environment, Film, Fresnel, Geometry, Material, Object, PixelFilter, RenderSettings,
-    ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, advance, replay_sample,
+    BadSample, ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Material, Object, PixelFilter,
+    RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -17,24 +17,50 @@ fn metal(alpha: f32, fresnel: Fresnel, compensate: bool) -> Material {
     Material::Metal { alpha: ScalarInput::Constant(alpha), reflectance, fresnel, compensate }
 }
 
-/// A room with a thing of each material, of each shape, under `lights`.
-fn room(lights: Vec<Shape>, environment: Environment, air: Vec3) -> Snapshot {
-    let mesh = procedural::icosphere(3).with_vertex_normals();
+/// A mesh in its place, with its normals and surface coordinates.
+fn placed(mesh: Mesh, world_from_object: Affine3A) -> (Shape, Option<Arc<Mesh>>) {
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
-    let placed = Affine3A::from_translation(Vec3::new(1.2, 0.9, 0.4)) * Affine3A::from_scale(Vec3::splat(0.4));
+    (Shape::Mesh { tree, world_from_object }, Some(Arc::new(mesh)))
+}
+
+/// Moved by `to` after it was scaled.
+fn scaled(scale: Vec3, to: Vec3) -> Affine3A {
+    Affine3A::from_translation(to) * Affine3A::from_scale(scale)
+}
+
+/// A small cloud of balls.
+fn cloud(to: Vec3) -> Shape {
+    let centers: Vec<Vec3> = (0..30).map(|i| Vec3::new((i % 6) as f32, (i / 6 % 2) as f32, (i / 12) as f32)).collect();
+    let radii: Vec<f32> = (0..30).map(|i| 0.2 + 0.01 * i as f32).collect();
+    let map = Affine3A::from_translation(to) * Affine3A::from_rotation_y(0.4) * Affine3A::from_scale(Vec3::splat(0.15));
+    Shape::Spheres { tree: Arc::new(SphereTree::build(&centers, &radii)), world_from_object: map }
+}
+
+/// A room with a thing of each material, of each shape, under `lights`.
+fn room(lights: Vec<(Shape, Option<Arc<Mesh>>)>, environment: Environment, air: Vec3) -> Snapshot {
+    let plain = |shape: Shape, material: u32| ((shape, None), material);
+    let smooth = procedural::icosphere(3).with_vertex_normals();
+    let mut unwrapped = procedural::icosphere(2).flat();
+    unwrapped.uvs = unwrapped.positions.iter().map(|p| Vec2::new(0.3 * p.x + 0.1 * p.z, 0.2 * p.y)).collect();
     let triangle = [Vec3::new(-2.0, 0.1, -1.0), Vec3::new(0.0, 0.3, -1.4), Vec3::new(-1.0, 2.0, -1.2)];
-    let mut shapes = vec![
-        (quad(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::Z * -6.0), 0),
-        (plane(Vec3::Z * -2.0, Vec3::Z), 1),
-        (sphere(Vec3::new(-1.2, 0.5, 0.2), 0.5), 2),
-        (sphere(Vec3::new(0.0, 0.5, 0.6), 0.5), 3),
-        (Shape::Triangle { vertices: triangle }, 4),
-        (sphere(Vec3::new(0.9, 0.3, 1.2), 0.3), 5),
-        (Shape::Mesh { tree, world_from_object: placed }, 6),
-        (sphere(Vec3::new(-0.6, 0.25, 1.3), 0.25), 7),
-        (sphere(Vec3::new(0.0, 0.4, 0.6), 0.2), 8),
+    let mut things = vec![
+        plain(quad(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::Z * -6.0), 0),
+        plain(plane(Vec3::Z * -2.0, Vec3::new(0.1, 0.0, 1.0).normalize()), 10),
+        plain(sphere(Vec3::new(-1.2, 0.5, 0.2), 0.5), 2),
+        plain(sphere(Vec3::new(0.0, 0.5, 0.6), 0.5), 3),
+        plain(Shape::Triangle { vertices: triangle }, 4),
+        plain(sphere(Vec3::new(0.9, 0.3, 1.2), 0.3), 5),
+        (placed(smooth.clone(), scaled(Vec3::splat(0.4), Vec3::new(1.2, 0.9, 0.4))), 6),
+        plain(sphere(Vec3::new(-0.6, 0.25, 1.3), 0.25), 7),
+        plain(sphere(Vec3::new(0.0, 0.4, 0.6), 0.2), 8),
+        plain(sphere(Vec3::new(1.7, 0.35, 1.4), 0.35), 11),
+        (placed(smooth.clone(), scaled(Vec3::new(-0.4, 0.3, 0.5), Vec3::new(-1.9, 0.8, -0.8))), 11),
+        (placed(unwrapped, scaled(Vec3::new(0.3, 0.4, 0.3), Vec3::new(0.5, 1.4, -0.6))), 12),
+        (placed(smooth, scaled(Vec3::splat(0.3), Vec3::new(-0.5, 1.6, 0.0))), 13),
+        plain(cloud(Vec3::new(-1.6, 0.1, 1.6)), 13),
+        plain(cloud(Vec3::new(0.6, 0.1, 2.0)), 1),
     ];
-    shapes.extend(lights.into_iter().map(|light| (light, 9)));
+    things.extend(lights.into_iter().map(|light| (light, 9)));
     let checker = ColorInput::Texture(0);
     let materials = vec![
         Material::Diffuse { albedo: checker },
@@ -47,15 +73,34 @@ fn room(lights: Vec<Shape>, environment: Environment, air: Vec3) -> Snapshot {
         metal(1e-6, Fresnel::Schlick, false),
         Material::Glass { ior: 1.2, absorption: Vec3::ZERO },
         emissive(7.0),
+        Material::Diffuse { albedo: ColorInput::Texture(1) },
+        // Matte under metal, metal that is matte in places, and the classic kind.
+        Material::Blend { weight: ScalarInput::Constant(0.3), a: 6, b: 5 },
+        Material::Blend { weight: ScalarInput::Constant(0.6), a: 4, b: 10 },
+        Material::Phong {
+            diffuse: checker,
+            ambient: 0.0,
+            specular: ScalarInput::Constant(0.25),
+            shininess: 30.0,
+            transparency: 0.0,
+            ior: 1.5,
+            absorption: Vec3::ZERO,
+        },
     ];
-    let objects = shapes.iter().enumerate().map(|(i, (_, material))| Object {
-        mesh: (i == 6).then(|| Arc::new(mesh.clone())),
-        ..Object::plain(*material)
-    });
+    let objects = things.iter().map(|((_, mesh), material)| Object { mesh: mesh.clone(), ..Object::plain(*material) });
     let objects = objects.collect();
-    let geometry = Geometry::build(shapes.into_iter().map(|(shape, _)| shape).collect(), objects);
-    let pattern = TexturePattern::Checker { a: Vec3::splat(0.7), b: Vec3::new(0.1, 0.3, 0.5) };
-    let textures = vec![Texture { pattern, uv_matrix: Mat2::from_diagonal(Vec2::splat(9.0)), uv_offset: Vec2::ZERO }];
+    let geometry = Geometry::build(things.into_iter().map(|((shape, _), _)| shape).collect(), objects);
+    let texture = |pattern, scale| Texture {
+        pattern,
+        uv_matrix: Mat2::from_diagonal(Vec2::splat(scale)),
+        uv_offset: Vec2::new(0.1, 0.0),
+    };
+    let texels = (0..12).map(|i| Vec3::new(0.1 + 0.06 * i as f32, 0.5, 0.9 - 0.07 * i as f32)).collect();
+    let image = Arc::new(ImageTexture { width: 4, height: 3, texels });
+    let textures = vec![
+        texture(TexturePattern::Checker { a: Vec3::splat(0.7), b: Vec3::new(0.1, 0.3, 0.5) }, 9.0),
+        texture(TexturePattern::Image { image, wrap: Wrap::Repeat, smooth: false }, 0.7),
+    ];
     let shading = Shading::build(&geometry, materials, textures, environment).with_air(air);
     let mut camera = camera(Vec3::new(0.2, 1.6, 5.0), Vec3::new(0.0, 0.6, 0.0), 42.0);
     (camera.lens_radius, camera.focus_distance) = (0.03, 5.0);
@@ -63,19 +108,23 @@ fn room(lights: Vec<Shape>, environment: Environment, air: Vec3) -> Snapshot {
 }
 
 fn rooms() -> Vec<(&'static str, Snapshot)> {
-    let ball = || sphere(Vec3::new(1.5, 2.5, 1.0), 0.4);
-    let lamp = || quad(Vec3::new(-1.0, 3.0, -0.5), Vec3::X * 1.2, Vec3::Z * 0.9);
-    let slanted = || quad(Vec3::new(-2.5, 1.0, 1.0), Vec3::new(0.1, 0.6, 0.1), Vec3::new(0.2, 0.1, 0.8));
-    let many = (0..20).map(|i| sphere(Vec3::new(i as f32 * 0.2 - 2.0, 2.6, 0.5), 0.08)).collect();
+    let ball = || (sphere(Vec3::new(1.5, 2.5, 1.0), 0.4), None);
+    let lamp = || (quad(Vec3::new(-1.0, 3.0, -0.5), Vec3::X * 1.2, Vec3::Z * 0.9), None);
+    let slanted = || (quad(Vec3::new(-2.5, 1.0, 1.0), Vec3::new(0.1, 0.6, 0.1), Vec3::new(0.2, 0.1, 0.8)), None);
+    let many = (0..20).map(|i| (sphere(Vec3::new(i as f32 * 0.2 - 2.0, 2.6, 0.5), 0.08), None)).collect();
     let triangle =
         Shape::Triangle { vertices: [Vec3::new(-1.0, 3.0, 0.0), Vec3::new(1.0, 3.0, 0.0), Vec3::new(0.0, 3.0, 1.0)] };
+    // Faces of a tenth of a steradian, and of a thousandth.
+    let shining = || placed(procedural::icosphere(1), scaled(Vec3::new(0.5, -0.4, 0.5), Vec3::new(-0.5, 2.6, 0.5)));
+    let small = || placed(procedural::icosphere(3), scaled(Vec3::splat(0.15), Vec3::new(1.2, 2.4, 1.0)));
     let sky = Environment::Gradient { zenith: Vec3::new(0.2, 0.4, 0.9), horizon: Vec3::ONE, ground: Vec3::splat(0.1) };
     vec![
         ("one quad", room(vec![lamp()], Environment::Black, Vec3::ZERO)),
         ("one ball", room(vec![ball()], Environment::Constant(Vec3::splat(0.3)), Vec3::ZERO)),
         ("both and a slanted one", room(vec![ball(), lamp(), slanted()], sky, Vec3::splat(0.05))),
-        ("a triangle", room(vec![triangle, ball()], Environment::Black, Vec3::ZERO)),
+        ("a triangle", room(vec![(triangle, None), ball()], Environment::Black, Vec3::ZERO)),
         ("many", room(many, Environment::Black, Vec3::ZERO)),
+        ("meshes that shine", room(vec![shining(), small(), ball(), lamp()], Environment::Black, Vec3::ZERO)),
     ]
 }
 

@@ -34,4 +34,4 @@ pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
 pub use sphere_tree::SphereTree;
 pub use stats::{KdTreeStats, Visits};
 pub use surface::SurfacePoint;
-pub(crate) use surface::{quad_rim, sphere_error};
+pub(crate) use surface::{INSET, WIDE_ERROR, quad_rim, sphere_error};

@@ -33,20 +33,20 @@ pub struct SurfacePoint {
 
 /// Maps between an object's own space and the world, with bounds on what the maps cost in precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Instance {
+pub(crate) struct Instance {
     pub object_from_world: Affine3A,
     /// Inverse transpose: carries normals, up to length.
-    normal_from_object: Mat3A,
+    pub normal_from_object: Mat3A,
     /// |world_from_object|, component by component.
     world_from_object_abs: Mat3A,
     /// |world_from_object| · |object_from_world|: what a relative error in the world becomes on the way there and back.
-    round_trip: Mat3A,
+    pub round_trip: Mat3A,
     /// The same of the translations.
-    round_trip_offset: Vec3,
+    pub round_trip_offset: Vec3,
     /// Largest growth of a relative error of a direction.
-    condition: f32,
+    pub condition: f32,
     /// What the way to the world and back adds to the error of points, in the object's own metres.
-    rim: f32,
+    pub rim: f32,
 }
 
 impl Instance {
@@ -109,7 +109,7 @@ impl Instance {
 ///
 /// A ray that starts `e` above one face and `4e` from the edge lies at least `e` in front of the other face, for all
 /// angles between the faces down to 30°.
-const INSET: f32 = 4.0;
+pub(crate) const INSET: f32 = 4.0;
 
 struct LocalPoint {
     position: Vec3,
@@ -118,6 +118,11 @@ struct LocalPoint {
 }
 
 impl SceneTree {
+    /// The maps of an object, by its number.
+    pub(crate) fn instance(&self, object: usize) -> &Instance {
+        &self.instances[object]
+    }
+
     /// The point of a hit that this tree gave for this ray.
     #[inline]
     pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
@@ -255,7 +260,7 @@ fn wide_cross(a: Vec3, b: Vec3) -> (Vec3, f32) {
 }
 
 /// What a few roundings in `f64` add, here and in the test of the next ray, relative to the numbers that they work on.
-const WIDE_ERROR: f64 = 16.0 * f64::EPSILON;
+pub(crate) const WIDE_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The hit projected onto the sphere, its error, and the outward normal.
 #[inline]

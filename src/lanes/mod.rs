@@ -14,5 +14,46 @@ pub(crate) use number::{Bits, Float, padded, select};
 pub use simd::InstructionSet;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use simd::{Avx2, Avx512};
-pub(crate) use simd::{LANES, Mask, Portable, Simd, dispatch};
+pub(crate) use simd::{Kernel, LANES, Mask, Portable, Simd, dispatch};
 pub(crate) use vector::{Vector, frame_around, select_vector};
+
+/// The array of an expression for 0, 1 and 2.
+///
+/// Written out, where a closure given to `array::map` may end up as a function of its own: compiled without the
+/// instructions of its caller, it would call each of them.
+macro_rules! three {
+    (|$k:ident| $of:expr) => {
+        [
+            {
+                let $k: usize = 0;
+                $of
+            },
+            {
+                let $k: usize = 1;
+                $of
+            },
+            {
+                let $k: usize = 2;
+                $of
+            },
+        ]
+    };
+}
+pub(crate) use three;
+
+/// The same for 0 and 1.
+macro_rules! two {
+    (|$k:ident| $of:expr) => {
+        [
+            {
+                let $k: usize = 0;
+                $of
+            },
+            {
+                let $k: usize = 1;
+                $of
+            },
+        ]
+    };
+}
+pub(crate) use two;

@@ -24,6 +24,9 @@ pub(crate) trait Simd: Copy {
     /// 16 `f64`.
     type D: Copy;
 
+    /// Runs a kernel as a function of its own, compiled once for the instruction set however often it is called for.
+    fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output;
+
     fn splat(self, x: f32) -> Self::F;
     fn load(self, from: &[f32; LANES]) -> Self::F;
     fn store(self, a: Self::F, to: &mut [f32; LANES]);
@@ -64,6 +67,8 @@ pub(crate) trait Simd: Copy {
     fn mul_d(self, a: Self::D, b: Self::D) -> Self::D;
     fn div_d(self, a: Self::D, b: Self::D) -> Self::D;
     fn sqrt_d(self, a: Self::D) -> Self::D;
+    fn abs_d(self, a: Self::D) -> Self::D;
+    fn max_d(self, a: Self::D, b: Self::D) -> Self::D;
     fn le_d(self, a: Self::D, b: Self::D) -> Mask;
 
     fn sqrt(self, a: Self::F) -> Self::F;
@@ -89,6 +94,14 @@ pub(crate) trait Simd: Copy {
     /// Moves the lanes with their bit set to the front, in order; what follows them is anything.
     fn compress(self, mask: Mask, a: Self::F) -> Self::F;
     fn compress_u(self, mask: Mask, a: Self::U) -> Self::U;
+}
+
+/// A function and its arguments, for [`Simd::call`].
+pub(crate) trait Kernel<S: Simd> {
+    type Output;
+
+    /// To be `#[inline(always)]`.
+    fn run(self, s: S) -> Self::Output;
 }
 
 /// What the processor can do.
@@ -185,6 +198,11 @@ impl Simd for Portable {
     type F = [f32; LANES];
     type U = [u32; LANES];
     type D = [f64; LANES];
+
+    #[inline(never)]
+    fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
 
     #[inline(always)]
     fn splat(self, x: f32) -> Self::F {
@@ -313,6 +331,14 @@ impl Simd for Portable {
     #[inline(always)]
     fn sqrt_d(self, a: Self::D) -> Self::D {
         a.map(f64::sqrt)
+    }
+    #[inline(always)]
+    fn abs_d(self, a: Self::D) -> Self::D {
+        a.map(f64::abs)
+    }
+    #[inline(always)]
+    fn max_d(self, a: Self::D, b: Self::D) -> Self::D {
+        zip(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
     fn le_d(self, a: Self::D, b: Self::D) -> Mask {
@@ -457,8 +483,16 @@ mod tests {
                 push(values);
             }
             let (x, y) = (s.widen(a), s.widen(b));
-            for wide in [s.add_d(x, y), s.sub_d(x, y), s.mul_d(x, y), s.div_d(x, y), s.sqrt_d(x), s.splat_d(1.0 / 3.0)]
-            {
+            for wide in [
+                s.add_d(x, y),
+                s.sub_d(x, y),
+                s.mul_d(x, y),
+                s.div_d(x, y),
+                s.sqrt_d(x),
+                s.abs_d(x),
+                s.max_d(x, y),
+                s.splat_d(1.0 / 3.0),
+            ] {
                 push(s.narrow(wide));
             }
             let (u, v) = (s.load_u(&array(1).map(f32::to_bits)), s.load_u(&array(3).map(f32::to_bits)));

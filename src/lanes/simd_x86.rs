@@ -1,6 +1,6 @@
 //! The x86 implementations of [`Simd`]: one AVX-512 register, or two of AVX2, for sixteen numbers.
 
-use super::{LANES, Mask, Simd, last_index};
+use super::{Kernel, LANES, Mask, Simd, last_index};
 use std::arch::x86_64::*;
 
 /// Proof that the processor has AVX-512 F, VL, DQ and BW.
@@ -46,6 +46,17 @@ impl Simd for Avx512 {
     type U = __m512i;
     type D = [__m512d; 2];
 
+    #[inline(always)]
+    fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output {
+        #[inline(never)]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+        fn apart<K: Kernel<Avx512>>(s: Avx512, kernel: K) -> K::Output {
+            kernel.run(s)
+        }
+        // SAFETY: `self` proves that the processor has the instructions.
+        unsafe { apart(self, kernel) }
+    }
+
     operations! {
         fn splat(x: f32) -> __m512 { _mm512_set1_ps(x) }
         fn load(from: &[f32; LANES]) -> __m512 { _mm512_loadu_ps(from.as_ptr()) }
@@ -86,6 +97,8 @@ impl Simd for Avx512 {
         fn mul_d(a: Self::D, b: Self::D) -> Self::D { [_mm512_mul_pd(a[0], b[0]), _mm512_mul_pd(a[1], b[1])] }
         fn div_d(a: Self::D, b: Self::D) -> Self::D { [_mm512_div_pd(a[0], b[0]), _mm512_div_pd(a[1], b[1])] }
         fn sqrt_d(a: Self::D) -> Self::D { [_mm512_sqrt_pd(a[0]), _mm512_sqrt_pd(a[1])] }
+        fn abs_d(a: Self::D) -> Self::D { [_mm512_abs_pd(a[0]), _mm512_abs_pd(a[1])] }
+        fn max_d(a: Self::D, b: Self::D) -> Self::D { [_mm512_max_pd(a[0], b[0]), _mm512_max_pd(a[1], b[1])] }
         fn le_d(a: Self::D, b: Self::D) -> Mask {
             let low = Mask::from(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a[0], b[0]));
             low | Mask::from(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a[1], b[1])) << 8
@@ -183,6 +196,17 @@ impl Simd for Avx2 {
     type U = [__m256i; 2];
     type D = [__m256d; 4];
 
+    #[inline(always)]
+    fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output {
+        #[inline(never)]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+        fn apart<K: Kernel<Avx2>>(s: Avx2, kernel: K) -> K::Output {
+            kernel.run(s)
+        }
+        // SAFETY: `self` proves that the processor has the instructions.
+        unsafe { apart(self, kernel) }
+    }
+
     operations! {
         fn splat(x: f32) -> Self::F { [_mm256_set1_ps(x); 2] }
         fn load(from: &[f32; LANES]) -> Self::F { [_mm256_loadu_ps(from.as_ptr()), _mm256_loadu_ps(from.as_ptr().add(8))] }
@@ -264,6 +288,11 @@ impl Simd for Avx2 {
         fn mul_d(a: Self::D, b: Self::D) -> Self::D { halves!(_mm256_mul_pd(a, b), 4) }
         fn div_d(a: Self::D, b: Self::D) -> Self::D { halves!(_mm256_div_pd(a, b), 4) }
         fn sqrt_d(a: Self::D) -> Self::D { halves!(_mm256_sqrt_pd(a), 4) }
+        fn abs_d(a: Self::D) -> Self::D {
+            let sign = [_mm256_set1_pd(-0.0); 4];
+            halves!(_mm256_andnot_pd(sign, a), 4)
+        }
+        fn max_d(a: Self::D, b: Self::D) -> Self::D { halves!(_mm256_max_pd(a, b), 4) }
         fn le_d(a: Self::D, b: Self::D) -> Mask {
             let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[0], b[0]))
                 | _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[1], b[1])) << 4;

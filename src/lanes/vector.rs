@@ -54,6 +54,15 @@ impl<S: Simd> Vector<S> {
     }
 
     #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - other.y * self.z,
+            y: self.z * other.x - other.z * self.x,
+            z: self.x * other.y - other.x * self.y,
+        }
+    }
+
+    #[inline(always)]
     pub fn length_squared(self) -> Float<S> {
         self.dot(self)
     }
@@ -77,6 +86,12 @@ impl<S: Simd> Vector<S> {
     #[inline(always)]
     pub fn times(self, other: Self) -> Self {
         Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
+    }
+
+    /// Coordinate by coordinate.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self { x: self.x.max(other.x), y: self.y.max(other.y), z: self.z.max(other.z) }
     }
 
     #[inline(always)]

@@ -161,10 +161,8 @@ impl PathWave {
         let set = settings.lanes.unwrap_or(InstructionSet::Portable);
         self.sorted.sort(set, scene, &self.hits, self.paths.len());
         let is_last = depth == settings.max_depth;
-        let features = &scene.shading.features;
-        let emitters_have_lanes = caustics.is_none()
-            && scene.shading.lights.has_lanes()
-            && !features.textures
+        let emitters_have_lanes = scene.shading.lights.has_lanes()
+            && !scene.shading.material_table.textured_emission
             && scene.shading.environment_sampler.is_none();
         for kind in 0..KINDS {
             let mut order = self.sorted.of_kind(kind);

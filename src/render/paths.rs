@@ -133,8 +133,8 @@ impl PathBatch {
 
     #[inline(always)]
     pub fn sampler_lanes<S: Simd>(&self, at: Bits<S>) -> SamplerLanes<S> {
-        let [stream, reversed_index, screen] =
-            [&self.stream, &self.reversed_index, &self.screen].map(|array| Bits::gather(array, at));
+        let (stream, reversed_index) = (Bits::gather(&self.stream, at), Bits::gather(&self.reversed_index, at));
+        let screen = Bits::gather(&self.screen, at);
         SamplerLanes { stream, reversed_index, screen }
     }
 

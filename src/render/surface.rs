@@ -18,6 +18,8 @@ pub(super) struct Vertex {
     pub geometric_normal: Vec3,
     /// Unit, and never facing away from the ray.
     pub normal: Vec3,
+    /// The same whoever looks from this side, even where it faces away.
+    pub smooth_normal: Vec3,
     /// Surface coordinates, see [`super::Texture`]; on spheres only for materials that ask for them.
     pub uv: Vec2,
     /// Whether the ray met the front: the outside of a closed surface.
@@ -39,7 +41,7 @@ impl Vertex {
         let front = wo.dot(point.geometric_normal) >= 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let geometric_normal = side * point.geometric_normal;
-        let mut normal = geometric_normal;
+        let mut smooth_normal = geometric_normal;
         let mut uv = Vec2::new(hit.u, hit.v);
         let mut lift = Vec3::ZERO;
         match &geometry.tree.shapes()[hit.object as usize] {
@@ -58,8 +60,7 @@ impl Vertex {
                     let smooth = if mirrored { -cofactors } else { cofactors }.normalize_or(point.geometric_normal);
                     // A normal that the viewer sees from behind would reflect light into the surface.
                     let turn = if smooth.dot(geometric_normal) < 0.0 { -1.0 } else { 1.0 };
-                    let facing = turn * smooth;
-                    normal = if facing.dot(wo) > 0.0 { facing } else { geometric_normal };
+                    smooth_normal = turn * smooth;
                     let corners = [a, b, c].map(|i| (mesh.positions[i], turn * mesh.normals[i]));
                     lift = world_from_object.transform_vector3(lift_of(&corners, weights));
                 }
@@ -87,7 +88,19 @@ impl Vertex {
             }
             Shape::Quad { .. } | Shape::Triangle { .. } => {}
         }
-        Self { position: point.position, error: point.error, geometric_normal, normal, uv, front, wo, lift }
+        let (position, error) = (point.position, point.error);
+        let normal = geometric_normal;
+        let vertex = Self { position, error, geometric_normal, normal, smooth_normal, uv, front, wo, lift };
+        vertex.seen_along(wo)
+    }
+
+    /// The same point as seen from elsewhere on the same side.
+    ///
+    /// - `wo`: unit, towards the viewer.
+    #[inline]
+    pub fn seen_along(&self, wo: Vec3) -> Self {
+        let faces_away = self.smooth_normal.dot(wo) <= 0.0;
+        Self { wo, normal: if faces_away { self.geometric_normal } else { self.smooth_normal }, ..*self }
     }
 
     /// `wo` mirrored by the shading normal, unit.
@@ -216,16 +229,6 @@ fn collect(
                 push(lobe, weight);
             }
         }
-    }
-}
-
-/// Albedo or reflectance of a material of one lobe.
-pub(super) fn color_at(scene: &Snapshot, id: MaterialId, uv: Vec2) -> Vec3 {
-    match &scene.shading.materials[id as usize] {
-        Material::Diffuse { albedo: color }
-        | Material::Mirror { reflectance: color }
-        | Material::Metal { reflectance: color, .. } => color.eval(scene, uv),
-        _ => Vec3::ONE,
     }
 }
 

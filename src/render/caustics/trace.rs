@@ -238,14 +238,6 @@ impl Step<'_> {
         LINE_DIMENSIONS + (self.n_vertices - 1) * VERTEX_DIMENSIONS
     }
 
-    /// The same point as a path that comes from `origin` would meet it.
-    fn seen_from(&self, origin: Vec3) -> Vertex {
-        let way = self.vertex.position - origin;
-        let distance = way.length();
-        let hit = Hit { t: distance, ..*self.hit };
-        Vertex::new(self.pass.scene, &Ray::new(origin, way / distance), &hit, self.material)
-    }
-
     /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
     fn join(&self, surface: &Surface) -> Option<(Ray, Vec2, Vec3)> {
         let &Self { pass, path, .. } = self;
@@ -260,10 +252,12 @@ impl Step<'_> {
         if !pass.reaches_film(film) {
             return None;
         }
-        let vertex = self.seen_from(origin);
         let to_lamp = self.vertex.wo;
+        let way = origin - self.vertex.position;
+        let distance2 = way.length_squared();
+        let vertex = self.vertex.seen_along(way / distance2.sqrt());
         // Lamp and eye on the same side of the true surface.
-        if vertex.front != self.vertex.front || !vertex.is_reached_from(to_lamp) {
+        if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || !vertex.is_reached_from(to_lamp) {
             return None;
         }
         let (value, pdf) = surface.eval(vertex.wo, to_lamp, vertex.normal);
@@ -274,7 +268,6 @@ impl Step<'_> {
         if cos_o <= 0.0 || cos_i <= 0.0 {
             return None;
         }
-        let distance2 = vertex.position.distance_squared(origin);
         let weight = pass.lamp_weight(path.ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
         let importance = cos_o / (distance2 * cos_lens.powi(3) * pass.pixel_area);
         let mut light = path.throughput * value * (weight * importance / cos_i);
@@ -337,7 +330,7 @@ impl Step<'_> {
             let eta = if sample.transmitted { before.eta(scene, material, vertex.front) } else { 1.0 };
             sample.weight * (gain / (eta * eta))
         } else {
-            let seen = self.seen_from(vertex.position + sample.wi);
+            let seen = vertex.seen_along(sample.wi);
             let (value, pdf) = surface.eval(sample.wi, vertex.wo, seen.normal);
             let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal), vertex.wo.dot(vertex.geometric_normal));
             if pdf <= 0.0 || cos_i <= 0.0 || !seen.is_reached_from(vertex.wo) {

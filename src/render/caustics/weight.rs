@@ -46,6 +46,11 @@ impl Track {
         self.ratio.is_nan()
     }
 
+    /// Whether the last vertex was smooth, and a path from a lamp can be the path so far.
+    pub fn is_gathered(&self) -> bool {
+        self.caster != NO_CASTER && !self.is_lost()
+    }
+
     pub fn guided(mut self, weight: Vec3) -> Self {
         self.gain /= weight.abs().max_element().clamp(f32::MIN_POSITIVE, 1.0);
         self

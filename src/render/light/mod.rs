@@ -7,6 +7,8 @@ mod selection;
 mod shape;
 mod tree;
 mod wide;
+mod wide_tree;
+mod wide_triangle;
 
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::kdtree::Shape;

@@ -1,6 +1,7 @@
 //! Which light to ask: a few lights by what each could send to the point, many by a tree over them.
 
 use super::tree::LightTree;
+use super::wide_tree::WideTree;
 use super::{Light, LightShape, Techniques};
 use crate::lanes::{Float, Simd, Vector, select};
 use crate::sampling::AliasTable;
@@ -15,6 +16,7 @@ pub(super) struct Selection {
     bounds: Vec<LightBounds>,
     /// When there are many.
     tree: LightTree,
+    wide_tree: WideTree,
     /// The same by power alone, for what has no point to ask from.
     alias: AliasTable,
 }
@@ -36,7 +38,9 @@ impl Selection {
         }
         let powers: Vec<f64> =
             lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
-        Self { bounds: Vec::new(), tree: LightTree::build(lights), alias: AliasTable::new(&powers) }
+        let tree = LightTree::build(lights);
+        let wide_tree = WideTree::new(&tree);
+        Self { bounds: Vec::new(), tree, wide_tree, alias: AliasTable::new(&powers) }
     }
 
     /// A light and the probability of the choice; `None` when no light can reach the point.
@@ -112,6 +116,12 @@ impl Selection {
     #[inline]
     pub fn bounds(&self) -> &[LightBounds] {
         &self.bounds
+    }
+
+    /// Of many lights.
+    #[inline]
+    pub fn wide_tree(&self) -> &WideTree {
+        &self.wide_tree
     }
 
     #[inline]

@@ -65,7 +65,7 @@ pub(in crate::render) struct SurfaceOfLight {
 pub(super) const SMALL_SOLID_ANGLE: f32 = 1e-3;
 
 /// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
-const LARGE_SOLID_ANGLE: f32 = 6.0;
+pub(super) const LARGE_SOLID_ANGLE: f32 = 6.0;
 
 impl LightShape {
     pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Self {

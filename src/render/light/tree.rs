@@ -19,26 +19,26 @@ const BINS: usize = 12;
 #[derive(Debug, Default)]
 pub(super) struct LightTree {
     /// Children lie side by side.
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     /// For each light the way to it from the root: bit k says which child on level k.
-    ways: Vec<u64>,
+    pub(super) ways: Vec<u64>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    center: Vec3,
-    radius: f32,
+pub(super) struct Node {
+    pub center: Vec3,
+    pub radius: f32,
     /// Mean direction of the normals, unit.
-    axis: Vec3,
+    pub axis: Vec3,
     /// By how much the cosine with some normal can exceed that with the axis: 2 sin(s/2) for normals up to s away.
-    widening: f32,
+    pub widening: f32,
     /// Luminance of the radiance, times area that can face a point.
-    power: f32,
+    pub power: f32,
     /// First of the two children, or `LEAF` plus a light.
-    link: u32,
+    pub link: u32,
 }
 
-const LEAF: u32 = 1 << 31;
+pub(super) const LEAF: u32 = 1 << 31;
 
 /// A light as the builder sees it.
 #[derive(Clone, Copy)]
@@ -294,7 +294,9 @@ fn partition(items: &mut [Item], is_below: impl Fn(&Item) -> bool) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::wide_tree::WideTree;
     use super::*;
+    use crate::lanes::{Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
     use crate::render::{ColorInput, Emission, Techniques};
     use crate::sampling::Sampler;
 
@@ -329,6 +331,52 @@ mod tests {
                 (at, Vec3::new(b.y - 0.5, c.x - 0.5, c.y - 0.5).normalize())
             })
             .collect()
+    }
+
+    #[inline(always)]
+    fn walk_lanes<S: Simd>(s: S, tree: &LightTree, places: &[(Vec3, Vec3)], out: &mut Vec<(u32, u32, u32)>) {
+        let wide = WideTree::new(tree);
+        for (round, chunk) in places.chunks(LANES).enumerate() {
+            let at = |k: usize| chunk[k.min(chunk.len() - 1)];
+            let u: [f32; LANES] = std::array::from_fn(|k| (k as f32 + 0.5) / LANES as f32);
+            let [px, py, pz] = [0, 1, 2].map(|axis| std::array::from_fn(|k| at(k).0[axis]));
+            let [nx, ny, nz] = [0, 1, 2].map(|axis| std::array::from_fn(|k| at(k).1[axis]));
+            let position = Vector::from_arrays(s, &[px, py, pz]);
+            let normal = Vector::from_arrays(s, &[nx, ny, nz]);
+            let (id, pmf, found) = wide.sample(Mask::MAX, position, normal, Float::load(s, &u));
+            let again = wide.pmf(found, id, position, normal).to_array();
+            let (ids, pmfs) = (id.to_array(), pmf.to_array());
+            for (k, &(position, normal)) in chunk.iter().enumerate() {
+                let expected = tree.sample(position, normal, u[k]);
+                let got = (found >> k & 1 != 0).then_some((ids[k], pmfs[k]));
+                assert_eq!(got, expected, "lane {k} of round {round}");
+                if let Some((id, pmf)) = got {
+                    assert_eq!(again[k], pmf);
+                    out.push((round as u32, id, pmf.to_bits()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_walk_the_same_way() {
+        for n in [2, 17, 40, 300] {
+            let (tree, places) = (LightTree::build(&lights(n, 9)), places());
+            let run = |set| {
+                let mut out = Vec::new();
+                let (tree, places, into) = (&tree, &places[..], &mut out);
+                dispatch!(
+                    set,
+                    walk_lanes(tree: &LightTree, places: &[(Vec3, Vec3)], into: &mut Vec<(u32, u32, u32)>)
+                );
+                out
+            };
+            let expected = run(InstructionSet::Portable);
+            assert!(expected.len() > 20, "{n} lights: hardly any place is reached");
+            for set in InstructionSet::available() {
+                assert_eq!(run(set), expected, "{n} lights, {set:?}");
+            }
+        }
     }
 
     #[test]

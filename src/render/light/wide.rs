@@ -1,4 +1,4 @@
-//! Light sampling for sixteen points at a time, where there are few lights and all are spheres or quads of one colour.
+//! Light sampling for sixteen points at a time, where no light is textured.
 //!
 //! The formulas are those of [`super::shape`] and [`super::selection`]; there is where they are explained.
 
@@ -6,7 +6,8 @@ use super::super::Techniques;
 use super::super::wide::place::offset_origin;
 use super::super::wide::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
 use super::selection::MAX_ESTIMATED;
-use super::shape::{CLOSE, SMALL_SOLID_ANGLE, sample_sphere};
+use super::shape::{CLOSE, LARGE_SOLID_ANGLE, SMALL_SOLID_ANGLE, sample_sphere};
+use super::wide_triangle::TriangleLanes;
 use super::{Light, LightShape, LightTable};
 use crate::geometry::robust::gamma;
 use crate::lanes::{
@@ -22,9 +23,11 @@ pub(super) struct WideLights {
     n: usize,
     has_spheres: bool,
     has_quads: bool,
+    has_triangles: bool,
     flags: Vec<u32>,
-    /// Corner or centre.
+    /// Corner, centre or first vertex.
     origin: [Vec<f32>; 3],
+    /// Of triangles, whole edges.
     unit_u: [Vec<f32>; 3],
     unit_v: [Vec<f32>; 3],
     normal: [Vec<f32>; 3],
@@ -40,6 +43,7 @@ pub(super) struct WideLights {
 
 const SPHERE: u32 = 1;
 const RECTANGLE: u32 = 2;
+const TRIANGLE: u32 = 4;
 
 /// Points on lights as seen from sixteen places; see [`super::LightSample`].
 #[derive(Clone, Copy)]
@@ -55,7 +59,7 @@ pub(in crate::render) struct LightLanes<S: Simd> {
 impl WideLights {
     /// `None` where lights have to be asked one at a time.
     pub fn build(lights: &[Light]) -> Option<Self> {
-        if lights.is_empty() || lights.len() > MAX_ESTIMATED {
+        if lights.is_empty() {
             return None;
         }
         let mut rows: [Vec<f32>; 20] = Default::default();
@@ -64,7 +68,10 @@ impl WideLights {
             let ColorInput::Constant(radiance) = light.emission.radiance else { return None };
             let radiance = light.emission.scale * radiance;
             let (flag, origin, u, v, normal, rest) = match &light.shape {
-                LightShape::Triangle { .. } => return None,
+                LightShape::Triangle { vertices: [a, b, c], normal, area: _ } => {
+                    let error = gamma(7) * (a.abs() + b.abs() + c.abs());
+                    (TRIANGLE, *a, *b - *a, *c - *a, *normal, [0.0, 0.0, 0.0, normal.abs().dot(error)])
+                }
                 LightShape::Sphere { center, radius } => {
                     (SPHERE, *center, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, [0.0, 0.0, *radius, 0.0])
                 }
@@ -84,13 +91,15 @@ impl WideLights {
             rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
         }
         let has_spheres = flags.contains(&SPHERE);
-        let has_quads = flags.iter().any(|&flag| flag != SPHERE);
+        let has_triangles = flags.contains(&TRIANGLE);
+        let has_quads = flags.iter().any(|&flag| flag & (SPHERE | TRIANGLE) == 0);
         let [ox, oy, oz, ux, uy, uz, vx, vy, vz, nx, ny, nz, r, g, b, length_u, length_v, radius, area, lift] =
             rows.map(padded);
         Some(Self {
             n: lights.len(),
             has_spheres,
             has_quads,
+            has_triangles,
             flags: padded(flags),
             origin: [ox, oy, oz],
             unit_u: [ux, uy, uz],
@@ -108,6 +117,8 @@ impl WideLights {
 
 impl LightTable {
     /// As [`Self::sample`] for the lanes of `mask`; `None` where only that can do it.
+    ///
+    /// - `u_select`: of use only where [`Self::selects_apart`].
     #[inline(always)]
     pub(in crate::render) fn sample_lanes<S: Simd>(
         &self,
@@ -115,14 +126,20 @@ impl LightTable {
         mask: Mask,
         position: Vector<S>,
         normal: Vector<S>,
+        u_select: Float<S>,
         mut u: [Float<S>; 2],
     ) -> Option<LightLanes<S>> {
         let wide = self.wide.as_ref()?;
-        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, position, normal, &mut u[0]);
+        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, [position, normal], u_select, &mut u[0]);
         let mut sample = wide.points(techniques.solid_angle, id, mask, position, u);
         sample.pdf = sample.pdf * pmf;
         sample.radiance = Vector::gather(&wide.radiance, id);
         Some(sample)
+    }
+
+    /// Whether there are so many lights that choosing one takes a number of its own.
+    pub(in crate::render) fn selects_apart(&self) -> bool {
+        self.lights.len() > MAX_ESTIMATED
     }
 
     /// Whether sixteen points at a time can be asked.
@@ -135,9 +152,9 @@ impl LightTable {
     pub(in crate::render) fn pdf_lanes<S: Simd>(
         &self,
         techniques: &Techniques,
+        mask: Mask,
         id: Bits<S>,
-        position: Vector<S>,
-        normal: Vector<S>,
+        [position, normal]: [Vector<S>; 2],
         wi: Vector<S>,
         distance: Float<S>,
     ) -> Float<S> {
@@ -149,6 +166,9 @@ impl LightTable {
         }
         if !techniques.light_selection {
             return pdf * (1.0 / wide.n as f32);
+        }
+        if wide.n > MAX_ESTIMATED {
+            return pdf * self.selection.wide_tree().pmf(mask, id, position, normal);
         }
         let (mut own, mut sum) = (one.all(0.0), one.all(0.0));
         for (i, bounds) in (0..).zip(self.selection.bounds()) {
@@ -166,8 +186,8 @@ impl LightTable {
         wide: &WideLights,
         techniques: &Techniques,
         mask: Mask,
-        position: Vector<S>,
-        normal: Vector<S>,
+        [position, normal]: [Vector<S>; 2],
+        u_select: Float<S>,
         u: &mut Float<S>,
     ) -> (Bits<S>, Float<S>, Mask) {
         let s = position.x.s;
@@ -179,6 +199,9 @@ impl LightTable {
             let id = scaled.truncate();
             *u = scaled - id.to_float();
             return (id, Float::splat(s, 1.0 / wide.n as f32), mask);
+        }
+        if wide.n > MAX_ESTIMATED {
+            return self.selection.wide_tree().sample(mask, position, normal, u_select);
         }
         let mut estimates = [Float::splat(s, 0.0); LANES];
         let mut sum = Float::splat(s, 0.0);
@@ -214,26 +237,25 @@ impl WideLights {
         position: Vector<S>,
         u: [Float<S>; 2],
     ) -> LightLanes<S> {
-        let spheres = if self.has_spheres { Bits::gather(&self.flags, id).has(SPHERE) } else { 0 };
-        let quads = mask & !spheres;
-        match (self.has_spheres, self.has_quads) {
-            (false, _) => self.quads(by_angle, id, mask, position, u),
-            (true, false) => self.spheres(by_angle, id, mask, position, u),
-            (true, true) => {
-                let a = self.spheres(by_angle, id, mask & spheres, position, u);
-                if quads == 0 {
-                    return a;
-                }
-                let b = self.quads(by_angle, id, quads, position, u);
-                LightLanes {
-                    found: a.found | b.found,
-                    target: select_vector(spheres, a.target, b.target),
-                    wi: select_vector(spheres, a.wi, b.wi),
-                    pdf: select(spheres, a.pdf, b.pdf),
-                    radiance: a.radiance,
-                }
-            }
+        let flags = Bits::gather(&self.flags, id);
+        let spheres = if self.has_spheres { mask & flags.has(SPHERE) } else { 0 };
+        let triangles = if self.has_triangles { mask & flags.has(TRIANGLE) } else { 0 };
+        let quads = mask & !spheres & !triangles;
+        let mut all = None;
+        if spheres != 0 {
+            all = Some(self.spheres(by_angle, id, spheres, position, u));
         }
+        if triangles != 0 {
+            let found = self.triangles(by_angle, id, triangles, position, u);
+            all = Some(all.map_or(found, |all| found.over(triangles, all)));
+        }
+        if quads != 0 && self.has_quads {
+            let found = self.quads(by_angle, id, quads, position, u);
+            all = Some(all.map_or(found, |all| found.over(quads, all)));
+        }
+        let zero = u[0].all(0.0);
+        let nowhere = Vector { x: zero, y: zero, z: zero };
+        all.unwrap_or(LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere })
     }
 
     /// See [`LightShape::pdf`].
@@ -252,12 +274,17 @@ impl WideLights {
         let relative = origin - position;
         let (zero, one) = (distance.all(0.0), distance.all(1.0));
         let mut pdf = zero;
-        if self.has_quads {
+        if self.has_quads || self.has_triangles {
             let normal = Vector::gather(&self.normal, id);
             let cos = -wi.dot(normal);
             let by_area = distance * distance / (cos * area);
             pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
-            if by_angle {
+            if by_angle && self.has_triangles {
+                let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+                let angle = TriangleLanes::new(relative, e1, e2).solid_angle;
+                pdf = select(flags.has(TRIANGLE) & large_enough(angle), one / angle, pdf);
+            }
+            if by_angle && self.has_quads {
                 let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
                 let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
                 let (x, y, height) = (relative.dot(unit_u), relative.dot(unit_v), relative.dot(normal));
@@ -323,6 +350,55 @@ impl WideLights {
     }
 
     #[inline(always)]
+    fn triangles<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        u: [Float<S>; 2],
+    ) -> LightLanes<S> {
+        let first = Vector::gather(&self.origin, id);
+        let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+        let (normal, area) = (Vector::gather(&self.normal, id), Float::gather(&self.area, id));
+        let relative = first - position;
+        let (zero, one) = (area.all(0.0), area.all(1.0));
+        let mut found = mask & relative.dot(normal).lt(zero);
+        // See `crate::sampling::uniform_triangle`.
+        let halves = [u[0] * 0.5, u[1] * 0.5];
+        let below = u[0].lt(u[1]);
+        let mut weights = [select(below, halves[0], u[0] - halves[1]), select(below, u[1] - halves[0], halves[1])];
+        let (mut angle, mut solid_angle) = (0, one);
+        if by_angle {
+            let triangle = TriangleLanes::new(relative, e1, e2);
+            solid_angle = triangle.solid_angle;
+            angle = large_enough(solid_angle);
+            if angle & found != 0 {
+                let (dir, seen) = triangle.sample(u);
+                found &= !angle | seen;
+                // Where the direction meets the plane (Möller and Trumbore 1997).
+                let p = dir.cross(e2);
+                let per_determinant = one / p.dot(e1);
+                let from = -relative;
+                let b1 = (from.dot(p) * per_determinant).at_least(0.0).at_most(1.0);
+                let b2 = (dir.dot(from.cross(e1)) * per_determinant).at_least(0.0).at_most(1.0);
+                let over = (b1 + b2).at_least(1.0);
+                weights = [select(angle, b1 / over, weights[0]), select(angle, b2 / over, weights[1])];
+            }
+        }
+        let point = first + e1 * weights[0] + e2 * weights[1];
+        let offset = point - position;
+        let distance = offset.length();
+        let wi = offset * (one / distance);
+        let cos = -wi.dot(normal);
+        let pdf = select(angle, one / solid_angle, distance * distance / (cos * area));
+        let found = found & zero.lt(distance) & (angle | (zero.lt(cos) & zero.lt(area)));
+        let lift =
+            Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
+        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+    }
+
+    #[inline(always)]
     fn spheres<S: Simd>(
         &self,
         by_angle: bool,
@@ -381,6 +457,26 @@ impl WideLights {
         let close = found & distance2.lt(r2 * CLOSE);
         if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
     }
+}
+
+impl<S: Simd> LightLanes<S> {
+    /// These where the bit is set, else the others.
+    #[inline(always)]
+    fn over(self, mask: Mask, other: Self) -> Self {
+        Self {
+            found: self.found | other.found,
+            target: select_vector(mask, self.target, other.target),
+            wi: select_vector(mask, self.wi, other.wi),
+            pdf: select(mask, self.pdf, other.pdf),
+            radiance: other.radiance,
+        }
+    }
+}
+
+/// Triangles that are sampled by solid angle.
+#[inline(always)]
+fn large_enough<S: Simd>(solid_angle: Float<S>) -> Mask {
+    solid_angle.all(SMALL_SOLID_ANGLE).le(solid_angle) & solid_angle.le(solid_angle.all(LARGE_SOLID_ANGLE))
 }
 
 /// Puts in what [`sample_sphere`] finds for the lanes of `close`.

@@ -3,11 +3,11 @@
 use super::super::Snapshot;
 use super::super::paths::PathBatch;
 use super::super::surface::Vertex;
-use super::tables::{BALL, FLAT, SurfaceTable};
+use super::tables::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable, TEXTURED};
 use crate::geometry::robust::UNIT_ROUNDOFF;
-use crate::kdtree::HitBatch;
-use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector, select, select_vector};
-use glam::Vec3;
+use crate::kdtree::{HitBatch, WIDE_ERROR};
+use crate::lanes::{Bits, Float, Kernel, LANES, Mask, Simd, Vector, select, select_vector, three, two};
+use glam::{Vec2, Vec3};
 
 /// Points on surfaces, each seen along a ray.
 #[derive(Clone, Copy)]
@@ -39,15 +39,41 @@ pub(super) struct At<'a, S: Simd> {
     pub mask: Mask,
 }
 
+impl<S: Simd> At<'_, S> {
+    #[inline(always)]
+    pub fn ray_origin(&self) -> Vector<S> {
+        let rays = &self.paths.rays;
+        let [x, y, z] = [&rays.origin_x, &rays.origin_y, &rays.origin_z];
+        let (x, y) = (Float::gather(x, self.index), Float::gather(y, self.index));
+        let z = Float::gather(z, self.index);
+        Vector { x, y, z }
+    }
+}
+
 /// Between `least` and as far from 1.
 #[inline(always)]
 fn away_from_rim<S: Simd>(at: Float<S>, least: Float<S>) -> Float<S> {
     at.max(least).min(at.all(1.0) - least)
 }
 
-impl<S: Simd> Place<S> {
+impl<S: Simd> Kernel<S> for &At<'_, S> {
+    type Output = Place<S>;
+
     #[inline(always)]
-    pub fn new(s: S, at: &At<S>) -> Self {
+    fn run(self, s: S) -> Place<S> {
+        Place::new(s, self)
+    }
+}
+
+impl<S: Simd> Place<S> {
+    /// Long, and asked for by all kinds of materials: they share one copy of it.
+    #[inline(always)]
+    pub fn of(s: S, at: &At<S>) -> Self {
+        s.call(at)
+    }
+
+    #[inline(always)]
+    fn new(s: S, at: &At<S>) -> Self {
         let (rays, hits, table) = (&at.paths.rays, at.hits, &at.scene.geometry.surfaces);
         let dir = Vector {
             x: Float::gather(&rays.dir_x, at.index),
@@ -57,13 +83,17 @@ impl<S: Simd> Place<S> {
         let wo = -dir;
         let object = Bits::gather(&hits.object, at.index);
         let kind = Bits::gather(&table.kind, object);
-        let (flat, mut ball) = (kind.equals(FLAT) & at.mask, kind.equals(BALL) & at.mask);
-        let mut other = at.mask & !flat & !ball;
-        if at.scene.shading.features.textures {
+        let (flat, plane) = (kind.equals(FLAT) & at.mask, kind.equals(PLANE) & at.mask);
+        let (mesh, mut cloud) = (kind.equals(MESH) & at.mask, kind.equals(CLOUD) & at.mask);
+        let mut ball = kind.equals(BALL) & at.mask;
+        let mut other = kind.equals(OTHER) & at.mask;
+        if at.scene.shading.features.textures && ball | cloud != 0 {
+            // Longitude and latitude.
             let material = Bits::gather(at.materials, at.index);
-            let textured = Bits::gather(&at.scene.shading.material_table.flags, material).has(super::tables::TEXTURED);
-            other |= ball & textured;
+            let textured = Bits::gather(&at.scene.shading.material_table.flags, material).has(TEXTURED);
+            other |= (ball | cloud) & textured;
             ball &= !textured;
+            cloud &= !textured;
         }
         let zero = Float::splat(s, 0.0);
         let nowhere = Vector { x: zero, y: zero, z: zero };
@@ -84,11 +114,30 @@ impl<S: Simd> Place<S> {
         if ball != 0 {
             place.set_balls(s, at, table, object, dir, ball);
         }
+        if plane != 0 {
+            place.set_planes(s, at, table, object, dir, plane);
+        }
+        let mut corners = None;
+        let mut row = object;
+        if mesh | cloud != 0 {
+            row = Bits::gather(&table.row, object);
+        }
+        if mesh != 0 {
+            let (found, near_rim) = place.set_meshes(s, at, row, mesh);
+            corners = Some(found);
+            other |= near_rim;
+        }
+        if cloud != 0 {
+            place.set_clouds(s, at, row, dir, cloud);
+        }
         place.front = Float::splat(s, 0.0).le(wo.dot(place.geometric_normal));
         place.geometric_normal = select_vector(place.front, place.geometric_normal, -place.geometric_normal);
         place.normal = place.geometric_normal;
         place.reach_normal = place.geometric_normal;
         place.lifted = place.position;
+        if let Some(corners) = &corners {
+            place.smooth_meshes(s, at, row, corners);
+        }
         if other != 0 {
             place.set_others(s, at, other);
         }
@@ -106,29 +155,11 @@ impl<S: Simd> Place<S> {
         self.uv = [u, v];
     }
 
-    /// In `f64`, as for one ball.
     #[inline(always)]
     fn set_balls(&mut self, s: S, at: &At<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
-        let rays = &at.paths.rays;
-        let center = Vector::gather(&table.a, object);
-        let radius = s.widen(Float::gather(&table.offset, object).v);
-        let t = s.widen(Float::gather(&at.hits.t, at.index).v);
-        let origin = [&rays.origin_x, &rays.origin_y, &rays.origin_z];
-        let (ox, oy) = (Float::gather(origin[0], at.index), Float::gather(origin[1], at.index));
-        let oz = Float::gather(origin[2], at.index);
-        let (x, cx) = outwards(s, ox, t, dir.x, center.x);
-        let (y, cy) = outwards(s, oy, t, dir.y, center.y);
-        let (z, cz) = outwards(s, oz, t, dir.z, center.z);
-        let squared = s.add_d(s.add_d(s.mul_d(x, x), s.mul_d(y, y)), s.mul_d(z, z));
-        let inverse = s.div_d(s.splat_d(1.0), s.sqrt_d(squared));
-        let (x, y, z) = (s.mul_d(x, inverse), s.mul_d(y, inverse), s.mul_d(z, inverse));
-        let position = Vector {
-            x: Float { s, v: s.narrow(s.add_d(cx, s.mul_d(radius, x))) },
-            y: Float { s, v: s.narrow(s.add_d(cy, s.mul_d(radius, y))) },
-            z: Float { s, v: s.narrow(s.add_d(cz, s.mul_d(radius, z))) },
-        };
-        let normal =
-            Vector { x: Float { s, v: s.narrow(x) }, y: Float { s, v: s.narrow(y) }, z: Float { s, v: s.narrow(z) } };
+        let (center, radius) = (Vector::gather(&table.a, object), Float::gather(&table.offset, object));
+        let t = Float::gather(&at.hits.t, at.index);
+        let [position, normal] = ball_points(s, [at.ray_origin(), dir], t, center, radius);
         let (n, error) = (normal.abs(), Float::gather(&table.least[0], object));
         let offset = n.dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF)) + (n.x + n.y + n.z) * error;
         self.position = select_vector(mask, position, self.position);
@@ -136,7 +167,30 @@ impl<S: Simd> Place<S> {
         self.offset = select(mask, offset, self.offset);
     }
 
-    /// Meshes, clouds of balls and planes, one at a time.
+    /// In `f64`, as for one plane.
+    #[inline(always)]
+    fn set_planes(&mut self, s: S, at: &At<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
+        let (point, normal) = (Vector::gather(&table.a, object), Vector::gather(&table.normal, object));
+        let t = s.widen(Float::gather(&at.hits.t, at.index).v);
+        let (origin, dir, from, n) = (widened(at.ray_origin()), widened(dir), widened(point), widened(normal));
+        let near = three!(|k| s.add_d(origin[k], s.mul_d(t, dir[k])));
+        let away = three!(|k| s.sub_d(near[k], from[k]));
+        let height = s.div_d(dot_d(s, away, n), dot_d(s, n, n));
+        let [x, y, z] = three!(|k| Float { s, v: s.narrow(s.sub_d(near[k], s.mul_d(n[k], height))) });
+        let position = Vector { x, y, z };
+        // All but the rounding is a power of two away from the size.
+        let error = (point.abs().max_element() + position.abs().max_element()) * WIDE_ERROR as f32;
+        let each = Vector { x: error, y: error, z: error };
+        let offset = normal.abs().dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF) + each);
+        let local = position - point;
+        let axes = [&table.b, &table.c];
+        self.position = select_vector(mask, position, self.position);
+        self.geometric_normal = select_vector(mask, normal, self.geometric_normal);
+        self.offset = select(mask, offset, self.offset);
+        self.uv = two!(|k| select(mask, local.dot(Vector::gather(axes[k], object)), self.uv[k]));
+    }
+
+    /// Lone triangles, textured balls and what is near the rim of a triangle, one at a time.
     #[inline(always)]
     fn set_others(&mut self, s: S, at: &At<S>, mask: Mask) {
         let mut vectors = [
@@ -173,6 +227,18 @@ impl<S: Simd> Place<S> {
         self.uv = [Float::load(s, &scalars[1]), Float::load(s, &scalars[2])];
     }
 
+    #[inline(always)]
+    pub fn stored(&self) -> StoredPlaces {
+        StoredPlaces {
+            position: self.position.to_arrays(),
+            geometric_normal: self.geometric_normal.to_arrays(),
+            normal: self.normal.to_arrays(),
+            wo: self.wo.to_arrays(),
+            uv: [self.uv[0].to_array(), self.uv[1].to_array()],
+            front: self.front,
+        }
+    }
+
     /// Where a ray starts that stays on the side of `wo`.
     #[inline(always)]
     pub fn leaving(&self) -> Vector<S> {
@@ -186,12 +252,64 @@ impl<S: Simd> Place<S> {
     }
 }
 
-/// One coordinate of a hit as seen from the centre, and of the centre.
+/// Places in memory, for what is done with them one at a time.
+pub(super) struct StoredPlaces {
+    position: [[f32; LANES]; 3],
+    geometric_normal: [[f32; LANES]; 3],
+    normal: [[f32; LANES]; 3],
+    wo: [[f32; LANES]; 3],
+    uv: [[f32; LANES]; 2],
+    front: Mask,
+}
+
+impl StoredPlaces {
+    /// The vertex of a lane, but for where rays leave it.
+    #[inline]
+    pub fn vertex(&self, lane: usize) -> Vertex {
+        let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
+        Vertex {
+            position: at(&self.position),
+            error: Vec3::ZERO,
+            geometric_normal: at(&self.geometric_normal),
+            normal: at(&self.normal),
+            smooth_normal: at(&self.normal),
+            uv: Vec2::new(self.uv[0][lane], self.uv[1][lane]),
+            front: self.front >> lane & 1 != 0,
+            wo: at(&self.wo),
+            lift: Vec3::ZERO,
+        }
+    }
+}
+
+/// Hits projected onto spheres, in `f64` as for one of them, and their outward normals.
 #[inline(always)]
-fn outwards<S: Simd>(s: S, origin: Float<S>, t: S::D, dir: Float<S>, center: Float<S>) -> (S::D, S::D) {
-    let center = s.widen(center.v);
-    let near = s.add_d(s.widen(origin.v), s.mul_d(t, s.widen(dir.v)));
-    (s.sub_d(near, center), center)
+pub(super) fn ball_points<S: Simd>(
+    s: S,
+    [origin, dir]: [Vector<S>; 2],
+    t: Float<S>,
+    center: Vector<S>,
+    radius: Float<S>,
+) -> [Vector<S>; 2] {
+    let (t, radius) = (s.widen(t.v), s.widen(radius.v));
+    let (origin, dir, center) = (widened(origin), widened(dir), widened(center));
+    let out = three!(|k| s.sub_d(s.add_d(origin[k], s.mul_d(t, dir[k])), center[k]));
+    let inverse = s.div_d(s.splat_d(1.0), s.sqrt_d(dot_d(s, out, out)));
+    let normal = three!(|k| s.mul_d(out[k], inverse));
+    let [x, y, z] = three!(|k| Float { s, v: s.narrow(s.add_d(center[k], s.mul_d(radius, normal[k]))) });
+    let position = Vector { x, y, z };
+    let [x, y, z] = three!(|k| Float { s, v: s.narrow(normal[k]) });
+    [position, Vector { x, y, z }]
+}
+
+#[inline(always)]
+fn widened<S: Simd>(v: Vector<S>) -> [S::D; 3] {
+    let s = v.x.s;
+    [s.widen(v.x.v), s.widen(v.y.v), s.widen(v.z.v)]
+}
+
+#[inline(always)]
+fn dot_d<S: Simd>(s: S, a: [S::D; 3], b: [S::D; 3]) -> S::D {
+    s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
 }
 
 #[inline(never)]

@@ -6,8 +6,8 @@ use super::tables::SEVERAL;
 use crate::kdtree::HitBatch;
 use crate::lanes::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 
-/// Kinds of hits: misses, then those of materials.
-pub(in crate::render) const KINDS: usize = Material::KINDS + 1;
+/// Kinds of hits: misses, then those of materials, and the one of two parts.
+pub(in crate::render) const KINDS: usize = Material::KINDS + 2;
 
 /// The hits of a wave, sorted.
 #[derive(Default)]
