@@ -141,6 +141,8 @@ impl Film {
                     // Not kept on disk: known again after the next doubling.
                     last: Vec::new(),
                 };
+            } else if !record_of_tile.steps.is_empty() {
+                return Err("what it knows of its error does not fit its samples".to_owned());
             }
         }
         if let Some(lamps) = lamps {
