@@ -78,77 +78,62 @@ fn found(hit: bool, t: f32) -> f32 {
     if hit { t } else { f32::INFINITY }
 }
 
-/// The best preset of obvhs over its binary tree, with triangles in the order of its leaves, as its examples do.
-pub struct ObvhsBinary {
-    tree: obvhs::bvh2::Bvh2,
-    triangles: Vec<Triangle>,
-    seconds: f64,
+/// The best preset of obvhs, with triangles in the order of the leaves, as its examples do.
+macro_rules! obvhs_engine {
+    ($(#[$doc:meta])* $engine:ident, $name:literal, $tree:ty, $build:path) => {
+        $(#[$doc])*
+        pub struct $engine {
+            tree: $tree,
+            triangles: Vec<Triangle>,
+            seconds: f64,
+        }
+
+        impl $engine {
+            pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+                let triangles = peer_triangles(positions, triangles);
+                let build = || $build(&triangles, BvhBuildParams::very_slow_build(), &mut Duration::default());
+                let (tree, seconds) = timed(build);
+                let ordered = tree.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
+                Self { tree, triangles: ordered, seconds }
+            }
+        }
+
+        impl Engine for $engine {
+            fn name(&self) -> &'static str {
+                $name
+            }
+
+            fn build_seconds(&self) -> f64 {
+                self.seconds
+            }
+
+            fn closest(&self, wave: &RayBatch, _: RayClass, to: &mut Vec<f32>) {
+                to.clear();
+                to.extend(each(wave).map(|ray| {
+                    let mut hit = RayHit::none();
+                    let is_hit =
+                        self.tree.ray_traverse(peer_ray(&ray), &mut hit, |ray, i| self.triangles[i].intersect(ray));
+                    found(is_hit, hit.t)
+                }));
+            }
+        }
+    };
 }
 
-impl ObvhsBinary {
-    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let triangles = peer_triangles(positions, triangles);
-        let build = || build_bvh2_from_tris(&triangles, BvhBuildParams::very_slow_build(), &mut Duration::default());
-        let (tree, seconds) = timed(build);
-        let ordered = tree.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
-        Self { tree, triangles: ordered, seconds }
-    }
-}
-
-impl Engine for ObvhsBinary {
-    fn name(&self) -> &'static str {
-        "obvhs Bvh2"
-    }
-
-    fn build_seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn closest(&self, wave: &RayBatch, _: RayClass, to: &mut Vec<f32>) {
-        to.clear();
-        to.extend(each(wave).map(|ray| {
-            let mut hit = RayHit::none();
-            let is_hit = self.tree.ray_traverse(peer_ray(&ray), &mut hit, |ray, i| self.triangles[i].intersect(ray));
-            found(is_hit, hit.t)
-        }));
-    }
-}
-
-/// The same over its compressed eight-wide tree.
-pub struct ObvhsWide {
-    tree: obvhs::cwbvh::CwBvh,
-    triangles: Vec<Triangle>,
-    seconds: f64,
-}
-
-impl ObvhsWide {
-    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let triangles = peer_triangles(positions, triangles);
-        let build = || build_cwbvh_from_tris(&triangles, BvhBuildParams::very_slow_build(), &mut Duration::default());
-        let (tree, seconds) = timed(build);
-        let ordered = tree.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
-        Self { tree, triangles: ordered, seconds }
-    }
-}
-
-impl Engine for ObvhsWide {
-    fn name(&self) -> &'static str {
-        "obvhs CwBvh"
-    }
-
-    fn build_seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn closest(&self, wave: &RayBatch, _: RayClass, to: &mut Vec<f32>) {
-        to.clear();
-        to.extend(each(wave).map(|ray| {
-            let mut hit = RayHit::none();
-            let is_hit = self.tree.ray_traverse(peer_ray(&ray), &mut hit, |ray, i| self.triangles[i].intersect(ray));
-            found(is_hit, hit.t)
-        }));
-    }
-}
+obvhs_engine!(
+    /// Over its binary tree.
+    ObvhsBinary,
+    "obvhs Bvh2",
+    obvhs::bvh2::Bvh2,
+    build_bvh2_from_tris
+);
+obvhs_engine!(
+    /// Over its compressed eight-wide tree.
+    ObvhsWide,
+    "obvhs CwBvh",
+    obvhs::cwbvh::CwBvh,
+    build_cwbvh_from_tris
+);
 
 struct BvhTriangle {
     triangle: Triangle,
