@@ -152,7 +152,7 @@ fn assault(target: &str, drive: fn(&[u8]), usual: usize, bytes: usize, factor: u
             std::fs::write(&kept, &input).unwrap();
             panic!("{target} {i}: kept as {}", kept.display());
         }
-        assert!(clock.elapsed() < Duration::from_secs(5), "{target} {i} took {:?}", clock.elapsed());
+        assert!(clock.elapsed() < Duration::from_secs(60), "{target} {i} took {:?}", clock.elapsed());
         let taken = PEAK.load(Ordering::Relaxed).saturating_sub(before);
         largest = largest.max(taken);
         assert!(taken <= bytes + factor * input.len(), "{target} {i}: {taken} bytes for {} of input", input.len());

@@ -8,7 +8,7 @@ use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, comp
 use super::saving::SavedAs;
 use super::status::{MessageKind, Picture, Status};
 use super::views::ViewTrail;
-use super::worker::{Job, Look, Worker};
+use super::worker::{Job, Look, Orders, Worker};
 use super::{Target, navigation};
 use crate::render::{Display, Integrator, RenderSettings, Snapshot};
 use crate::scene::{
@@ -387,30 +387,31 @@ pub fn accumulate(
     mut shown: ResMut<Shown>,
     mut found: ResMut<Found>,
 ) {
+    let mut orders = Orders::default();
     // The first frame finds what the worker was started with.
     if let Some(before) = shown.threads.replace(threads.0).filter(|before| *before != threads.0) {
-        renderer.0.set_threads(threads.0);
+        orders.threads = Some(threads.0);
         found.0.add(Level::Reschedule, format!("threads: {before} → {}", threads.0));
     }
     if shown.target.replace(stop_at.0).is_some_and(|before| before != stop_at.0) {
-        renderer.0.set_target(stop_at.0);
+        orders.target = Some(stop_at.0);
         found.0.add(Level::Reschedule, "target");
     }
     if shown.region != brush.0 {
-        renderer.0.set_region(brush.0);
+        orders.region = Some(brush.0);
         shown.region = brush.0;
         found.0.add(Level::Reschedule, "region");
     }
     let paused = paused.0 || hidden.0 || size.is_empty();
     if shown.paused != paused {
-        renderer.0.set_paused(paused);
+        orders.paused = Some(paused);
         shown.paused = paused;
         found.0.add(Level::Reschedule, "pause");
     }
     if found.0.restarts()
         && let (Some(extraction), Some(PictureSize { width, height })) = (&shown.extraction, shown.size)
     {
-        renderer.0.set_job(Job {
+        orders.job = Some(Job {
             generation: shown.generation,
             snapshot: extraction.snapshot.clone(),
             settings: shown.settings,
@@ -418,6 +419,7 @@ pub fn accumulate(
             height,
         });
     }
+    renderer.0.order(orders);
 }
 
 /// Tells the workers how to develop the film; no sample is lost.

@@ -95,21 +95,47 @@ pub struct Stats {
     pub failure: Option<String>,
 }
 
+/// What is to be done from now on, as far as it has changed. All of it takes effect at once: a target without the
+/// region that it is meant for would give samples to the rest.
+#[derive(Default)]
+pub struct Orders {
+    /// Throws all samples away; the rest keeps them.
+    pub job: Option<Job>,
+    pub target: Option<Target>,
+    pub paused: Option<bool>,
+    /// 0 is one a processor.
+    pub threads: Option<usize>,
+    /// What gets the next samples, in fractions of the picture: left, top, right, bottom.
+    pub region: Option<Option<[f64; 4]>>,
+}
+
+impl Orders {
+    /// Whether nothing has changed.
+    pub fn is_empty(&self) -> bool {
+        matches!(self, Self { job: None, target: None, paused: None, threads: None, region: None })
+    }
+
+    /// Later orders take the place of earlier ones.
+    fn follow(&mut self, later: Self) {
+        let Self { job, target, paused, threads, region } = later;
+        self.job = job.or(self.job.take());
+        self.target = target.or(self.target);
+        self.paused = paused.or(self.paused);
+        self.threads = threads.or(self.threads);
+        self.region = region.or(self.region);
+    }
+}
+
 /// Messages to the thread; a later one of a kind takes the place of an earlier one.
 #[derive(Default)]
 struct Inbox {
-    job: Option<Job>,
+    orders: Orders,
     /// When the first job that has not been taken over was posted, if the thread was at work then.
     posted: Option<Instant>,
     /// Of the job of this generation: gives the same samples.
     snapshot: Option<(u64, Snapshot)>,
     display: Option<Display>,
     look: Option<Look>,
-    target: Option<Target>,
-    paused: Option<bool>,
-    threads: Option<usize>,
-    /// In fractions of the picture: left, top, right, bottom.
-    region: Option<Option<[f64; 4]>>,
     question: Option<(Question, Sender<Answer>)>,
     film_wanted: Vec<Sender<Film>>,
     to_keep: Vec<Sender<Film>>,
@@ -167,11 +193,14 @@ impl Worker {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    pub fn set_job(&self, job: Job) {
-        let works = !self.shared.sleeping.load(Ordering::Acquire);
+    pub fn order(&self, orders: Orders) {
+        if orders.is_empty() {
+            return;
+        }
+        let interrupts = orders.job.is_some() && !self.shared.sleeping.load(Ordering::Acquire);
         self.post(|inbox| {
-            inbox.job = Some(job);
-            inbox.posted = inbox.posted.or(works.then(Instant::now));
+            inbox.orders.follow(orders);
+            inbox.posted = inbox.posted.or(interrupts.then(Instant::now));
         });
     }
 
@@ -188,26 +217,6 @@ impl Worker {
     /// Keeps all samples.
     pub fn set_look(&self, look: Look) {
         self.post(|inbox| inbox.look = Some(look));
-    }
-
-    /// Keeps all samples.
-    pub fn set_target(&self, target: Target) {
-        self.post(|inbox| inbox.target = Some(target));
-    }
-
-    /// Keeps all samples.
-    pub fn set_paused(&self, paused: bool) {
-        self.post(|inbox| inbox.paused = Some(paused));
-    }
-
-    /// Keeps all samples; 0 is one a processor.
-    pub fn set_threads(&self, threads: usize) {
-        self.post(|inbox| inbox.threads = Some(threads));
-    }
-
-    /// Keeps all samples; what gets the next ones, in fractions of the picture: left, top, right, bottom.
-    pub fn set_region(&self, region: Option<[f64; 4]>) {
-        self.post(|inbox| inbox.region = Some(region));
     }
 
     /// Why a pixel looks as it does; never waits. When the answer cannot come any more, the other end is closed.

@@ -84,16 +84,17 @@ impl<'a> Loop<'a> {
         if inbox.quit {
             return false;
         }
+        let orders = inbox.orders;
         if let Some(posted) = inbox.posted {
             lock(&self.shared.cancels).add(posted.elapsed());
         }
-        if let Some(threads) = inbox.threads {
+        if let Some(threads) = orders.threads {
             self.set_threads(threads);
         }
-        if let Some(target) = inbox.target {
+        if let Some(target) = orders.target {
             self.scheduler.set_target(target);
         }
-        if let Some(paused) = inbox.paused {
+        if let Some(paused) = orders.paused {
             self.scheduler.set_paused(paused);
         }
         if let Some(look) = inbox.look {
@@ -112,15 +113,15 @@ impl<'a> Loop<'a> {
         }
         self.to_keep.extend(inbox.to_keep);
         // What is seen now is about to go.
-        self.hand_out(inbox.job.is_some());
+        self.hand_out(orders.job.is_some());
         if let Some(question) = inbox.question {
             self.question = Some(question);
         }
         let region_before = self.region;
-        if let Some(region) = inbox.region {
+        if let Some(region) = orders.region {
             self.region = region;
         }
-        if let Some(job) = inbox.job {
+        if let Some(job) = orders.job {
             let size = (job.width, job.height);
             self.scheduler.resize(size.0, size.1, self.clock.elapsed());
             let threads = lock(&self.shared.pool).current_num_threads();
@@ -252,7 +253,7 @@ impl<'a> Loop<'a> {
         stats.n_bad += pass.n_bad;
         stats.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(stats.bad.len())));
         let interrupted = !pass.completed && interrupt.load(Ordering::Relaxed);
-        let replaced = interrupted && lock(&self.shared.inbox).job.is_some();
+        let replaced = interrupted && lock(&self.shared.inbox).orders.job.is_some();
         let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
         stats.error = error.filter(|_| divider == 1);
         let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp_in(region.as_ref()), error };
