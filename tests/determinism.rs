@@ -71,3 +71,19 @@ fn portions_and_interruptions_change_nothing() {
     }
     assert!(bits(&whole) == bits(&portions));
 }
+
+#[test]
+fn a_cleared_film_is_like_a_new_one() {
+    let (scene, settings) = (busy_scene(), RenderSettings::default());
+    let new = || Film::new(75, 50).starting_at(3);
+    let (mut expected, mut used) = (new(), Film::new(75, 50));
+    advance(&scene, &settings, &mut expected, 4, &|| false);
+    advance(&scene, &RenderSettings { seed: 9, ..settings }, &mut used, 5, &|| false);
+    used.clear();
+    assert_eq!((used.spp(), used.max_spp(), used.mean(40, 30)), (0, 0, Vec3::ZERO));
+    assert!(used.error_estimate().is_none());
+    let mut used = used.starting_at(3);
+    advance(&scene, &settings, &mut used, 4, &|| false);
+    assert!(bits(&used) == bits(&expected));
+    assert_eq!(used.error_estimate().map(|e| e.relative), expected.error_estimate().map(|e| e.relative));
+}

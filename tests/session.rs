@@ -230,7 +230,11 @@ fn the_number_of_threads_changes_live_and_nothing_else_does() {
     driver.open("cornell-balls");
     driver.run_until(|session| session.picture().number > 0);
     let restarts = driver.session.status().restarts;
-    for threads in [1, 3, 2] {
+    for (step, threads) in [1, 3, 2, 1, 2].into_iter().enumerate() {
+        // Also when there is nothing left to do.
+        if step == 3 {
+            driver.run_until(|session| session.status().done && session.is_idle());
+        }
         driver.session.send(Command::SetThreads { threads });
         driver.run_until(|session| {
             session.status().threads == threads && session.pool().current_num_threads() == threads

@@ -12,12 +12,13 @@ use std::time::Duration;
 /// A film side is divided by one of these.
 const DIVIDERS: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 
-/// A coarse picture must take no longer than this, seconds: two frames of a 60 Hz screen.
-const SLOWEST: f64 = 1.0 / 30.0;
+/// A coarse picture must take no longer than this, seconds: a frame of a 60 Hz screen. With what it takes to notice
+/// an input and to draw a frame, new pixels come within two.
+const SLOWEST: f64 = 1.0 / 60.0;
 /// A finer one is tried when it would take less than this, seconds.
-const FASTEST: f64 = 1.0 / 60.0;
+const FASTEST: f64 = 1.0 / 120.0;
 /// What a fresh choice aims at: between the two, so that it does not change at once.
-const AIM: f64 = 1.0 / 45.0;
+const AIM: f64 = 1.0 / 90.0;
 
 /// So long after the last restart things are taken to have come to rest, and the picture sharpens. Shorter, and the
 /// resolution would jump between two events of a slow mouse.
@@ -25,7 +26,14 @@ const QUIET: Duration = Duration::from_millis(120);
 
 /// Seconds between pictures at full resolution: lively at first, then less often, since less changes.
 const FIRST_SLICE: f64 = 0.05;
-const LAST_SLICE: f64 = 0.1;
+const LATER_SLICE: f64 = 0.1;
+/// After half a minute or so.
+const LAST_SLICE: f64 = 0.25;
+
+/// From so many samples on, so many are taken of a tile at once: one at a time leaves the workers with small
+/// batches of rays, and a picture of which some tiles are a little ahead looks the same.
+const EVEN_UNTIL: u32 = 16;
+const AT_ONCE: u32 = 4;
 
 /// Camera paths per second, before anything has been measured.
 const GUESSED_RATE: f64 = 1e6;
@@ -174,8 +182,10 @@ impl Scheduler {
             Phase::Full if self.spp == 0 => Step::Render { divider: 1, target_spp: 1, at_most: None },
             Phase::Full => {
                 let n_pixels = self.region.map_or(self.pixels(1), |n| n.max(1) as f64);
-                let slice = (FIRST_SLICE + 0.1 * self.spent).min(LAST_SLICE);
-                let passes = (slice * self.speed() / n_pixels).floor().clamp(1.0, 65_536.0) as u32;
+                let slice = (FIRST_SLICE + 0.1 * self.spent).min(LATER_SLICE).max((0.01 * self.spent).min(LAST_SLICE));
+                let least = if self.spp < EVEN_UNTIL { 1 } else { AT_ONCE };
+                let passes = (slice * self.speed() / n_pixels).clamp(1.0, 65_536.0) as u32;
+                let passes = passes.max(least);
                 let goal = self.target.spp.unwrap_or(u32::MAX);
                 // A pass that takes longer than a slice is shown unfinished.
                 let at_most = Duration::from_secs_f64(1.5 * slice);
@@ -216,7 +226,7 @@ impl Scheduler {
 
     /// On to a film of half the divider, or to the full one when that is near or quick enough.
     fn sharpen(&mut self, divider: u32) {
-        let quick = self.seconds_for(1) <= LAST_SLICE;
+        let quick = self.seconds_for(1) <= LATER_SLICE;
         self.phase = if divider <= 2 || quick { Phase::Full } else { Phase::Sharpening(divider / 2) };
         (self.spp, self.error) = (0, None);
     }

@@ -24,6 +24,8 @@ pub struct Film {
     tile_size: u32,
     /// From paths that began at the lamps; `None` until there is some.
     pub(super) light: Option<LightLayer>,
+    /// Memory of such a layer that is not in use.
+    idle_light: Vec<ExactSum>,
 }
 
 /// The pixels of one tile, row by row.
@@ -70,14 +72,13 @@ impl Film {
                 FilmTile::new(origin, size)
             })
             .collect();
-        Self { width, height, tiles, tiles_x, tile_size, light: None }
+        Self { width, height, tiles, tiles_x, tile_size, light: None, idle_light: Vec::new() }
     }
 
     /// The same without samples, to begin with sample number `first`.
     pub fn starting_at(mut self, first: u32) -> Self {
-        self.light = None;
+        self.clear();
         for tile in &mut self.tiles {
-            *tile = FilmTile::new(tile.origin, tile.size);
             tile.ranges = std::iter::once(first..first).collect();
         }
         self
@@ -115,6 +116,23 @@ impl Film {
     pub fn max_spp(&self) -> u32 {
         let from_lamps = self.light.as_ref().map(LightLayer::begun);
         self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).max().unwrap_or(0)
+    }
+
+    /// A film like a new one, in the memory of this one: for a large film, memory is what takes time.
+    pub fn clear(&mut self) {
+        self.tiles.par_iter_mut().for_each(FilmTile::clear);
+        if let Some(layer) = self.light.take() {
+            self.idle_light = layer.sums;
+        }
+    }
+
+    /// Makes room for light from the lamps, if there is none.
+    pub(super) fn want_light(&mut self) {
+        if self.light.is_none() {
+            let size = UVec2::new(self.width, self.height);
+            let memory = std::mem::take(&mut self.idle_light);
+            self.light = Some(LightLayer::in_memory(memory, size, self.first_sample()));
+        }
     }
 
     /// The number of the first sample.
@@ -184,6 +202,25 @@ impl Film {
         })
     }
 
+    /// The same as [`Self::row`], given to `take` with the column: quicker, where every picture is read.
+    pub(super) fn for_each_in_row(&self, y: u32, mut take: impl FnMut(usize, Vec3)) {
+        let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
+        for tile in tiles {
+            let columns = tile.origin.x..tile.origin.x + tile.size.x;
+            let first = ((y - tile.origin.y) * tile.size.x) as usize;
+            if self.light.is_some() || !tile.bad.is_empty() || tile.spp == 0 {
+                for (local, x) in (first..).zip(columns) {
+                    take(x as usize, (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3());
+                }
+            } else {
+                let n = f64::from(tile.spp);
+                for (sum, x) in tile.sums[first..].iter().zip(columns) {
+                    take(x as usize, (sum.sum / n).as_vec3());
+                }
+            }
+        }
+    }
+
     /// Mean radiance of all pixels, row by row from the top.
     pub fn means(&self) -> Vec<Vec3> {
         (0..self.height).flat_map(|y| self.row(y)).collect()
@@ -230,6 +267,16 @@ impl FilmTile {
         let n = (size.x * size.y) as usize;
         let (sums, ranges) = (vec![ExactSum::default(); n], std::iter::once(0..0).collect());
         Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence: TileConvergence::default() }
+    }
+
+    fn clear(&mut self) {
+        let Self { origin: _, size: _, spp, ranges, sums, bad, convergence } = self;
+        *spp = 0;
+        ranges.clear();
+        ranges.push(0..0);
+        sums.fill(ExactSum::default());
+        bad.clear();
+        *convergence = TileConvergence::default();
     }
 
     pub fn n_pixels(&self) -> usize {

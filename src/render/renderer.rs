@@ -1,6 +1,6 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
-use super::caustics::{CausticPass, LightLayer};
+use super::caustics::CausticPass;
 use super::explain::{Record, TracedPath};
 use super::film::{Film, FilmTile};
 use super::filter::{FilterSampler, PixelFilter};
@@ -131,8 +131,7 @@ pub fn advance_region(
     if !caustics.prepare(stop) {
         return PassReport::default();
     }
-    let first = film.first_sample();
-    film.light.get_or_insert_with(|| LightLayer::new(size, first));
+    film.want_light();
     let mut total = PassReport { completed: true, ..PassReport::default() };
     // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp_in(region) < target_spp {

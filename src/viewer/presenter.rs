@@ -54,11 +54,25 @@ impl Presenter {
             }
             other => PresentError::Failed(other),
         };
-        let mut pixels = PixelsBuilder::new(width, height, surface).build().map_err(no_driver)?;
+        // Bytes are what the screen wants already, and overlays are mixed as bytes: no conversions, which a processor
+        // that stands in for a graphics card would have to make for every pixel. Nor does the picture let anything
+        // through.
+        let mut pixels = PixelsBuilder::new(width, height, surface)
+            .texture_format(wgpu::TextureFormat::Rgba8Unorm)
+            .surface_texture_format(wgpu::TextureFormat::Bgra8Unorm)
+            .blend_state(wgpu::BlendState::REPLACE)
+            .build()
+            .map_err(no_driver)?;
+        let modes = &pixels.context().surface_capabilities.present_modes;
+        let can = |mode| modes.contains(&mode);
+        // A frame that waits for the screen keeps the next input waiting. Pictures come at most as often as a screen is
+        // drawn, so the ones that are replaced before they are seen are few.
+        let best = [wgpu::PresentMode::Mailbox, wgpu::PresentMode::Immediate].into_iter().find(|&mode| can(mode));
+        if let Some(mode) = best {
+            pixels.set_present_mode(mode);
+        }
         // The default handler panics; a frame that failed is followed by another.
         pixels.device().on_uncaptured_error(Arc::new(|error| log::error!("graphics: {error}")));
-        pixels.set_scaling_mode(ScalingMode::Fill);
-        pixels.resize_surface(width, height)?;
         let egui_state = egui_winit::State::new(
             egui::Context::default(),
             egui::ViewportId::ROOT,
@@ -69,14 +83,10 @@ impl Presenter {
         );
         let egui_renderer =
             egui_wgpu::Renderer::new(pixels.device(), pixels.surface_texture_format(), Default::default());
-        Ok(Self {
-            egui_renderer,
-            egui_state,
-            pixels,
-            surface_size: (width, height),
-            picture_size: (width, height),
-            window,
-        })
+        let size = (width, height);
+        let mut presenter = Self { egui_renderer, egui_state, pixels, surface_size: size, picture_size: size, window };
+        presenter.fit_picture()?;
+        Ok(presenter)
     }
 
     pub fn egui_context(&self) -> &egui::Context {
@@ -107,9 +117,19 @@ impl Presenter {
         if size != self.picture_size {
             self.pixels.resize_buffer(size.0, size.1)?;
             self.picture_size = size;
+            self.fit_picture()?;
         }
         self.pixels.frame_mut().copy_from_slice(&picture.rgba);
         Ok(())
+    }
+
+    /// The picture fills the window; where it is as large, its pixels are those of the window, which is cheaper.
+    fn fit_picture(&mut self) -> Result<(), PresentError> {
+        let (width, height) = self.surface_size;
+        let is_as_large = self.picture_size == self.surface_size;
+        self.pixels.set_scaling_mode(if is_as_large { ScalingMode::PixelPerfect } else { ScalingMode::Fill });
+        // Where the picture lies depends on the mode, and is worked out here.
+        Ok(self.pixels.resize_surface(width, height)?)
     }
 
     /// Draws the picture with `overlays` over it. A window without pixels is left alone.
@@ -140,8 +160,8 @@ impl Presenter {
         }
         let surface_size = (size.width.min(self.max_side()), size.height.min(self.max_side()));
         if self.surface_size != surface_size {
-            self.pixels.resize_surface(surface_size.0, surface_size.1)?;
             self.surface_size = surface_size;
+            self.fit_picture()?;
         }
         // The surface's own size: the window's may be newer already.
         let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: [surface_size.0, surface_size.1], pixels_per_point };

@@ -5,6 +5,7 @@ use super::{Stats, lock};
 use crate::render::{Inspected, Inspection, depths, develop, inspect, tint_sharp_zone};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 /// What was made last and may do again.
 #[derive(Default)]
@@ -39,6 +40,7 @@ impl Loop<'_> {
                 return;
             }
         }
+        let start = Instant::now();
         let pool = lock(&self.shared.pool).clone();
         let (width, height) = (job.width, job.height);
         let picture = &mut self.spare;
@@ -83,6 +85,7 @@ impl Loop<'_> {
             outbox.stats.legend = legend;
             outbox.fresh = true;
         }
+        tracing::trace!("developed in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
         self.redraw = false;
         self.wake();
     }

@@ -29,6 +29,8 @@ pub struct Loop<'a> {
     pub(super) film: Option<(u32, Film)>,
     /// The film before it, as long as the new one has pixels without a sample.
     pub(super) previous: Option<(u32, Film)>,
+    /// A film at full resolution that is not in use, for its memory.
+    idle_film: Option<Film>,
     pub(super) stats: Stats,
     /// Developed pictures that are not shared, for their memory.
     pub(super) spare: Picture,
@@ -53,6 +55,7 @@ impl<'a> Loop<'a> {
             job: None,
             film: None,
             previous: None,
+            idle_film: None,
             stats: Stats { asleep: true, ..Stats::default() },
             spare: Picture::default(),
             redraw: false,
@@ -86,6 +89,7 @@ impl<'a> Loop<'a> {
         }
         let orders = inbox.orders;
         if let Some(posted) = inbox.posted {
+            tracing::trace!("dropped what it was at in {:.1} ms", posted.elapsed().as_secs_f64() * 1e3);
             lock(&self.shared.cancels).add(posted.elapsed());
         }
         if let Some(threads) = orders.threads {
@@ -127,7 +131,10 @@ impl<'a> Loop<'a> {
             let threads = lock(&self.shared.pool).current_num_threads();
             self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
             self.job = Some(job);
-            (self.film, self.previous) = (None, None);
+            let films = [self.film.take(), self.previous.take()];
+            if let Some((_, film)) = films.into_iter().flatten().find(|(divider, _)| *divider == 1) {
+                self.idle_film = Some(film);
+            }
             self.redraw = false;
             self.scheduler.set_region(None, 0, None);
         } else if self.region != region_before {
@@ -211,7 +218,15 @@ impl<'a> Loop<'a> {
         let Step::Render { divider, mut target_spp, mut at_most } = step else { return };
         let Some(job) = &self.job else { return };
         if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
-            let film = Film::new(job.width.div_ceil(divider), job.height.div_ceil(divider));
+            let size = (job.width.div_ceil(divider), job.height.div_ceil(divider));
+            let idle = if divider == 1 { self.idle_film.take() } else { None };
+            let film = match idle.filter(|film| (film.width(), film.height()) == size) {
+                Some(mut film) => {
+                    lock(&self.shared.pool).install(|| film.clear());
+                    film
+                }
+                None => Film::new(size.0, size.1),
+            };
             if let Some(old) = self.film.replace((divider, film)).filter(|(_, old)| old.spp() > 0) {
                 self.previous = Some(old);
             }
@@ -234,6 +249,7 @@ impl<'a> Loop<'a> {
             pool.install(|| advance_region(&job.snapshot, &job.settings, film, region.as_ref(), target_spp, &stop))
         }));
         let seconds = start.elapsed().as_secs_f64();
+        tracing::trace!("rendered for {:.1} ms at 1/{divider}", seconds * 1e3);
         let pass = match result {
             Ok(pass) => pass,
             Err(panic) => return self.fail(panic.as_ref()),
@@ -303,8 +319,8 @@ impl<'a> Loop<'a> {
         self.to_keep.clear();
         self.question = None;
         let shown = {
-            let outbox = lock(&self.shared.outbox);
-            outbox.stats.asleep && outbox.stats.generation == self.stats.generation
+            let stats = &lock(&self.shared.outbox).stats;
+            stats.asleep && (stats.generation, stats.threads) == (self.stats.generation, self.stats.threads)
         };
         if self.film.is_some() && (!shown || self.redraw) {
             self.show(true);

@@ -73,7 +73,13 @@ pub(in crate::render) struct LayerReport {
 impl LightLayer {
     /// - `first_sample`: number of the sample to begin with.
     pub fn new(size: UVec2, first_sample: u32) -> Self {
-        let sums = vec![ExactSum::default(); (size.x * size.y) as usize];
+        Self::in_memory(Vec::new(), size, first_sample)
+    }
+
+    /// The same with `sums`, whatever they are, as its memory.
+    pub fn in_memory(mut sums: Vec<ExactSum>, size: UVec2, first_sample: u32) -> Self {
+        sums.par_iter_mut().for_each(|sum| *sum = ExactSum::default());
+        sums.resize((size.x * size.y) as usize, ExactSum::default());
         let batches = Batches::of_film(sums.len());
         let first = batches.of_sample(first_sample);
         Self { sums, batches, done: std::iter::once(first..first).collect(), spp: 0 }

@@ -27,6 +27,8 @@ impl ApplicationHandler<Wake> for App {
     fn user_event(&mut self, _: &ActiveEventLoop, _: Wake) {
         self.pending.store(false, Ordering::Release);
         self.stirred = true;
+        // Somebody may be waiting for this picture.
+        self.last_tick = None;
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {

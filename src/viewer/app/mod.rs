@@ -91,7 +91,7 @@ struct Wake;
 
 /// Ticks and frames come no faster: more would only cost the workers their processors.
 const FRAME: Duration = Duration::from_micros(8_000);
-/// So long a movement waits for the picture of the one before it.
+/// So long a movement waits for the picture of the one before it, and overlays for the picture that is to come.
 const LATEST: Duration = Duration::from_millis(250);
 /// Figures that change by themselves are shown again so often.
 const FIGURES: Duration = Duration::from_millis(250);
@@ -359,17 +359,20 @@ impl App {
         let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES);
         let new_figures = self.overlays && self.figures() != self.shown_figures;
         let repaint = self.repaint_at.is_some_and(|at| now >= at) || self.toasts.len() != n_toasts;
-        if !self.occluded && (new_picture || repaint || (new_figures && figures_due)) {
+        // The picture that the last change asked for comes first: drawing the old one again would only keep it waiting.
+        let comes = !self.is_rendered() && now < self.restarted_at + LATEST;
+        if !self.occluded && (new_picture || !comes && (repaint || (new_figures && figures_due))) {
             window.request_redraw();
         }
         let moving = match answered {
             true => self.input.is_moving().then(|| now + FRAME),
             false => Some(self.steered_at + LATEST),
         };
+        let late = comes.then(|| self.restarted_at + LATEST);
         let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
         let session = self.session.next_wake(clock).map(|at| self.start + at);
-        self.wake_at = [session, self.toasts.next_change(), moving, figures, repaint_at, self.keep_size_at]
+        self.wake_at = [session, self.toasts.next_change(), moving, late, figures, repaint_at, self.keep_size_at]
             .into_iter()
             .flatten()
             .min();
@@ -383,8 +386,12 @@ impl App {
 
     /// The last change of the view has been rendered, or that takes too long to wait for.
     fn is_answered(&self, now: Instant) -> bool {
-        let rendered = self.session.picture().generation >= self.session.status().restarts;
-        rendered || now >= self.steered_at + LATEST
+        self.is_rendered() || now >= self.steered_at + LATEST
+    }
+
+    /// There is a picture of what the scene is now.
+    fn is_rendered(&self) -> bool {
+        self.session.picture().generation >= self.session.status().restarts
     }
 
     /// Hands over how keys and mouse moved.
