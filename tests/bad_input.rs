@@ -166,6 +166,10 @@ fn a_model_of_nothing_but_lines_is_refused() {
     std::fs::write(&path, "v 5 5 5\nv 6 6.5 7\nv 7 8 9\nv 5 5 5\nf 1 2 3\nf 1 4 2\n").unwrap();
     let error = load(&SceneSource::Model(path.clone()), &LoadOptions::default()).unwrap_err().to_string();
     assert_says(&error, &["flat.obj: none of its 2 triangles has an area"]);
+    // Faces that name one corner twice.
+    std::fs::write(&path, "v 5 5 5\nv 6 6.5 7\nv 7 8 9.5\nf 1 1 2\nf 3 2 3\nf 3 3 3\n").unwrap();
+    let error = load(&SceneSource::Model(path.clone()), &LoadOptions::default()).unwrap_err().to_string();
+    assert_says(&error, &["flat.obj: none of its 3 triangles has an area"]);
     // One thin triangle among them is a model.
     std::fs::write(&path, "v 5 5 5\nv 6 6.5 7\nv 7 8 9\nv 5 5 5.000001\nf 1 2 3\nf 1 4 2\n").unwrap();
     assert!(load(&SceneSource::Model(path), &LoadOptions::default()).is_ok());

@@ -109,6 +109,31 @@ fn a_window_of_nothing_is_survived() {
 }
 
 #[test]
+fn another_scale_of_the_screen_changes_the_window_while_it_runs() {
+    let Some(desktop) = Desktop::start() else { return };
+    let scale = desktop.scale();
+    let mut program = desktop.open(&["cornell", "--size", "320x240"], &[]);
+    seen(&program);
+    // The panel too, since its text is what the scale is for.
+    program.key("n");
+    for (dpi, size) in [(192, (640, 480)), (144, (480, 360)), (96, (320, 240))] {
+        scale.set_dpi(dpi);
+        until(&format!("{dpi} dots an inch"), || (program.pixels().dimensions() == size).then_some(()));
+        seen(&program);
+        program.must_live();
+    }
+    // The picture has as many pixels as the window.
+    program.key("n");
+    scale.set_dpi(192);
+    until("a window of twice the size", || (program.pixels().dimensions() == (640, 480)).then_some(()));
+    let path = desktop.folder().join("cornell-0001.png");
+    keep(&program, &path);
+    assert_eq!(image::image_dimensions(&path).expect("a picture"), (640, 480));
+    program.key("ctrl+q");
+    assert!(program.ended().success());
+}
+
+#[test]
 fn a_screen_that_goes_away_ends_the_program_and_leaves_the_settings() {
     let Some(desktop) = Desktop::start() else { return };
     let program = desktop.open(&["cornell", "--size", "320x240"], &[]);

@@ -63,7 +63,8 @@ impl Told<'_> {
             let name = object.name.as_deref().unwrap_or("(no name)");
             match &object.shape {
                 Shape::Mesh(mesh) => {
-                    row("", format!("{name}: {} triangles, {} vertices", mesh.triangles.len(), mesh.positions.len()));
+                    let triangles = counted(mesh.triangles.len(), "triangle", "triangles");
+                    row("", format!("{name}: {triangles}, {}", counted(mesh.positions.len(), "vertex", "vertices")));
                 }
                 Shape::Spheres(balls) => row("", format!("{name}: {} balls", balls.centers.len())),
                 _ => {}
@@ -72,7 +73,8 @@ impl Told<'_> {
         let shading = &extraction.snapshot.shading;
         row("materials", counts(self.materials()));
         row("textures", shading.textures.len().to_string());
-        row("lights", format!("{} emissive objects, {} point lights", self.emitters(), inputs.lights.len()));
+        let emitters = counted(self.emitters(), "emissive object", "emissive objects");
+        row("lights", format!("{emitters}, {}", counted(inputs.lights.len(), "point light", "point lights")));
         row("environment", environment(&shading.environment));
         let lens = self.lens();
         row("camera", if lens.enabled { format!("lens of radius {} m", lens.radius) } else { "pinhole".to_owned() });
@@ -241,4 +243,8 @@ fn counts<'a>(kinds: impl Iterator<Item = &'a str>) -> BTreeMap<&'a str, usize> 
         *counts.entry(kind).or_default() += 1;
     }
     counts
+}
+
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
 }

@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 mod drop;
+mod scale;
+
+pub use scale::Scale;
 
 const TOOLS: &[&str] = &["Xvfb", "openbox", "xdotool", "wmctrl", "import"];
 /// Far more than anything here takes, even where other work holds the processors.
@@ -93,6 +96,11 @@ impl Desktop {
         let mut server = self.server.lock().expect("nobody else holds it");
         server.0.kill().expect("the server can be ended");
         server.0.wait().expect("it has ended");
+    }
+
+    /// What programs that are opened from now on ask for the scale of the screen.
+    pub fn scale(&self) -> Scale {
+        Scale::new(&self.display)
     }
 
     /// Starts the program and waits for its window.

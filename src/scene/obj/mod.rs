@@ -119,7 +119,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
         warnings.push(format!("{}: {dropped} triangles use a vertex twice and were left out", path.display()));
     }
     if triangles.is_empty() {
-        return Err(ObjError::NoFaces { path: path.into() });
+        return Err(ObjError::NoArea { path: path.into(), triangles: dropped });
     }
     let mesh_error = |source| ObjError::Mesh { path: path.into(), source };
     let mut mesh = Mesh::from_f64(&corners.positions, triangles).map_err(mesh_error)?;
