@@ -3,7 +3,9 @@
 mod common;
 
 use common::*;
-use firstlight::render::{Environment, Film, Material, RenderSettings, Snapshot, advance};
+use firstlight::render::{
+    ColorInput, Environment, Film, Fresnel, Integrator, Material, RenderSettings, ScalarInput, Snapshot, advance,
+};
 use glam::Vec3;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,8 +20,29 @@ fn busy_scene() -> Snapshot {
             (sphere(Vec3::new(0.5, 0.5, 0.4), 0.5), 0),
             (quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0), 1),
             (sphere(Vec3::new(3.0, 3.0, 2.0), 0.3), 1),
+            (sphere(Vec3::new(-0.2, 0.25, 1.4), 0.25), 3),
+            (sphere(Vec3::new(1.3, 0.3, 1.0), 0.3), 4),
         ],
-        vec![diffuse(0.7), emissive(6.0), Material::Glass { ior: 1.5, absorption: Vec3::splat(0.3) }],
+        vec![
+            diffuse(0.7),
+            emissive(6.0),
+            Material::Glass { ior: 1.5, absorption: Vec3::splat(0.3) },
+            Material::Phong {
+                diffuse: ColorInput::Constant(Vec3::new(0.2, 0.3, 0.6)),
+                ambient: 0.8,
+                specular: ScalarInput::Constant(0.4),
+                shininess: 50.0,
+                transparency: 0.0,
+                ior: 1.5,
+                absorption: Vec3::ZERO,
+            },
+            Material::Metal {
+                alpha: ScalarInput::Constant(0.1),
+                reflectance: ColorInput::Constant(Vec3::splat(0.8)),
+                fresnel: Fresnel::Schlick,
+                compensate: true,
+            },
+        ],
         Environment::Constant(Vec3::splat(0.2)),
         camera,
     )
@@ -36,11 +59,16 @@ fn with_threads<T: Send>(n: usize, work: impl FnOnce() -> T + Send) -> T {
 #[test]
 fn any_number_of_threads_and_any_tile_size_give_the_same_bits() {
     let scene = busy_scene();
-    let settings = RenderSettings { seed: 12, ..RenderSettings::default() };
+    for integrator in [Integrator::Path, Integrator::Phong] {
+        any_tiles_give_the_same_bits(&scene, RenderSettings { integrator, seed: 12, ..RenderSettings::default() });
+    }
+}
+
+fn any_tiles_give_the_same_bits(scene: &Snapshot, settings: RenderSettings) {
     let picture = |threads, tile_size| {
         with_threads(threads, || {
             let mut film = Film::with_tile_size(75, 50, tile_size);
-            advance(&scene, &settings, &mut film, 5, &|| false);
+            advance(scene, &settings, &mut film, 5, &|| false);
             bits(&film)
         })
     };
@@ -50,24 +78,29 @@ fn any_number_of_threads_and_any_tile_size_give_the_same_bits() {
     }
     let other = RenderSettings { seed: 13, ..settings };
     let mut film = Film::new(75, 50);
-    advance(&scene, &other, &mut film, 5, &|| false);
+    advance(scene, &other, &mut film, 5, &|| false);
     assert!(bits(&film) != reference, "another seed must give another picture");
 }
 
 #[test]
 fn portions_and_interruptions_change_nothing() {
     let scene = busy_scene();
-    let settings = RenderSettings::default();
+    for integrator in [Integrator::Path, Integrator::Phong] {
+        portions_change_nothing(&scene, RenderSettings { integrator, ..RenderSettings::default() });
+    }
+}
+
+fn portions_change_nothing(scene: &Snapshot, settings: RenderSettings) {
     let mut whole = Film::new(75, 50);
-    advance(&scene, &settings, &mut whole, 6, &|| false);
+    advance(scene, &settings, &mut whole, 6, &|| false);
     let mut portions = Film::new(75, 50);
     for target in [1, 2, 5, 6] {
         // Stopped after a while, a different while each time, and then finished.
         let asked = AtomicU32::new(0);
         let report =
-            advance(&scene, &settings, &mut portions, target, &|| asked.fetch_add(1, Ordering::Relaxed) > 3 * target);
+            advance(scene, &settings, &mut portions, target, &|| asked.fetch_add(1, Ordering::Relaxed) > 3 * target);
         assert!(!report.completed || target == 1 || portions.spp() == target);
-        assert!(advance(&scene, &settings, &mut portions, target, &|| false).completed);
+        assert!(advance(scene, &settings, &mut portions, target, &|| false).completed);
     }
     assert!(bits(&whole) == bits(&portions));
 }

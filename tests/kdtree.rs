@@ -326,6 +326,9 @@ fn mixed_scene(seed: u64, n: usize, preset: BuildPreset) -> (SceneTree, Soup) {
     let centers: Vec<Vec3> = (0..300).map(|_| random.point()).collect();
     let radii: Vec<f32> = (0..300).map(|_| 0.01 + 0.1 * random.signed().abs()).collect();
     let balls = Arc::new(SphereTree::build(&centers, &radii));
+    // So few that packets test them one by one, the last at the place of the first.
+    let few: Vec<Vec3> = centers[..7].iter().chain([&centers[0]]).copied().collect();
+    let few_balls = Arc::new(SphereTree::build(&few, &[0.3, 0.1, 0.2, 0.15, 0.25, 0.05, 0.1, 0.3]));
     let mut shapes = vec![Shape::Plane { point: vec3(0.0, -1.0, 0.0), normal: Vec3::Y }];
     let placed = placements(&mut random, n, 1.0, false);
     let placed_balls = placements(&mut random, n, 1.0, true);
@@ -336,7 +339,10 @@ fn mixed_scene(seed: u64, n: usize, preset: BuildPreset) -> (SceneTree, Soup) {
             1 => Shape::Sphere { center: p, radius: 0.05 + 0.3 * random.signed().abs() },
             2 => Shape::Triangle { vertices: [p, p + q, p + r] },
             3 => Shape::Mesh { tree: tree.clone(), world_from_object: placed[i] },
-            4 => Shape::Spheres { tree: balls.clone(), world_from_object: placed_balls[i] },
+            4 => {
+                let tree = if i / 7 % 2 == 0 { &balls } else { &few_balls };
+                Shape::Spheres { tree: tree.clone(), world_from_object: placed_balls[i] }
+            }
             5 => Shape::Mesh { tree: soup_tree.clone(), world_from_object: placed[i] },
             _ => shapes[random.below(shapes.len())].clone(),
         });

@@ -6,8 +6,9 @@ use common::*;
 use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Material, Object, PixelFilter,
-    RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance, replay_sample,
+    BadSample, ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object,
+    PixelFilter, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance,
+    replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -38,6 +39,16 @@ fn cloud(to: Vec3) -> Shape {
 
 /// A room with a thing of each material, of each shape, under `lights`.
 fn room(lights: Vec<(Shape, Option<Arc<Mesh>>)>, environment: Environment, air: Vec3) -> Snapshot {
+    room_with(lights, false, environment, air)
+}
+
+/// - `as_points`: the balls among the lights stand for point lights.
+fn room_with(
+    lights: Vec<(Shape, Option<Arc<Mesh>>)>,
+    as_points: bool,
+    environment: Environment,
+    air: Vec3,
+) -> Snapshot {
     let plain = |shape: Shape, material: u32| ((shape, None), material);
     let smooth = procedural::icosphere(3).with_vertex_normals();
     let mut unwrapped = procedural::icosphere(2).flat();
@@ -87,7 +98,10 @@ fn room(lights: Vec<(Shape, Option<Arc<Mesh>>)>, environment: Environment, air: 
             absorption: Vec3::ZERO,
         },
     ];
-    let objects = things.iter().map(|((_, mesh), material)| Object { mesh: mesh.clone(), ..Object::plain(*material) });
+    let objects = things.iter().map(|((shape, mesh), material)| {
+        let is_point_light = as_points && *material == 9 && matches!(shape, Shape::Sphere { .. });
+        Object { mesh: mesh.clone(), is_point_light, ..Object::plain(*material) }
+    });
     let objects = objects.collect();
     let geometry = Geometry::build(things.into_iter().map(|((shape, _), _)| shape).collect(), objects);
     let texture = |pattern, scale| Texture {
@@ -111,7 +125,10 @@ fn rooms() -> Vec<(&'static str, Snapshot)> {
     let ball = || (sphere(Vec3::new(1.5, 2.5, 1.0), 0.4), None);
     let lamp = || (quad(Vec3::new(-1.0, 3.0, -0.5), Vec3::X * 1.2, Vec3::Z * 0.9), None);
     let slanted = || (quad(Vec3::new(-2.5, 1.0, 1.0), Vec3::new(0.1, 0.6, 0.1), Vec3::new(0.2, 0.1, 0.8)), None);
-    let many = (0..20).map(|i| (sphere(Vec3::new(i as f32 * 0.2 - 2.0, 2.6, 0.5), 0.08), None)).collect();
+    let many = || (0..20).map(|i| (sphere(Vec3::new(i as f32 * 0.2 - 2.0, 2.6, 0.5), 0.08), None)).collect::<Vec<_>>();
+    let texels = (0..32).map(|i| Vec3::new(0.1 + 0.02 * i as f32, 0.4, if i == 9 { 8.0 } else { 0.3 })).collect();
+    let image = Arc::new(ImageTexture { width: 8, height: 4, texels });
+    let picture = Environment::Image { image, scale: Vec3::ONE, rotation: 0.4 };
     let triangle =
         Shape::Triangle { vertices: [Vec3::new(-1.0, 3.0, 0.0), Vec3::new(1.0, 3.0, 0.0), Vec3::new(0.0, 3.0, 1.0)] };
     // Faces of a tenth of a steradian, and of a thousandth.
@@ -121,18 +138,34 @@ fn rooms() -> Vec<(&'static str, Snapshot)> {
     vec![
         ("one quad", room(vec![lamp()], Environment::Black, Vec3::ZERO)),
         ("one ball", room(vec![ball()], Environment::Constant(Vec3::splat(0.3)), Vec3::ZERO)),
-        ("both and a slanted one", room(vec![ball(), lamp(), slanted()], sky, Vec3::splat(0.05))),
+        ("both and a slanted one", room(vec![ball(), lamp(), slanted()], sky.clone(), Vec3::splat(0.05))),
         ("a triangle", room(vec![(triangle, None), ball()], Environment::Black, Vec3::ZERO)),
-        ("many", room(many, Environment::Black, Vec3::ZERO)),
+        ("many", room(many(), Environment::Black, Vec3::ZERO)),
+        ("points and a quad", room_with(vec![ball(), lamp()], true, sky.clone(), Vec3::ZERO)),
+        ("many points", room_with(many(), true, Environment::Black, Vec3::splat(0.02))),
+        ("a picture and a ball", room(vec![ball()], picture, Vec3::ZERO)),
         ("meshes that shine", room(vec![shining(), small(), ball(), lamp()], Environment::Black, Vec3::ZERO)),
     ]
 }
 
 #[test]
 fn lanes_find_what_one_path_at_a_time_finds() {
+    compare_with_one_at_a_time(Integrator::Path);
+}
+
+#[test]
+fn classic_lanes_find_what_one_ray_at_a_time_finds() {
+    compare_with_one_at_a_time(Integrator::Phong);
+}
+
+fn compare_with_one_at_a_time(integrator: Integrator) {
     for (name, scene) in rooms() {
         for techniques in std::iter::once(Techniques::ALL).chain(Techniques::ablations().map(|(_, t)| t)) {
-            let lanes = RenderSettings { techniques, seed: 7, max_depth: 12, ..RenderSettings::default() };
+            // Only where samples lie makes a difference to the classic model.
+            if integrator == Integrator::Phong && techniques != Techniques::ALL && techniques.even_samples {
+                continue;
+            }
+            let lanes = RenderSettings { integrator, techniques, seed: 7, max_depth: 12, ..RenderSettings::default() };
             let single = RenderSettings { lanes: None, ..lanes };
             let size = UVec2::new(24, 24);
             let (mut n_differing, n) = (0, if techniques == Techniques::ALL { 24 * 24 * 4 } else { 24 * 24 });
@@ -160,16 +193,20 @@ fn lanes_find_what_one_path_at_a_time_finds() {
 #[test]
 fn all_instruction_sets_draw_the_same_picture() {
     for (name, scene) in rooms() {
-        for filter in [PixelFilter::Box, PixelFilter::Tent] {
+        for (integrator, filter) in [
+            (Integrator::Path, PixelFilter::Box),
+            (Integrator::Path, PixelFilter::Tent),
+            (Integrator::Phong, PixelFilter::Box),
+        ] {
             let draw = |set| {
-                let settings = RenderSettings { lanes: Some(set), filter, ..RenderSettings::default() };
+                let settings = RenderSettings { integrator, lanes: Some(set), filter, ..RenderSettings::default() };
                 let mut film = Film::new(21, 19);
                 advance(&scene, &settings, &mut film, 4, &|| false);
                 film.means().iter().flat_map(|mean| mean.to_array().map(f32::to_bits)).collect::<Vec<_>>()
             };
             let expected = draw(InstructionSet::Portable);
             for set in InstructionSet::available() {
-                assert!(draw(set) == expected, "{name}, {filter:?}: {set:?}");
+                assert!(draw(set) == expected, "{name}, {integrator:?}, {filter:?}: {set:?}");
             }
         }
     }

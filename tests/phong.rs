@@ -5,21 +5,15 @@ mod common;
 use common::{camera, diffuse, emissive, picture_mean, plane, quad, render, scene, sphere};
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, PixelFilter,
-    RenderSettings, ScalarInput, Shading, Snapshot, Techniques, advance,
+    ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, RenderSettings,
+    ScalarInput, Shading, Snapshot, advance,
 };
 use glam::Vec3;
 use std::f32::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-const PHONG: RenderSettings = RenderSettings {
-    integrator: Integrator::Phong,
-    max_depth: u32::MAX,
-    seed: 0,
-    filter: PixelFilter::Box,
-    techniques: Techniques::ALL,
-    lanes: None,
-};
+static PHONG: LazyLock<RenderSettings> =
+    LazyLock::new(|| RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() });
 
 /// Without ambient light, to compare with what can be worked out.
 fn matte(albedo: f32) -> Material {
@@ -227,7 +221,7 @@ fn air_absorbs_by_distance_in_both_models() {
     let plain = Arc::try_unwrap(scene.shading).unwrap();
     scene.shading = Arc::new(plain.with_air(Vec3::new(0.0, 0.03, 0.3)));
     for integrator in [Integrator::Path, Integrator::Phong] {
-        let (film, _) = render(&scene, &RenderSettings { integrator, ..PHONG }, 1, 1, 1);
+        let (film, _) = render(&scene, &RenderSettings { integrator, ..*PHONG }, 1, 1, 1);
         let expected = 2.0 * Vec3::new(1.0, (-0.15_f32).exp(), (-1.5_f32).exp());
         assert!((film.mean(0, 0) - expected).abs().max_element() < 1e-4, "{integrator:?}: {}", film.mean(0, 0));
     }

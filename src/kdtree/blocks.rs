@@ -274,15 +274,21 @@ pub(super) struct PreciseRay {
     inv_dir_squared: f64,
 }
 
+impl PreciseRay {
+    #[inline(always)]
+    pub fn new(origin: [f64; 3], dir: [f64; 3]) -> Self {
+        let inv_dir_squared = 1.0 / (dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
+        Self { origin, dir, inv_dir_squared }
+    }
+}
+
 impl LeafBlock for SphereBlock {
     type Ray = PreciseRay;
     const IDLE: PreciseRay = PreciseRay { origin: [0.0; 3], dir: [0.0; 3], inv_dir_squared: 0.0 };
 
     #[inline(always)]
     fn ray(ray: &Ray, _shear: &Shear) -> PreciseRay {
-        let (origin, dir) = (ray.origin.as_dvec3().to_array(), ray.dir.as_dvec3().to_array());
-        let inv_dir_squared = 1.0 / (dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
-        PreciseRay { origin, dir, inv_dir_squared }
+        PreciseRay::new(ray.origin.as_dvec3().to_array(), ray.dir.as_dvec3().to_array())
     }
 
     #[inline(always)]

@@ -1,13 +1,14 @@
-//! Sixteen rays side by side through one mesh: for rays that go the same way.
+//! Sixteen rays side by side through one mesh or one cloud of balls: for rays that go the same way.
 //!
 //! All rays of a packet visit a node together, as long as one of them has business there. Rays of different octants
 //! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
 //! traced in groups.
 
 use super::block_tree::BlockTree;
-use super::blocks::{BLOCK, LeafBlock, ShearedRay, TriangleBlock};
-use super::lanes::{may_hit, resolve, shear};
+use super::blocks::{BLOCK, LeafBlock, PreciseRay, ShearedRay, SphereBlock, TriangleBlock};
+use super::lanes::{LaneHits, may_hit, resolve, shear, sphere_hits};
 use super::nodes::{MAX_DEPTH, Node};
+use super::objects::WideFrame;
 use super::ray::{Nearest, WIDEN};
 use super::simd::{LANES, Mask, Simd};
 
@@ -32,6 +33,76 @@ pub(super) struct NearestLanes {
     pub found: Mask,
 }
 
+/// What packets test in leaves.
+pub(super) trait PacketBlock: LeafBlock {
+    /// What the test of balls wants to know of the rays.
+    type Frame<S: Simd>: Copy;
+
+    /// Whether a [`Footprint`] is of any use.
+    const HAS_FOOTPRINT: bool;
+
+    fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> Self::Frame<S>;
+
+    /// The rays of `mask` against all of the block.
+    fn test_rays<S: Simd>(
+        s: S,
+        packet: &mut MeshPacket<S>,
+        shared: (&Group<S>, &Self::Frame<S>),
+        block: &Self,
+        mask: Mask,
+    );
+}
+
+impl PacketBlock for TriangleBlock {
+    type Frame<S: Simd> = ();
+
+    const HAS_FOOTPRINT: bool = true;
+
+    #[inline(always)]
+    fn frame<S: Simd>(_: S, _: &MeshPacket<S>) {}
+
+    #[inline(always)]
+    fn test_rays<S: Simd>(s: S, packet: &mut MeshPacket<S>, (group, ()): (&Group<S>, &()), block: &Self, mask: Mask) {
+        packet.test_leaf(s, group, block, mask);
+    }
+}
+
+impl PacketBlock for SphereBlock {
+    type Frame<S: Simd> = WideFrame<S>;
+
+    const HAS_FOOTPRINT: bool = false;
+
+    #[inline(always)]
+    fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> WideFrame<S> {
+        WideFrame::new(s, &packet.origin, &packet.dir)
+    }
+
+    #[inline(always)]
+    fn test_rays<S: Simd>(
+        s: S,
+        packet: &mut MeshPacket<S>,
+        (_, frame): (&Group<S>, &WideFrame<S>),
+        block: &Self,
+        mut mask: Mask,
+    ) {
+        let n_balls = block.prims().len();
+        if n_balls <= mask.count_ones() as usize {
+            for lane in 0..n_balls {
+                packet.test_ball(s, frame, block, lane, mask);
+            }
+            return;
+        }
+        let origin = [stored(s, packet.origin[0]), stored(s, packet.origin[1]), stored(s, packet.origin[2])];
+        let dir = [stored(s, packet.dir[0]), stored(s, packet.dir[1]), stored(s, packet.dir[2])];
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize % LANES;
+            mask &= mask - 1;
+            let at = |v: &[[f32; LANES]; 3]| [f64::from(v[0][lane]), f64::from(v[1][lane]), f64::from(v[2][lane])];
+            packet.nearest.offer_one(s, block, &PreciseRay::new(at(&origin), at(&dir)), lane);
+        }
+    }
+}
+
 /// So few rays are tested one after the other, without asking which triangles they could hit.
 const FEW_RAYS: u32 = 2;
 
@@ -47,7 +118,7 @@ impl<S: Simd> PacketStack<S> {
 }
 
 /// What all rays of a group share, and their reciprocals.
-struct Group<S: Simd> {
+pub(super) struct Group<S: Simd> {
     inv_lo: [S::F; 3],
     inv_hi: [S::F; 3],
     slack: S::F,
@@ -70,6 +141,8 @@ struct Footprint {
 }
 
 impl Footprint {
+    const NONE: Self = Self { origin: [[0.0; 2]; 3], sx: [0.0; 2], sy: [0.0; 2], down: false };
+
     /// Lanes of the block whose triangle one of the rays might hit.
     ///
     /// Rounding is monotone: the steps of the test done on intervals, in the order of the test, bound what it gets for every ray,
@@ -130,7 +203,8 @@ fn interval<S: Simd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
 impl<S: Simd> MeshPacket<S> {
     /// Finds the nearest hits; with `ANY` a ray ends at its first hit.
     #[inline(always)]
-    pub fn trace<const ANY: bool>(&mut self, s: S, tree: &BlockTree<TriangleBlock>, stack: &mut PacketStack<S>) {
+    pub fn trace<B: PacketBlock, const ANY: bool>(&mut self, s: S, tree: &BlockTree<B>, stack: &mut PacketStack<S>) {
+        let frame = B::frame(s, self);
         let [x, y, z] = [s.abs(self.dir[0]), s.abs(self.dir[1]), s.abs(self.dir[2])];
         let along_x = s.le(y, x) & s.le(z, x);
         let along_y = !along_x & s.le(z, y);
@@ -145,19 +219,18 @@ impl<S: Simd> MeshPacket<S> {
             left &= !group;
             let octant = (0..3).fold(0, |octant, axis| octant | usize::from(down[axis] >> first & 1) << axis);
             let kz = if along_x >> first & 1 != 0 { 0 } else { 2 - usize::from(along_y >> first & 1) };
-            self.trace_group::<ANY>(s, tree, stack, group, octant, kz);
+            self.trace_group::<B, ANY>(s, tree, &frame, stack, (group, octant, kz));
         }
     }
 
     #[inline(always)]
-    fn trace_group<const ANY: bool>(
+    fn trace_group<B: PacketBlock, const ANY: bool>(
         &mut self,
         s: S,
-        tree: &BlockTree<TriangleBlock>,
+        tree: &BlockTree<B>,
+        frame: &B::Frame<S>,
         stack: &mut PacketStack<S>,
-        lanes: Mask,
-        octant: usize,
-        kz: usize,
+        (lanes, octant, kz): (Mask, usize, usize),
     ) {
         let one = s.splat(1.0);
         let inv = [s.div(one, self.dir[0]), s.div(one, self.dir[1]), s.div(one, self.dir[2])];
@@ -165,15 +238,8 @@ impl<S: Simd> MeshPacket<S> {
         let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
         let sz = inv[kz];
         let (sx, sy) = (s.div(self.dir[axes[0]], self.dir[kz]), s.div(self.dir[axes[1]], self.dir[kz]));
-        let group = Group::<S> {
-            inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
-            inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
-            slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
-            axes,
-            sx,
-            sy,
-            sz,
-            footprint: Footprint {
+        let footprint = if B::HAS_FOOTPRINT {
+            Footprint {
                 origin: [
                     interval(s, lanes, self.origin[axes[0]]),
                     interval(s, lanes, self.origin[axes[1]]),
@@ -182,7 +248,19 @@ impl<S: Simd> MeshPacket<S> {
                 sx: interval(s, lanes, sx),
                 sy: interval(s, lanes, sy),
                 down: octant >> kz & 1 != 0,
-            },
+            }
+        } else {
+            Footprint::NONE
+        };
+        let group = Group::<S> {
+            inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
+            inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
+            slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
+            axes,
+            sx,
+            sy,
+            sz,
+            footprint,
         };
         let bounds = [tree.nodes.bounds.min, tree.nodes.bounds.max];
         let (mut t0, mut t1) = (s.splat(0.0), s.load(&self.nearest.t));
@@ -218,7 +296,7 @@ impl<S: Simd> MeshPacket<S> {
                 }
                 Node::Leaf { first, count } => {
                     for block in tree.leaf(first, count) {
-                        self.test_leaf(s, &group, block, mask);
+                        B::test_rays(s, self, (&group, frame), block, mask);
                     }
                 }
             }
@@ -275,15 +353,19 @@ impl<S: Simd> MeshPacket<S> {
                 sy: sy[lane],
                 sz: sz[lane],
             };
-            let lanes = &mut self.nearest;
-            let (t, prim) = (lanes.t[lane], lanes.prim[lane]);
-            let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
-            TriangleBlock::test(s, block, &ray, &mut nearest);
-            if nearest.found {
-                (lanes.t[lane], lanes.u[lane], lanes.v[lane]) = (nearest.t, nearest.u, nearest.v);
-                lanes.prim[lane] = nearest.prim;
-                lanes.found |= 1 << lane;
-            }
+            self.nearest.offer_one(s, block, &ray, lane);
+        }
+    }
+
+    /// One ball against all rays.
+    #[inline(always)]
+    fn test_ball(&mut self, s: S, frame: &WideFrame<S>, block: &SphereBlock, lane: usize, mask: Mask) {
+        let (center, radius) = block.sphere(lane % BLOCK);
+        let to_center = frame.towards(s, &center.as_dvec3().to_array());
+        let radius_squared = s.splat_d(f64::from(radius).powi(2));
+        let hits = sphere_hits(s, mask, &to_center, radius_squared, &frame.dir, frame.inv_dir_squared);
+        if hits.mask != 0 {
+            self.offer(s, hits, block.prims().get(lane % BLOCK));
         }
     }
 
@@ -305,12 +387,18 @@ impl<S: Simd> MeshPacket<S> {
             return;
         }
         let hits = resolve(s, mask, &a, &b, &c, group.sz);
+        self.offer(s, hits, block.prims.get(lane));
+    }
+
+    /// Keeps the lanes that are nearer; at equal `t` the lower primitive.
+    #[inline(always)]
+    fn offer(&mut self, s: S, hits: LaneHits<S>, prim: u32) {
         let best = s.load(&self.nearest.t);
         let ahead = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, best);
         if ahead == 0 {
             return;
         }
-        let prim = s.splat_u(block.prims.get(lane));
+        let prim = s.splat_u(prim);
         let old = s.load_u(&self.nearest.prim);
         let take = ahead & (s.lt(hits.t, best) | s.lt_u(prim, old));
         let nearest = &mut self.nearest;
@@ -319,6 +407,21 @@ impl<S: Simd> MeshPacket<S> {
         s.store(s.select(take, hits.v, s.load(&nearest.v)), &mut nearest.v);
         s.store_u(s.select_u(take, prim, old), &mut nearest.prim);
         nearest.found |= take;
+    }
+}
+
+impl NearestLanes {
+    /// One ray against all of a block.
+    #[inline(always)]
+    fn offer_one<S: Simd, B: LeafBlock>(&mut self, s: S, block: &B, ray: &B::Ray, lane: usize) {
+        let (t, prim) = (self.t[lane], self.prim[lane]);
+        let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
+        B::test(s, block, ray, &mut nearest);
+        if nearest.found {
+            (self.t[lane], self.u[lane], self.v[lane]) = (nearest.t, nearest.u, nearest.v);
+            self.prim[lane] = nearest.prim;
+            self.found |= 1 << lane;
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use super::batch::{HitBatch, RayBatch};
 use super::lanes::{LaneHits, Sheared, dot, may_hit, quad_hits, resolve, shear, sphere_hits};
 use super::scene_tree::Shape;
 use super::simd::{LANES, Mask, Simd};
+use super::sphere_tree::SphereTree;
 use crate::geometry::quad_corners;
 use glam::Vec3;
 
@@ -130,9 +131,9 @@ impl<S: Simd> Packet<S> {
         store_some_u(s, object, &mut hits.object[first..]);
     }
 
-    /// Keeps the lanes that are nearer; at equal `t` the lower object.
+    /// Keeps the lanes that are nearer; at equal `t` the lower object. Returns them.
     #[inline(always)]
-    fn offer(&mut self, s: S, hits: LaneHits<S>, object: u32) {
+    fn offer(&mut self, s: S, hits: LaneHits<S>, object: u32) -> Mask {
         let ahead = hits.mask & s.lt(s.splat(0.0), hits.t);
         let tie = s.eq(hits.t, self.t);
         let mut nearer = s.lt(hits.t, self.t);
@@ -146,6 +147,7 @@ impl<S: Simd> Packet<S> {
         self.prim = s.select_u(take, s.splat_u(0), self.prim);
         self.object = s.select_u(take, s.splat_u(object), self.object);
         self.found |= take;
+        take
     }
 
     /// Tests all simple objects; with `ANY` stops once every ray has hit something.
@@ -183,6 +185,34 @@ impl<S: Simd> Packet<S> {
                 let t = s.narrow(s.div_d(dot(s, &normal, &to_point), dot(s, &normal, &wide.dir)));
                 let zero = s.splat(0.0);
                 self.offer(s, LaneHits { mask: self.lanes, t, u: zero, v: zero }, plane.object);
+            }
+        }
+    }
+
+    /// Tests every ball of a cloud.
+    ///
+    /// - `origin`, `dir`: in its space.
+    #[inline(always)]
+    pub fn test_cloud<const ANY: bool>(
+        &mut self,
+        s: S,
+        tree: &SphereTree,
+        object: u32,
+        origin: &[S::F; 3],
+        dir: &[S::F; 3],
+    ) {
+        let wide = WideFrame::new(s, origin, dir);
+        for (prim, (center, radius)) in (0..).zip(tree.centers.iter().zip(&tree.radii)) {
+            if self.is_done::<ANY>() {
+                return;
+            }
+            let to_center = wide.towards(s, &center.as_dvec3().to_array());
+            let radius_squared = s.splat_d(f64::from(*radius).powi(2));
+            let hits = sphere_hits(s, self.lanes, &to_center, radius_squared, &wide.dir, wide.inv_dir_squared);
+            if hits.mask != 0 {
+                // The first of balls at equal distance is there already.
+                let take = self.offer(s, hits, object);
+                self.prim = s.select_u(take, s.splat_u(prim), self.prim);
             }
         }
     }
@@ -299,15 +329,16 @@ fn store_some_u<S: Simd>(s: S, from: S::U, to: &mut [u32]) {
 }
 
 /// The rays in `f64`.
-struct WideFrame<S: Simd> {
+#[derive(Clone, Copy)]
+pub(super) struct WideFrame<S: Simd> {
     origin: [S::D; 3],
-    dir: [S::D; 3],
-    inv_dir_squared: S::D,
+    pub dir: [S::D; 3],
+    pub inv_dir_squared: S::D,
 }
 
 impl<S: Simd> WideFrame<S> {
     #[inline(always)]
-    fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
+    pub fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let origin = [s.widen(origin[0]), s.widen(origin[1]), s.widen(origin[2])];
         let dir = [s.widen(dir[0]), s.widen(dir[1]), s.widen(dir[2])];
         let inv_dir_squared = s.div_d(s.splat_d(1.0), dot(s, &dir, &dir));
@@ -315,7 +346,7 @@ impl<S: Simd> WideFrame<S> {
     }
 
     #[inline(always)]
-    fn towards(&self, s: S, point: &[f64; 3]) -> [S::D; 3] {
+    pub fn towards(&self, s: S, point: &[f64; 3]) -> [S::D; 3] {
         [
             s.sub_d(s.splat_d(point[0]), self.origin[0]),
             s.sub_d(s.splat_d(point[1]), self.origin[1]),

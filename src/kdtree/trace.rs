@@ -1,17 +1,16 @@
 //! Batches of rays through a scene: which objects are tested by which traversal.
 //!
-//! A handful of simple objects is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
+//! A handful of simple objects, and of balls in a cloud, is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
 //! box of an instance go on through its own tree, as a packet when the caller says that they belong together, otherwise
 //! in a stream. Of many instances each ray asks for the nearest first, and rays that ask for the same one go together, round
 //! after round. None of this changes what is found.
 
-use super::MeshTree;
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
 use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
 use super::instance_tree::{Entry, InstanceTree, Recent};
 use super::loose::LooseTrees;
-use super::mesh_packet::{MeshPacket, NearestLanes, PacketStack};
+use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
 use super::objects::{Packet, SimpleObjects};
 use super::ray::Nearest;
 use super::scene_tree::{RayClass, SceneTree, Shape};
@@ -51,6 +50,9 @@ impl Default for Instances {
         Self::Few(Vec::new())
     }
 }
+
+/// Clouds of at most so many balls are tested by sixteen rays at once, ball by ball.
+const MAX_BALLS: usize = 16;
 
 /// With more instances than this a tree above them pays.
 const MAX_INSTANCES: usize = 12;
@@ -190,10 +192,15 @@ fn trace<A: Answers + ?Sized>(
         Instances::Few(few) => (&few[..], CHUNK),
         Instances::Many(_) => (&[][..], LARGE_CHUNK),
     };
-    let in_packets: &[u32] = if class == RayClass::Coherent { few } else { &[] };
+    let goes_in_packets = |object: &u32| match &scene.shapes()[*object as usize] {
+        Shape::Mesh { .. } => class == RayClass::Coherent,
+        Shape::Spheres { tree, .. } => class == RayClass::Coherent || tree.len() <= MAX_BALLS,
+        _ => false,
+    };
+    let (in_packets, streamed): (Vec<u32>, Vec<u32>) = few.iter().partition(|object| goes_in_packets(object));
     let all: Vec<u32> = (0..rays.len() as u32).collect();
     for queue in all.chunks(chunk) {
-        answers.packets(set, &Packets { simple: &top.simple, meshes: in_packets, scene, rays, queue });
+        answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, queue });
         let own =
             |instance: Option<u32>| Rays { rays, queue, instance: instance.map(|i| (i, &scene.instances[i as usize])) };
         if let Some(tree) = &top.loose.spheres {
@@ -205,11 +212,9 @@ fn trace<A: Answers + ?Sized>(
         if let Some(tree) = &top.loose.triangles {
             answers.stream(set, StreamTree::Triangles(tree), own(None), &mut stacks);
         }
-        for &object in few {
-            match tree_of(scene, object) {
-                Some(StreamTree::Triangles(_)) if class == RayClass::Coherent => {}
-                Some(tree) => answers.stream(set, tree, own(Some(object)), &mut stacks),
-                None => {}
+        for &object in &streamed {
+            if let Some(tree) = tree_of(scene, object) {
+                answers.stream(set, tree, own(Some(object)), &mut stacks);
             }
         }
         if let Instances::Many(tree) = &top.instances {
@@ -230,8 +235,8 @@ fn tree_of(scene: &SceneTree, object: u32) -> Option<StreamTree<'_>> {
 /// What rays are taken through sixteen at a time.
 struct Packets<'a> {
     simple: &'a SimpleObjects,
-    /// Objects that are meshes.
-    meshes: &'a [u32],
+    /// Meshes and small clouds of balls.
+    instances: &'a [u32],
     scene: &'a SceneTree,
     rays: &'a RayBatch,
     /// Rays in a row.
@@ -255,10 +260,20 @@ fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &
         let first = sixteen[0] as usize;
         let mut packet = Packet::load(s, packets.rays, first);
         packet.test_objects::<ANY>(s, packets.simple);
-        for &object in packets.meshes {
-            if let Shape::Mesh { tree, .. } = &packets.scene.shapes()[object as usize] {
-                let instance = &packets.scene.instances[object as usize];
-                trace_packet::<S, ANY>(s, tree, instance, object, &mut packet, &mut stack);
+        for &object in packets.instances {
+            let instance = &packets.scene.instances[object as usize];
+            match &packets.scene.shapes()[object as usize] {
+                Shape::Mesh { tree, .. } => {
+                    trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
+                }
+                Shape::Spheres { tree, .. } if tree.len() > MAX_BALLS => {
+                    trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
+                }
+                Shape::Spheres { tree, .. } => {
+                    let [origin, dir] = own_rays(s, instance, &packet);
+                    packet.test_cloud::<ANY>(s, tree, object, &origin, &dir);
+                }
+                _ => {}
             }
         }
         answers.store(s, &packet, first);
@@ -279,11 +294,24 @@ fn transform_row<S: Simd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S:
     s.add(s.add(x, y), z)
 }
 
-/// Takes a packet through one mesh.
+/// Origins and directions in the space of an instance.
 #[inline(always)]
-fn trace_packet<S: Simd, const ANY: bool>(
+fn own_rays<S: Simd>(s: S, instance: &Instance, packet: &Packet<S>) -> [[S::F; 3]; 2] {
+    let map = &instance.object_from_world;
+    let turned = transform(s, map, &packet.origin);
+    let origin = [
+        s.add(turned[0], s.splat(map.translation[0])),
+        s.add(turned[1], s.splat(map.translation[1])),
+        s.add(turned[2], s.splat(map.translation[2])),
+    ];
+    [origin, transform(s, map, &packet.dir)]
+}
+
+/// Takes a packet through one mesh or cloud of balls.
+#[inline(always)]
+fn trace_packet<S: Simd, B: PacketBlock, const ANY: bool>(
     s: S,
-    tree: &MeshTree,
+    tree: &BlockTree<B>,
     instance: &Instance,
     object: u32,
     packet: &mut Packet<S>,
@@ -293,21 +321,14 @@ fn trace_packet<S: Simd, const ANY: bool>(
     if lanes == 0 {
         return;
     }
-    let map = &instance.object_from_world;
-    let turned = transform(s, map, &packet.origin);
-    let origin = [
-        s.add(turned[0], s.splat(map.translation[0])),
-        s.add(turned[1], s.splat(map.translation[1])),
-        s.add(turned[2], s.splat(map.translation[2])),
-    ];
-    let dir = transform(s, map, &packet.dir);
+    let [origin, dir] = own_rays(s, instance, packet);
     let mut nearest = NearestLanes { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], prim: [0; LANES], found: 0 };
     s.store(packet.t, &mut nearest.t);
     // At equal distance the lower object wins, whatever its primitive.
     let wins_ties: Mask = packet.found & s.lt_u(s.splat_u(object), packet.object);
     s.store_u(s.select_u(wins_ties, s.splat_u(u32::MAX), s.splat_u(0)), &mut nearest.prim);
     let mut mesh_packet = MeshPacket { origin, dir, lanes, nearest };
-    mesh_packet.trace::<ANY>(s, &tree.tree, stack);
+    mesh_packet.trace::<B, ANY>(s, tree, stack);
     let nearest = mesh_packet.nearest;
     let take = nearest.found;
     packet.t = s.select(take, s.load(&nearest.t), packet.t);

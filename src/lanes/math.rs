@@ -2,7 +2,7 @@
 
 use super::number::{Float, select};
 use super::simd::Simd;
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
 
 /// Sine and cosine of angles within ±100, to 2e-7.
 ///
@@ -58,10 +58,118 @@ pub(crate) fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
     angle.copysign(y)
 }
 
+/// `x` to the power of `y`, for `x` in 0..=1 and `y` from 0 on; relative error below 3e-7 (1 + |log₂ xʸ|), and 0 for what is
+/// below 2⁻¹²⁶.
+///
+/// The mantissa is brought to within a factor √2 of 1, where the series of the area tangent is short.
+#[inline(always)]
+pub(crate) fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
+    const ONE: u32 = 0x3f80_0000;
+    const SQRT_HALF: u32 = 0x3f35_04f3;
+    let shifted = x.to_bits() + (ONE - SQRT_HALF);
+    let exponent = (shifted.shr(23) + 127_u32.wrapping_neg()).to_float();
+    let mantissa = ((shifted & 0x007f_ffff) + SQRT_HALF).as_float();
+    let one = x.all(1.0);
+    let f = mantissa - one;
+    let r = f / (f + 2.0);
+    let r2 = r * r;
+    let series = ((r2 * (1.0 / 9.0) + 1.0 / 7.0) * r2 + 1.0 / 5.0) * r2 + 1.0 / 3.0;
+    let log = (r + r * (r2 * series)) * (2.0 * LOG2_E) + exponent;
+    let log = (log * y).at_least(-200.0);
+    let whole = (log - 0.5).truncate();
+    let part = (log - whole.to_float()) * LN_2;
+    let series = (part * (1.0 / 5040.0) + 1.0 / 720.0) * part + 1.0 / 120.0;
+    let series = ((series * part + 1.0 / 24.0) * part + 1.0 / 6.0) * part + 0.5;
+    let raised = (series * part * part + part + 1.0) * (whole + 127).shl(23).as_float();
+    let vanishes = log.lt(one.all(-126.0)) | (x.is_zero() & y.is_positive());
+    select(vanishes, one.all(0.0), raised)
+}
+
+/// The largest whole number that is not above `x`, as `f32::floor` for all finite numbers.
+#[inline(always)]
+pub(crate) fn floor<S: Simd>(x: Float<S>) -> Float<S> {
+    let whole = truncated(x);
+    select(x.lt(whole), whole - 1.0, whole)
+}
+
+/// As `f32::trunc` for all finite numbers but for the sign of zero.
+#[inline(always)]
+pub(crate) fn truncated<S: Simd>(x: Float<S>) -> Float<S> {
+    // Larger ones have no digits behind the point.
+    let small = x.abs().lt(x.all(8_388_608.0));
+    select(small, select(small, x, x.all(0.0)).truncate().to_float(), x)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::lanes::{InstructionSet, LANES, dispatch};
+
+    #[inline(always)]
+    fn powers<S: Simd>(s: S, a: &[f32; LANES], b: &[f32; LANES], out: &mut [[f32; LANES]; 3]) {
+        let (x, y) = (Float::load(s, a), Float::load(s, b));
+        power(x, y).store(&mut out[0]);
+        floor(y).store(&mut out[1]);
+        truncated(y).store(&mut out[2]);
+    }
+
+    fn powers_by(set: InstructionSet, a: &[f32; LANES], b: &[f32; LANES]) -> [[f32; LANES]; 3] {
+        let mut out = [[0.0; LANES]; 3];
+        let to = &mut out;
+        dispatch!(set, powers(a: &[f32; LANES], b: &[f32; LANES], to: &mut [[f32; LANES]; 3]));
+        out
+    }
+
+    #[test]
+    fn powers_are_as_good_as_promised() {
+        for i in 0..20_000_u32 {
+            let a: [f32; LANES] = std::array::from_fn(|k| match (i + k as u32) % 4 {
+                0 => (i * 16 + k as u32) as f32 / 320_000.0,
+                1 => 1.0 - (i * 16 + k as u32) as f32 / 32_000_000.0,
+                2 => (-((i * 16 + k as u32) as f32) / 40_000.0).exp2(),
+                _ => [0.0, 1.0, 0.5, f32::from_bits(0x3f7f_ffff)][(i % 4) as usize],
+            });
+            let exponents = [0.0, 0.3, 1.0, 5.0, 49.5, 400.0, 1e5];
+            let b: [f32; LANES] = std::array::from_fn(|k| exponents[(i as usize + 3 * k) % exponents.len()]);
+            let out = powers_by(InstructionSet::detect(), &a, &b);
+            if i % 100 == 0 {
+                assert!(InstructionSet::available().into_iter().all(|set| powers_by(set, &a, &b) == out));
+            }
+            for k in 0..LANES {
+                let expected = f64::from(a[k]).powf(f64::from(b[k]));
+                let bound = expected * 3e-7 * (1.0 - expected.log2()) + f64::from(f32::MIN_POSITIVE);
+                let found = f64::from(out[0][k]);
+                assert!(!((found - expected).abs() > bound), "{} to {}: {found} for {expected}", a[k], b[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_those_of_one_lane() {
+        let numbers = [
+            0.0,
+            -0.0,
+            0.5,
+            -0.5,
+            1.0,
+            -1.0,
+            1e7,
+            -1e7,
+            8_388_607.5,
+            -8_388_607.5,
+            3e9,
+            -3e9,
+            1e30,
+            -1e30,
+            1e-30,
+            -1e-30,
+        ];
+        for set in InstructionSet::available() {
+            let out = powers_by(set, &[1.0; LANES], &numbers);
+            assert_eq!(out[1], numbers.map(f32::floor), "{set:?}");
+            assert_eq!(out[2], numbers.map(f32::trunc), "{set:?}");
+        }
+    }
 
     #[inline(always)]
     fn both<S: Simd>(s: S, a: &[f32; LANES], b: &[f32; LANES], out: &mut [[f32; LANES]; 3]) {

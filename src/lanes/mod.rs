@@ -9,7 +9,7 @@ mod number;
 mod simd;
 mod vector;
 
-pub(crate) use math::{atan2, sin_cos, sin_cos_eighth};
+pub(crate) use math::{atan2, floor, power, sin_cos, sin_cos_eighth, truncated};
 pub(crate) use number::{Bits, Float, padded, select};
 pub use simd::InstructionSet;
 #[cfg(target_arch = "x86_64")]

@@ -5,6 +5,7 @@
 //! Representation for Irradiance Environment Maps".
 
 use super::Environment;
+use crate::lanes::{Simd, Vector};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 
@@ -49,6 +50,30 @@ impl AmbientLight {
     pub fn radiance(&self, normal: Vec3) -> Vec3 {
         let terms = self.coefficients.iter().zip(harmonics(normal));
         terms.map(|(coefficient, basis)| *coefficient * basis).sum::<Vec3>().max(Vec3::ZERO)
+    }
+}
+
+impl AmbientLight {
+    /// The same for sixteen normals.
+    #[inline(always)]
+    pub fn radiance_lanes<S: Simd>(&self, normal: Vector<S>) -> Vector<S> {
+        let Vector { x, y, z } = normal;
+        let basis = [
+            x.all(0.282_094_8),
+            y * 0.488_602_5,
+            z * 0.488_602_5,
+            x * 0.488_602_5,
+            x * 1.092_548_4 * y,
+            y * 1.092_548_4 * z,
+            (z * 3.0 * z - x.all(1.0)) * 0.315_391_57,
+            x * 1.092_548_4 * z,
+            (x * x - y * y) * 0.546_274_2,
+        ];
+        let mut sum = Vector::splat(x.s, Vec3::ZERO);
+        for (coefficient, basis) in self.coefficients.iter().zip(basis) {
+            sum = sum + Vector::splat(x.s, *coefficient) * basis;
+        }
+        sum.max(Vector::splat(x.s, Vec3::ZERO))
     }
 }
 

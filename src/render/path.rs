@@ -159,7 +159,8 @@ impl PathWave {
         self.next.start(self.paths.len(), scene.shading.features.glass, caustics.is_some());
         self.shadows.start(self.paths.len());
         let set = settings.lanes.unwrap_or(InstructionSet::Portable);
-        self.sorted.sort(set, scene, &self.hits, self.paths.len());
+        let kinds = &scene.shading.material_table.kinds;
+        self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
         let is_last = depth == settings.max_depth;
         let emitters_have_lanes = scene.shading.lights.has_lanes()
             && !scene.shading.material_table.textured_emission
@@ -203,6 +204,9 @@ impl PathWave {
                 shadows: &mut self.shadows,
             };
             match (settings.lanes, kind) {
+                (Some(set), MISSES) if scene.shading.environment_sampler.is_none() => {
+                    wide::shade_misses(set, scene, &self.paths, order, radiance);
+                }
                 (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
                 (Some(set), EMITTERS) if emitters_have_lanes => wide::shade_emitters(set, group, radiance),
                 // What emits no light and is the end of its path adds nothing.

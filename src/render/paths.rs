@@ -66,8 +66,15 @@ impl PathBatch {
     /// Forgets all paths; there is room for `n` new ones afterwards.
     pub fn start(&mut self, n: usize, with_media: bool, with_tracks: bool) {
         self.rays.clear();
+        self.make_room(n);
+        restart(&mut self.media, with_media);
+        restart(&mut self.tracks, with_tracks);
+    }
+
+    /// So that `n` more paths can be appended.
+    pub fn make_room(&mut self, n: usize) {
         self.rays.make_room(n);
-        let least = n + LANES;
+        let least = self.len() + n + LANES;
         if self.slot.len() < least {
             let floats = self.throughput.iter_mut().chain(&mut self.position).chain(&mut self.normal);
             floats.chain([&mut self.pdf]).for_each(|array| array.resize(least, 0.0));
@@ -75,8 +82,6 @@ impl PathBatch {
                 array.resize(least, 0);
             }
         }
-        restart(&mut self.media, with_media);
-        restart(&mut self.tracks, with_tracks);
     }
 
     #[inline]
@@ -196,6 +201,12 @@ impl ShadowBatch {
         append_bits(&mut self.slot, at, mask, slot);
         append_vector(&mut self.light, at, mask, light);
         self.rays.append(mask, origin, dir, t_max);
+    }
+
+    /// What a ray brings if nothing is in its way.
+    #[inline]
+    pub fn light_of(&self, i: usize) -> Vec3 {
+        get(&self.light, i)
     }
 
     /// Asks `trace` which rays are occluded, and adds the light of the others.

@@ -194,11 +194,27 @@ struct Wave {
     path: PathWave,
     phong: PhongWave,
     pixels: Pixels,
+    /// Of the tile whose pixels these are.
+    origin: UVec2,
+    size: UVec2,
+    radiance: Vec<Vec3>,
 }
 
 impl Wave {
     fn of_pixel(pixel: UVec2) -> Self {
         Self { pixels: Pixels { x: vec![pixel.x], y: vec![pixel.y], local: vec![0] }, ..Self::default() }
+    }
+
+    /// Takes the pixels of a tile; those of one that is as large as the last only have to be moved.
+    fn take_tile(&mut self, origin: UVec2, size: UVec2) {
+        if size != self.size || self.pixels.local.is_empty() {
+            self.pixels = pixels_in_blocks(origin, size);
+        } else {
+            let (x, y) = (origin.x.wrapping_sub(self.origin.x), origin.y.wrapping_sub(self.origin.y));
+            self.pixels.x.iter_mut().for_each(|pixel| *pixel = pixel.wrapping_add(x));
+            self.pixels.y.iter_mut().for_each(|pixel| *pixel = pixel.wrapping_add(y));
+        }
+        (self.origin, self.size) = (origin, size);
     }
 
     /// Takes one sample of each of the pixels for each number in `samples`, and adds what they see to `radiance`: those
@@ -211,7 +227,7 @@ impl Wave {
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        let Self { path, phong, pixels } = self;
+        let Self { path, phong, pixels, .. } = self;
         let pixels = &*pixels;
         let slot = |sample: u32| (sample - samples.start) * stride;
         let camera_paths = samples.clone().flat_map(|sample| {
@@ -233,7 +249,7 @@ impl Wave {
             }
         };
         match pass.settings.integrator {
-            Integrator::Phong => phong.trace(pass.snapshot, pass.settings.max_depth, start, radiance, stop),
+            Integrator::Phong => phong.trace(pass.snapshot, pass.settings, start, radiance, stop),
             Integrator::Path => path.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), start, radiance, stop),
         }
     }
@@ -257,8 +273,8 @@ fn advance_tile(
 ) -> PassReport {
     let mut report = PassReport { completed: true, ..PassReport::default() };
     let n_pixels = tile.n_pixels();
-    wave.pixels = pixels_in_blocks(tile.origin, tile.size);
-    let mut radiance = Vec::new();
+    wave.take_tile(tile.origin, tile.size);
+    let mut radiance = std::mem::take(&mut wave.radiance);
     while tile.spp < target_spp {
         let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
         radiance.clear();
@@ -285,6 +301,7 @@ fn advance_tile(
             BadSample { x: pixel.x, y: pixel.y, sample }
         }));
     }
+    wave.radiance = radiance;
     report
 }
 

@@ -7,7 +7,7 @@ use super::ambient::AmbientLight;
 use super::caustics::CasterTable;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
-use super::wide::{MaterialTable, SurfaceTable};
+use super::wide::{ClassicTable, MaterialTable, SurfaceTable};
 use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
 use crate::kdtree::{SceneTree, Shape};
 use crate::mesh::Mesh;
@@ -65,6 +65,7 @@ pub struct Shading {
     pub lights: LightTable,
     pub(super) environment_sampler: Option<EnvironmentSampler>,
     pub(super) material_table: MaterialTable,
+    pub(super) classic_table: ClassicTable,
     /// What gathers light, where something does.
     pub(super) casters: Option<CasterTable>,
     pub features: Features,
@@ -121,6 +122,7 @@ impl Shading {
             caustics: casters.is_some(),
         };
         let material_table = MaterialTable::build(geometry, &materials);
+        let classic_table = ClassicTable::build(&materials);
         let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
         let ambient = AmbientLight::of(&environment);
         let air = Vec3::ZERO;
@@ -135,6 +137,7 @@ impl Shading {
             lights,
             environment_sampler,
             material_table,
+            classic_table,
             casters,
             features,
         }

@@ -193,8 +193,8 @@ impl LightTable {
         self.lights[id as usize].sample(textures, techniques, position, u, pmf)
     }
 
-    /// Tells `found` of one point on every light, or on one of them where there are many, and whether the light is a
-    /// point: those are points here.
+    /// Tells `found` of one point on every light, or on one of them where there are many, by the number of the question, and
+    /// whether the light is a point: those are points here.
     ///
     /// Uses [`EACH_DIMENSIONS`] dimensions of `sampler`, `dimension` being the first.
     #[inline]
@@ -204,9 +204,9 @@ impl LightTable {
         position: Vec3,
         sampler: &Sampler,
         dimension: u32,
-        mut found: impl FnMut(LightSample, bool),
+        mut found: impl FnMut(usize, LightSample, bool),
     ) {
-        let mut ask = |id: u32, pmf: f32, dimension: u32| {
+        let mut ask = |k: u32, id: u32, pmf: f32, dimension: u32| {
             let light = &self.lights[id as usize];
             let sample = match light.shape {
                 LightShape::Sphere { center, radius } if light.is_point => {
@@ -215,15 +215,15 @@ impl LightTable {
                 _ => light.sample(textures, &Techniques::default(), position, sampler.pair(dimension), pmf),
             };
             if let Some(sample) = sample {
-                found(sample, light.is_point);
+                found(k as usize, sample, light.is_point);
             }
         };
         if self.lights.len() <= selection::MAX_ESTIMATED {
             for id in 0..self.lights.len() as u32 {
-                ask(id, 1.0, dimension + id);
+                ask(id, id, 1.0, dimension + id);
             }
         } else if let Some((id, pmf)) = self.selection.by_power(sampler.single(dimension)) {
-            ask(id, pmf, dimension + 1);
+            ask(0, id, pmf, dimension + 1);
         }
     }
 

@@ -14,8 +14,9 @@ use crate::lanes::{
     Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
 };
 use crate::render::ColorInput;
+use crate::sampling::SamplerLanes;
 use glam::{Vec2, Vec3};
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// The lights as arrays that lanes look up.
 #[derive(Debug)]
@@ -44,6 +45,8 @@ pub(super) struct WideLights {
 const SPHERE: u32 = 1;
 const RECTANGLE: u32 = 2;
 const TRIANGLE: u32 = 4;
+/// With [`SPHERE`]: stands for a point light.
+const POINT: u32 = 8;
 
 /// Points on lights as seen from sixteen places; see [`super::LightSample`].
 #[derive(Clone, Copy)]
@@ -83,14 +86,14 @@ impl WideLights {
                     (flag, *corner, *edge_u / length_u, *edge_v / length_v, *normal, rest)
                 }
             };
-            flags.push(flag);
+            flags.push(if light.is_point { flag | POINT } else { flag });
             let [length_u, length_v, radius, lift] = rest;
             let vectors = [origin, u, v, normal, radiance].map(|v| v.to_array());
             let values = vectors.as_flattened().iter().copied();
             let values = values.chain([length_u, length_v, radius, light.shape.area(), lift]);
             rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
         }
-        let has_spheres = flags.contains(&SPHERE);
+        let has_spheres = flags.iter().any(|&flag| flag & SPHERE != 0);
         let has_triangles = flags.contains(&TRIANGLE);
         let has_quads = flags.iter().any(|&flag| flag & (SPHERE | TRIANGLE) == 0);
         let [ox, oy, oz, ux, uy, uz, vx, vy, vz, nx, ny, nz, r, g, b, length_u, length_v, radius, area, lift] =
@@ -135,6 +138,53 @@ impl LightTable {
         sample.pdf = sample.pdf * pmf;
         sample.radiance = Vector::gather(&wide.radiance, id);
         Some(sample)
+    }
+
+    /// How many questions [`Self::sample_each`] asks.
+    pub(in crate::render) fn n_each(&self) -> usize {
+        if self.selects_apart() { 1 } else { self.lights.len() }
+    }
+
+    /// The answers to question `k` of [`Self::sample_each`] for the lanes of `mask`, and the lanes whose light is a point.
+    /// Only where [`Self::has_lanes`].
+    #[inline(always)]
+    pub(in crate::render) fn sample_each_lanes<S: Simd>(
+        &self,
+        k: u32,
+        mut mask: Mask,
+        position: Vector<S>,
+        sampler: &SamplerLanes<S>,
+        mut dimension: u32,
+    ) -> (LightLanes<S>, Mask) {
+        let wide = self.wide.as_ref().expect("lanes are asked only where there are any");
+        let s = position.x.s;
+        let (mut id, mut pmf) = (Bits::splat(s, k), Float::splat(s, 1.0));
+        dimension += k;
+        if self.selects_apart() {
+            let choices = sampler.single(dimension).to_array();
+            let (mut ids, mut pmfs) = ([0; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                if let Some(chosen) = self.selection.by_power(choices[lane]) {
+                    (ids[lane], pmfs[lane]) = chosen;
+                }
+            }
+            (id, pmf) = (Bits::load(s, &ids), Float::load(s, &pmfs));
+            mask &= pmf.is_positive();
+            dimension += 1;
+        }
+        let as_point = mask & Bits::gather(&wide.flags, id).has(POINT);
+        let by_area = mask & !as_point;
+        let nowhere = Vector::splat(s, Vec3::ZERO);
+        let mut found = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: pmf, radiance: nowhere };
+        if by_area != 0 {
+            found = wide.points(true, id, by_area, position, sampler.pair(dimension));
+        }
+        if as_point != 0 {
+            found = wide.as_points(id, as_point, position).over(as_point, found);
+        }
+        found.pdf = found.pdf * pmf;
+        found.radiance = Vector::gather(&wide.radiance, id);
+        (found, as_point)
     }
 
     /// Whether there are so many lights that choosing one takes a number of its own.
@@ -228,6 +278,22 @@ impl LightTable {
 }
 
 impl WideLights {
+    /// See [`super::shape::sphere_as_point`].
+    #[inline(always)]
+    fn as_points<S: Simd>(&self, id: Bits<S>, mask: Mask, position: Vector<S>) -> LightLanes<S> {
+        let (center, radius) = (Vector::gather(&self.origin, id), Float::gather(&self.radius, id));
+        let offset = center - position;
+        let distance = offset.length();
+        let wi = offset * (distance.all(1.0) / distance);
+        let found = mask & distance.is_positive() & radius.lt(distance);
+        let n = wi.abs();
+        let around = n.x + n.y + n.z;
+        let lift = (n.dot(center.abs()) + around * radius) * gamma(6) + around * distance * gamma(16);
+        let ratio = distance / radius;
+        let target = offset_origin(center - wi * radius, lift, -wi);
+        LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi }
+    }
+
     #[inline(always)]
     fn points<S: Simd>(
         &self,

@@ -6,6 +6,9 @@
 //! both reflected and refracted, until their weight is small; then chance decides, which costs no accuracy (Arvo and
 //! Kirk 1990). All rays of a wave that are at the same depth go to the kernel in one batch.
 //!
+//! Hits on matte surfaces, and on those with one part that sends a ray, are shaded sixteen at a time (`wide/classic.rs`). What
+//! is here shades all others, and whatever is asked of it as the reference.
+//!
 //! What it leaves out, and [`super::path`] does not: light from one matte surface to another, and caustics.
 //! Start reading at [`PhongWave::trace`].
 
@@ -13,67 +16,49 @@ mod finish;
 mod shadow;
 
 use super::dielectric::{fresnel, refract};
-use super::medium::MediumStack;
 use super::path::CAMERA_DIMENSIONS;
-use super::paths::PathBatch;
-use super::renderer::RayCounts;
+use super::paths::{Path, PathBatch};
+use super::renderer::{RayCounts, RenderSettings};
 use super::surface::{Vertex, material_of};
+use super::wide::{self, ClassicGroup, KINDS, SortedHits};
 use super::{MaterialId, Snapshot};
 use crate::geometry::{Frame, Ray};
-use crate::kdtree::{HitBatch, RayBatch, RayClass};
-use crate::sampling::Sampler;
+use crate::kdtree::{HitBatch, RayClass};
 use finish::{Finish, Shiny};
 use glam::{Vec2, Vec3};
-use shadow::Shadows;
+pub(super) use shadow::Shadows;
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// Share of a light's fluence at a point that reaches surfaces there from all around, whatever is in its way: about
 /// what the walls of a large, rather dark room send back.
-const AMBIENT_SHARE: f32 = 0.05;
+pub(super) const AMBIENT_SHARE: f32 = 0.05;
 
 /// Rays that count for less than this are followed with a probability, and then for this much: a grey level of a
 /// picture, and few enough rays behind any pixel.
-const LEAST_WEIGHT: f32 = 1.0 / 64.0;
+pub(super) const LEAST_WEIGHT: f32 = 1.0 / 64.0;
 
 /// From here on rays that lose nothing are ended now and then, too.
-const ENDLESS_DEPTH: u32 = 64;
+pub(super) const ENDLESS_DEPTH: u32 = 64;
 
 /// Sample dimensions of each vertex: of the lights (see [`super::light::LightTable::sample_each`]), the environment,
 /// and three for each shiny part.
-const DIM_ENVIRONMENT: u32 = super::light::EACH_DIMENSIONS;
-const DIM_SHINY: u32 = DIM_ENVIRONMENT + 1;
+pub(super) const DIM_ENVIRONMENT: u32 = super::light::EACH_DIMENSIONS;
+pub(super) const DIM_SHINY: u32 = DIM_ENVIRONMENT + 1;
 const VERTEX_DIMENSIONS: u32 = DIM_SHINY + 3 * super::bsdf::MAX_LOBES as u32;
 
-/// A ray on its way.
-#[derive(Clone, Copy)]
-struct Walk {
-    weight: Vec3,
-    sampler: Sampler,
-    slot: u32,
-    media: MediumStack,
-    lights: LightsMet,
-}
+/// What a ray may still bring of lights, which a highlight asks for by itself, as the density that it keeps: infinite for
+/// all of it, because nothing else has asked; this for nothing, because a highlight has stood in for them; else the ray lies
+/// within a lobe, with that density per steradian, and lights were asked from where it starts.
+pub(super) const LIGHTS_COUNTED: f32 = 0.0;
 
-/// What a ray may still bring of lights, which a highlight asks for by itself.
-#[derive(Clone, Copy)]
-enum LightsMet {
-    /// All of it: nothing else has asked.
-    Count,
-    /// Nothing: a highlight has stood in for them.
-    Counted,
-    /// A share: the ray lies within a lobe, with this density per steradian, and lights were asked from `position`.
-    Shared { pdf: f32, position: Vec3 },
-}
-
-impl LightsMet {
-    /// How much counts of a light that is asked for with the density that `asked` tells for a position.
-    #[inline]
-    fn share(self, asked: impl FnOnce(Vec3) -> f32) -> f32 {
-        match self {
-            Self::Count => 1.0,
-            Self::Counted => 0.0,
-            Self::Shared { pdf, position } => share(pdf, asked(position)),
-        }
+/// How much counts of a light that the ray of a path finds, where it is asked for with the density that `asked` tells for a
+/// position.
+#[inline]
+fn share_of_light(path: &Path, asked: impl FnOnce(Vec3) -> f32) -> f32 {
+    match path.pdf {
+        f32::INFINITY => 1.0,
+        LIGHTS_COUNTED => 0.0,
+        pdf => share(pdf, asked(path.position)),
     }
 }
 
@@ -89,15 +74,16 @@ fn share(own: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
+/// Of hits, see [`SortedHits::of_kind`]; the others are one more than the kinds of the table.
+const MISSES: usize = 0;
+
 /// Scratch memory of one worker: cleared between waves, never given back.
 #[derive(Default)]
 pub(super) struct PhongWave {
-    starts: PathBatch,
-    rays: RayBatch,
-    walks: Vec<Walk>,
-    next_rays: RayBatch,
-    next_walks: Vec<Walk>,
+    paths: PathBatch,
+    next: PathBatch,
     hits: HitBatch,
+    sorted: SortedHits,
     shadows: Shadows,
 }
 
@@ -105,123 +91,177 @@ impl PhongWave {
     /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
     /// slot.
     ///
-    /// `max_depth` as for paths: a light seen in two mirrors is three segments away. `None` when `stop` said so; what
+    /// The longest path as for paths: a light seen in two mirrors is three segments away. `None` when `stop` said so; what
     /// is in `radiance` then is of no use.
     pub fn trace(
         &mut self,
         scene: &Snapshot,
-        max_depth: u32,
+        settings: &RenderSettings,
         start: impl FnOnce(&mut PathBatch),
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
-        self.starts.start(radiance.len(), false, false);
-        start(&mut self.starts);
-        std::mem::swap(&mut self.rays, &mut self.starts.rays);
-        self.walks.clear();
-        self.walks.extend((0..self.rays.len()).map(|i| Walk {
-            weight: self.starts.throughput_of(i),
-            sampler: self.starts.sampler(i),
-            slot: self.starts.slot[i],
-            media: MediumStack::default(),
-            lights: LightsMet::Count,
-        }));
-        let mut counts = RayCounts { camera: self.rays.len() as u64, ..RayCounts::default() };
-        for depth in 1..=max_depth {
-            if self.rays.is_empty() {
+        self.paths.start(radiance.len(), scene.shading.features.glass, false);
+        start(&mut self.paths);
+        let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
+        for depth in 1..=settings.max_depth {
+            if self.paths.is_empty() {
                 break;
             }
             if stop() {
                 return None;
             }
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
-            scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
-            self.shade(scene, depth, max_depth, radiance);
+            scene.geometry.tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            self.shade(scene, depth, settings, radiance);
             counts.shadow += self.shadows.cast(scene, class, radiance);
-            counts.bounce += self.next_rays.len() as u64;
-            std::mem::swap(&mut self.rays, &mut self.next_rays);
-            std::mem::swap(&mut self.walks, &mut self.next_walks);
+            counts.bounce += self.next.len() as u64;
+            std::mem::swap(&mut self.paths, &mut self.next);
         }
         Some(counts)
     }
 
-    fn shade(&mut self, scene: &Snapshot, depth: u32, max_depth: u32, radiance: &mut [Vec3]) {
+    fn shade(&mut self, scene: &Snapshot, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
         let shading = &*scene.shading;
-        self.next_rays.clear();
-        self.next_walks.clear();
-        self.shadows.clear();
+        let (n, is_last) = (self.paths.len(), depth == settings.max_depth);
+        self.next.start(n, shading.features.glass, false);
+        let n_lights = shading.lights.n_each() + usize::from(shading.environment_sampler.is_some());
+        self.shadows.start(scene, n_lights, n);
         let mut finish = Finish::new();
-        for i in 0..self.rays.len() {
-            let mut walk = self.walks[i];
-            let ray = self.rays.get(i);
-            let slot = walk.slot as usize;
-            let Some(hit) = self.hits.get(i) else {
-                if shading.features.environment {
-                    let sampler = &shading.environment_sampler;
-                    let share = sampler.as_ref().map_or(1.0, |sampler| walk.lights.share(|_| sampler.pdf(ray.dir)));
-                    radiance[slot] += walk.weight * share * shading.environment.radiance(ray.dir);
+        let Some(set) = settings.lanes else {
+            for i in 0..n {
+                self.shade_one(scene, depth, is_last, i, &mut finish, radiance);
+            }
+            return;
+        };
+        let kinds = &shading.classic_table.kinds;
+        self.sorted.sort(set, scene, kinds, &self.hits, n);
+        for kind in 0..KINDS {
+            let order = self.sorted.of_kind(kind);
+            if order.is_empty() {
+                continue;
+            }
+            if kind == MISSES && shading.environment_sampler.is_none() {
+                wide::shade_misses(set, scene, &self.paths, order, radiance);
+                continue;
+            }
+            if kind > MISSES && wide::knows_classic(scene, kind as u32 - 1) {
+                // What emits no light and is the end of its path adds nothing.
+                if is_last {
+                    continue;
                 }
-                continue;
-            };
-            if shading.features.media {
-                walk.weight *= walk.media.transmittance(scene, hit.t);
-            }
-            let material = material_of(scene, &hit);
-            let vertex = Vertex::new(scene, &ray, &hit, material);
-            if let Some(emission) = shading.emission[material as usize]
-                && vertex.front
-            {
-                let share = match shading.lights.light_of(hit.object, hit.prim) {
-                    None => 1.0,
-                    // A point shows to the eye alone: in a mirror its ball would be a speck that few samples meet.
-                    Some(id) if depth > 1 && shading.lights.is_point(id) => 0.0,
-                    Some(id) => walk
-                        .lights
-                        .share(|from| shading.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))),
+                self.next.make_room(order.len());
+                let group = ClassicGroup {
+                    scene,
+                    kind: kind as u32 - 1,
+                    depth,
+                    dimension: first_dimension(depth),
+                    paths: &self.paths,
+                    hits: &self.hits,
+                    materials: &self.sorted.materials,
+                    order,
+                    next: &mut self.next,
+                    shadows: &mut self.shadows,
+                    radiance: &mut *radiance,
                 };
-                radiance[slot] += walk.weight * share * emission.scale * emission.radiance.eval(scene, vertex.uv);
-            }
-            if depth == max_depth {
+                wide::shade_classic(set, group);
                 continue;
             }
-            let step = Step { scene, walk: &walk, vertex: &vertex, depth };
-            finish.look_up(scene, material, &vertex, &walk.media);
-            if finish.is_lit() {
-                radiance[slot] += walk.weight * self.light(&step, &finish);
+            for k in 0..order.len() {
+                let i = self.sorted.of_kind(kind)[k] as usize;
+                self.shade_one(scene, depth, is_last, i, &mut finish, radiance);
             }
-            for (k, shiny) in finish.shiny().iter().enumerate() {
-                self.send(&step, shiny, step.dimension() + DIM_SHINY + 3 * k as u32);
+        }
+    }
+
+    /// Shades one hit or miss.
+    fn shade_one(
+        &mut self,
+        scene: &Snapshot,
+        depth: u32,
+        is_last: bool,
+        i: usize,
+        finish: &mut Finish,
+        radiance: &mut [Vec3],
+    ) {
+        let shading = &*scene.shading;
+        let mut path = self.paths.get(i);
+        let ray = self.paths.rays.get(i);
+        let slot = path.slot as usize;
+        let Some(hit) = self.hits.get(i) else {
+            if shading.features.environment {
+                let sampler = &shading.environment_sampler;
+                let share = sampler.as_ref().map_or(1.0, |sampler| share_of_light(&path, |_| sampler.pdf(ray.dir)));
+                radiance[slot] += path.throughput * share * shading.environment.radiance(ray.dir);
             }
+            return;
+        };
+        if shading.features.media {
+            path.throughput *= path.media.transmittance(scene, hit.t);
+        }
+        let material = material_of(scene, &hit);
+        let vertex = Vertex::new(scene, &ray, &hit, material);
+        if let Some(emission) = shading.emission[material as usize]
+            && vertex.front
+        {
+            let share = match shading.lights.light_of(hit.object, hit.prim) {
+                None => 1.0,
+                // A point shows to the eye alone: in a mirror its ball would be a speck that few samples meet.
+                Some(id) if depth > 1 && shading.lights.is_point(id) => 0.0,
+                Some(id) => share_of_light(&path, |from| {
+                    shading.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))
+                }),
+            };
+            radiance[slot] += path.throughput * share * emission.scale * emission.radiance.eval(scene, vertex.uv);
+        }
+        if is_last {
+            return;
+        }
+        let step = Step { scene, path: &path, vertex: &vertex, depth };
+        finish.look_up(scene, material, &vertex, &path.media);
+        if finish.is_lit() {
+            radiance[slot] += path.throughput * self.light(&step, finish);
+        }
+        // A pane sends two.
+        self.next.make_room(2 * finish.shiny().len());
+        for (k, shiny) in finish.shiny().iter().enumerate() {
+            self.send(&step, shiny, step.dimension() + DIM_SHINY + 3 * k as u32);
         }
     }
 
     /// Ambient light, returned at once; direct light waits for its shadow rays.
     fn light(&mut self, step: &Step, finish: &Finish) -> Vec3 {
-        let Step { scene, walk, vertex, .. } = *step;
+        let Step { scene, path, vertex, .. } = *step;
         let shading = &*scene.shading;
         let mirrored = vertex.mirrored();
         let mut ambient = Vec3::ZERO;
-        let mut direct = |radiance: Vec3, wi: Vec3, target: Option<Vec3>, pdf: Option<f32>| {
+        let mut direct = |k: usize, radiance: Vec3, wi: Vec3, target: Option<Vec3>, pdf: Option<f32>| {
             if !vertex.is_reached_from(wi) {
                 return;
             }
-            let light = walk.weight * finish.reflected(wi, vertex.normal, mirrored, pdf) * radiance;
+            let light = path.throughput * finish.reflected(wi, vertex.normal, mirrored, pdf) * radiance;
             if light != Vec3::ZERO {
-                self.shadows.push(walk.slot, light, vertex.leaving(wi), wi, target);
+                self.shadows.push(k, path.slot, light, vertex.leaving(wi), wi, target);
             }
         };
         let dimension = step.dimension();
-        shading.lights.sample_each(&shading.textures, vertex.position, &walk.sampler, dimension, |sample, is_point| {
-            let mut arriving = sample.radiance / sample.pdf;
-            if shading.features.media {
-                arriving *= walk.media.transmittance(scene, vertex.position.distance(sample.target));
-            }
-            ambient += finish.ambient * arriving * (AMBIENT_SHARE * FRAC_1_PI);
-            direct(arriving, sample.wi, Some(sample.target), (!is_point).then_some(sample.pdf));
-        });
+        shading.lights.sample_each(
+            &shading.textures,
+            vertex.position,
+            &path.sampler,
+            dimension,
+            |k, sample, is_point| {
+                let mut arriving = sample.radiance / sample.pdf;
+                if shading.features.media {
+                    arriving *= path.media.transmittance(scene, vertex.position.distance(sample.target));
+                }
+                ambient += finish.ambient * arriving * (AMBIENT_SHARE * FRAC_1_PI);
+                direct(k, arriving, sample.wi, Some(sample.target), (!is_point).then_some(sample.pdf));
+            },
+        );
         if let Some(environment) = &shading.environment_sampler {
-            if let Some((wi, pdf)) = environment.sample(walk.sampler.pair(dimension + DIM_ENVIRONMENT)) {
-                direct(shading.environment.radiance(wi) / pdf, wi, None, Some(pdf));
+            if let Some((wi, pdf)) = environment.sample(path.sampler.pair(dimension + DIM_ENVIRONMENT)) {
+                direct(shading.lights.n_each(), shading.environment.radiance(wi) / pdf, wi, None, Some(pdf));
             }
         } else if shading.features.environment {
             ambient += finish.ambient * shading.ambient.radiance(vertex.normal);
@@ -231,71 +271,70 @@ impl PhongWave {
 
     /// The rays of a mirror or of glass.
     fn send(&mut self, step: &Step, shiny: &Shiny, dimension: u32) {
-        let Step { walk, vertex, .. } = *step;
+        let Step { path, vertex, .. } = *step;
         match *shiny {
             Shiny::Mirror { tint } => {
-                self.follow(step, walk.weight * tint, vertex.mirrored(), None, LightsMet::Count, dimension);
+                self.follow(step, path.throughput * tint, vertex.mirrored(), None, f32::INFINITY, dimension);
             }
             Shiny::Gloss { tint, exponent, rough } => {
                 let mirrored = vertex.mirrored();
-                let weight = walk.weight * tint;
+                let weight = path.throughput * tint;
                 if rough {
-                    let wi = within_lobe(mirrored, exponent, walk.sampler.pair(dimension + 1));
+                    let wi = within_lobe(mirrored, exponent, path.sampler.pair(dimension + 1));
                     if vertex.is_reached_from(wi) && wi.dot(vertex.normal) > 0.0 {
                         let pdf = lobe_pdf(exponent, mirrored.dot(wi));
-                        let lights = LightsMet::Shared { pdf, position: vertex.position };
-                        self.follow(step, weight, wi, None, lights, dimension);
+                        self.follow(step, weight, wi, None, pdf, dimension);
                         return;
                     }
                     // Below the surface there is nothing to see: the middle of the lobe stands in.
                 }
-                self.follow(step, weight, mirrored, None, LightsMet::Counted, dimension);
+                self.follow(step, weight, mirrored, None, LIGHTS_COUNTED, dimension);
             }
             Shiny::Pane { share, eta, id } => {
                 let (reflectance, cos_t) = fresnel(vertex.normal.dot(vertex.wo).clamp(0.0, 1.0), eta);
-                let weight = walk.weight * share;
-                self.follow(step, weight * reflectance, vertex.mirrored(), None, LightsMet::Count, dimension);
+                let weight = path.throughput * share;
+                self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
                 if reflectance < 1.0 {
                     let wi = refract(vertex.wo, vertex.normal, eta, cos_t);
                     // Radiance is squeezed into a narrower cone where light is slower: the factor η².
                     let weight = weight * ((1.0 - reflectance) * eta * eta);
-                    self.follow(step, weight, wi, Some(id), LightsMet::Count, dimension + 2);
+                    self.follow(step, weight, wi, Some(id), f32::INFINITY, dimension + 2);
                 }
             }
         }
     }
 
-    /// - `through`: the glass whose surface is crossed, if one is.
+    /// - `through`: the glass whose surface is crossed, if one is; `pdf`: see [`LIGHTS_COUNTED`].
     fn follow(
         &mut self,
         step: &Step,
         mut weight: Vec3,
         wi: Vec3,
         through: Option<MaterialId>,
-        lights: LightsMet,
+        pdf: f32,
         dimension: u32,
     ) {
-        let Step { scene, walk, vertex, depth } = *step;
+        let Step { scene, path, vertex, depth } = *step;
         // The true surface decides which side a direction leads to.
         let reached =
             if through.is_some() { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) };
         if !reached {
             return;
         }
-        let media = through.map_or(walk.media, |id| walk.media.crossed(id, vertex.front));
+        let media = through.map_or(path.media, |id| path.media.crossed(id, vertex.front));
         // Inside glass weights carry 1/n², which the way out gives back: it must not count as loss.
         let ior = if scene.shading.features.glass { media.ior(scene) } else { 1.0 };
         let most = weight.abs().max_element() * ior * ior / LEAST_WEIGHT;
         let survival = if depth >= ENDLESS_DEPTH { most.min(0.95) } else { most.min(1.0) };
         if survival < 1.0 {
-            if walk.sampler.single(dimension) >= survival {
+            if path.sampler.single(dimension) >= survival {
                 return;
             }
             weight /= survival;
         }
         let origin = if through.is_some() { vertex.passing(wi) } else { vertex.leaving(wi) };
-        self.next_rays.push(&Ray::new(origin, wi));
-        self.next_walks.push(Walk { weight, media, lights, ..*walk });
+        let next = Path { throughput: weight, media, pdf, position: vertex.position, normal: vertex.normal, ..*path };
+        self.next.push(&Ray::new(origin, wi), &next);
     }
 }
 
@@ -303,7 +342,7 @@ impl PhongWave {
 #[derive(Clone, Copy)]
 struct Step<'a> {
     scene: &'a Snapshot,
-    walk: &'a Walk,
+    path: &'a Path,
     vertex: &'a Vertex,
     /// Segments so far.
     depth: u32,
@@ -312,8 +351,12 @@ struct Step<'a> {
 impl Step<'_> {
     /// The first sample dimension of this vertex.
     fn dimension(&self) -> u32 {
-        CAMERA_DIMENSIONS + (self.depth - 1) * VERTEX_DIMENSIONS
+        first_dimension(self.depth)
     }
+}
+
+fn first_dimension(depth: u32) -> u32 {
+    CAMERA_DIMENSIONS + (depth - 1) * VERTEX_DIMENSIONS
 }
 
 /// (n + 1) / 2π · cosⁿ about an axis, per steradian; `cos` may be negative.
@@ -334,6 +377,7 @@ fn within_lobe(axis: Vec3, exponent: f32, u: Vec2) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::Sampler;
 
     #[test]
     fn directions_fill_the_lobe_as_its_density_says() {

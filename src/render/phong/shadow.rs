@@ -3,11 +3,13 @@
 //! Straight light through glass is an approximation that keeps shadows of glass from being black where nothing
 //! gathers caustics. A scene without glass asks for any hit and is done.
 
+use super::super::paths::ShadowBatch;
 use super::super::surface::{Vertex, material_of};
 use super::super::{Material, MaterialId, Snapshot};
 use super::finish::straight_through;
 use crate::geometry::{Ray, robust};
-use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
+use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass, append};
+use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
 /// Light that arrives unless something is in its way.
@@ -19,44 +21,111 @@ struct Arriving {
     target: Option<Vec3>,
 }
 
-/// Shadow rays of one wave, and scratch memory to trace them.
+/// Shadow rays of one wave by what they were sent to, and scratch memory to trace them.
+///
+/// Those of one light lie together and run in much the same direction. Light is added light by light, and for each of them in
+/// the order of the rays.
 #[derive(Default)]
-pub(super) struct Shadows {
+pub(in crate::render) struct Shadows {
+    /// Of each light, and then of the surroundings; those behind the first `n` are not in use.
+    asked: Vec<Asked>,
+    n: usize,
+    with_targets: bool,
     rays: RayBatch,
     lights: Vec<Arriving>,
     next_rays: RayBatch,
     next_lights: Vec<Arriving>,
-    occluded: Vec<bool>,
     hits: HitBatch,
+}
+
+#[derive(Default)]
+struct Asked {
+    batch: ShadowBatch,
+    /// Where rays end, for those that go on behind glass.
+    targets: [Vec<f32>; 3],
 }
 
 /// Glass surfaces in the way of one shadow ray before it counts as blocked.
 const MAX_CROSSINGS: usize = 32;
 
 impl Shadows {
-    pub fn clear(&mut self) {
-        self.rays.clear();
-        self.lights.clear();
+    /// Forgets all rays; there is room for `n_hits` to each of `n` lights.
+    pub fn start(&mut self, scene: &Snapshot, n: usize, n_hits: usize) {
+        self.n = n;
+        self.with_targets = scene.shading.features.glass;
+        if self.asked.len() < n {
+            self.asked.resize_with(n, Asked::default);
+        }
+        for asked in &mut self.asked[..n] {
+            asked.batch.start(n_hits);
+            let least = n_hits + LANES;
+            if self.with_targets && asked.targets[0].len() < least {
+                asked.targets.iter_mut().for_each(|array| array.resize(least, 0.0));
+            }
+        }
     }
 
-    /// Light for `slot` that comes from `target`, or from outside along `wi`, to `origin`.
+    /// Light for `slot` that comes from `target` on light `k`, or from outside along `wi`, to `origin`.
     #[inline]
-    pub fn push(&mut self, slot: u32, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
-        self.rays.push(&shadow_ray(origin, wi, target));
-        self.lights.push(Arriving { slot, light, target });
+    pub fn push(&mut self, k: usize, slot: u32, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
+        let Asked { batch, targets } = &mut self.asked[k];
+        if self.with_targets {
+            let target = target.unwrap_or(wi);
+            targets.iter_mut().zip(target.to_array()).for_each(|(array, x)| array[batch.rays.len()] = x);
+        }
+        batch.push(&shadow_ray(origin, wi, target), slot, light);
+    }
+
+    /// The same for the lanes of `mask`; rays that end at `target` have a `t_max` of 1, the others none.
+    #[allow(clippy::too_many_arguments)]
+    #[inline(always)]
+    pub fn append<S: Simd>(
+        &mut self,
+        k: usize,
+        mask: Mask,
+        rays: [Vector<S>; 2],
+        t_max: Float<S>,
+        slot: Bits<S>,
+        light: Vector<S>,
+        target: Vector<S>,
+    ) {
+        let Asked { batch, targets } = &mut self.asked[k];
+        if self.with_targets {
+            let at = batch.rays.len();
+            append(&mut targets[0], at, mask, target.x);
+            append(&mut targets[1], at, mask, target.y);
+            append(&mut targets[2], at, mask, target.z);
+        }
+        batch.append(mask, rays, t_max, slot, light);
     }
 
     /// Adds what arrives to `radiance`; returns how many rays it took.
     pub fn cast(&mut self, scene: &Snapshot, class: RayClass, radiance: &mut [Vec3]) -> u64 {
-        if !scene.shading.features.glass {
-            scene.geometry.tree.any_hits(&self.rays, class, &mut self.occluded);
-            for (arriving, &occluded) in self.lights.iter().zip(&self.occluded) {
-                if !occluded {
-                    radiance[arriving.slot as usize] += arriving.light;
-                }
+        let mut n_rays = 0;
+        for k in 0..self.n {
+            if self.with_targets {
+                n_rays += self.cast_through(k, scene, class, radiance);
+                continue;
             }
-            return self.rays.len() as u64;
+            let batch = &mut self.asked[k].batch;
+            if !batch.rays.is_empty() {
+                n_rays += batch.rays.len() as u64;
+                batch.settle(radiance, |rays, occluded| scene.geometry.tree.any_hits(rays, class, occluded));
+            }
         }
+        n_rays
+    }
+
+    /// The same for one light where rays may go on behind what they meet.
+    fn cast_through(&mut self, k: usize, scene: &Snapshot, class: RayClass, radiance: &mut [Vec3]) -> u64 {
+        let Asked { batch, targets } = &mut self.asked[k];
+        std::mem::swap(&mut self.rays, &mut batch.rays);
+        self.lights.clear();
+        self.lights.extend((0..self.rays.len()).map(|i| Arriving {
+            slot: batch.slot[i],
+            light: batch.light_of(i),
+            target: (self.rays.t_max[i] == 1.0).then(|| Vec3::new(targets[0][i], targets[1][i], targets[2][i])),
+        }));
         let mut n_rays = 0;
         for _ in 0..MAX_CROSSINGS {
             if self.rays.is_empty() {

@@ -42,7 +42,7 @@ impl<S: Simd> Coat<S> {
         let material = Bits::gather(at.materials, at.index);
         let rows = two!(|k| Bits::gather(&table.parts[k], material));
         let weights = two!(|k| Float::gather(&table.weights[k], material));
-        let kinds = two!(|k| Bits::gather(&table.kind, rows[k]));
+        let kinds = two!(|k| Bits::gather(&table.kinds.of_material, rows[k]));
         let colors = two!(|k| colors_of(s, at, place, rows[k]));
         // Chosen by what they reflect.
         let strengths = two!(|k| luminance(colors[k]) * weights[k]);

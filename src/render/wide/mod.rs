@@ -8,15 +8,19 @@
 //! Start reading at [`shade`].
 
 mod camera;
+mod classic;
+mod classic_table;
 mod coat;
 mod emitters;
 mod instances;
 mod lights;
 mod metal;
+mod misses;
 pub(super) mod place;
 mod scatter;
 mod sort;
 mod tables;
+mod texture;
 pub(super) mod warp;
 
 use super::bsdf::Scatter;
@@ -29,9 +33,12 @@ use super::{Material, Snapshot, Techniques};
 use crate::kdtree::HitBatch;
 use crate::lanes::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
 pub(super) use camera::{Lens, Pixels};
+pub(super) use classic::{ClassicGroup, knows_classic, shade_classic};
+pub(super) use classic_table::ClassicTable;
 pub(super) use emitters::shade_emitters;
 use glam::Vec3;
 use lights::{LightPoints, light_weight};
+pub(super) use misses::shade_misses;
 use place::{At, Place};
 use scatter::{Bounce, eval, sample, surface_of};
 pub(super) use sort::{KINDS, SortedHits};

@@ -8,6 +8,7 @@ use super::coat::Coat;
 use super::metal::{self, MetalLanes};
 use super::place::{At, Place};
 use super::tables::{COATED, TEXTURED};
+use super::texture::looked_up;
 use super::warp::cosine_hemisphere;
 use super::{DIFFUSE, GLASS, METAL, lanes_of};
 use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector, frame_around, select, select_vector};
@@ -74,16 +75,7 @@ pub(super) fn colors_of<S: Simd>(s: S, at: &At<S>, place: &Place<S>, row: Bits<S
         return color;
     }
     let textured = at.mask & Bits::gather(&table.flags, row).has(TEXTURED);
-    if textured == 0 {
-        return color;
-    }
-    let (us, vs) = (place.uv[0].to_array(), place.uv[1].to_array());
-    let (rows, mut colors) = (row.to_array(), color.to_arrays());
-    for lane in lanes_of(textured) {
-        let found = table.inputs[rows[lane] as usize].eval(at.scene, Vec2::new(us[lane], vs[lane]));
-        (colors[0][lane], colors[1][lane], colors[2][lane]) = (found.x, found.y, found.z);
-    }
-    Vector::from_arrays(s, &colors)
+    looked_up(s, at.scene, &table.inputs, row, textured, place, color)
 }
 
 /// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.

@@ -9,6 +9,15 @@ use crate::lanes::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 /// Kinds of hits: misses, then those of materials, and the one of two parts.
 pub(in crate::render) const KINDS: usize = Material::KINDS + 2;
 
+/// What materials are sorted by: numbers below [`KINDS`] − 1.
+#[derive(Debug, Default)]
+pub(in crate::render) struct Kinds {
+    /// Ready to be gathered from.
+    pub of_material: Vec<u32>,
+    /// One bit a kind, for those that there are.
+    pub present: u32,
+}
+
 /// The hits of a wave, sorted.
 #[derive(Default)]
 pub(in crate::render) struct SortedHits {
@@ -25,7 +34,7 @@ impl SortedHits {
     }
 
     /// Sorts the first `n` hits.
-    pub fn sort(&mut self, set: InstructionSet, scene: &Snapshot, hits: &HitBatch, n: usize) {
+    pub fn sort(&mut self, set: InstructionSet, scene: &Snapshot, kinds: &Kinds, hits: &HitBatch, n: usize) {
         for array in self.order.iter_mut().chain([&mut self.materials]) {
             if array.len() < n + LANES {
                 array.resize(n + LANES, 0);
@@ -33,12 +42,12 @@ impl SortedHits {
         }
         self.counts = [0; KINDS];
         let sorted = self;
-        dispatch!(set, sort(sorted: &mut SortedHits, scene: &Snapshot, hits: &HitBatch, n: usize));
+        dispatch!(set, sort(sorted: &mut SortedHits, scene: &Snapshot, kinds: &Kinds, hits: &HitBatch, n: usize));
     }
 }
 
 #[inline(always)]
-fn sort<S: Simd>(s: S, sorted: &mut SortedHits, scene: &Snapshot, hits: &HitBatch, n: usize) {
+fn sort<S: Simd>(s: S, sorted: &mut SortedHits, scene: &Snapshot, kinds: &Kinds, hits: &HitBatch, n: usize) {
     let table = &scene.shading.material_table;
     let lane_numbers = Bits::load(s, &std::array::from_fn(|lane| lane as u32));
     for first in (0..n).step_by(LANES) {
@@ -67,12 +76,12 @@ fn sort<S: Simd>(s: S, sorted: &mut SortedHits, scene: &Snapshot, hits: &HitBatc
             material = Bits::load(s, &materials);
         }
         material.store(sorted.materials[first..].first_chunk_mut().expect("room for all lanes"));
-        let kind = Bits::gather(&table.kind, material);
+        let kind = Bits::gather(&kinds.of_material, material);
         let index = lane_numbers + first as u32;
         for k in 0..KINDS {
             let lanes = match k {
                 0 => mask & missed,
-                _ if table.kinds >> (k - 1) & 1 == 0 => continue,
+                _ if kinds.present >> (k - 1) & 1 == 0 => continue,
                 _ => mask & !missed & kind.equals(k as u32 - 1),
             };
             let at = sorted.counts[k];

@@ -3,6 +3,7 @@
 use super::super::bsdf::SMALLEST_ALPHA;
 use super::super::{ColorInput, Fresnel, Geometry, Material, MaterialId, ScalarInput};
 use super::instances::InstanceTable;
+use super::sort::Kinds;
 use crate::geometry::Frame;
 use crate::kdtree::{SceneTree, Shape, quad_rim, sphere_error};
 use crate::lanes::padded;
@@ -104,12 +105,10 @@ pub(in crate::render) struct MaterialTable {
     pub alpha: Vec<f32>,
     pub flags: Vec<u32>,
     /// See [`Material::kind`]; [`COATED`] for materials of two parts.
-    pub kind: Vec<u32>,
+    pub kinds: Kinds,
     /// Rows of the parts, with their weights; the parts of a classic material have rows behind those of all materials.
     pub parts: [Vec<u32>; 2],
     pub weights: [Vec<f32>; 2],
-    /// One bit a kind, for those that there are.
-    pub kinds: u32,
     /// Whether some emission has to be looked up.
     pub textured_emission: bool,
     /// The material of each object; [`SEVERAL`] where its primitives differ.
@@ -150,8 +149,8 @@ impl MaterialTable {
                 _ => {}
             }
             let kind = if parts[0].1 > 0.0 { COATED } else { material.kind() };
-            table.kind.push(kind as u32);
-            table.kinds |= 1 << kind;
+            table.kinds.of_material.push(kind as u32);
+            table.kinds.present |= 1 << kind;
             for (k, (row, weight)) in parts.into_iter().enumerate() {
                 table.parts[k].push(row);
                 table.weights[k].push(weight);
@@ -159,7 +158,7 @@ impl MaterialTable {
         }
         for part in &parts_of_classics {
             table.add(part, materials);
-            table.kind.push(part.kind() as u32);
+            table.kinds.of_material.push(part.kind() as u32);
         }
         let of_object = geometry
             .objects
@@ -171,10 +170,9 @@ impl MaterialTable {
             inputs: table.inputs,
             alpha: padded(table.alpha),
             flags: padded(table.flags),
-            kind: padded(table.kind),
+            kinds: Kinds { of_material: padded(table.kinds.of_material), ..table.kinds },
             parts: table.parts.map(padded),
             weights: table.weights.map(padded),
-            kinds: table.kinds,
             textured_emission: materials.iter().any(is_textured_emitter),
             of_object: padded(of_object),
         }

@@ -1,0 +1,53 @@
+//! Rays that leave the scene, sixteen at a time, under skies that are no pictures.
+
+use super::super::paths::PathBatch;
+use super::super::{Environment, Snapshot};
+use super::lanes_of;
+use crate::lanes::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select_vector};
+use glam::Vec3;
+
+/// Adds what the surroundings send along the rays of `order`; see [`Environment::radiance`].
+pub(in crate::render) fn shade_misses(
+    set: InstructionSet,
+    scene: &Snapshot,
+    paths: &PathBatch,
+    order: &[u32],
+    radiance: &mut [Vec3],
+) {
+    dispatch!(set, misses(scene: &Snapshot, paths: &PathBatch, order: &[u32], radiance: &mut [Vec3]));
+}
+
+#[inline(always)]
+fn misses<S: Simd>(s: S, scene: &Snapshot, paths: &PathBatch, order: &[u32], radiance: &mut [Vec3]) {
+    for chunk in order.chunks(LANES) {
+        let mut indices = [chunk[0]; LANES];
+        indices[..chunk.len()].copy_from_slice(chunk);
+        let mask = if chunk.len() == LANES { Mask::MAX } else { (1 << chunk.len()) - 1 };
+        let index = Bits::load(s, &indices);
+        let arriving = match &scene.shading.environment {
+            Environment::Black => return,
+            Environment::Constant(light) => Vector::splat(s, *light),
+            Environment::Gradient { zenith, horizon, ground } => {
+                let y = Float::gather(&paths.rays.dir_y, index);
+                let rest = -y + 1.0;
+                let share = -(rest * rest * rest) + 1.0;
+                let (low, high) = (Vector::splat(s, *horizon), Vector::splat(s, *zenith));
+                let above = low * (-share + 1.0) + high * share;
+                select_vector(y.is_negative(), Vector::splat(s, *ground), above)
+            }
+            Environment::Image { .. } => {
+                let mut found = [[0.0; LANES]; 3];
+                for lane in lanes_of(mask) {
+                    let light = scene.shading.environment.radiance(paths.rays.get(indices[lane] as usize).dir);
+                    (found[0][lane], found[1][lane], found[2][lane]) = (light.x, light.y, light.z);
+                }
+                Vector::from_arrays(s, &found)
+            }
+        };
+        let light = Vector::gather(&paths.throughput, index).times(arriving).to_arrays();
+        for lane in lanes_of(mask) {
+            let slot = paths.slot[indices[lane] as usize];
+            radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
+        }
+    }
+}
