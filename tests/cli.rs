@@ -94,7 +94,7 @@ fn without_a_display_the_scene_becomes_a_picture() {
 fn info_tells_what_is_in_a_scene_and_what_it_uses() {
     let folder = tempfile::tempdir().unwrap();
     let out = firstlight(folder.path(), &["info", "cornell-balls"]);
-    for expected in ["2 × sphere", "6 × quad", "1 × glass", "pinhole", "512 x 512", "1 emissive objects"] {
+    for expected in ["2 × sphere", "6 × quad", "1 × glass", "pinhole", "512 x 512", "1 emissive object,"] {
         assert!(out.contains(expected), "expected {expected:?} in:\n{out}");
     }
     let uses = out.lines().find(|line| line.trim_start().starts_with("uses")).unwrap();
