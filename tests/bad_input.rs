@@ -105,7 +105,7 @@ fn values_out_of_range_are_named_with_what_is_expected() {
         ("eye: (0, 5, 0), look_at: (0, 0, 0)", "`up` is parallel to the view direction"),
         ("eye: (0, 0, 5), look_at: (0, 0, 0), up: (0, 0, 0)", "`up` is (0, 0, 0)"),
         ("eye: (0, NaN, 5), look_at: (0, 0, 0)", "must be finite"),
-        ("eye: (0, 0, 5), look_at: (0, 0, 0), vfov: 180", "between 0 and 180"),
+        ("eye: (0, 0, 5), look_at: (0, 0, 0), vfov: 180", "above 0 and below 180"),
         ("eye: (0, 0, 5), look_at: (0, 0, 0), lens_radius: -1", "must be 0 or positive"),
         ("eye: (0, 0, 5), look_at: (0, 0, 0), f_stop: 0", "`f_stop` is 0"),
         ("eye: (0, 0, 5), look_at: (0, 0, 0), f_stop: 2, lens_radius: 1", "say the same thing"),

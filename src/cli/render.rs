@@ -315,6 +315,13 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
         let n_bad = film.n_bad() - bad_before;
         remark(format_args!("warning: {n_bad} of {total} samples were not finite and were left out"));
     }
+    if let (false, Some(wanted), Some(error)) = (stopped, target.error, error)
+        && error > wanted
+    {
+        remark(format_args!(
+            "warning: the error is {error:.3} still, not {wanted}: more time or samples would lower it"
+        ));
+    }
     if args.json {
         print(json(&job, &report, cpu_seconds, &film, stopped))?;
     } else if std::io::stderr().is_terminal() {

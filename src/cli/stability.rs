@@ -11,7 +11,8 @@ use std::time::Instant;
 
 #[derive(Args, Clone, Debug)]
 pub struct StabilityArgs {
-    /// How many rays the largest case traces; the others trace a share of it. 1e9 is a long run.
+    /// About how many rays the largest case traces; the others trace a share of it, and each as many as it needs at the
+    /// least. 1e9 is a long run.
     #[arg(long, value_name = "N", default_value = "1e7", value_parser = parse_rays)]
     rays: u64,
     /// Only this case; may be given several times.
@@ -42,8 +43,13 @@ pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
             return Err(Failure::Usage("--replay wants one --case NAME beside it".to_owned()));
         };
         let told = case.replay(stage, ray);
-        let told =
-            told.ok_or_else(|| Failure::Failed(format!("{}: there is no stage {stage} to replay", case.name)))?;
+        let told = told.ok_or_else(|| {
+            let name = case.name;
+            Failure::Failed(match case.n_stages() {
+                0 => format!("{name}: has no rays of its own to replay; its findings say all that there is"),
+                n => format!("{name}: there is no stage {stage} to replay, only 0 to {}", n - 1),
+            })
+        })?;
         return print(told.trim_end());
     }
     let pool = rayon::ThreadPoolBuilder::new()

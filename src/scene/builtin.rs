@@ -28,7 +28,7 @@ pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
     ("models", "six models around a point", include_str!("../../assets/scenes/models.ron")),
     (
         "simplify",
-        "one model with all of its triangles, a fifth, a fiftieth",
+        "one model with all of its triangles, a fifth, a hundredth",
         include_str!("../../assets/scenes/simplify.ron"),
     ),
     ("soft-shadow", "a ball and its soft shadow", include_str!("../../assets/scenes/soft-shadow.ron")),

@@ -168,6 +168,15 @@ impl Case {
         matches!(self.kind, Kind::Rays(_) | Kind::Pictures(_))
     }
 
+    /// How many stages there are to replay rays of.
+    pub fn n_stages(&self) -> usize {
+        match self.kind {
+            Kind::Rays(plans) => plans().len(),
+            Kind::Pictures(pictures) => pictures().len(),
+            _ => 0,
+        }
+    }
+
     /// Everything about one ray of the case, for people; `None` if it has no such stage, or no rays of its own.
     pub fn replay(&self, stage: usize, ray: u64) -> Option<String> {
         match self.kind {

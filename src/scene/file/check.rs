@@ -85,7 +85,7 @@ impl Check<'_> {
             }
         }
         if !(camera.vfov > 0.0 && camera.vfov < 180.0) {
-            self.wrong("camera/vfov", format!("`vfov` is {}, but must lie between 0 and 180 degrees", camera.vfov));
+            self.wrong("camera/vfov", format!("`vfov` is {}, but must lie above 0 and below 180 degrees", camera.vfov));
         }
         if camera.lens_radius.is_some() && camera.f_stop.is_some() {
             self.wrong("camera/f_stop", "`lens_radius` and `f_stop` say the same thing: give one of them");
