@@ -165,3 +165,17 @@ fn a_model_alone_is_framed_and_lit() {
     }
     assert!(warm * 4 > all, "the model fills the middle: {warm} of {all} pixels");
 }
+
+#[test]
+fn every_built_in_scene_opens_by_its_name_alone() {
+    // A command of the same name would come first.
+    let folder = tempfile::tempdir().unwrap();
+    let help = firstlight(folder.path(), &["help"]);
+    let part = |from: &str, to: &str| {
+        let lines = help.lines().skip_while(move |line| !line.starts_with(from)).skip(1);
+        lines.take_while(move |line| !line.starts_with(to)).filter_map(|line| line.split_whitespace().next()).collect()
+    };
+    let (commands, scenes): (Vec<&str>, Vec<&str>) = (part("Commands:", "Arguments:"), part("Built-in scenes:", "@"));
+    assert!(commands.len() >= 8 && scenes.contains(&"gallery") && scenes.len() >= 15, "{help}");
+    assert!(scenes.iter().all(|scene| !commands.contains(scene)), "{help}");
+}

@@ -27,9 +27,9 @@ pub const BUILTIN_SCENES: &[(&str, &str, &str)] = &[
     ),
     ("models", "six models around a point", include_str!("../../assets/scenes/models.ron")),
     (
-        "simplify",
+        "simplified",
         "one model with all of its triangles, a fifth, a hundredth",
-        include_str!("../../assets/scenes/simplify.ron"),
+        include_str!("../../assets/scenes/simplified.ron"),
     ),
     ("soft-shadow", "a ball and its soft shadow", include_str!("../../assets/scenes/soft-shadow.ron")),
     (
