@@ -185,6 +185,8 @@ struct App {
     steered_at: Instant,
     /// When the last restart was.
     restarted_at: Instant,
+    /// When the target was reached after that.
+    done_at: Option<Instant>,
     last_draw: Option<Instant>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
@@ -214,6 +216,7 @@ impl App {
             start,
             steered_at: start,
             restarted_at: start,
+            done_at: None,
             pending,
             session,
             saver: Saver::new(&options.folder, waker.clone()),
@@ -274,8 +277,8 @@ impl App {
         window.request_redraw();
     }
 
-    /// How long people waited (milliseconds), and the paths since the last restart with the seconds since then, in which
-    /// the window did all that it does.
+    /// How long people waited (milliseconds), and the paths since the last restart with the seconds since then, or until
+    /// the target was reached, in which the window did all that it does.
     fn print_figures(&self) {
         let milliseconds = |waits: &Waits| {
             let of = |share| waits.quantile(share).map(|wait| wait.as_secs_f64() * 1e3);
@@ -289,7 +292,7 @@ impl App {
             "reaction_ms": milliseconds(self.reaction.waits()),
             "cancel_ms": milliseconds(&self.session.cancels()),
             "camera_rays": status.rays.camera,
-            "seconds": self.restarted_at.elapsed().as_secs_f64(),
+            "seconds": self.done_at.unwrap_or_else(Instant::now).duration_since(self.restarted_at).as_secs_f64(),
         });
         // Standard output may be closed, and then nobody reads it.
         let _ = writeln!(std::io::stdout(), "{figures}");
@@ -318,8 +321,10 @@ impl App {
             self.reaction.carried_out((generation != restarts).then_some(generation));
         }
         if self.session.status().restarts != restarts {
-            self.restarted_at = now;
+            (self.restarted_at, self.done_at) = (now, None);
         }
+        self.done_at =
+            self.done_at.filter(|_| self.session.status().done).or(self.session.status().done.then_some(now));
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
         }
