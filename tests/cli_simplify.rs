@@ -1,6 +1,7 @@
 //! `firstlight simplify` from outside: what it writes, what it says, and what it makes of bad input.
 
 use assert_cmd::Command;
+use firstlight::scene::obj::{ObjExtras, save_obj};
 use std::path::Path;
 
 struct Outcome {
@@ -224,4 +225,28 @@ fn faults_of_a_mesh_are_named_and_survived() {
     // A second run has nothing left to complain of but the walls, which stay as they are.
     let again = simplify(path, &["out.obj", "-o", "again.obj", "--ratio", "0.9"]);
     assert!(again.code == 0 && !again.err.contains("same three places"), "{}", again.err);
+}
+
+#[test]
+fn a_closed_mesh_with_a_seam_is_closed_by_the_numbers_of_its_vertices() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, few) = (folder.path().join("ring.obj"), folder.path().join("few.obj"));
+    // Texture coordinates end at a seam each way around.
+    let mesh = firstlight::mesh::procedural::torus(1.0, 0.4, 48, 32);
+    assert!(!mesh.uvs.is_empty());
+    save_obj(&whole, &mesh, &ObjExtras::default()).unwrap();
+    report(folder.path(), &["ring.obj", "-o", "few.obj", "--ratio", "0.3"]);
+    for path in [whole, few] {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut sides = std::collections::HashMap::new();
+        for face in text.lines().filter_map(|line| line.strip_prefix("f ")) {
+            let places: Vec<u32> =
+                face.split(' ').map(|corner| corner.split('/').next().unwrap().parse().unwrap()).collect();
+            for k in 0..3 {
+                let (a, b) = (places[k], places[(k + 1) % 3]);
+                *sides.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+            }
+        }
+        assert!(sides.len() > 100 && sides.values().all(|faces| *faces == 2), "{}", path.display());
+    }
 }

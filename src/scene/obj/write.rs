@@ -3,7 +3,7 @@
 use super::ObjError;
 use crate::mesh::Mesh;
 use crate::scene::whole_file::{WholeFile, unwritable};
-use std::fmt::Display;
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -41,14 +41,19 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
             _ => writeln!(out, "mtllib {}", std::path::absolute(library)?.display())?,
         }
     }
-    for position in &mesh.positions {
-        let [x, y, z] = (position.as_dvec3() + mesh.center).to_array();
+    // Vertices that differ in texture coordinate or normal alone share a place, so that a closed surface is closed for
+    // whoever goes by the numbers of places.
+    let places = Distinct::of(&mesh.positions);
+    for place in &places.values {
+        let [x, y, z] = (place.as_dvec3() + mesh.center).to_array();
         writeln!(out, "v {x} {y} {z}")?;
     }
-    for [u, v] in mesh.uvs.iter().map(|uv| uv.to_array()) {
+    let uvs = Distinct::of(&mesh.uvs);
+    for [u, v] in uvs.values.iter().map(|uv| uv.to_array()) {
         writeln!(out, "vt {u} {v}")?;
     }
-    for [x, y, z] in mesh.normals.iter().map(|normal| normal.to_array()) {
+    let normals = Distinct::of(&mesh.normals);
+    for [x, y, z] in normals.values.iter().map(|normal| normal.to_array()) {
         writeln!(out, "vn {x} {y} {z}")?;
     }
     let mut current = None;
@@ -60,19 +65,44 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
                 writeln!(out, "usemtl {name}")?;
             }
         }
-        let [a, b, c] = triangle.map(|vertex| vertex + 1);
-        match (mesh.uvs.is_empty(), mesh.normals.is_empty()) {
-            (true, true) => writeln!(out, "f {a} {b} {c}")?,
-            (false, true) => writeln!(out, "f {a}/{a} {b}/{b} {c}/{c}")?,
-            (true, false) => writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}")?,
-            (false, false) => writeln!(out, "f {} {} {}", all(a), all(b), all(c))?,
+        write!(out, "f")?;
+        for vertex in triangle.map(|vertex| vertex as usize) {
+            let numbers = [&places.numbers, &uvs.numbers, &normals.numbers].map(|numbers| numbers.get(vertex));
+            match numbers {
+                [Some(v), None, None] => write!(out, " {v}")?,
+                [Some(v), Some(vt), None] => write!(out, " {v}/{vt}")?,
+                [Some(v), None, Some(vn)] => write!(out, " {v}//{vn}")?,
+                [Some(v), Some(vt), Some(vn)] => write!(out, " {v}/{vt}/{vn}")?,
+                [None, ..] => unreachable!("a mesh's triangles name its vertices"),
+            }
         }
+        writeln!(out)?;
     }
     Ok(())
 }
 
-fn all(vertex: u32) -> impl Display {
-    std::fmt::from_fn(move |f| write!(f, "{vertex}/{vertex}/{vertex}"))
+/// Values in the order in which they come first, and for each element the number of its own, from 1.
+struct Distinct<V> {
+    values: Vec<V>,
+    numbers: Vec<u32>,
+}
+
+impl<V: Copy> Distinct<V> {
+    fn of<const N: usize>(list: &[V]) -> Self
+    where
+        V: Into<[f32; N]>,
+    {
+        let mut known = HashMap::new();
+        let mut values = Vec::new();
+        let number = |&value: &V| {
+            *known.entry(value.into().map(f32::to_bits)).or_insert_with(|| {
+                values.push(value);
+                values.len() as u32
+            })
+        };
+        let numbers = list.iter().map(number).collect();
+        Self { values, numbers }
+    }
 }
 
 fn same_folder(a: &Path, b: &Path) -> bool {
