@@ -77,6 +77,14 @@ fn time_and_error_end_a_render() {
     assert!(samples >= 1 && (0.2..5.0).contains(&seconds), "{samples} samples in {seconds} s");
     let (samples, _, error) = spp(["--error", "0.05"]);
     assert!(samples >= 4 && error.is_some_and(|error| error <= 0.05), "{error:?} after {samples}");
+    // Who asked for an error and got another is told.
+    for (limits, missed) in [(["--error", "1e-6", "--spp", "8"], true), (["--error", "0.05", "--spp", "9999"], false)] {
+        let mut command = Command::cargo_bin("firstlight").unwrap();
+        command.current_dir(folder.path()).args(["render", "dof-balls", "-o", "d.png", "--size", "32x24"]).args(limits);
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.contains("the error is 0.") == missed, "{limits:?}: {said}");
+    }
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn all_techniques_together_have_the_mean_of_the_plain_ones() {
         let largest = ts.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
         let summary = format!("{name:<20} {:>7.3} % {t:>8.2} {squares:>8.2} {far:>8} {largest:>8.1}", 100.0 * error);
         println!("{summary}");
-        // One in ten thousand runs of fifteen scenes would find a t beyond this by chance; noise of glass has longer tails
+        // One in a thousand runs of fifteen scenes would find a t beyond this by chance; noise of glass has longer tails
         // than the normal distribution, so some of the pixels may.
         assert!(t.abs() < 4.5 && error < 0.07, "{summary}");
         assert!(squares < 2.5 && far * 50 <= ts.len(), "{summary}");

@@ -1,7 +1,8 @@
 //! What to render next, decided without threads and without a clock: it is told the times.
 //!
 //! After a restart comes a coarse picture that is there within a frame, then sharper ones, then samples at full
-//! resolution in slices, so that the picture is shown ten to twenty times a second, until the target is reached.
+//! resolution in slices, so that the picture is shown ten to twenty times a second at first and four times when it has
+//! long been converging, until the target is reached.
 //! The resolution while things move follows from the measured speed, with a band in which it stays as it is.
 //!
 //! The one who renders asks [`Scheduler::next`], does it, tells [`Scheduler::finished`], and asks again.
@@ -184,8 +185,7 @@ impl Scheduler {
                 let n_pixels = self.region.map_or(self.pixels(1), |n| n.max(1) as f64);
                 let slice = (FIRST_SLICE + 0.1 * self.spent).min(LATER_SLICE).max((0.01 * self.spent).min(LAST_SLICE));
                 let least = if self.spp < EVEN_UNTIL { 1 } else { AT_ONCE };
-                let passes = (slice * self.speed() / n_pixels).clamp(1.0, 65_536.0) as u32;
-                let passes = passes.max(least);
+                let passes = (slice * self.speed() / n_pixels).clamp(f64::from(least), 65_536.0) as u32;
                 let goal = self.target.spp.unwrap_or(u32::MAX);
                 // A pass that takes longer than a slice is shown unfinished.
                 let at_most = Duration::from_secs_f64(1.5 * slice);

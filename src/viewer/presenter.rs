@@ -65,8 +65,8 @@ impl Presenter {
             .map_err(no_driver)?;
         let modes = &pixels.context().surface_capabilities.present_modes;
         let can = |mode| modes.contains(&mode);
-        // A frame that waits for the screen keeps the next input waiting. Pictures come at most as often as a screen is
-        // drawn, so the ones that are replaced before they are seen are few.
+        // A frame that waits for the screen keeps the next input waiting. The scheduler makes pictures hardly faster than a
+        // screen shows them, so the ones that are replaced before they are seen are few.
         let best = [wgpu::PresentMode::Mailbox, wgpu::PresentMode::Immediate].into_iter().find(|&mode| can(mode));
         if let Some(mode) = best {
             pixels.set_present_mode(mode);

@@ -6,11 +6,11 @@
 
 use super::super::Snapshot;
 use super::super::light::LightLanes;
-use super::super::medium::MediumStack;
 use super::super::paths::{PathBatch, PathLanes};
 use super::super::phong::{
     AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, ENDLESS_DEPTH, LEAST_WEIGHT, LIGHTS_COUNTED, Shadows,
 };
+use super::chunk::{Chunk, iors};
 use super::classic_table::{GLOSS, Inputs, MATTE, ROUGH};
 use super::metal::fresnel;
 use super::place::{At, Place};
@@ -100,21 +100,15 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
     let n_lights = shading.lights.n_each();
     let zero = Float::splat(s, 0.0);
     for chunk in order.chunks(LANES) {
-        let mut indices = [chunk[0]; LANES];
-        indices[..chunk.len()].copy_from_slice(chunk);
-        let mask = if chunk.len() == LANES { Mask::MAX } else { (1 << chunk.len()) - 1 };
+        let chunk = Chunk::of(chunk);
+        let Chunk { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
         let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
         let place = Place::of(s, &at);
         let mut weight = Vector::gather(&paths.throughput, index);
         let sampler = paths.sampler_lanes(index);
         let slot = Bits::gather(&paths.slot, index);
-        let mut media = [MediumStack::default(); LANES];
-        if features.glass {
-            for (lane, &i) in indices.iter().enumerate() {
-                media[lane] = paths.media_of(i as usize);
-            }
-        }
+        let media = chunk.media(scene, paths);
         if features.media {
             weight = weight.times(transmittance(s, scene, mask, &media, Float::gather(&hits.t, index)));
         }
@@ -182,15 +176,8 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         }
         let mut throughput = weight.times(tint);
         let mut go_on = mask & wi.dot(place.reach_normal).is_positive();
-        let mut most = throughput.abs().max_element() * (1.0 / LEAST_WEIGHT);
-        if features.glass {
-            let mut ior = [1.0; LANES];
-            for lane in lanes_of(go_on).filter(|&lane| !media[lane].is_empty()) {
-                ior[lane] = media[lane].ior(scene);
-            }
-            let ior = Float::load(s, &ior);
-            most = most * ior * ior;
-        }
+        let ior = iors(s, scene, go_on, &media);
+        let most = throughput.abs().max_element() * (1.0 / LEAST_WEIGHT) * ior * ior;
         let survival = most.at_most(if depth >= ENDLESS_DEPTH { 0.95 } else { 1.0 });
         let at_stake = go_on & survival.lt(survival.all(1.0));
         if at_stake != 0 {

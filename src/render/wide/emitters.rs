@@ -1,6 +1,7 @@
 //! Hits on what shines, sixteen at a time.
 
 use super::super::caustics::CausticPass;
+use super::chunk::Chunk;
 use super::lights::light_weight;
 use super::place::{At, Place};
 use super::{Group, lanes_of, transmittance};
@@ -20,9 +21,7 @@ fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
     let Group { scene, techniques, caustics, paths, hits, materials, order, .. } = group;
     let shading = &*scene.shading;
     for chunk in order.chunks(LANES) {
-        let mut indices = [chunk[0]; LANES];
-        indices[..chunk.len()].copy_from_slice(chunk);
-        let mask = if chunk.len() == LANES { Mask::MAX } else { (1 << chunk.len()) - 1 };
+        let Chunk { indices, mask } = Chunk::of(chunk);
         let index = Bits::load(s, &indices);
         let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
         let place = Place::of(s, &at);

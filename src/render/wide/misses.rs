@@ -2,8 +2,9 @@
 
 use super::super::paths::PathBatch;
 use super::super::{Environment, Snapshot};
+use super::chunk::Chunk;
 use super::lanes_of;
-use crate::lanes::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select_vector};
+use crate::lanes::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select_vector};
 use glam::Vec3;
 
 /// Adds what the surroundings send along the rays of `order`; see [`Environment::radiance`].
@@ -20,9 +21,7 @@ pub(in crate::render) fn shade_misses(
 #[inline(always)]
 fn misses<S: Simd>(s: S, scene: &Snapshot, paths: &PathBatch, order: &[u32], radiance: &mut [Vec3]) {
     for chunk in order.chunks(LANES) {
-        let mut indices = [chunk[0]; LANES];
-        indices[..chunk.len()].copy_from_slice(chunk);
-        let mask = if chunk.len() == LANES { Mask::MAX } else { (1 << chunk.len()) - 1 };
+        let Chunk { indices, mask } = Chunk::of(chunk);
         let index = Bits::load(s, &indices);
         let arriving = match &scene.shading.environment {
             Environment::Black => return,

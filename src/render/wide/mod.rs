@@ -8,6 +8,7 @@
 //! Start reading at [`shade`].
 
 mod camera;
+mod chunk;
 mod classic;
 mod classic_table;
 mod coat;
@@ -33,6 +34,7 @@ use super::{Material, Snapshot, Techniques};
 use crate::kdtree::HitBatch;
 use crate::lanes::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
 pub(super) use camera::{Lens, Pixels};
+use chunk::{Chunk, iors};
 pub(super) use classic::{ClassicGroup, knows_classic, shade_classic};
 pub(super) use classic_table::ClassicTable;
 pub(super) use emitters::shade_emitters;
@@ -123,21 +125,15 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
         group;
     let features = &scene.shading.features;
     for chunk in order.chunks(LANES) {
-        let mut indices = [chunk[0]; LANES];
-        indices[..chunk.len()].copy_from_slice(chunk);
-        let mask = if chunk.len() == LANES { Mask::MAX } else { (1 << chunk.len()) - 1 };
+        let chunk = Chunk::of(chunk);
+        let Chunk { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
         let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
         let place = Place::of(s, &at);
         let mut throughput = Vector::gather(&paths.throughput, index);
         let sampler = paths.sampler_lanes(index);
         let slot = Bits::gather(&paths.slot, index);
-        let mut media = [MediumStack::default(); LANES];
-        if features.glass {
-            for (lane, &i) in indices.iter().enumerate() {
-                media[lane] = paths.media_of(i as usize);
-            }
-        }
+        let mut media = chunk.media(scene, paths);
         if features.media {
             let distance = Float::gather(&hits.t, index);
             throughput = throughput.times(transmittance(s, scene, mask, &media, distance));
@@ -184,15 +180,8 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             }
         }
         if let Some(most_kept) = survival.share {
-            let mut most = throughput.abs().max_element();
-            if features.glass {
-                let mut ior = [1.0; LANES];
-                for lane in lanes_of(go_on).filter(|&lane| !media[lane].is_empty()) {
-                    ior[lane] = media[lane].ior(scene);
-                }
-                let ior = Float::load(s, &ior);
-                most = most * ior * ior;
-            }
+            let ior = iors(s, scene, go_on, &media);
+            let mut most = throughput.abs().max_element() * ior * ior;
             if paths.tracks.is_some() {
                 most = most * Float::load(s, &indices.map(|i| paths.track_of(i as usize).gain));
             }

@@ -3,7 +3,7 @@
 use super::super::{ColorInput, Snapshot, TexturePattern};
 use super::lanes_of;
 use super::place::Place;
-use crate::lanes::{Bits, Float, Mask, Simd, Vector, floor, select_vector, truncated};
+use crate::lanes::{Bits, Mask, Simd, Vector, floor, select_vector, truncated};
 use glam::Vec2;
 
 /// `color`, but for the lanes of `textured`: there what `inputs` says of their rows.
@@ -48,5 +48,5 @@ pub(super) fn looked_up<S: Simd>(
         let found = inputs[rows[lane] as usize].eval(scene, Vec2::new(us[lane], vs[lane]));
         (colors[0][lane], colors[1][lane], colors[2][lane]) = (found.x, found.y, found.z);
     }
-    Vector { x: Float::load(s, &colors[0]), y: Float::load(s, &colors[1]), z: Float::load(s, &colors[2]) }
+    Vector::from_arrays(s, &colors)
 }

@@ -313,9 +313,11 @@ impl App {
         let clock = now - self.start;
         let restarts = self.session.status().restarts;
         self.session.update(clock);
-        // A movement that came before the last one was seen would only take its place: it waits, and adds up.
+        // A movement that came before the last one was seen would only take its place: it waits, and adds up. Nor does it
+        // come faster than frames, though a picture that is ready is looked at sooner.
         let answered = self.is_answered(now);
-        if answered {
+        let soon = Some(self.steered_at + FRAME).filter(|soon| *soon > now);
+        if answered && soon.is_none() {
             self.steer(now, clock);
             let generation = self.session.status().restarts;
             self.reaction.carried_out((generation != restarts).then_some(generation));
@@ -323,8 +325,7 @@ impl App {
         if self.session.status().restarts != restarts {
             (self.restarted_at, self.done_at) = (now, None);
         }
-        self.done_at =
-            self.done_at.filter(|_| self.session.status().done).or(self.session.status().done.then_some(now));
+        self.done_at = if self.session.status().done { self.done_at.or(Some(now)) } else { None };
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
         }
@@ -370,7 +371,7 @@ impl App {
             window.request_redraw();
         }
         let moving = match answered {
-            true => self.input.is_moving().then(|| now + FRAME),
+            true => soon.or_else(|| self.input.is_moving().then(|| now + FRAME)),
             false => Some(self.steered_at + LATEST),
         };
         let late = comes.then(|| self.restarted_at + LATEST);
