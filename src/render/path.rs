@@ -90,9 +90,6 @@ pub(super) struct PathWave {
     next: PathBatch,
     hits: HitBatch,
     sorted: SortedHits,
-    /// Of the hits of one kind, those with hints of where gathered light comes from, and the others.
-    told: Vec<u32>,
-    untold: Vec<u32>,
     shadows: ShadowBatch,
     /// Looks on, when somebody wants to know.
     pub record: Option<Box<Record>>,
@@ -166,28 +163,9 @@ impl PathWave {
             && !scene.shading.material_table.textured_emission
             && scene.shading.environment_sampler.is_none();
         for kind in 0..KINDS {
-            let mut order = self.sorted.of_kind(kind);
+            let order = self.sorted.of_kind(kind);
             if order.is_empty() {
                 continue;
-            }
-            // Where there are hints, they are followed one path at a time.
-            self.told.clear();
-            if let Some(pass) = caustics
-                && kind > MISSES
-                && wide::scatters(kind - 1)
-                && settings.lanes.is_some()
-            {
-                let (paths, hits) = (&self.paths, &self.hits);
-                let is_told = |i: &u32| {
-                    let i = *i as usize;
-                    pass.hints(&paths.track_of(i), depth, paths.rays.get(i).at(hits.t[i])).is_some()
-                };
-                self.told.extend(order.iter().copied().filter(is_told));
-                if !self.told.is_empty() {
-                    self.untold.clear();
-                    self.untold.extend(order.iter().copied().filter(|i| !is_told(i)));
-                    order = &self.untold;
-                }
             }
             let group = Group {
                 scene,
@@ -218,9 +196,6 @@ impl PathWave {
                         self.shade_one(scene, depth, settings, caustics, i, radiance);
                     }
                 }
-            }
-            for k in 0..self.told.len() {
-                self.shade_one(scene, depth, settings, caustics, self.told[k] as usize, radiance);
             }
         }
     }

@@ -8,9 +8,12 @@
 //! the density of the mixture being known exactly, so the mean stays as it is whatever the list holds.
 
 use crate::geometry::Frame;
+use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
 use crate::render::bsdf::{BsdfSample, Scatter};
+use crate::render::wide::warp;
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone};
 use glam::{Vec2, Vec3};
+use std::ops::Range;
 
 /// Most exits in one list. Each costs a few multiplications an evaluation.
 const LIST: usize = 32;
@@ -20,7 +23,7 @@ const LIST: usize = 32;
 const NEIGHBOR: usize = 3;
 
 /// Share of directions that are chosen by the list where there is one.
-const SHARE: f32 = 0.35;
+pub(in crate::render) const SHARE: f32 = 0.35;
 
 /// Where gathered light went, and where it came from last.
 #[derive(Clone, Copy, Debug)]
@@ -29,18 +32,43 @@ pub(super) struct Trace {
     pub from: Vec3,
 }
 
+/// A tree over the places that gathered light comes to; the lower child of a node is the next one.
 #[derive(Debug, Default)]
 pub(in crate::render) struct Guide {
-    nodes: Vec<Node>,
-    exits: Vec<Exit>,
+    splits: Vec<f32>,
+    /// The axis or [`LEAF`], and from the third bit on the upper child or the leaf.
+    links: Vec<u32>,
+    leaves: Vec<Leaf>,
+    blocks: Vec<ExitBlock>,
 }
 
-#[derive(Clone, Copy, Debug)]
-enum Node {
-    /// The lower child is the next node.
-    Inner { axis: u8, split: f32, upper: u32 },
-    /// Nothing is known outside of the box.
-    Leaf { first: u32, n: u32, min: Vec3, max: Vec3 },
+/// In place of an axis.
+const LEAF: u32 = 3;
+
+#[derive(Debug)]
+struct Leaf {
+    /// Nothing is known outside.
+    min: Vec3,
+    max: Vec3,
+    blocks: Range<u32>,
+    n_exits: u32,
+}
+
+/// Balls around exits, side by side; those that there are not have no inside.
+#[derive(Debug)]
+#[repr(C, align(64))]
+struct ExitBlock {
+    center: [[f32; LANES]; 3],
+    radius2: [f32; LANES],
+}
+
+impl ExitBlock {
+    const NONE: Self = Self { center: [[0.0; LANES]; 3], radius2: [-1.0; LANES] };
+
+    fn exit(&self, lane: usize) -> Exit {
+        let [x, y, z] = &self.center;
+        Exit { center: Vec3::new(x[lane], y[lane], z[lane]), radius2: self.radius2[lane] }
+    }
 }
 
 /// A ball around the exit.
@@ -51,10 +79,12 @@ struct Exit {
 }
 
 impl Guide {
-    pub fn build(mut traces: Vec<Trace>) -> Self {
+    pub(super) fn build(mut traces: Vec<Trace>) -> Self {
         let mut guide = Self::default();
         if traces.len() > 2 * NEIGHBOR {
             guide.split(&mut traces);
+            guide.splits = padded(guide.splits);
+            guide.links = padded(guide.links);
         }
         guide
     }
@@ -65,12 +95,25 @@ impl Guide {
         let size = max - min;
         if traces.len() <= LIST || size == Vec3::ZERO {
             // All of equal points lie in one leaf: enough of them say as much as all.
-            let list = &traces[..traces.len().min(LIST)];
-            let first = self.exits.len() as u32;
-            self.exits.extend(exits_of(list, size.length()));
+            let exits = exits_of(&traces[..traces.len().min(LIST)], size.length());
             let margin = Vec3::splat(0.25 * size.length());
-            let n = list.len() as u32;
-            self.nodes.push(Node::Leaf { first, n, min: min - margin, max: max + margin });
+            let first_block = self.blocks.len() as u32;
+            for some in exits.chunks(LANES) {
+                let mut block = ExitBlock::NONE;
+                for (lane, exit) in some.iter().enumerate() {
+                    (0..3).for_each(|axis| block.center[axis][lane] = exit.center[axis]);
+                    block.radius2[lane] = exit.radius2;
+                }
+                self.blocks.push(block);
+            }
+            self.splits.push(0.0);
+            self.links.push((self.leaves.len() as u32) << 2 | LEAF);
+            self.leaves.push(Leaf {
+                min: min - margin,
+                max: max + margin,
+                blocks: first_block..self.blocks.len() as u32,
+                n_exits: exits.len() as u32,
+            });
             return;
         }
         let axis = size.max_position();
@@ -87,11 +130,11 @@ impl Guide {
         });
         let split = traces[middle].at[axis];
         let (below, above) = traces.split_at_mut(middle);
-        let here = self.nodes.len();
-        self.nodes.push(Node::Inner { axis: axis as u8, split, upper: 0 });
+        let here = self.links.len();
+        self.splits.push(split);
+        self.links.push(0);
         self.split(below);
-        let above_at = self.nodes.len() as u32;
-        self.nodes[here] = Node::Inner { axis: axis as u8, split, upper: above_at };
+        self.links[here] = (self.links.len() as u32) << 2 | axis as u32;
         self.split(above);
     }
 
@@ -99,17 +142,43 @@ impl Guide {
     pub fn at(&self, position: Vec3) -> Option<Hints<'_>> {
         let mut node = 0;
         loop {
-            match *self.nodes.get(node)? {
-                Node::Inner { axis, split, upper } => {
-                    node = if position[usize::from(axis)] < split { node + 1 } else { upper as usize };
-                }
-                Node::Leaf { first, n, min, max } => {
-                    let inside = position.cmpge(min).all() && position.cmple(max).all();
-                    let exits = &self.exits[first as usize..][..n as usize];
-                    return inside.then_some(Hints { exits, position });
-                }
+            let link = *self.links.get(node)?;
+            let axis = link & 3;
+            if axis == LEAF {
+                return self.in_leaf(link >> 2, position);
             }
+            node = if position[axis as usize] < self.splits[node] { node + 1 } else { (link >> 2) as usize };
         }
+    }
+
+    /// The leaves that sixteen places belong to; see [`Self::in_leaf`]. The guide must not be empty.
+    #[inline(always)]
+    pub fn leaves_at<S: Simd>(&self, s: S, mask: Mask, position: Vector<S>) -> [u32; LANES] {
+        let mut node = Bits::splat(s, 0);
+        loop {
+            let link = Bits::gather(&self.links, node);
+            let (axis, beyond) = (link & LEAF, link.shr(2));
+            let at_leaf = axis.equals(LEAF);
+            if mask & !at_leaf == 0 {
+                return beyond.to_array();
+            }
+            let at = select(axis.equals(0), position.x, select(axis.equals(1), position.y, position.z));
+            let below = at.lt(Float::gather(&self.splits, node));
+            let child = s.select_u(below, (node + 1).v, beyond.v);
+            node = Bits { s, v: s.select_u(at_leaf, node.v, child) };
+        }
+    }
+
+    #[inline(always)]
+    pub fn in_leaf(&self, leaf: u32, position: Vec3) -> Option<Hints<'_>> {
+        let Leaf { min, max, ref blocks, n_exits } = self.leaves[leaf as usize];
+        let inside = position.cmpge(min).all() && position.cmple(max).all();
+        let blocks = &self.blocks[blocks.start as usize..blocks.end as usize];
+        inside.then_some(Hints { blocks, n_exits, position })
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.links.is_empty()
     }
 }
 
@@ -143,14 +212,18 @@ fn exits_of(list: &[Trace], extent: f32) -> Vec<Exit> {
 /// Where gathered light may come from at one place; never empty.
 #[derive(Clone, Copy)]
 pub(in crate::render) struct Hints<'a> {
-    exits: &'a [Exit],
+    blocks: &'a [ExitBlock],
+    n_exits: u32,
     position: Vec3,
 }
 
 impl Hints<'_> {
+    /// A direction to one of the exits, unit.
+    ///
     /// - `u_exit`, `u`: independent uniform numbers in `[0, 1)`.
-    fn sample(&self, u_exit: f32, u: Vec2) -> Vec3 {
-        let exit = &self.exits[((u_exit * self.exits.len() as f32) as usize).min(self.exits.len() - 1)];
+    pub fn sample(&self, u_exit: f32, u: Vec2) -> Vec3 {
+        let chosen = ((u_exit * self.n_exits as f32) as usize).min(self.n_exits as usize - 1);
+        let exit = self.blocks[chosen / LANES].exit(chosen % LANES);
         let way = exit.center - self.position;
         let distance2 = way.length_squared();
         if distance2 <= exit.radius2 {
@@ -163,10 +236,9 @@ impl Hints<'_> {
 
     /// Per steradian.
     fn pdf(&self, wi: Vec3) -> f32 {
-        let sum: f32 = self
-            .exits
-            .iter()
-            .map(|exit| {
+        let sum: f32 = (0..self.n_exits as usize)
+            .map(|i| {
+                let exit = self.blocks[i / LANES].exit(i % LANES);
                 let way = exit.center - self.position;
                 let (distance2, along) = (way.length_squared(), way.dot(wi));
                 if distance2 <= exit.radius2 {
@@ -177,7 +249,26 @@ impl Hints<'_> {
                 if hit { cone_pdf(one_minus_cos_from_sin2(exit.radius2 / distance2)) } else { 0.0 }
             })
             .sum();
-        sum / self.exits.len() as f32
+        sum / self.n_exits as f32
+    }
+
+    /// [`Self::pdf`], sixteen exits at a time.
+    #[inline(always)]
+    pub fn pdf_lanes<S: Simd>(&self, s: S, wi: Vec3) -> f32 {
+        let (position, wi) = (Vector::splat(s, self.position), Vector::splat(s, wi));
+        let zero = Float::splat(s, 0.0);
+        let mut sum = zero;
+        for block in self.blocks {
+            let (way, radius2) = (Vector::from_arrays(s, &block.center) - position, Float::load(s, &block.radius2));
+            let distance2 = way.length_squared();
+            let inside = distance2.le(radius2);
+            let hit = way.dot(wi).is_positive() & way.cross(wi).length_squared().le(radius2);
+            if inside | hit != 0 {
+                let found = warp::cone_pdf(warp::one_minus_cos_from_sin2(radius2 / distance2));
+                sum += select(inside, zero.all(cone_pdf(2.0)), select(hit, found, zero));
+            }
+        }
+        sum.to_array().iter().sum::<f32>() / self.n_exits as f32
     }
 }
 
@@ -217,6 +308,7 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::{InstructionSet, dispatch};
     use crate::render::bsdf::Lobe;
     use crate::sampling::Sampler;
 
@@ -281,6 +373,61 @@ mod tests {
             let dof = f64::from(dof);
             let z = ((chi2 / dof).cbrt() - (1.0 - 2.0 / (9.0 * dof))) / (2.0 / (9.0 * dof)).sqrt();
             assert!(z < 2.6, "place {place}: χ² {chi2:.0} with {dof} degrees of freedom");
+        }
+    }
+
+    /// Each place with what is known there: whether anything, and the density of a direction.
+    #[inline(always)]
+    fn ask<S: Simd>(s: S, guide: &Guide, asked: &[[Vec3; 2]], answers: &mut Vec<Option<f32>>) {
+        for some in asked.chunks_exact(LANES) {
+            let mut at = [[0.0; LANES]; 3];
+            for (lane, [place, _]) in some.iter().enumerate() {
+                (0..3).for_each(|axis| at[axis][lane] = place[axis]);
+            }
+            let leaves = guide.leaves_at(s, Mask::MAX, Vector::from_arrays(s, &at));
+            for (leaf, [place, wi]) in leaves.into_iter().zip(some) {
+                answers.push(guide.in_leaf(leaf, *place).map(|hints| hints.pdf_lanes(s, *wi)));
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_know_what_one_place_at_a_time_knows() {
+        let guide = &guide();
+        let asked: Vec<_> = (0..64 * LANES as u32)
+            .map(|i| {
+                let sampler = Sampler::new(6, 0, 0, i);
+                let (at, to) = (sampler.pair(0), sampler.pair(1));
+                let place = Vec3::new(1.2 * at.x - 0.1, 0.0, 1.2 * at.y - 0.1);
+                // At and beside the windows.
+                let window = if i % 2 == 0 { Vec3::new(-1.0, 0.5, 0.0) } else { Vec3::new(0.8, 1.0, 0.3) };
+                let exit = window + 0.4 * Vec3::new(to.x - 0.25, 0.0, to.y - 0.25);
+                [place, (exit - place).normalize()]
+            })
+            .collect();
+        let asked = &asked[..];
+        let one_by_one = asked.iter().map(|&[place, wi]| guide.at(place).map(|hints| hints.pdf(wi)));
+        let one_by_one: Vec<_> = one_by_one.collect();
+        for share in
+            [one_by_one.iter().flatten().filter(|pdf| **pdf > 0.0).count(), one_by_one.iter().flatten().count()]
+        {
+            assert!(share > asked.len() / 8 && share < asked.len(), "{share} say little");
+        }
+        let ask_on = |set| {
+            let mut found = Vec::new();
+            let answers = &mut found;
+            dispatch!(set, ask(guide: &Guide, asked: &[[Vec3; 2]], answers: &mut Vec<Option<f32>>));
+            found
+        };
+        let expected = ask_on(InstructionSet::Portable);
+        for set in InstructionSet::available() {
+            assert!(ask_on(set) == expected, "{set:?}");
+        }
+        for (lanes, single) in expected.iter().zip(&one_by_one) {
+            match (lanes, single) {
+                (Some(lanes), Some(single)) => assert!((lanes - single).abs() <= 1e-5 * single, "{lanes} {single}"),
+                (lanes, single) => assert_eq!(lanes.is_some(), single.is_some()),
+            }
         }
     }
 

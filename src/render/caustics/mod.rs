@@ -18,7 +18,7 @@ mod trace;
 mod weight;
 
 pub(super) use aim::CasterTable;
-pub(super) use guide::{Guided, Hints};
+pub(super) use guide::{Guided, Hints, SHARE as HINTED};
 use layer::Batches;
 pub(super) use layer::LightLayer;
 pub(super) use weight::{Bounce, Track};
@@ -100,12 +100,18 @@ impl CausticPass<'_> {
         true
     }
 
+    /// `None` while it is not prepared, and where it knows nothing.
+    #[inline]
+    pub fn guide(&self) -> Option<&Guide> {
+        self.casters.guide.get().filter(|guide| !guide.is_empty())
+    }
+
     /// Hints for a vertex, where paths from lamps are of no use to the path so far.
     ///
     /// - `n_vertices`: up to and with this one.
     #[inline]
     pub fn hints(&self, track: &Track, n_vertices: u32, position: Vec3) -> Option<Hints<'_>> {
         let needs_them = n_vertices > 1 && track.is_lost();
-        needs_them.then(|| self.casters.guide.get()?.at(position)).flatten()
+        needs_them.then(|| self.guide()?.at(position)).flatten()
     }
 }

@@ -3,14 +3,12 @@
 //! The formulas are those of [`super::super::bsdf::Blend`]: light sampling asks both parts, a bounce is chosen from one
 //! and weighted over both.
 
-use super::super::path::{DIM_DIRECTION, DIM_LOBE};
 use super::metal::MetalLanes;
 use super::place::{At, Place};
 use super::scatter::{Bounce, colors_of, mirrored};
 use super::warp::cosine_hemisphere;
 use super::{DIFFUSE, METAL, MIRROR};
 use crate::lanes::{Bits, Float, Mask, Simd, Vector, frame_around, select, select_vector, two};
-use crate::sampling::SamplerLanes;
 use std::f32::consts::FRAC_1_PI;
 
 /// The parts of the surface of each lane, by what they do; of each kind there is one at most.
@@ -94,10 +92,9 @@ impl<S: Simd> Coat<S> {
     }
 
     #[inline(always)]
-    pub fn sample(&self, mask: Mask, place: &Place<S>, sampler: &SamplerLanes<S>, dimension: u32) -> Bounce<S> {
-        let first = sampler.single(dimension + DIM_LOBE).lt(self.pmfs[0]) | self.pmfs[1].is_zero();
+    pub fn sample(&self, mask: Mask, place: &Place<S>, u_lobe: Float<S>, u: [Float<S>; 2]) -> Bounce<S> {
+        let first = u_lobe.lt(self.pmfs[0]) | self.pmfs[1].is_zero();
         let (rough, mirror) = (mask & self.chosen(first, METAL), mask & self.chosen(first, MIRROR));
-        let u = sampler.pair(dimension + DIM_DIRECTION);
         let local = cosine_hemisphere(u);
         let mut wi = local.to_world(&frame_around(place.normal));
         let mut go_on = mask & self.chosen(first, DIFFUSE) & local.z.is_positive();

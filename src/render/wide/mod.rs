@@ -13,6 +13,7 @@ mod classic;
 mod classic_table;
 mod coat;
 mod emitters;
+mod hints;
 mod instances;
 mod lights;
 mod metal;
@@ -39,6 +40,7 @@ pub(super) use classic::{ClassicGroup, knows_classic, shade_classic};
 pub(super) use classic_table::ClassicTable;
 pub(super) use emitters::shade_emitters;
 use glam::Vec3;
+use hints::HintLanes;
 use lights::{LightPoints, light_weight};
 pub(super) use misses::shade_misses;
 use place::{At, Place};
@@ -78,8 +80,8 @@ pub(super) fn knows(kind: usize) -> bool {
     (DIFFUSE..=METAL).contains(&kind) || kind == COATED
 }
 
-/// Whether [`shade`] knows the kind, and light sampling finds something for it.
-pub(super) fn scatters(kind: usize) -> bool {
+/// Whether light sampling finds something for hits on materials of a kind.
+fn scatters(kind: usize) -> bool {
     [DIFFUSE, METAL, COATED].contains(&kind)
 }
 
@@ -139,6 +141,10 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             throughput = throughput.times(transmittance(s, scene, mask, &media, distance));
         }
         let surface = surface_of::<S, KIND>(s, &at, &place);
+        let hints = match caustics {
+            Some(pass) if scatters(KIND) => HintLanes::of(s, pass, depth, &at, &place, mask & surface.smooth),
+            _ => HintLanes::NONE,
+        };
         if KIND != MIRROR && KIND != GLASS && techniques.light_sampling && features.light_sampling {
             let lit = mask & surface.smooth;
             if lit != 0 {
@@ -146,6 +152,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                     s.call(LightPoints { scene, techniques, mask: lit, place: &place, sampler: &sampler, dimension });
                 let (wi, found) = (points.wi, points.found);
                 let (value, pdf) = eval::<S, KIND>(&surface, &place, wi);
+                let pdf = hints.mixed(s, wi, pdf);
                 let reached = wi.dot(place.reach_normal).is_positive();
                 let found = found & reached & pdf.is_positive();
                 let weight = light_weight(techniques, points.pdf, pdf) / points.pdf;
@@ -167,7 +174,8 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                 }
             }
         }
-        let bounce = sample::<S, KIND>(s, &at, &surface, &place, &sampler, dimension, &media);
+        let bounce = sample::<S, KIND>(s, &at, &surface, &place, &hints, &sampler, dimension, &media);
+        let bounce = hints.follow::<S, KIND>(s, &surface, &place, &sampler, dimension, bounce);
         let beyond = bounce.wi.dot(place.geometric_normal).is_negative();
         let reached = bounce.wi.dot(place.reach_normal).is_positive();
         let mut go_on = mask & bounce.go_on;
@@ -183,7 +191,10 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             let ior = iors(s, scene, go_on, &media);
             let mut most = throughput.abs().max_element() * ior * ior;
             if paths.tracks.is_some() {
-                most = most * Float::load(s, &indices.map(|i| paths.track_of(i as usize).gain));
+                let weight = bounce.weight.to_arrays();
+                let mut gains = [1.0; LANES];
+                lanes_of(go_on).for_each(|lane| gains[lane] = hints.track(&at, lane, &weight).gain);
+                most = most * Float::load(s, &gains);
             }
             let kept = (most * ROULETTE_GRACE).at_most(most_kept);
             let at_stake = go_on & kept.lt(kept.all(1.0));
@@ -203,7 +214,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             origin = select_vector(bounce.transmitted, place.passing(), origin);
         }
         if let (Some(pass), Some(tracks)) = (caustics, &mut next.tracks) {
-            tracks.extend(follow(pass, &at, &place, &bounce, go_on, depth == 1, &media));
+            tracks.extend(follow(pass, &at, &place, &hints, &bounce, go_on, depth == 1, &media));
         }
         let pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
         let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
@@ -222,13 +233,14 @@ fn follow<S: Simd>(
     pass: &CausticPass,
     at: &At<S>,
     place: &Place<S>,
+    hints: &HintLanes,
     bounce: &Bounce<S>,
     go_on: Mask,
     is_first: bool,
     media: &[MediumStack; LANES],
 ) -> impl Iterator<Item = Track> {
     let vertices = place.stored();
-    let (wi, pdfs) = (bounce.wi.to_arrays(), bounce.pdf.to_array());
+    let (wi, pdfs, weights) = (bounce.wi.to_arrays(), bounce.pdf.to_array(), bounce.weight.to_arrays());
     let transmitted = bounce.transmitted;
     lanes_of(go_on).map(move |lane| {
         let i = at.indices[lane] as usize;
@@ -253,7 +265,7 @@ fn follow<S: Simd>(
             _ => lobe_at(at.scene, material, &vertex, &before)
                 .map_or(0.0, |lobe| lobe.eval(wi, vertex.wo, vertex.normal).1),
         };
-        pass.follow(at.paths.track_of(i), &bounce, reverse_pdf)
+        pass.follow(hints.track(at, lane, &weights), &bounce, reverse_pdf)
     })
 }
 

@@ -5,6 +5,7 @@ use super::super::medium::MediumStack;
 use super::super::path::{DIM_DIRECTION, DIM_LOBE};
 use super::super::surface::scalar_at;
 use super::coat::Coat;
+use super::hints::HintLanes;
 use super::metal::{self, MetalLanes};
 use super::place::{At, Place};
 use super::tables::{COATED, TEXTURED};
@@ -112,6 +113,7 @@ pub(super) fn sample<S: Simd, const KIND: usize>(
     at: &At<S>,
     surface: &Surface<S>,
     place: &Place<S>,
+    hints: &HintLanes,
     sampler: &SamplerLanes<S>,
     dimension: u32,
     media: &[MediumStack; LANES],
@@ -122,7 +124,7 @@ pub(super) fn sample<S: Simd, const KIND: usize>(
     match KIND {
         COATED => {
             let coat = surface.coat.as_ref().expect("a coated surface has its parts");
-            coat.sample(at.mask, place, sampler, dimension)
+            coat.sample(at.mask, place, hints.u_lobe(sampler, dimension), sampler.pair(dimension + DIM_DIRECTION))
         }
         DIFFUSE => {
             let local = cosine_hemisphere(sampler.pair(dimension + DIM_DIRECTION));
