@@ -190,6 +190,34 @@ fn compare_with_one_at_a_time(integrator: Integrator) {
     }
 }
 
+/// Paths from the lamps are in films alone: whole pictures, with the same numbers for both.
+#[test]
+fn lanes_light_what_one_path_at_a_time_lights() {
+    let mut n_lit = 0;
+    for (name, scene) in rooms() {
+        for techniques in [Techniques::ALL, Techniques { mis: false, ..Techniques::ALL }] {
+            let draw = |lanes, caustics| {
+                let techniques = Techniques { caustics, ..techniques };
+                let settings =
+                    RenderSettings { techniques, lanes, seed: 3, max_depth: 10, ..RenderSettings::default() };
+                let mut film = Film::new(48, 48);
+                advance(&scene, &settings, &mut film, 1, &|| false);
+                film.means().iter().map(|mean| f64::from(mean.y)).collect::<Vec<_>>()
+            };
+            let single = draw(None, true);
+            let lanes = draw(RenderSettings::default().lanes, true);
+            let without = draw(None, false);
+            let differ = |a: f64, b: f64| (a - b).abs() > 1e-2 * b + 1e-5;
+            let count = |a: &[f64], b: &[f64]| a.iter().zip(b).filter(|(a, b)| differ(**a, **b)).count();
+            n_lit += count(&single, &without);
+            // Rounding may send a path past an edge, or end it where it would have gone on.
+            let share = count(&lanes, &single) as f64 / single.len() as f64;
+            assert!(share < 0.02, "{name}, MIS {}: {share} of the pixels differ", techniques.mis);
+        }
+    }
+    assert!(n_lit > 4_000, "{n_lit} pixels say little");
+}
+
 #[test]
 fn all_instruction_sets_draw_the_same_picture() {
     for (name, scene) in rooms() {

@@ -123,6 +123,11 @@ impl<S: Simd> Float<S> {
     }
 
     #[inline(always)]
+    pub fn is_nan(self) -> Mask {
+        !self.s.eq(self.v, self.v)
+    }
+
+    #[inline(always)]
     pub fn to_bits(self) -> Bits<S> {
         Bits { s: self.s, v: self.s.to_bits(self.v) }
     }

@@ -13,11 +13,12 @@
 
 mod aim;
 mod guide;
+mod lanes;
 mod layer;
 mod trace;
 mod weight;
 
-pub(super) use aim::CasterTable;
+pub(super) use aim::{CasterTable, NO_CASTER};
 pub(super) use guide::{Guided, Hints, SHARE as HINTED};
 use layer::Batches;
 pub(super) use layer::LightLayer;
@@ -25,6 +26,7 @@ pub(super) use weight::{Bounce, Track};
 
 use super::filter::PixelFilter;
 use super::{Camera, Integrator, RenderSettings, Snapshot, Techniques};
+use crate::lanes::InstructionSet;
 use glam::{UVec2, Vec2, Vec3};
 use guide::Guide;
 use rayon::prelude::*;
@@ -37,6 +39,8 @@ pub(super) struct CausticPass<'a> {
     techniques: Techniques,
     max_depth: u32,
     seed: u32,
+    /// `None` for one path at a time.
+    lanes: Option<InstructionSet>,
     size: Vec2,
     filter: PixelFilter,
     /// The integral of the filter along one axis.
@@ -64,6 +68,7 @@ impl<'a> CausticPass<'a> {
             techniques: settings.techniques,
             max_depth: settings.max_depth,
             seed: settings.seed,
+            lanes: settings.lanes,
             size: size.as_vec2(),
             filter: settings.filter,
             filter_norm: settings.filter.integral(),

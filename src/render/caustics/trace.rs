@@ -2,28 +2,34 @@
 //!
 //! The twin of [`super::super::path`], with light and eye in each other's place. Where shading normals differ from true
 //! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the eye's view is the
-//! one that counts, so surfaces are always looked at from the eye's side here.
+//! one that counts, so surfaces are always looked at from the eye's side here. Hits on what has no shading normals of its
+//! own are taken sixteen at a time ([`super::lanes`]).
 
 use super::aim::LINE_DIMENSIONS;
 use super::guide::Trace;
+use super::lanes::{self, Group};
 use super::layer::Splat;
-use super::weight::{Bounce, etendue_gain, is_reversible};
+use super::weight::{Bounce, Track, etendue_gain, is_reversible};
 use super::{CausticPass, aim};
 use crate::geometry::Ray;
-use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass};
+use crate::kdtree::{Hit, HitBatch, InstructionSet, RayBatch, RayClass, append};
+use crate::lanes::{Float, LANES, Mask, Simd, Vector};
 use crate::render::bsdf::{Blend, BsdfSample, Lobe, Scatter};
 use crate::render::medium::MediumStack;
+use crate::render::path::{DIM_DIRECTION, DIM_LOBE};
+use crate::render::paths::{Path, PathBatch};
 use crate::render::surface::{Vertex, blend_at, lobe_at, material_of};
+use crate::render::wide::{KINDS, SortedHits};
 use crate::render::{Material, MaterialId, PixelFilter, RayCounts};
 use crate::sampling::{Sampler, hash_u32};
 use glam::{Vec2, Vec3};
 
 /// Sample dimensions of a vertex.
 const VERTEX_DIMENSIONS: u32 = 4;
-const DIM_LENS: u32 = 0;
-const DIM_DIRECTION: u32 = 1;
-const DIM_LOBE: u32 = 2;
-const DIM_ROULETTE: u32 = 3;
+pub(super) const DIM_LENS: u32 = 0;
+pub(super) const DIM_ROULETTE: u32 = 2;
+// Those of directions and lobes are where paths from the eye have them: surfaces are sampled alike.
+const _: () = assert!(DIM_DIRECTION == 1 && DIM_LOBE == 3);
 
 /// What a surface that scatters keeps of a path, at most: most of what can be seen of a caustic is its first light.
 const SURVIVAL: f32 = 0.5;
@@ -50,18 +56,85 @@ struct LightPath {
     media: MediumStack,
 }
 
+/// Paths from the lamps are kept like those from the eye, of which they need less: the density is the ratio, and the
+/// slot is what they are aimed at.
+impl From<LightPath> for Path {
+    fn from(LightPath { throughput, ratio, sampler, aimed_at, media }: LightPath) -> Self {
+        let (position, normal) = (Vec3::ZERO, Vec3::ZERO);
+        Self { throughput, pdf: ratio, position, normal, sampler, slot: aimed_at, media, track: Track::default() }
+    }
+}
+
+impl From<Path> for LightPath {
+    fn from(Path { throughput, pdf, sampler, slot, media, .. }: Path) -> Self {
+        Self { throughput, ratio: pdf, sampler, aimed_at: slot, media }
+    }
+}
+
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(super) struct LightWave {
-    rays: RayBatch,
-    paths: Vec<LightPath>,
-    next_rays: RayBatch,
-    next_paths: Vec<LightPath>,
+    paths: PathBatch,
+    next: PathBatch,
     hits: HitBatch,
-    shadow_rays: RayBatch,
-    /// Where in the film each shadow ray leads, and with how much light.
-    arrivals: Vec<(Vec2, Vec3)>,
+    sorted: SortedHits,
+    /// Of the hits of one kind, those that are shaded sixteen at a time, and the others.
+    together: Vec<u32>,
+    apart: Vec<u32>,
+    arrivals: Arrivals,
+}
+
+/// Shadow rays to the lens, where in the film each leads, and with how much light.
+#[derive(Default)]
+pub(super) struct Arrivals {
+    rays: RayBatch,
+    film: [Vec<f32>; 2],
+    light: [Vec<f32>; 3],
     occluded: Vec<bool>,
+}
+
+impl Arrivals {
+    /// Forgets all rays; there is room for `n` new ones afterwards.
+    fn start(&mut self, n: usize) {
+        self.rays.clear();
+        self.rays.make_room(n);
+        let least = n + LANES;
+        for array in self.film.iter_mut().chain(&mut self.light) {
+            if array.len() < least {
+                array.resize(least, 0.0);
+            }
+        }
+    }
+
+    fn push(&mut self, ray: &Ray, film: Vec2, light: Vec3) {
+        let i = self.rays.len();
+        self.film.iter_mut().zip(film.to_array()).for_each(|(array, x)| array[i] = x);
+        self.light.iter_mut().zip(light.to_array()).for_each(|(array, x)| array[i] = x);
+        self.rays.push(ray);
+    }
+
+    /// The same of the lanes of `mask`, whose rays end where `dir` does.
+    #[inline(always)]
+    pub fn append<S: Simd>(
+        &mut self,
+        mask: Mask,
+        [origin, dir]: [Vector<S>; 2],
+        film: [Float<S>; 2],
+        light: Vector<S>,
+    ) {
+        let at = self.rays.len();
+        append(&mut self.film[0], at, mask, film[0]);
+        append(&mut self.film[1], at, mask, film[1]);
+        append(&mut self.light[0], at, mask, light.x);
+        append(&mut self.light[1], at, mask, light.y);
+        append(&mut self.light[2], at, mask, light.z);
+        self.rays.append(mask, origin, dir, light.x.all(1.0));
+    }
+
+    fn get(&self, i: usize) -> (Vec2, Vec3) {
+        let [x, y, z] = &self.light;
+        (Vec2::new(self.film[0][i], self.film[1][i]), Vec3::new(x[i], y[i], z[i]))
+    }
 }
 
 /// One of the two kinds of scattering of a surface.
@@ -83,24 +156,25 @@ impl LightWave {
         let mut counts = RayCounts::default();
         self.start(pass, first, n);
         let mut n_vertices = 0;
-        while !self.rays.is_empty() {
+        while !self.paths.is_empty() {
             if stop() {
                 return None;
             }
             n_vertices += 1;
-            counts.bounce += self.rays.len() as u64;
+            counts.bounce += self.paths.len() as u64;
             let tree = &pass.scene.geometry.tree;
-            tree.closest_hits(&self.rays, RayClass::Incoherent, &mut self.hits);
+            tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             self.scatter(pass, n_vertices);
-            tree.any_hits(&self.shadow_rays, RayClass::Incoherent, &mut self.occluded);
-            counts.shadow += self.shadow_rays.len() as u64;
-            for (&(film, light), &occluded) in self.arrivals.iter().zip(&self.occluded) {
-                if !occluded {
+            let arrivals = &mut self.arrivals;
+            tree.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
+            counts.shadow += arrivals.rays.len() as u64;
+            for i in 0..arrivals.rays.len() {
+                if !arrivals.occluded[i] {
+                    let (film, light) = arrivals.get(i);
                     pass.spread(film, light, &mut splats);
                 }
             }
-            std::mem::swap(&mut self.rays, &mut self.next_rays);
-            std::mem::swap(&mut self.paths, &mut self.next_paths);
+            std::mem::swap(&mut self.paths, &mut self.next);
         }
         Some((splats, counts))
     }
@@ -116,40 +190,36 @@ impl LightWave {
         let mut traces = Vec::new();
         self.start(pass, first, n);
         let mut n_vertices = 0;
-        while !self.rays.is_empty() {
+        while !self.paths.is_empty() {
             if stop() {
                 return None;
             }
             n_vertices += 1;
-            pass.scene.geometry.tree.closest_hits(&self.rays, RayClass::Incoherent, &mut self.hits);
-            self.next_rays.clear();
-            self.next_paths.clear();
-            for i in 0..self.rays.len() {
-                let path = self.paths[i];
+            pass.scene.geometry.tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            self.next.start(self.paths.len(), pass.scene.shading.features.glass, false);
+            for i in 0..self.paths.len() {
+                let path = LightPath::from(self.paths.get(i));
                 let Some(hit) = self.hits.get(i) else { continue };
                 if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
                     continue;
                 }
-                let ray = self.rays.get(i);
+                let ray = self.paths.rays.get(i);
                 let Some((vertex, material, surface)) = surface_at(pass, &ray, &hit, &path.media) else { continue };
                 if n_vertices > 1 && surface.is_smooth() {
                     traces.push(Trace { at: vertex.position, from: ray.origin });
                 }
                 let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
                 if let Some((ray, path, true)) = step.go_on(&surface) {
-                    self.next_rays.push(&ray);
-                    self.next_paths.push(path);
+                    self.next.push(&ray, &path.into());
                 }
             }
-            std::mem::swap(&mut self.rays, &mut self.next_rays);
-            std::mem::swap(&mut self.paths, &mut self.next_paths);
+            std::mem::swap(&mut self.paths, &mut self.next);
         }
         Some(traces)
     }
 
     fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
-        self.rays.clear();
-        self.paths.clear();
+        self.paths.start(n as usize, pass.scene.shading.features.glass, false);
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
         // One sequence for all paths: its stream is none of any pixel's.
         let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
@@ -161,47 +231,89 @@ impl LightWave {
             if throughput == Vec3::ZERO {
                 continue;
             }
-            self.rays.push(&line.ray);
-            let media = MediumStack::default();
-            self.paths.push(LightPath { throughput, ratio: line.density, sampler, aimed_at: line.caster, media });
+            let (ratio, media) = (line.density, MediumStack::default());
+            let path = LightPath { throughput, ratio, sampler, aimed_at: line.caster, media };
+            self.paths.push(&line.ray, &path.into());
         }
     }
 
     /// - `n_vertices`: up to and with the ones that were hit now.
     fn scatter(&mut self, pass: &CausticPass, n_vertices: u32) {
         let scene = pass.scene;
-        self.next_rays.clear();
-        self.next_paths.clear();
-        self.shadow_rays.clear();
-        self.arrivals.clear();
-        for i in 0..self.rays.len() {
-            let mut path = self.paths[i];
-            let Some(hit) = self.hits.get(i) else { continue };
-            if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
-                continue;
+        let (surfaces, kinds) = (&scene.geometry.surfaces, &scene.shading.material_table.kinds);
+        self.next.start(self.paths.len(), scene.shading.features.glass, false);
+        self.arrivals.start(self.paths.len());
+        let set = pass.lanes.unwrap_or(InstructionSet::Portable);
+        self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
+        // Those behind the misses.
+        for kind in 0..KINDS - 1 {
+            self.together.clear();
+            self.apart.clear();
+            for &i in self.sorted.of_kind(kind + 1) {
+                let Some(hit) = self.hits.get(i as usize) else { continue };
+                if n_vertices == 1 && pass.casters.of_hit(&hit) != self.paths.slot[i as usize] {
+                    continue;
+                }
+                let has_lanes = pass.lanes.is_some() && lanes::know(kind, surfaces, &hit);
+                if has_lanes { &mut self.together } else { &mut self.apart }.push(i);
             }
-            if scene.shading.features.media {
-                path.throughput *= path.media.transmittance(scene, hit.t);
+            if !self.together.is_empty() {
+                let group = Group {
+                    pass,
+                    n_vertices,
+                    dimension: first_dimension(n_vertices),
+                    paths: &self.paths,
+                    hits: &self.hits,
+                    materials: &self.sorted.materials,
+                    order: &self.together,
+                    next: &mut self.next,
+                    arrivals: &mut self.arrivals,
+                };
+                lanes::scatter(set, kind, group);
             }
-            let found = surface_at(pass, &self.rays.get(i), &hit, &path.media);
-            let Some((vertex, material, surface)) = found else { continue };
-            let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
-            if n_vertices > 1
-                && surface.is_smooth()
-                && path.media == MediumStack::default()
-                && let Some((ray, film, light)) = step.join(&surface)
-            {
-                self.shadow_rays.push(&ray);
-                self.arrivals.push((film, light));
-            }
-            // One more vertex, and the way to the eye: two more segments.
-            if n_vertices + 2 <= pass.max_depth
-                && let Some((ray, path, _)) = step.go_on(&surface)
-            {
-                self.next_rays.push(&ray);
-                self.next_paths.push(path);
+            for k in 0..self.apart.len() {
+                self.scatter_one(pass, n_vertices, self.apart[k] as usize);
             }
         }
+    }
+
+    fn scatter_one(&mut self, pass: &CausticPass, n_vertices: u32, i: usize) {
+        let scene = pass.scene;
+        let mut path = LightPath::from(self.paths.get(i));
+        let Some(hit) = self.hits.get(i) else { return };
+        if scene.shading.features.media {
+            path.throughput *= path.media.transmittance(scene, hit.t);
+        }
+        let found = surface_at(pass, &self.paths.rays.get(i), &hit, &path.media);
+        let Some((vertex, material, surface)) = found else { return };
+        let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
+        if n_vertices > 1
+            && surface.is_smooth()
+            && path.media.is_empty()
+            && let Some((ray, film, light)) = step.join(&surface)
+        {
+            self.arrivals.push(&ray, film, light);
+        }
+        if pass.goes_on(n_vertices)
+            && let Some((ray, path, _)) = step.go_on(&surface)
+        {
+            self.next.push(&ray, &path.into());
+        }
+    }
+}
+
+/// The first sample dimension of the vertex that is number `n_vertices`.
+fn first_dimension(n_vertices: u32) -> u32 {
+    LINE_DIMENSIONS + (n_vertices - 1) * VERTEX_DIMENSIONS
+}
+
+/// The most that roulette keeps of a path behind its vertex number `n_vertices`; `None` while all go on.
+pub(super) fn most_kept(n_vertices: u32, is_smooth: bool) -> Option<f32> {
+    match n_vertices {
+        ENDLESS_DEPTH.. => Some(0.95),
+        _ if !is_smooth => Some(SURVIVAL),
+        ROULETTE_DEPTH.. => Some(1.0),
+        _ => None,
     }
 }
 
@@ -235,7 +347,7 @@ struct Step<'a> {
 
 impl Step<'_> {
     fn dimension(&self) -> u32 {
-        LINE_DIMENSIONS + (self.n_vertices - 1) * VERTEX_DIMENSIONS
+        first_dimension(self.n_vertices)
     }
 
     /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
@@ -339,13 +451,7 @@ impl Step<'_> {
             path.ratio *= sample.pdf * cos_i / (cos_o * pdf);
             value * (cos_o / (cos_i * sample.pdf))
         };
-        let kept = factor.abs().max_element();
-        let survival = match n_vertices {
-            ENDLESS_DEPTH.. => kept.min(0.95),
-            _ if !is_smooth => kept.min(SURVIVAL),
-            ROULETTE_DEPTH.. => kept.min(1.0),
-            _ => 1.0,
-        };
+        let survival = most_kept(n_vertices, is_smooth).map_or(1.0, |most| factor.abs().max_element().min(most));
         path.throughput *= factor;
         if survival < 1.0 {
             if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -386,6 +492,11 @@ impl Surface {
 }
 
 impl CausticPass<'_> {
+    /// Whether paths may have more than these vertices: one more, and the way to the eye, are two more segments.
+    pub(super) fn goes_on(&self, n_vertices: u32) -> bool {
+        n_vertices + 2 <= self.max_depth
+    }
+
     /// Whether any pixel takes notice of a point of the film.
     fn reaches_film(&self, film: Vec2) -> bool {
         let radius = self.filter.radius();
@@ -414,5 +525,3 @@ impl CausticPass<'_> {
         }
     }
 }
-
-const _: () = assert!(size_of::<LightPath>() <= 48);

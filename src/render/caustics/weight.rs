@@ -41,6 +41,19 @@ impl Default for Track {
 }
 
 impl Track {
+    /// - `ratio`: NaN if no path from a lamp can be the path so far.
+    /// - `caster`: that the last vertex lies on, if it was perfectly smooth; [`NO_CASTER`] otherwise.
+    #[inline(always)]
+    pub fn new(ratio: f32, caster: u32, gain: f32) -> Self {
+        Self { ratio, caster, gain }
+    }
+
+    /// See [`CausticPass::follow`]; NaN if no path from a lamp can be the path so far.
+    #[inline(always)]
+    pub fn ratio(&self) -> f32 {
+        self.ratio
+    }
+
     /// Whether no path from a lamp can be the path so far and what follows.
     pub fn is_lost(&self) -> bool {
         self.ratio.is_nan()
@@ -101,13 +114,21 @@ impl CausticPass<'_> {
         }
     }
 
+    /// The caster that a hit lies on, [`NO_CASTER`] if none.
+    #[inline]
+    pub fn caster_of(&self, hit: &Hit) -> u32 {
+        self.casters.of_hit(hit)
+    }
+
     /// The factor of the vertex that is joined to the lens, and of the number of paths.
     #[inline]
     pub(super) fn join_ratio(&self, distance2: f32, cos_lens: f32, cos_o: f32, cos_i: f32, pdf: f32) -> f32 {
         self.density_scale() * distance2 * cos_lens.powi(3) * cos_i / (cos_o * pdf)
     }
 
-    fn density_scale(&self) -> f32 {
+    /// Of paths from the lamps that are joined to a pixel.
+    #[inline]
+    pub fn density_scale(&self) -> f32 {
         self.paths_per_sample as f32 * self.pixel_area
     }
 

@@ -7,7 +7,7 @@ use super::lanes_of;
 use crate::lanes::{Float, LANES, Mask, Simd};
 
 /// Up to sixteen hits of a list.
-pub(super) struct Chunk {
+pub(in crate::render) struct Chunk {
     /// The first one again, where there are fewer.
     pub indices: [u32; LANES],
     /// Of those that count.

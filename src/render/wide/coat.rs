@@ -12,7 +12,7 @@ use crate::lanes::{Bits, Float, Mask, Simd, Vector, frame_around, select, select
 use std::f32::consts::FRAC_1_PI;
 
 /// The parts of the surface of each lane, by what they do; of each kind there is one at most.
-pub(super) struct Coat<S: Simd> {
+pub(in crate::render) struct Coat<S: Simd> {
     matte: Part<S>,
     rough: Part<S>,
     mirror: Part<S>,

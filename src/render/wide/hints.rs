@@ -10,7 +10,7 @@ use crate::sampling::SamplerLanes;
 use glam::{Vec2, Vec3};
 
 /// What each lane is told.
-pub(super) struct HintLanes<'a> {
+pub(in crate::render) struct HintLanes<'a> {
     /// Lanes that have hints.
     pub told: Mask,
     hints: [Option<Hints<'a>>; LANES],

@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 
 /// Metal as seen along `wo`.
 #[derive(Clone, Copy)]
-pub(super) struct MetalLanes<S: Simd> {
+pub(in crate::render) struct MetalLanes<S: Simd> {
     pub alpha: Float<S>,
     pub reflectance: Vector<S>,
     pub flags: Bits<S>,
@@ -21,7 +21,7 @@ pub(super) struct MetalLanes<S: Simd> {
 }
 
 /// Of directions that a metal was asked about.
-pub(super) struct MetalValue<S: Simd> {
+pub(in crate::render) struct MetalValue<S: Simd> {
     pub tint: Vector<S>,
     /// f · cos over the tint.
     pub value: Float<S>,

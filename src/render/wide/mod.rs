@@ -23,31 +23,32 @@ mod scatter;
 mod sort;
 mod tables;
 mod texture;
+mod track;
 pub(super) mod warp;
 
-use super::bsdf::Scatter;
-use super::caustics::{CausticPass, Track};
+use super::caustics::CausticPass;
 use super::medium::MediumStack;
 use super::path::{DIM_ROULETTE, ROULETTE_GRACE, Survival};
 use super::paths::{PathBatch, PathLanes, ShadowBatch};
-use super::surface::{blend_at, lobe_at};
 use super::{Material, Snapshot, Techniques};
 use crate::kdtree::HitBatch;
 use crate::lanes::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
 pub(super) use camera::{Lens, Pixels};
-use chunk::{Chunk, iors};
+pub(super) use chunk::Chunk;
+use chunk::iors;
 pub(super) use classic::{ClassicGroup, knows_classic, shade_classic};
 pub(super) use classic_table::ClassicTable;
 pub(super) use emitters::shade_emitters;
 use glam::Vec3;
-use hints::HintLanes;
+pub(super) use hints::HintLanes;
 use lights::{LightPoints, light_weight};
 pub(super) use misses::shade_misses;
-use place::{At, Place};
-use scatter::{Bounce, eval, sample, surface_of};
+pub(super) use place::{At, Place};
+pub(super) use scatter::{eval, sample, surface_of};
 pub(super) use sort::{KINDS, SortedHits};
-use tables::COATED;
+pub(super) use tables::COATED;
 pub(super) use tables::{MaterialTable, SurfaceTable};
+use track::BounceTracks;
 
 /// Hits of one kind of material, and where their light and their paths go on.
 pub(super) struct Group<'a> {
@@ -69,10 +70,10 @@ pub(super) struct Group<'a> {
     pub shadows: &'a mut ShadowBatch,
 }
 
-const DIFFUSE: usize = 1;
-const MIRROR: usize = 2;
-const GLASS: usize = 3;
-const METAL: usize = 4;
+pub(super) const DIFFUSE: usize = 1;
+pub(super) const MIRROR: usize = 2;
+pub(super) const GLASS: usize = 3;
+pub(super) const METAL: usize = 4;
 
 /// Whether [`shade`] knows what to do with hits on materials of a kind.
 pub(super) fn knows(kind: usize) -> bool {
@@ -81,7 +82,7 @@ pub(super) fn knows(kind: usize) -> bool {
 }
 
 /// Whether light sampling finds something for hits on materials of a kind.
-fn scatters(kind: usize) -> bool {
+pub(super) fn scatters(kind: usize) -> bool {
     [DIFFUSE, METAL, COATED].contains(&kind)
 }
 
@@ -214,7 +215,9 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             origin = select_vector(bounce.transmitted, place.passing(), origin);
         }
         if let (Some(pass), Some(tracks)) = (caustics, &mut next.tracks) {
-            tracks.extend(follow(pass, &at, &place, &hints, &bounce, go_on, depth == 1, &media));
+            let of_bounce =
+                BounceTracks { pass, at: &at, place: &place, hints: &hints, bounce: &bounce, media: &media };
+            of_bounce.append::<KIND>(s, go_on, depth == 1, tracks);
         }
         let pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
         let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
@@ -225,58 +228,14 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
     }
 }
 
-/// What the lanes of `go_on` must remember against paths from the lamps, one at a time.
-///
-/// - `media`: behind the bounce; `is_first`: these are the hits of camera rays.
 #[inline(always)]
-fn follow<S: Simd>(
-    pass: &CausticPass,
-    at: &At<S>,
-    place: &Place<S>,
-    hints: &HintLanes,
-    bounce: &Bounce<S>,
-    go_on: Mask,
-    is_first: bool,
-    media: &[MediumStack; LANES],
-) -> impl Iterator<Item = Track> {
-    let vertices = place.stored();
-    let (wi, pdfs, weights) = (bounce.wi.to_arrays(), bounce.pdf.to_array(), bounce.weight.to_arrays());
-    let transmitted = bounce.transmitted;
-    lanes_of(go_on).map(move |lane| {
-        let i = at.indices[lane] as usize;
-        let vertex = vertices.vertex(lane);
-        let wi = Vec3::new(wi[0][lane], wi[1][lane], wi[2][lane]);
-        let (before, after) = (at.paths.media_of(i), media[lane]);
-        let bounce = super::caustics::Bounce {
-            vertex: &vertex,
-            hit: &at.hits.get(i).expect("a hit is being shaded"),
-            eye: is_first.then(|| at.paths.rays.get(i).origin),
-            wi,
-            pdf: pdfs[lane],
-            transmitted: transmitted >> lane & 1 != 0,
-            blended: false,
-            before,
-            after,
-        };
-        let material = at.materials[i];
-        let reverse_pdf = || match at.scene.shading.materials[material as usize] {
-            Material::Blend { .. } | Material::Phong { .. } => blend_at(at.scene, material, &vertex, &before)
-                .map_or(0.0, |blend| blend.eval(wi, vertex.wo, vertex.normal).1),
-            _ => lobe_at(at.scene, material, &vertex, &before)
-                .map_or(0.0, |lobe| lobe.eval(wi, vertex.wo, vertex.normal).1),
-        };
-        pass.follow(hints.track(at, lane, &weights), &bounce, reverse_pdf)
-    })
-}
-
-#[inline(always)]
-fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {
+pub(super) fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {
     (0..LANES).filter(move |lane| mask >> lane & 1 != 0)
 }
 
 /// What is left of light after `distance` metres, lane by lane.
 #[inline(always)]
-fn transmittance<S: Simd>(
+pub(super) fn transmittance<S: Simd>(
     s: S,
     scene: &Snapshot,
     mask: Mask,

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 /// Points on surfaces, each seen along a ray.
 #[derive(Clone, Copy)]
-pub(super) struct Place<S: Simd> {
+pub(in crate::render) struct Place<S: Simd> {
     pub position: Vector<S>,
     /// On the side that the ray came from.
     pub geometric_normal: Vector<S>,
@@ -28,7 +28,7 @@ pub(super) struct Place<S: Simd> {
 }
 
 /// Which hits, and of which materials.
-pub(super) struct At<'a, S: Simd> {
+pub(in crate::render) struct At<'a, S: Simd> {
     pub scene: &'a Snapshot,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
@@ -228,7 +228,7 @@ impl<S: Simd> Place<S> {
     }
 
     #[inline(always)]
-    pub fn stored(&self) -> StoredPlaces {
+    pub(super) fn stored(&self) -> StoredPlaces {
         StoredPlaces {
             position: self.position.to_arrays(),
             geometric_normal: self.geometric_normal.to_arrays(),

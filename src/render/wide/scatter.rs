@@ -18,7 +18,7 @@ use glam::Vec2;
 use std::f32::consts::FRAC_1_PI;
 
 /// How the surface of each lane scatters.
-pub(super) struct Surface<S: Simd> {
+pub(in crate::render) struct Surface<S: Simd> {
     /// Albedo or reflectance.
     pub color: Vector<S>,
     pub metal: Option<MetalLanes<S>>,
@@ -28,7 +28,7 @@ pub(super) struct Surface<S: Simd> {
 }
 
 /// Directions in which paths go on.
-pub(super) struct Bounce<S: Simd> {
+pub(in crate::render) struct Bounce<S: Simd> {
     pub go_on: Mask,
     pub wi: Vector<S>,
     pub weight: Vector<S>,
@@ -38,7 +38,7 @@ pub(super) struct Bounce<S: Simd> {
 
 /// The parameters of the surfaces; black and without lobe only where the scalar code would say so too.
 #[inline(always)]
-pub(super) fn surface_of<S: Simd, const KIND: usize>(s: S, at: &At<S>, place: &Place<S>) -> Surface<S> {
+pub(in crate::render) fn surface_of<S: Simd, const KIND: usize>(s: S, at: &At<S>, place: &Place<S>) -> Surface<S> {
     let table = &at.scene.shading.material_table;
     if KIND == COATED {
         let coat = Coat::new(s, at, place);
@@ -81,7 +81,7 @@ pub(super) fn colors_of<S: Simd>(s: S, at: &At<S>, place: &Place<S>, row: Bits<S
 
 /// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.
 #[inline(always)]
-pub(super) fn eval<S: Simd, const KIND: usize>(
+pub(in crate::render) fn eval<S: Simd, const KIND: usize>(
     surface: &Surface<S>,
     place: &Place<S>,
     wi: Vector<S>,
@@ -108,7 +108,7 @@ pub(super) fn eval<S: Simd, const KIND: usize>(
 }
 
 #[inline(always)]
-pub(super) fn sample<S: Simd, const KIND: usize>(
+pub(in crate::render) fn sample<S: Simd, const KIND: usize>(
     s: S,
     at: &At<S>,
     surface: &Surface<S>,

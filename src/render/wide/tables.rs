@@ -39,6 +39,11 @@ pub(in crate::render) struct SurfaceTable {
 }
 
 impl SurfaceTable {
+    /// Whether the true normal of an object shades it, whoever looks.
+    pub fn is_shaded_as_it_is(&self, object: u32) -> bool {
+        [FLAT, BALL, PLANE, CLOUD].contains(&self.kind[object as usize])
+    }
+
     pub fn build(tree: &SceneTree) -> Self {
         let mut table = Self::default();
         let mut n_instances = 0;
