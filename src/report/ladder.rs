@@ -175,6 +175,17 @@ impl Ladder {
         slope(&warm.map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect::<Vec<_>>())
     }
 
+    /// Seconds that the renderer foretold for the error that it tells in the end, over those that it took; 1 is perfect.
+    /// Foretold at the first step behind a tenth of the time; `None` where that is the last, or nothing was told.
+    pub fn foresight(&self) -> Option<f64> {
+        let (last, _) = self.steps.split_last()?;
+        let is_early = |step: &&Step| step.spent.seconds() >= 0.1 * last.spent.seconds() && step.spp < last.spp;
+        let early = self.steps.iter().find(is_early)?;
+        let spp = early.estimate?.spp_for(last.estimate?.relative);
+        let foretold = early.spent.seconds() * f64::from(spp) / f64::from(early.spp);
+        Some(foretold / last.spent.seconds())
+    }
+
     /// Seconds until the relative error is down to `error`; `None` where the curve does not lead there.
     pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
         seconds_to(&self.curve(), self.slope(), error * error)

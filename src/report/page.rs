@@ -26,7 +26,8 @@ pub fn page(outcomes: &[SceneOutcome], command: &str) -> String {
          <p>The error is √relMSE, the root of the mean of (x − ref)² / (ref² + 0.01) over pixels and channels of linear \
          light. Seconds are CPU seconds a thread (wall time on a quiet machine) spent on rendering alone. Times in \
          brackets lie beyond the measured steps and follow the fitted slope. A slope of −1 means: twice the time, half \
-         the squared error.</p>\n",
+         the squared error. Time foretold: by the renderer, when a tenth of the time had passed, until the error that \
+         it told in the end.</p>\n",
         include_str!("page.css"),
         env!("CARGO_PKG_VERSION"),
         escape(command),
@@ -46,7 +47,7 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
     for target in TARGETS {
         let _ = write!(text, "  {:>9}", format!("s to {}%", 100.0 * target));
     }
-    let _ = writeln!(text, "  {:>6}  {:>8}  {:>7}  est./true", "slope", "Mrays/s", "error %");
+    let _ = writeln!(text, "  {:>6}  {:>8}  {:>7}  {:>9}  foretold/taken", "slope", "Mrays/s", "error %", "est./true");
     for outcome in outcomes {
         let ladder = &outcome.ladder;
         let _ = write!(text, "{:width$}  {:>9}", outcome.title, format!("{}x{}", outcome.width, outcome.height));
@@ -56,11 +57,12 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
         let last = ladder.last();
         let _ = writeln!(
             text,
-            "  {:>6}  {:>8}  {:>7}  {}",
+            "  {:>6}  {:>8}  {:>7}  {:>9}  {}",
             ladder.slope().map_or("-".to_owned(), |slope| format!("{slope:.2}")),
             number(last.spent.rays_per_second() * 1e-6),
             number(100.0 * last.error()),
             last.calibration().map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
+            ladder.foresight().map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
         );
     }
     text
@@ -75,7 +77,7 @@ fn summary(outcomes: &[SceneOutcome]) -> String {
         let _ = writeln!(
             rows,
             "<tr><td><a href=\"#{id}\">{}</a></td><td>{} × {}</td>{times}<td>{}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td>{}</td></tr>",
+             <td>{}</td><td>{}</td><td>{}</td></tr>",
             escape(&outcome.title),
             outcome.width,
             outcome.height,
@@ -84,13 +86,14 @@ fn summary(outcomes: &[SceneOutcome]) -> String {
             number(last.spent.paths_per_second() * 1e-6),
             last.spp,
             percent(last.error()),
+            ladder.foresight().map_or("–".to_owned(), |ratio| format!("{ratio:.2}")),
             id = anchor(&outcome.title),
         );
     }
     format!(
         "<div class=\"wide\"><table>\n<tr><th>scene</th><th>pixels</th><th>s to 10 %</th><th>s to 3 %</th>\
          <th>s to 1 %</th><th>slope</th><th>M rays/s</th><th>M camera paths/s</th><th>last spp</th>\
-         <th>its error</th></tr>\n{rows}</table></div>\n"
+         <th>its error</th><th>time foretold / taken</th></tr>\n{rows}</table></div>\n"
     )
 }
 
