@@ -2,6 +2,7 @@
 
 use super::animate::animate;
 use super::console::{print, remark};
+use super::number::parse_stops;
 use super::stop::Stop;
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
 use bevy_ecs::prelude::World;
@@ -42,7 +43,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
     /// Samples per pixel; 256 unless a time or an error is given.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
     pub spp: Option<u32>,
     /// Samples A to B-1 of each pixel: ranges that do not overlap can be added up with `firstlight merge`.
     #[arg(long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
@@ -88,7 +89,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: Option<u32>,
     /// Brighter or darker by factors of two, on top of the scene's own exposure; .exr keeps the linear light.
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0)]
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0, value_parser = parse_stops)]
     pub exposure: f32,
     /// Print one JSON object with times and counts as the last line.
     #[arg(long)]
@@ -99,9 +100,6 @@ pub struct RenderArgs {
 }
 
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
-    if !args.exposure.is_finite() {
-        return Err(Failure::Usage("--exposure must be a finite number of stops".to_owned()));
-    }
     PictureFormat::of(&args.output).map_err(Failure::Usage)?;
     let film_path = film_path(args)?;
     // A picture that cannot be written is not worth the wait.

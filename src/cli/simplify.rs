@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::console::{print, remark};
+use super::number::{parse_error, parse_faces, parse_ratio};
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Topology};
@@ -20,13 +21,13 @@ pub struct SimplifyArgs {
     #[arg(short, long, value_name = "OUT.obj")]
     output: PathBuf,
     /// Keep this share of the triangles, above 0 and at most 1.
-    #[arg(long, value_name = "R", allow_negative_numbers = true, group = "target")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = parse_ratio, group = "target")]
     ratio: Option<f64>,
     /// Keep at most this many triangles.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, group = "target")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_faces, group = "target")]
     faces: Option<usize>,
     /// Keep as few triangles as this largest distance between the surfaces allows, in the file's unit.
-    #[arg(long, value_name = "E", allow_negative_numbers = true, group = "target")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_error, group = "target")]
     error: Option<f64>,
     #[arg(long, value_enum, default_value = "quadric")]
     method: MethodArg,

@@ -16,7 +16,7 @@ const USUAL_RAYS: u64 = 10_000_000;
 pub struct StabilityArgs {
     /// About how many rays the largest case traces; the others trace a share of it, and each as many as it needs at the
     /// least. 1e9 is a long run.
-    #[arg(long, value_name = "N", default_value_t = USUAL_RAYS, value_parser = parse_rays)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = USUAL_RAYS, value_parser = parse_rays)]
     rays: u64,
     /// Only this case; may be given several times.
     #[arg(long = "case", value_name = "NAME")]
@@ -28,7 +28,7 @@ pub struct StabilityArgs {
     #[arg(long, requires = "cases", value_name = "STAGE:RAY", value_parser = parse_ray)]
     replay: Option<(usize, u64)>,
     /// Worker threads; all cores when not given. The counts do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print one JSON object.
     #[arg(long)]
