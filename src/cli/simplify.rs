@@ -5,7 +5,7 @@ use super::console::{print, remark};
 use super::number::{parse_error, parse_faces, parse_ratio};
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
-use firstlight::mesh::{Deviation, Distances, Topology};
+use firstlight::mesh::{Deviation, Distances, Faults, Topology};
 use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
 use firstlight::scene::whole_file::check_writable;
 use std::path::PathBuf;
@@ -136,16 +136,15 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
 
 /// What is not as a simplifier would have it, and what becomes of it; a sentence each.
 fn faults(model: &ImportedObj) -> Vec<String> {
-    let found = Topology::of(&model.mesh);
-    [
-        (model.polygons, "faces of more than three corners were cut into triangles"),
-        (found.degenerate_triangles, "triangles are without area"),
-        (found.duplicate_triangles, "triangles lie on the same three places as an earlier one and are left out"),
-        (found.non_manifold_edges, "edges of three or more triangles stay as they are"),
-        (found.misoriented_edges, "edges between triangles that face opposite ways stay as they are"),
-    ]
-    .into_iter()
-    .filter(|&(count, _)| count > 0)
-    .map(|(count, fate)| format!("{count} {fate}"))
-    .collect()
+    let (triangles, edges) = (Faults::of(&model.mesh), Topology::of(&model.mesh));
+    let counted = |count: usize, fate: &str| (count > 0).then(|| format!("{count} {fate}"));
+    let left_out = Faults { flat: 0, ..triangles };
+    let kept = Faults { flat: triangles.flat, ..Faults::default() };
+    counted(model.polygons, "faces of more than three corners were cut into triangles")
+        .into_iter()
+        .chain(left_out.sentences().map(|fault| format!("{fault} and are left out")))
+        .chain(kept.sentences())
+        .chain(counted(edges.non_manifold_edges, "edges of three or more triangles stay as they are"))
+        .chain(counted(edges.misoriented_edges, "edges between triangles that face opposite ways stay as they are"))
+        .collect()
 }
