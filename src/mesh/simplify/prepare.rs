@@ -25,6 +25,9 @@ pub(super) struct Prepared {
     pub scale: f32,
 }
 
+/// Triangles at a vertex that are looked through one by one.
+const FEW: usize = 32;
+
 impl Prepared {
     /// - `with_quadrics`: false leaves them empty.
     pub fn of(mesh: &Mesh, with_quadrics: bool) -> Self {
@@ -245,10 +248,16 @@ impl Prepared {
     /// line through it: the triangle's plane and the one that stands on it there.
     fn add_edge_planes(&self, around: &Around, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
         let here = self.positions[vertex].as_dvec3();
+        // To look for each side among all others would take quadratic time at a hub.
+        let sides = (around.corners(vertex).len() > FEW).then(|| self.sorted_sides(around.corners(vertex)));
+        let is_line = |corner: u32, other: u32| match &sides {
+            Some(sides) => self.is_line_among(sides, corner, other),
+            None => self.is_line(around, corner, other),
+        };
         for &corner in around.corners(vertex) {
             for other in ring(corner) {
                 let end = self.triangles[other as usize / 3][other as usize % 3];
-                if self.kinds[end as usize] == Kind::Free || !self.is_line(around, corner, other) {
+                if self.kinds[end as usize] == Kind::Free || !is_line(corner, other) {
                     continue;
                 }
                 let along = self.positions[end as usize].as_dvec3() - here;
@@ -279,6 +288,29 @@ impl Prepared {
             }
         }
         matching != 2
+    }
+
+    /// The sides of triangles at the vertex of these corners: the other end, and the wedges at both.
+    fn sorted_sides(&self, corners: &[u32]) -> Vec<(u32, [u32; 2])> {
+        let pairs = corners.iter().flat_map(|&corner| ring(corner).map(|other| (corner, other)));
+        let mut sides: Vec<_> = pairs.map(|(corner, other)| self.side(corner, other)).collect();
+        sides.sort_unstable();
+        sides
+    }
+
+    fn side(&self, corner: u32, other: u32) -> (u32, [u32; 2]) {
+        let end = self.triangles[other as usize / 3][other as usize % 3];
+        (end, [corner, other].map(|c| self.corner_wedges.get(c as usize).copied().unwrap_or(0)))
+    }
+
+    /// The same as [`Self::is_line`] by a search in what [`Self::sorted_sides`] gave.
+    fn is_line_among(&self, sides: &[(u32, [u32; 2])], corner: u32, other: u32) -> bool {
+        let side = self.side(corner, other);
+        let first = sides.partition_point(|s| s.0 < side.0);
+        // Two alike and no more, and none that differs.
+        let [a, b] = [first, first + 1].map(|i| sides.get(i) == Some(&side));
+        let more = sides.get(first + 2).is_some_and(|s| s.0 == side.0);
+        !(a && b && !more)
     }
 
     fn doubled_area_normal(&self, triangle: &[u32; 3]) -> DVec3 {
