@@ -15,6 +15,7 @@ mod simplify;
 mod stability;
 mod stop;
 mod trees;
+mod waiting;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use console::remark;

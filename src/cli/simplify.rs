@@ -3,6 +3,7 @@
 use super::Failure;
 use super::console::{print, remark};
 use super::number::{parse_error, parse_faces, parse_ratio};
+use super::waiting::Waiting;
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Faults, Topology};
@@ -64,6 +65,7 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(message));
     }
     check_writable(&args.output).map_err(Failure::Failed)?;
+    let waiting = Waiting::new(format!("reading {}", args.input.display()));
     // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
     let mut model = load_obj_with(&args.input, &ObjOptions::default()).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
@@ -76,13 +78,14 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
     for fault in faults(&model) {
         remark(format_args!("warning: {}: {fault}", args.input.display()));
     }
+    let before = model.mesh.triangles.len();
+    waiting.next(format!("simplifying {before} triangles"));
     let start = Instant::now();
     let result = simplify(&model.mesh, method, target).map_err(|error| match error {
         SimplifyError::Degenerate => Failure::Failed(format!("{}: {error}", args.input.display())),
         _ => Failure::Usage(error.to_string()),
     })?;
     let seconds = start.elapsed().as_secs_f64();
-    let before = model.mesh.triangles.len();
     let after = result.triangles.len();
     let missed = match target {
         Target::Ratio(ratio) => after > ((before as f64 * ratio) as usize).max(1),
@@ -95,10 +98,13 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
     let names: Vec<String> = model.materials.iter().map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
+    waiting.next(format!("writing {}", args.output.display()));
     save_obj(&args.output, &result, &extras).map_err(|error| failed(&error))?;
+    waiting.next("measuring how far the two surfaces are apart");
     let deviation = Deviation::between(&model.mesh, &result, SAMPLES);
     let diagonal = model.mesh.bounds().size().as_dvec3().length();
     let topology = Topology::of(&result);
+    drop(waiting);
     if args.json {
         let way = |d: Distances| serde_json::json!({ "mean": d.mean, "rms": d.rms, "max": d.max });
         let report = serde_json::json!({
