@@ -239,3 +239,59 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     }
     assert_eq!(entries(), before, "nothing was written");
 }
+
+/// The model and the scene are not there, so whoever looked for them first would say that.
+#[test]
+fn numbers_out_of_range_are_refused_before_anything_is_loaded() {
+    let folder = tempfile::tempdir().unwrap();
+    let simplify = ["simplify", "none.obj", "-o", "a.obj"];
+    for (args, expected) in [
+        (["--ratio", "1.5"], "above 0 and at most 1, not 1.5"),
+        (["--ratio", "0"], "above 0 and at most 1"),
+        (["--ratio", "nan"], "above 0 and at most 1"),
+        (["--ratio", "half"], "above 0 and at most 1"),
+        (["--faces", "0"], "at least one triangle"),
+        (["--faces", "-3"], "at least 1"),
+        (["--error", "-1"], "above 0, not -1"),
+        (["--error", "inf"], "above 0"),
+        (["--error", "much"], "above 0"),
+    ] {
+        let said = fails(folder.path(), &[&simplify[..], &args].concat(), 2);
+        assert!(said.contains(expected) && said.contains(args[0]), "{args:?}: {said}");
+    }
+    let render = &["render", "none.ron", "-o", "a.png"][..];
+    let explain = &["explain", "none.ron"][..];
+    let report = &["report", "none.ron"][..];
+    let show = &["none.ron"][..];
+    let stability = &["stability"][..];
+    for (command, args, expected) in [
+        (render, &["--threads", "0"][..], "0 is not in 1..=1024"),
+        (render, &["--threads", "1025"], "1025 is not in 1..=1024"),
+        (render, &["--spp", "0"], "0 is not in 1..=2147483648"),
+        (render, &["--spp", "2147483649"], "2147483649 is not in 1..=2147483648"),
+        (render, &["--seed", "-1"], "-1 is not in 0..=4294967295"),
+        (render, &["--size", "0x0"], "must be at least 1"),
+        (render, &["--size", "100000x100000"], "GiB"),
+        (render, &["--scale", "0"], "must be a positive number"),
+        (render, &["--time", "nan"], "must be a positive number"),
+        (render, &["--error", "0"], "must be a positive number"),
+        (render, &["--exposure", "nan"], "must be a finite number of stops"),
+        (render, &["--max-depth", "0"], "0 is not in 1.."),
+        (render, &["--samples", "5..5"], "no sample from 5 up to 5"),
+        (render, &["--region", "1,1,0,5"], "not a rectangle"),
+        (render, &["--turntable", "0"], "0 is not in 1..=100000"),
+        (explain, &["--pixel", "9,3", "--size", "9x9"], "there is no pixel 9,3"),
+        (explain, &["--pixel", "9"], "not a pixel"),
+        (explain, &["--spp", "0", "--pixel", "1,1"], "0 is not in 1..=1048576"),
+        (report, &["--threads", "-1"], "-1 is not in 1..=1024"),
+        (report, &["--spp", "0"], "0 is not in 1..=1048576"),
+        (show, &["--threads", "0"], "0 is not in 1..=1024"),
+        (show, &["--size", "0x0"], "must be at least 1"),
+        (stability, &["--rays", "0"], "from 1 to 1e15"),
+        (stability, &["--rays", "-1"], "from 1 to 1e15"),
+        (stability, &["--threads", "-1"], "-1 is not in 1..=1024"),
+    ] {
+        let said = fails(folder.path(), &[command, args].concat(), 2);
+        assert!(said.contains(expected) && said.contains(args[0]), "{args:?}: {said}");
+    }
+}

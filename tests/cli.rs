@@ -187,3 +187,56 @@ fn every_built_in_scene_opens_by_its_name_alone() {
     assert!(commands.len() >= 8 && scenes.contains(&"gallery") && scenes.len() >= 15, "{help}");
     assert!(scenes.iter().all(|scene| !commands.contains(scene)), "{help}");
 }
+
+/// What `firstlight stability` says, and how it ends.
+fn stability(args: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::cargo_bin("firstlight").unwrap().arg("stability").args(args).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn a_ray_is_replayed_for_people_and_for_machines() {
+    let args = ["--case", "closed", "--replay", "0:7"];
+    let (code, told, _) = stability(&args);
+    assert_eq!(code, Some(0));
+    let rows: Vec<(&str, &str)> = told.lines().map(|line| line.split_once("  ").unwrap()).collect();
+    let value = |label: &str| rows.iter().find(|(known, _)| known.trim() == label).unwrap().1.trim();
+    let (code, json, _) = stability(&[&args[..], &["--json"]].concat());
+    assert_eq!(code, Some(0));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((json["case"].as_str(), json["replay"].as_str()), (Some("closed"), Some("0:7")));
+    // The same numbers to the last bit.
+    let bits = |numbers: Vec<f32>| numbers.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+    for label in ["origin", "direction", "point", "normal", "next_direction"] {
+        let of_text = value(label).split(", ").map(|x| x.parse::<f32>().unwrap()).collect();
+        let of_json = json[label].as_array().unwrap().iter().map(|x| x.as_f64().unwrap() as f32).collect();
+        assert_eq!(bits(of_text), bits(of_json), "{label}:\n{told}");
+    }
+    assert_eq!(value("t").parse::<f32>().unwrap(), json["t"].as_f64().unwrap() as f32);
+    assert_eq!((value("verdict"), json["verdict"].as_str()), ("right", Some("right")));
+    assert_eq!((value("must_hit"), json["must_hit"].as_bool()), ("yes", Some(true)));
+    for (args, expected) in [
+        (&["--case", "closed", "--replay", "0:99999999999"][..], "stage 0 has no ray 99999999999, only 0 to "),
+        (&["--case", "closed", "--replay", "5000:1"], "there is no stage 5000"),
+        (&["--case", "glass", "--replay", "0:99999999999"], "stage 0 has no ray 99999999999"),
+        (&["--case", "white-box", "--replay", "0:0"], "no rays of its own"),
+        (&["--case", "closed", "--case", "glass", "--replay", "0:0"], "wants one --case"),
+        (&["--replay", "0:0"], "--case"),
+        (&["--list", "--case", "closed"], "cannot be used with"),
+    ] {
+        let (code, told, said) = stability(args);
+        assert!(code == Some(2) && said.contains(expected) && told.is_empty(), "{args:?}: {said}{told}");
+    }
+}
+
+#[test]
+fn the_cases_of_stability_are_listed_for_machines_too() {
+    let (code, json, _) = stability(&["--list", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let names: Vec<&str> =
+        json["cases"].as_array().unwrap().iter().map(|case| case["case"].as_str().unwrap()).collect();
+    let (_, text, _) = stability(&["--list"]);
+    let listed: Vec<&str> = text.lines().map(|line| line.split(' ').next().unwrap()).collect();
+    assert!(code == Some(0) && names.len() > 10 && names == listed, "{names:?} {listed:?}");
+}

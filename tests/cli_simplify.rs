@@ -228,6 +228,43 @@ fn faults_of_a_mesh_are_named_and_survived() {
 }
 
 #[test]
+fn every_command_counts_the_same_faults_and_what_is_left_out_is_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    // Vertex 4 is at the place of vertex 1, vertex 5 on a line with 1 and 2; a triangle and its back lie apart.
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 2 0 0\nv 0 0 1\nv 5 0 0\nv 6 0 0\nv 5 1 0\n\
+        f 1 2 3\nf 1 2 3\nf 3 2 4\nf 1 1 2\nf 1 4 2\nf 4 1 2\nf 1 2 5\nf 1 2 6\nf 7 8 9\nf 7 9 8\n";
+    std::fs::write(path.join("faulty.obj"), text).unwrap();
+    let json = report(path, &["faulty.obj", "-o", "out.obj", "--ratio", "1"]);
+    // The loader leaves out what names a vertex twice; then two collapsed ones and three duplicates go.
+    assert_eq!((json["faces_before"].as_u64(), json["faces_after"].as_u64()), (Some(9), Some(4)), "{json}");
+    let said = simplify(path, &["faulty.obj", "-o", "out.obj", "--ratio", "1"]).err;
+    let info = |args: &[&str]| {
+        let output =
+            Command::cargo_bin("firstlight").unwrap().current_dir(path).arg("info").args(args).output().unwrap();
+        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (told, warned) = info(&["faulty.obj"]);
+    for fault in [
+        "2 triangles have two corners at one place",
+        "3 triangles lie on the same three places as an earlier one",
+        "1 triangles have three corners on one line",
+    ] {
+        assert!(said.contains(fault) && told.contains(fault), "expected {fault:?} in:\n{said}{told}");
+    }
+    let twice = "1 triangles use a vertex twice and were left out";
+    assert!(said.contains(twice) && warned.contains(twice), "{said}{warned}");
+    let json: serde_json::Value = serde_json::from_str(&info(&["faulty.obj", "--json"]).0).unwrap();
+    let mesh = json["parts"].as_array().unwrap().iter().find(|part| part["triangles"] == 9).unwrap();
+    let counts =
+        ["collapsed_triangles", "duplicate_triangles", "flat_triangles"].map(|key| mesh[key].as_u64().unwrap());
+    assert_eq!(counts, [2, 3, 1]);
+    // Nothing but the flat one is left to complain of.
+    let told = info(&["out.obj"]).0;
+    assert!(told.contains("1 triangles have") && !told.contains("place"), "{told}");
+}
+
+#[test]
 fn a_closed_mesh_with_a_seam_is_closed_by_the_numbers_of_its_vertices() {
     let folder = tempfile::tempdir().unwrap();
     let (whole, few) = (folder.path().join("ring.obj"), folder.path().join("few.obj"));

@@ -147,6 +147,48 @@ fn a_film_beyond_the_limit_is_refused_with_the_size_that_it_would_take() {
     assert!(said.contains("GiB"), "{said}");
 }
 
+/// Whatever the size, a picture is rendered or refused with what it would take: the process never ends in an allocation.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_picture_beyond_the_memory_of_the_process_is_refused_with_the_size_that_it_would_take() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("grey.ron"), "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)))").unwrap();
+    let render = |args: &str, limit_kib: u32| {
+        let line = format!("ulimit -v {limit_kib}; exec {PROGRAM} render {args} --spp 1 --threads 2");
+        let output = Command::new("bash").args(["-c", &line]).current_dir(folder.path()).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for args in ["grey.ron -o a.png", "glass-balls -o a.png", "grey.ron -o a.exr", "grey.ron -o a.png --film film.exr"]
+    {
+        let (code, said) = render(&format!("{args} --size 16000x16000"), 2_000_000);
+        assert!(code == Some(1) && said.contains("16000 x 16000") && said.contains("GiB"), "{args}: {code:?} {said}");
+        assert!(!said.contains("panicked"), "{args}: {said}");
+    }
+    // From what fits to what does not, past the edge where the film fits and something else might not.
+    let mut codes = Vec::new();
+    for side in (600..=3000).step_by(300) {
+        for output in ["a.png", "a.exr", "b.png --film film.exr"] {
+            let _ = std::fs::remove_file(folder.path().join("film.exr"));
+            let (code, said) = render(&format!("grey.ron -o {output} --size {side}x{side}"), 700_000);
+            let refused = code == Some(1) && said.contains(&format!("{side} x {side}")) && said.contains("iB");
+            assert!(code == Some(0) || refused, "{side}, {output}: {code:?} {said}");
+            codes.push(code);
+        }
+    }
+    assert!(codes.contains(&Some(0)) && codes.contains(&Some(1)), "{codes:?}");
+    assert_eq!(
+        std::fs::read_dir(folder.path())
+            .unwrap()
+            .filter(|entry| {
+                let name = entry.as_ref().unwrap().file_name();
+                name.to_string_lossy().starts_with(".firstlight-")
+            })
+            .count(),
+        0,
+        "nothing temporary is left"
+    );
+}
+
 #[test]
 fn one_thread_and_sixty_four_render_the_same_bits() {
     let render = |threads: usize| {

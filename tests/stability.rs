@@ -2,7 +2,7 @@
 //!
 //! `FIRSTLIGHT_RAYS`: rays of the largest case instead of the usual number.
 
-use firstlight::stability::{CASES, Case};
+use firstlight::stability::{CASES, Case, ReplayError, Told};
 
 fn rays(usual: u64) -> u64 {
     std::env::var("FIRSTLIGHT_RAYS").ok().and_then(|n| n.parse::<f64>().ok()).map_or(usual, |n| n as u64)
@@ -74,8 +74,22 @@ fn names_are_unique_and_rays_can_be_replayed() {
     for (i, case) in CASES.iter().enumerate() {
         assert!(CASES[..i].iter().all(|other| other.name != case.name), "{} twice", case.name);
     }
-    let told = Case::find("closed").unwrap().replay(0, 7).unwrap();
-    assert!(told.contains("0x1") && told.contains("Right"), "{told}");
-    assert_eq!(told, Case::find("closed").unwrap().replay(0, 7).unwrap());
-    assert!(Case::find("closed").unwrap().replay(1_000_000, 7).is_none());
+    let closed = Case::find("closed").unwrap();
+    let told = closed.replay(0, 7, 10_000_000).unwrap();
+    assert_eq!(told.get("verdict"), Some(&Told::Text("right".to_owned())), "{told}");
+    assert_eq!(told, closed.replay(0, 7, 1_000_000_000).unwrap(), "a ray is the same one in a longer run");
+}
+
+#[test]
+fn what_is_not_there_cannot_be_replayed() {
+    let replay = |name: &str, stage, ray, rays| Case::find(name).unwrap().replay(stage, ray, rays).unwrap_err();
+    assert!(matches!(replay("closed", 1_000_000, 7, 10_000_000), ReplayError::NoStage { stage: 1_000_000, .. }));
+    assert_eq!(replay("white-box", 0, 0, 10_000_000), ReplayError::NoRays);
+    for name in ["closed", "glass"] {
+        let case = Case::find(name).unwrap();
+        let ReplayError::NoRay { last, .. } = replay(name, 0, u64::MAX, 1) else { panic!("{name} has rays") };
+        assert!(case.replay(0, last, 1).is_ok(), "{name}: the last one is {last}");
+        assert_eq!(replay(name, 0, last + 1, 1), ReplayError::NoRay { stage: 0, ray: last + 1, last });
+        assert!(case.replay(0, last + 1, 10_000_000_000).is_ok(), "{name}: more rays have it");
+    }
 }

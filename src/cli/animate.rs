@@ -18,7 +18,7 @@ pub(super) fn animate(args: &RenderArgs, mut job: Job, bar: &ProgressBar, stop: 
         bar.set_position((i * 1000 / rigs.len()) as u64);
         bar.set_message(format!("picture {} of {}", i + 1, rigs.len()));
         job.set_rig(rig);
-        let film = job.picture(target, stop);
+        let film = job.picture(args, target, stop)?;
         if stop.is_asked() {
             bar.finish_and_clear();
             return Err(Failure::Stopped(format!("stopped after {i} of {} pictures", rigs.len())));

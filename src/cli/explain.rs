@@ -32,22 +32,16 @@ pub struct ExplainArgs {
 }
 
 pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
+    if let Some(size) = args.size {
+        check_pixel(args.pixel, size.into())?;
+    }
     let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
     let scene = args.scene.load(aspect, &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let FilmSize { width, height } = *world.resource();
     let size = args.size.map_or(UVec2::new(width, height), UVec2::from);
-    if args.pixel.cmpge(size).any() {
-        let UVec2 { x, y } = args.pixel;
-        return Err(Failure::Usage(format!(
-            "--pixel: there is no pixel {x},{y} in a picture of {} x {}: the last one is {},{}",
-            size.x,
-            size.y,
-            size.x - 1,
-            size.y - 1
-        )));
-    }
+    check_pixel(args.pixel, size)?;
     let inputs = SceneInputs::of(&mut world);
     let extraction = Extraction::new(&inputs, &scene.trees);
     for problem in &extraction.problems {
@@ -66,6 +60,20 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     }
     let story = PixelStory::new(&explanation, from_lamps, &SnapshotNames::of(&extraction, &inputs));
     if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
+}
+
+/// Whether a picture has the pixel; of the scene's own size that is known only once it is read.
+fn check_pixel(UVec2 { x, y }: UVec2, size: UVec2) -> Result<(), Failure> {
+    if x < size.x && y < size.y {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "--pixel: there is no pixel {x},{y} in a picture of {} x {}: the last one is {},{}",
+        size.x,
+        size.y,
+        size.x - 1,
+        size.y - 1
+    )))
 }
 
 /// For people; luminance, since a table of three channels is hard to read.

@@ -3,6 +3,7 @@
 use super::console::{print, remark};
 use super::{Failure, SceneArgs};
 use clap::Args;
+use firstlight::mesh::{Faults, Mesh};
 use firstlight::render::{Environment, Film, Material};
 use firstlight::scene::{Extraction, FilmSize, Lens, LoadedScene, SceneInputs, Shape};
 use std::collections::BTreeMap;
@@ -33,7 +34,13 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         return super::trees::run(&inputs, &extraction, args.json);
     }
     let film = *world.resource::<FilmSize>();
-    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film };
+    let mut faults = BTreeMap::new();
+    for object in &inputs.objects {
+        if let Shape::Mesh(mesh) = &object.shape {
+            faults.entry(Arc::as_ptr(mesh)).or_insert_with(|| Faults::of(mesh));
+        }
+    }
+    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, faults };
     if args.json { print(told.json()) } else { print(told.text().trim_end()) }
 }
 
@@ -43,6 +50,8 @@ struct Told<'a> {
     inputs: &'a SceneInputs,
     extraction: &'a Extraction,
     film: FilmSize,
+    /// Of each mesh.
+    faults: BTreeMap<*const Mesh, Faults>,
 }
 
 const NOT_MODELLED: [&str; 6] =
@@ -51,7 +60,7 @@ const NOT_MODELLED: [&str; 6] =
 impl Told<'_> {
     /// For people.
     fn text(&self) -> String {
-        let Self { scene, inputs, extraction, film } = self;
+        let Self { scene, inputs, extraction, film, .. } = self;
         let mut out = format!("{}\n", scene.source.title());
         let mut row = |name: &str, text: String| out += &format!("  {name:14}{text}\n");
         let counts = |counts: BTreeMap<&str, usize>| {
@@ -65,6 +74,7 @@ impl Told<'_> {
                 Shape::Mesh(mesh) => {
                     let triangles = counted(mesh.triangles.len(), "triangle", "triangles");
                     row("", format!("{name}: {triangles}, {}", counted(mesh.positions.len(), "vertex", "vertices")));
+                    self.faults[&Arc::as_ptr(mesh)].sentences().for_each(|fault| row("", format!("{name}: {fault}")));
                 }
                 Shape::Spheres(balls) => row("", format!("{name}: {} balls", balls.centers.len())),
                 _ => {}
@@ -91,13 +101,17 @@ impl Told<'_> {
 
     /// One line for machines.
     fn json(&self) -> serde_json::Value {
-        let Self { scene, inputs, extraction, film } = self;
+        let Self { scene, inputs, extraction, film, .. } = self;
         let shading = &extraction.snapshot.shading;
         let parts: Vec<_> = (inputs.objects.iter())
             .filter_map(|object| match &object.shape {
-                Shape::Mesh(mesh) => Some(serde_json::json!({
-                    "name": object.name, "triangles": mesh.triangles.len(), "vertices": mesh.positions.len(),
-                })),
+                Shape::Mesh(mesh) => {
+                    let Faults { collapsed, duplicates, flat } = self.faults[&Arc::as_ptr(mesh)];
+                    Some(serde_json::json!({
+                        "name": object.name, "triangles": mesh.triangles.len(), "vertices": mesh.positions.len(),
+                        "collapsed_triangles": collapsed, "duplicate_triangles": duplicates, "flat_triangles": flat,
+                    }))
+                }
                 Shape::Spheres(balls) => Some(serde_json::json!({ "name": object.name, "balls": balls.centers.len() })),
                 _ => None,
             })

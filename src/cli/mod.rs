@@ -6,6 +6,7 @@ mod console;
 mod explain;
 mod info;
 mod merge;
+mod number;
 mod render;
 mod report;
 mod save;
@@ -14,11 +15,13 @@ mod simplify;
 mod stability;
 mod stop;
 mod trees;
+mod waiting;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use console::remark;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::{BUILTIN_SCENES, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+use number::{parse_positive, parse_size};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -184,23 +187,6 @@ fn start_log() {
     });
     // Only a second logger can fail, and then the first one does the work.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
-}
-
-/// `640x480` as a width and a height.
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let (width, height) = text.split_once(['x', 'X', '×']).ok_or("write it as WIDTHxHEIGHT, such as 1280x720")?;
-    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a number of pixels"));
-    let (width, height) = (number(width)?, number(height)?);
-    firstlight::scene::file::check_film_size(width, height)?;
-    Ok((width, height))
-}
-
-/// A positive, finite number.
-fn parse_positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("must be a positive number".to_owned()),
-    }
 }
 
 fn builtin_help() -> String {

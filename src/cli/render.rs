@@ -2,6 +2,7 @@
 
 use super::animate::animate;
 use super::console::{print, remark};
+use super::number::parse_stops;
 use super::stop::Stop;
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
 use bevy_ecs::prelude::World;
@@ -11,7 +12,7 @@ use firstlight::frame::{
     FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, render_region_until,
     write_film_file,
 };
-use firstlight::render::{Display, Film, Region, RenderSettings};
+use firstlight::render::{Display, Film, NoRoom, Purpose, Region, RenderSettings, Room};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::check_writable;
 use firstlight::scene::{
@@ -42,7 +43,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
     /// Samples per pixel; 256 unless a time or an error is given.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
     pub spp: Option<u32>,
     /// Samples A to B-1 of each pixel: ranges that do not overlap can be added up with `firstlight merge`.
     #[arg(long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
@@ -88,7 +89,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: Option<u32>,
     /// Brighter or darker by factors of two, on top of the scene's own exposure; .exr keeps the linear light.
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0)]
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0, value_parser = parse_stops)]
     pub exposure: f32,
     /// Print one JSON object with times and counts as the last line.
     #[arg(long)]
@@ -99,9 +100,6 @@ pub struct RenderArgs {
 }
 
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
-    if !args.exposure.is_finite() {
-        return Err(Failure::Usage("--exposure must be a finite number of stops".to_owned()));
-    }
     PictureFormat::of(&args.output).map_err(Failure::Usage)?;
     let film_path = film_path(args)?;
     // A picture that cannot be written is not worth the wait.
@@ -209,11 +207,24 @@ impl Job {
     }
 
     /// Renders a whole picture.
-    pub fn picture(&self, target: Target, stop: &Stop) -> Film {
-        let mut film = Film::new(self.size.0, self.size.1);
+    pub fn picture(&self, args: &RenderArgs, target: Target, stop: &Stop) -> Result<Film, Failure> {
+        let mut film = self.new_film(&purposes(args))?;
         let asked = || stop.is_asked();
         render_offline_until(&self.extraction.snapshot, &self.settings, &mut film, target, &asked, |_| true);
-        film
+        Ok(film)
+    }
+
+    /// A film, and the certainty that there is memory for all that it is made for: before any ray is traced.
+    fn new_film(&self, purposes: &[Purpose]) -> Result<Film, Failure> {
+        let (width, height) = self.size;
+        let no_room = |error: NoRoom| Failure::Failed(error.to_string());
+        let from_lamps = self.extraction.snapshot.shading.features.caustics;
+        drop(Room::for_film(width, height, from_lamps, purposes).map_err(no_room)?);
+        let mut film = Film::try_new(width, height).map_err(no_room)?;
+        if from_lamps {
+            film.reserve_light().map_err(no_room)?;
+        }
+        Ok(film)
     }
 
     /// Writes a picture with its note.
@@ -234,7 +245,7 @@ impl Job {
         let shot = self.scene.shot.as_ref();
         let first = args.samples.as_ref().map(|samples| samples.start).or(shot.map(|shot| shot.first_sample));
         let Some((FilmFile { film, shot }, path)) = kept else {
-            return Ok(Film::new(self.size.0, self.size.1).starting_at(first.unwrap_or(0)));
+            return Ok(self.new_film(&purposes(args))?.starting_at(first.unwrap_or(0)));
         };
         let ours = Shot::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
         match ours.differs_from(&shot) {
@@ -271,6 +282,7 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
         return animate(args, job, &bar, stop);
     }
     let mut film = job.film(args, kept)?;
+    let room = room_to_write(args, job.size)?;
     let target = job.target(args);
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
@@ -305,6 +317,7 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
         return Err(Failure::Stopped(message.to_owned()));
     }
 
+    drop(room);
     // The film first: a picture can be made of it.
     if let Some(path) = film_path {
         write_film_file(&film, &job.note(&film, path), path).map_err(Failure::Failed)?;
@@ -344,6 +357,21 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
             args.output.display()
         ))),
     }
+}
+
+/// What is written at the end.
+fn purposes(args: &RenderArgs) -> Vec<Purpose> {
+    let film = args.film.is_some() || args.resume;
+    let picture = match PictureFormat::of(&args.output) {
+        Ok(PictureFormat::Exr) => Purpose::Exr,
+        _ => Purpose::Png,
+    };
+    std::iter::once(picture).chain(film.then_some(Purpose::FilmFile)).collect()
+}
+
+/// Memory kept free for what is written at the end: a picture that cannot be written is not worth the wait.
+fn room_to_write(args: &RenderArgs, (width, height): (u32, u32)) -> Result<Room, Failure> {
+    Room::for_files(width, height, &purposes(args)).map_err(|error| Failure::Failed(error.to_string()))
 }
 
 /// `size` times `scale`, if that is a film that can be had.

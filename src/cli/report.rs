@@ -3,7 +3,7 @@
 use super::console::{print, remark};
 use super::{Failure, SceneArgs, parse_positive, parse_size};
 use clap::Args;
-use firstlight::render::{RenderSettings, Snapshot, Techniques};
+use firstlight::render::{Purpose, RenderSettings, Room, Snapshot, Techniques};
 use firstlight::report::{
     Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv, page,
     summary_text,
@@ -129,6 +129,9 @@ impl Prepared {
             (_, Some(size)) | (Some(size), None) => size,
             (None, None) => modest(width, height),
         };
+        let from_lamps = extraction.snapshot.shading.features.caustics;
+        let room = Room::for_film(size.0, size.1, from_lamps, &[Purpose::Exr]);
+        drop(room.map_err(|error| Failure::Failed(error.to_string()))?);
         let settings = RenderSettings { seed: args.seed, ..world.resource::<Rendering>().0 };
         Ok(Self {
             title: scene.source.title(),

@@ -6,6 +6,7 @@ use super::stop::Stop;
 use super::{Failure, SceneArgs};
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
+use firstlight::render::Film;
 use firstlight::scene::ShotSamples;
 use firstlight::scene::whole_file::check_writable;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ pub struct ShowArgs {
     #[arg(short, long, value_name = "FILE", default_value = "replay.png", requires = "replay")]
     output: PathBuf,
     /// Samples per pixel of that picture; as many as when it was recorded when not given.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..), requires = "replay")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)), requires = "replay")]
     spp: Option<u32>,
     /// Print at the end how promptly the window reacted and how many paths it traced, as one JSON object.
     #[cfg(feature = "viewer")]

@@ -2,9 +2,11 @@
 
 use super::Failure;
 use super::console::{print, remark};
+use super::number::{parse_error, parse_faces, parse_ratio};
+use super::waiting::Waiting;
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
-use firstlight::mesh::{Deviation, Distances, Topology};
+use firstlight::mesh::{Deviation, Distances, Faults, Topology};
 use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
 use firstlight::scene::whole_file::check_writable;
 use std::path::PathBuf;
@@ -20,13 +22,13 @@ pub struct SimplifyArgs {
     #[arg(short, long, value_name = "OUT.obj")]
     output: PathBuf,
     /// Keep this share of the triangles, above 0 and at most 1.
-    #[arg(long, value_name = "R", allow_negative_numbers = true, group = "target")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = parse_ratio, group = "target")]
     ratio: Option<f64>,
     /// Keep at most this many triangles.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, group = "target")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_faces, group = "target")]
     faces: Option<usize>,
     /// Keep as few triangles as this largest distance between the surfaces allows, in the file's unit.
-    #[arg(long, value_name = "E", allow_negative_numbers = true, group = "target")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_error, group = "target")]
     error: Option<f64>,
     #[arg(long, value_enum, default_value = "quadric")]
     method: MethodArg,
@@ -63,6 +65,7 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(message));
     }
     check_writable(&args.output).map_err(Failure::Failed)?;
+    let waiting = Waiting::new(format!("reading {}", args.input.display()));
     // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
     let mut model = load_obj_with(&args.input, &ObjOptions::default()).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
@@ -75,13 +78,14 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
     for fault in faults(&model) {
         remark(format_args!("warning: {}: {fault}", args.input.display()));
     }
+    let before = model.mesh.triangles.len();
+    waiting.next(format!("simplifying {before} triangles"));
     let start = Instant::now();
     let result = simplify(&model.mesh, method, target).map_err(|error| match error {
         SimplifyError::Degenerate => Failure::Failed(format!("{}: {error}", args.input.display())),
         _ => Failure::Usage(error.to_string()),
     })?;
     let seconds = start.elapsed().as_secs_f64();
-    let before = model.mesh.triangles.len();
     let after = result.triangles.len();
     let missed = match target {
         Target::Ratio(ratio) => after > ((before as f64 * ratio) as usize).max(1),
@@ -94,10 +98,13 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
     let names: Vec<String> = model.materials.iter().map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
+    waiting.next(format!("writing {}", args.output.display()));
     save_obj(&args.output, &result, &extras).map_err(|error| failed(&error))?;
+    waiting.next("measuring how far the two surfaces are apart");
     let deviation = Deviation::between(&model.mesh, &result, SAMPLES);
     let diagonal = model.mesh.bounds().size().as_dvec3().length();
     let topology = Topology::of(&result);
+    drop(waiting);
     if args.json {
         let way = |d: Distances| serde_json::json!({ "mean": d.mean, "rms": d.rms, "max": d.max });
         let report = serde_json::json!({
@@ -135,16 +142,15 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
 
 /// What is not as a simplifier would have it, and what becomes of it; a sentence each.
 fn faults(model: &ImportedObj) -> Vec<String> {
-    let found = Topology::of(&model.mesh);
-    [
-        (model.polygons, "faces of more than three corners were cut into triangles"),
-        (found.degenerate_triangles, "triangles are without area"),
-        (found.duplicate_triangles, "triangles lie on the same three places as an earlier one and are left out"),
-        (found.non_manifold_edges, "edges of three or more triangles stay as they are"),
-        (found.misoriented_edges, "edges between triangles that face opposite ways stay as they are"),
-    ]
-    .into_iter()
-    .filter(|&(count, _)| count > 0)
-    .map(|(count, fate)| format!("{count} {fate}"))
-    .collect()
+    let (triangles, edges) = (Faults::of(&model.mesh), Topology::of(&model.mesh));
+    let counted = |count: usize, fate: &str| (count > 0).then(|| format!("{count} {fate}"));
+    let left_out = Faults { flat: 0, ..triangles };
+    let kept = Faults { flat: triangles.flat, ..Faults::default() };
+    counted(model.polygons, "faces of more than three corners were cut into triangles")
+        .into_iter()
+        .chain(left_out.sentences().map(|fault| format!("{fault} and are left out")))
+        .chain(kept.sentences())
+        .chain(counted(edges.non_manifold_edges, "edges of three or more triangles stay as they are"))
+        .chain(counted(edges.misoriented_edges, "edges between triangles that face opposite ways stay as they are"))
+        .collect()
 }

@@ -4,28 +4,31 @@ use super::Failure;
 use super::console::print;
 use clap::Args;
 use firstlight::report::cpu_seconds;
-use firstlight::stability::{CASES, Case, Tally};
+use firstlight::stability::{CASES, Case, Tally, Worst};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Instant;
+
+/// Rays of the largest case, unless given.
+const USUAL_RAYS: u64 = 10_000_000;
 
 #[derive(Args, Clone, Debug)]
 pub struct StabilityArgs {
     /// About how many rays the largest case traces; the others trace a share of it, and each as many as it needs at the
     /// least. 1e9 is a long run.
-    #[arg(long, value_name = "N", default_value = "1e7", value_parser = parse_rays)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = USUAL_RAYS, value_parser = parse_rays)]
     rays: u64,
     /// Only this case; may be given several times.
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
     /// Tell what cases there are.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["cases", "replay"])]
     list: bool,
-    /// Tell everything about one ray of one case, as a finding names it.
-    #[arg(long, value_name = "STAGE:RAY", value_parser = parse_ray)]
+    /// Tell everything about one ray of one case, as a finding names it; with --rays as when it was found.
+    #[arg(long, requires = "cases", value_name = "STAGE:RAY", value_parser = parse_ray)]
     replay: Option<(usize, u64)>,
     /// Worker threads; all cores when not given. The counts do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print one JSON object.
     #[arg(long)]
@@ -34,29 +37,49 @@ pub struct StabilityArgs {
 
 pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
     if args.list {
-        let width = CASES.iter().map(|case| case.name.len()).max().unwrap_or(0);
-        return CASES.iter().try_for_each(|case| print(format_args!("{:width$}  {}", case.name, case.about)));
+        return list(args.json);
     }
     let cases = chosen(args)?;
     if let Some((stage, ray)) = args.replay {
-        let [case] = cases[..] else {
-            return Err(Failure::Usage("--replay wants one --case NAME beside it".to_owned()));
-        };
-        let told = case.replay(stage, ray);
-        let told = told.ok_or_else(|| {
-            let name = case.name;
-            Failure::Failed(match case.n_stages() {
-                0 => format!("{name}: has no rays of its own to replay; its findings say all that there is"),
-                n => format!("{name}: there is no stage {stage} to replay, only 0 to {}", n - 1),
-            })
-        })?;
-        return print(told.trim_end());
+        return replay(args, &cases, stage, ray);
     }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
     pool.install(|| count(args, &cases))
+}
+
+fn list(as_json: bool) -> Result<(), Failure> {
+    if as_json {
+        let case =
+            |case: &Case| serde_json::json!({ "case": case.name, "about": case.about, "replay": case.can_replay() });
+        return print(serde_json::json!({ "cases": CASES.iter().map(case).collect::<Vec<_>>() }));
+    }
+    let width = CASES.iter().map(|case| case.name.len()).max().unwrap_or(0);
+    CASES.iter().try_for_each(|case| print(format_args!("{:width$}  {}", case.name, case.about)))
+}
+
+fn replay(args: &StabilityArgs, cases: &[&Case], stage: usize, ray: u64) -> Result<(), Failure> {
+    let [case] = cases else {
+        return Err(Failure::Usage("--replay wants one --case NAME beside it, not several".to_owned()));
+    };
+    let told = case.replay(stage, ray, args.rays);
+    let told = told.map_err(|error| Failure::Usage(format!("--replay: {}: {error}", case.name)))?;
+    if !args.json {
+        return print(told);
+    }
+    let rows = told.rows().map(|(label, value)| (label.to_owned(), value.json()));
+    let mut object: serde_json::Map<_, _> = rows.collect();
+    object.insert("case".to_owned(), case.name.into());
+    object.insert("replay".to_owned(), format!("{stage}:{ray}").into());
+    print(serde_json::Value::from(object))
+}
+
+/// The ray of a finding, as arguments that replay it.
+fn replay_args(args: &StabilityArgs, case: &Case, worst: &Worst) -> String {
+    let rays = if args.rays == USUAL_RAYS { String::new() } else { format!(" --rays {}", args.rays) };
+    format!("--case {} --replay {}:{}{rays}", case.name, worst.stage, worst.ray)
 }
 
 fn chosen(args: &StabilityArgs) -> Result<Vec<&'static Case>, Failure> {
@@ -99,7 +122,7 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
     let findings: u64 = rows.iter().map(|(_, tally, _)| tally.findings()).sum();
     let rays: u64 = rows.iter().map(|(_, tally, _)| tally.rays).sum();
     if args.json {
-        let cases: Vec<_> = rows.iter().map(|(case, tally, seconds)| json(case, tally, *seconds)).collect();
+        let cases: Vec<_> = rows.iter().map(|(case, tally, seconds)| json(args, case, tally, *seconds)).collect();
         let seconds = start.elapsed().as_secs_f64();
         print(
             serde_json::json!({ "cases": cases, "rays": rays, "findings": findings, "seconds": seconds, "cpu_s": cpu }),
@@ -110,8 +133,7 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
             let Some(worst) = &tally.worst else { continue };
             print(format_args!("\nworst of {}: {}", case.name, worst.what))?;
             if case.can_replay() {
-                let (stage, ray) = (worst.stage, worst.ray);
-                print(format_args!("  firstlight stability --case {} --replay {stage}:{ray}", case.name))?;
+                print(format_args!("  firstlight stability {}", replay_args(args, case, worst)))?;
             }
         }
     }
@@ -133,10 +155,10 @@ fn row(case: &Case, tally: &Tally) -> String {
     )
 }
 
-fn json(case: &Case, tally: &Tally, seconds: f64) -> serde_json::Value {
+fn json(args: &StabilityArgs, case: &Case, tally: &Tally, seconds: f64) -> serde_json::Value {
     let energy = tally.energy.map(|energy| serde_json::json!({ "error": energy.error, "allowed": energy.allowed }));
     let worst = tally.worst.as_ref().map(|worst| {
-        let replay = case.can_replay().then(|| format!("--case {} --replay {}:{}", case.name, worst.stage, worst.ray));
+        let replay = case.can_replay().then(|| replay_args(args, case, worst));
         serde_json::json!({ "severity": worst.severity, "what": worst.what, "replay": replay })
     });
     serde_json::json!({

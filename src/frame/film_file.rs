@@ -6,7 +6,7 @@
 //! checksum; the note of the picture ([`Shot`]) says which scene it is, and makes it open as any picture.
 
 use super::picture_file::mean_channels;
-use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES};
+use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::limits::open_file;
 use crate::scene::shot::NOTE_KEY;
@@ -47,6 +47,7 @@ const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * N_PLANES as u64);
 
 /// Writes a film with the note of what it shows; whole or not at all.
 pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), String> {
+    drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, &error))?);
     let record = film.to_record();
     let header = Header { format: FORMAT, check: checksum(&record).to_string(), layout: record.layout };
     // Plain structs and numbers can always be written.
@@ -117,6 +118,7 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
     if n_pixels * BYTES_A_PIXEL > MOST_UNPACKED * bytes.len() as u64 {
         return Err(damaged(&"it is far too short for its size"));
     }
+    drop(Room::for_files(width, height, &[Purpose::FilmFile]).map_err(|error| error.to_string())?);
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()

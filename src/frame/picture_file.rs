@@ -2,7 +2,7 @@
 //!
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
-use crate::render::{Display, Film, develop};
+use crate::render::{Display, Film, Purpose, Room, develop};
 use crate::scene::shot::NOTE_KEY;
 use crate::scene::whole_file::{WholeFile, unwritable};
 use exr::prelude::{
@@ -75,6 +75,12 @@ impl Print<'_> {
 
     /// The whole picture in a temporary file in the folder of `path`.
     fn encode_beside(&self, format: PictureFormat, path: &Path) -> Result<WholeFile, String> {
+        // What is asked for below is not asked whether it can be had.
+        let room = match format {
+            PictureFormat::Png => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
+            PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr]),
+        };
+        drop(room.map_err(|error| unwritable(path, &error))?);
         let mut out = WholeFile::begin(path)?;
         match format {
             PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, &error))?,
@@ -88,9 +94,12 @@ impl Print<'_> {
 
     fn png(&self, out: &mut impl Write) -> Result<(), png::EncodingError> {
         let (width, height) = self.size;
-        let mut rgba = Vec::new();
-        develop(self.film, self.display, width, height, &mut rgba);
-        let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let mut rgb = Vec::new();
+        develop(self.film, self.display, width, height, &mut rgb);
+        // In place: no pixel is opaque more than another.
+        let n_pixels = rgb.len() / 4;
+        (0..n_pixels).for_each(|i| rgb.copy_within(4 * i..4 * i + 3, 3 * i));
+        rgb.truncate(3 * n_pixels);
         let mut encoder = png::Encoder::new(out, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);

@@ -225,7 +225,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     let snapshot = extraction.map(|extraction| extraction.snapshot.clone());
     let snapshot = snapshot.ok_or_else(|| failed("nothing is open".to_owned()))?;
     let settings = world.resource::<Rendering>().0;
-    let mut film = Film::new(width.max(1), height.max(1));
+    let mut film = Film::try_new(width.max(1), height.max(1)).map_err(|error| failed(error.to_string()))?;
     let target = Target { spp: Some(spp.max(1)), ..Target::default() };
     let pool = session.pool();
     pool.install(|| render_offline_until(&snapshot, &settings, &mut film, target, stop, |_| true));

@@ -153,13 +153,14 @@ impl InstructionSet {
     }
 }
 
-/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set.
+/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set. Panics if the processor does not have it: any
+/// caller can name one, in `RenderSettings::lanes` too.
 macro_rules! dispatch {
     ($set:expr, $kernel:ident ( $($name:ident : $kind:ty),* $(,)? )) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn avx512($($name: $kind),*) {
-            // SAFETY: this function only runs on processors with these instructions.
+            // SAFETY: this function has these instructions enabled, and whoever called it has promised that they are there.
             $kernel(unsafe { crate::lanes::Avx512::new() }, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
@@ -168,10 +169,13 @@ macro_rules! dispatch {
             // SAFETY: as above.
             $kernel(unsafe { crate::lanes::Avx2::new() }, $($name),*)
         }
-        match $set {
-            // SAFETY: the set was found on this processor.
+        let set: crate::lanes::InstructionSet = $set;
+        assert!(set.is_available(), "this processor does not have {set:?}");
+        match set {
+            // SAFETY: the processor has the set, which was asserted, and with it all that `available` looks for.
             #[cfg(target_arch = "x86_64")]
             crate::lanes::InstructionSet::Avx512 => unsafe { avx512($($name),*) },
+            // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             crate::lanes::InstructionSet::Avx2 => unsafe { avx2($($name),*) },
             _ => $kernel(crate::lanes::Portable, $($name),*),

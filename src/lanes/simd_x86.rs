@@ -3,17 +3,17 @@
 use super::{Kernel, LANES, Mask, Simd, last_index};
 use std::arch::x86_64::*;
 
-/// Proof that the processor has AVX-512 F, VL, DQ and BW.
+/// Proof that the processor has AVX-512 F, VL, DQ and BW, and all that [`Avx2`] is proof of.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512(());
 
-/// Proof that the processor has AVX2, FMA and BMI.
+/// Proof that the processor has AVX2, FMA, BMI 1 and 2, LZCNT and POPCNT.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(());
 
 impl Avx512 {
     /// # Safety
-    /// The processor must have the instructions.
+    /// The processor must have the instructions that this is the proof of.
     #[inline(always)]
     pub unsafe fn new() -> Self {
         Self(())
@@ -22,22 +22,23 @@ impl Avx512 {
 
 impl Avx2 {
     /// # Safety
-    /// The processor must have the instructions.
+    /// The processor must have the instructions that this is the proof of.
     #[inline(always)]
     pub unsafe fn new() -> Self {
         Self(())
     }
 }
 
-/// Functions whose body is one expression of intrinsics.
-///
-/// SAFETY of all of them: `self` proves that the processor has the instructions; pointers come from references to
-/// arrays of the size that is read or written.
+/// Functions whose body is one expression of intrinsics. Loads and stores of all of them take any alignment.
 macro_rules! operations {
     ($($(#[$attribute:meta])* fn $name:ident($($arg:ident: $kind:ty),*) $(-> $result:ty)? $body:block)*) => {
         $($(#[$attribute])*
         #[inline(always)]
-        fn $name(self, $($arg: $kind),*) $(-> $result)? { unsafe { $body } })*
+        fn $name(self, $($arg: $kind),*) $(-> $result)? {
+            // SAFETY: `self` proves that the processor has the instructions. Pointers come from references to arrays of
+            // the size that is read or written; a gather reads below `last_index` of its slice, which is checked there.
+            unsafe { $body }
+        })*
     };
 }
 
@@ -141,8 +142,12 @@ impl Simd for Avx512 {
 }
 
 /// A mask of 8 bits as a register of lanes that are all ones or all zeros.
+///
+/// # Safety
+/// The processor must have the instructions that [`Avx2`] is the proof of.
 #[inline(always)]
 unsafe fn lanes_of(mask: Mask) -> __m256 {
+    // SAFETY: the caller's promise; no memory is touched.
     unsafe {
         let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
         let both = _mm256_and_si256(_mm256_set1_epi32(i32::from(mask)), bit);
@@ -150,32 +155,45 @@ unsafe fn lanes_of(mask: Mask) -> __m256 {
     }
 }
 
+/// # Safety
+/// As [`lanes_of`].
 #[inline(always)]
 unsafe fn bits_of(low: __m256, high: __m256) -> Mask {
+    // SAFETY: the caller's promise; no memory is touched.
     unsafe { _mm256_movemask_ps(low) as Mask | (_mm256_movemask_ps(high) as Mask) << 8 }
 }
 
+/// # Safety
+/// As [`lanes_of`].
 #[inline(always)]
 unsafe fn blend(mask: Mask, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+    // SAFETY: the caller's promise; no memory is touched.
     unsafe { [_mm256_blendv_ps(b[0], a[0], lanes_of(mask)), _mm256_blendv_ps(b[1], a[1], lanes_of(mask >> 8))] }
 }
 
 /// Moves the lanes of the mask to the front: each half by itself, then the upper one behind the lower.
+///
+/// # Safety
+/// As [`lanes_of`].
 #[inline(always)]
 unsafe fn compress(mask: Mask, a: [__m256i; 2]) -> [__m256i; 2] {
+    // SAFETY: the caller's promise; the second store begins at the eighth of sixteen numbers at the latest.
     unsafe {
         let (low, high) = (compress_half(mask as u8, a[0]), compress_half((mask >> 8) as u8, a[1]));
         let mut both = [0u32; 16];
         _mm256_storeu_si256(both.as_mut_ptr().cast(), low);
-        // At most 8 lanes lie before it.
         _mm256_storeu_si256(both.as_mut_ptr().add((mask as u8).count_ones() as usize).cast(), high);
         [_mm256_loadu_si256(both.as_ptr().cast()), _mm256_loadu_si256(both.as_ptr().add(8).cast())]
     }
 }
 
 /// Spreads the mask to bytes and collects the numbers of its lanes: a compress in two steps.
+///
+/// # Safety
+/// As [`lanes_of`].
 #[inline(always)]
 unsafe fn compress_half(mask: u8, a: __m256i) -> __m256i {
+    // SAFETY: the caller's promise; no memory is touched.
     unsafe {
         let bytes = _pdep_u64(u64::from(mask), 0x0101_0101_0101_0101) * 0xFF;
         let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(_pext_u64(0x0706_0504_0302_0100, bytes) as i64));

@@ -5,6 +5,7 @@
 
 mod build;
 mod deviation;
+mod faults;
 mod measure;
 mod normals;
 pub mod procedural;
@@ -14,6 +15,7 @@ mod weld;
 
 pub use build::MeshError;
 pub use deviation::{Deviation, Distances};
+pub use faults::Faults;
 pub use normals::NormalWeight;
 pub use topology::Topology;
 pub use weld::Welding;

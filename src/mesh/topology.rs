@@ -1,5 +1,6 @@
 //! How the triangles of a mesh hang together, counted.
 
+use super::faults::{Faults, distinct};
 use super::{Mesh, Welding};
 
 /// Counts over the mesh with vertices at equal places welded.
@@ -19,9 +20,9 @@ pub struct Topology {
     pub misoriented_edges: usize,
     /// Vertices where two fans of triangles touch.
     pub non_manifold_vertices: usize,
-    /// Triangles without area: corners at one place or on one line.
+    /// Triangles without area that are no duplicates: corners at one place or on one line.
     pub degenerate_triangles: usize,
-    /// Triangles on the same three places as an earlier one, whichever way they face.
+    /// Triangles on the same three different places as an earlier one, whichever way they face.
     pub duplicate_triangles: usize,
     /// Pieces connected over edges or vertices.
     pub pieces: usize,
@@ -31,13 +32,12 @@ impl Topology {
     pub fn of(mesh: &Mesh) -> Self {
         let welding = Welding::of(&mesh.positions);
         let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|&t| welding.places(t)).collect();
+        let faults = Faults::in_places(mesh, &triangles);
         let mut counts = Self {
             triangles: triangles.len(),
             loose_vertices: loose_vertices(mesh),
-            degenerate_triangles: (0..mesh.triangles.len())
-                .filter(|&t| mesh.doubled_area_normal(t).length_squared() == 0.0)
-                .count(),
-            duplicate_triangles: duplicates(&triangles),
+            degenerate_triangles: faults.collapsed + faults.flat,
+            duplicate_triangles: faults.duplicates,
             ..Self::default()
         };
         counts.count_edges(&triangles);
@@ -108,27 +108,10 @@ impl Topology {
     }
 }
 
-fn distinct(&[a, b, c]: &[u32; 3]) -> bool {
-    a != b && b != c && c != a
-}
-
 fn loose_vertices(mesh: &Mesh) -> usize {
     let mut used = vec![false; mesh.positions.len()];
     mesh.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
     used.iter().filter(|&&u| !u).count()
-}
-
-fn duplicates(triangles: &[[u32; 3]]) -> usize {
-    let mut sorted: Vec<[u32; 3]> = triangles
-        .iter()
-        .map(|&t| {
-            let mut key = t;
-            key.sort_unstable();
-            key
-        })
-        .collect();
-    sorted.sort_unstable();
-    sorted.windows(2).filter(|pair| pair[0] == pair[1]).count()
 }
 
 /// Union–find with path halving; the smaller number leads, so that results do not depend on the order of joins.

@@ -10,6 +10,7 @@
 //! yet (a caustic) would raise the very value that its own error is divided by, and hide itself: see [`local_level`].
 
 use glam::DVec3;
+use std::collections::TryReserveError;
 
 /// The error of the whole picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,28 +112,45 @@ pub(super) struct TileConvergence {
 }
 
 impl TileConvergence {
+    /// Has the memory ready that a tile of `n` pixels needs.
+    pub fn try_reserve(&mut self, n: usize) -> Result<(), TryReserveError> {
+        self.checkpoint.try_reserve_exact(n)?;
+        self.last.try_reserve_exact(n)
+    }
+
+    /// As new, in the same memory.
+    pub fn clear(&mut self) {
+        let Self { checkpoint, checkpoint_spp, steps, last, n_values } = self;
+        checkpoint.clear();
+        steps.clear();
+        last.clear();
+        (*checkpoint_spp, *n_values) = (0, 0.0);
+    }
+
     /// Takes the means after `spp` samples, a power of two, of a tile `width` pixels wide.
     pub fn record(&mut self, spp: u32, width: usize, means: impl Iterator<Item = DVec3>) {
-        let before = std::mem::replace(&mut self.checkpoint, means.collect());
-        self.n_values = 3.0 * self.checkpoint.len() as f64;
+        let now: Vec<DVec3> = means.collect();
+        self.n_values = 3.0 * now.len() as f64;
         let spp_before = std::mem::replace(&mut self.checkpoint_spp, spp);
         let level = spp.ilog2() as usize;
         if spp > 1 && spp_before == spp / 2 {
-            let pairs = before.iter().zip(&self.checkpoint).enumerate();
+            let pairs = self.checkpoint.iter().zip(&now).enumerate();
             let relative = pairs.map(|(i, (a, b))| {
-                let (difference, level) = (*a - *b, local_level(&self.checkpoint, *a, width, i));
+                let (difference, level) = (*a - *b, local_level(&now, *a, width, i));
                 (difference * difference / (level * level + 0.01)).element_sum()
             });
-            let mut last = std::mem::take(&mut self.last);
-            last.clear();
+            self.last.clear();
+            let last = &mut self.last;
             let sum = relative.inspect(|step| last.push((step / 3.0) as f32)).sum();
-            self.last = last;
             self.steps.resize(level - 1, f64::NAN);
             self.steps.push(sum);
         } else {
             // Samples came in too large a lump to tell.
             self.steps.resize(level, f64::NAN);
         }
+        // Not the new list itself: this one's memory is reserved, for as long as the film is there.
+        self.checkpoint.clear();
+        self.checkpoint.extend_from_slice(&now);
     }
 
     /// Of one pixel, relative and squared; 0 before the second sample.

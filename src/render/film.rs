@@ -7,8 +7,10 @@ use super::caustics::LightLayer;
 use super::estimate::{ErrorEstimate, TileConvergence};
 use super::exact_sum::ExactSum;
 use super::region::Region;
+use super::room::{NoRoom, Room};
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
+use std::collections::TryReserveError;
 use std::ops::Range;
 
 /// Sums and counts of one picture.
@@ -56,23 +58,52 @@ impl Film {
     /// Memory that a pixel takes: its sums, and its mean at the last power of two.
     pub const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
 
-    /// Width and height in pixels, at least 1 each.
+    /// Memory that a pixel takes for light from the lamps, where there is such light.
+    pub const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>();
+
+    /// Width and height in pixels, at least 1 each. Panics where there is no memory for it.
     pub fn new(width: u32, height: u32) -> Self {
         Self::with_tile_size(width, height, Self::TILE_SIZE)
     }
 
+    /// The same, or how much memory it would have taken.
+    pub fn try_new(width: u32, height: u32) -> Result<Self, NoRoom> {
+        Self::try_with_tile_size(width, height, Self::TILE_SIZE)
+    }
+
     /// The picture does not depend on `tile_size`, bit for bit.
     pub fn with_tile_size(width: u32, height: u32, tile_size: u32) -> Self {
+        Self::try_with_tile_size(width, height, tile_size).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// All that a render will need for it is there then, but for light from the lamps ([`Self::reserve_light`]).
+    pub fn try_with_tile_size(width: u32, height: u32, tile_size: u32) -> Result<Self, NoRoom> {
         assert!(width > 0 && height > 0 && tile_size > 0, "a film of {width} × {height} has no pixels");
-        let tiles_x = width.div_ceil(tile_size);
-        let tiles = (0..tiles_x * height.div_ceil(tile_size))
-            .map(|i| {
-                let origin = UVec2::new(i % tiles_x, i / tiles_x) * tile_size;
-                let size = (UVec2::new(width, height) - origin).min(UVec2::splat(tile_size));
-                FilmTile::new(origin, size)
-            })
-            .collect();
-        Self { width, height, tiles, tiles_x, tile_size, light: None, idle_light: Vec::new() }
+        // In one piece first: a system that promises small pieces beyond what it has refuses such a large one.
+        drop(Room::for_film(width, height, false, &[])?);
+        let bytes = u64::from(width) * u64::from(height) * (Self::BYTES_A_PIXEL + size_of::<f32>()) as u64;
+        let no_room = |_| NoRoom { width, height, bytes };
+        let (tiles_x, tiles_y) = (width.div_ceil(tile_size), height.div_ceil(tile_size));
+        let mut tiles = Vec::new();
+        tiles.try_reserve_exact(tiles_x as usize * tiles_y as usize).map_err(no_room)?;
+        for (y, x) in (0..tiles_y).flat_map(|y| (0..tiles_x).map(move |x| (y, x))) {
+            let origin = UVec2::new(x, y) * tile_size;
+            let size = (UVec2::new(width, height) - origin).min(UVec2::splat(tile_size));
+            tiles.push(FilmTile::try_new(origin, size).map_err(no_room)?);
+        }
+        Ok(Self { width, height, tiles, tiles_x, tile_size, light: None, idle_light: Vec::new() })
+    }
+
+    /// Has memory ready for light from the lamps.
+    pub fn reserve_light(&mut self) -> Result<(), NoRoom> {
+        if self.light.is_some() {
+            return Ok(());
+        }
+        let (width, height) = (self.width, self.height);
+        let n_pixels = width as usize * height as usize;
+        let bytes = (n_pixels * Self::LIGHT_BYTES_A_PIXEL) as u64;
+        let missing = n_pixels.saturating_sub(self.idle_light.len());
+        self.idle_light.try_reserve_exact(missing).map_err(|_| NoRoom { width, height, bytes })
     }
 
     /// The same without samples, to begin with sample number `first`.
@@ -263,10 +294,14 @@ impl Film {
 }
 
 impl FilmTile {
-    fn new(origin: UVec2, size: UVec2) -> Self {
-        let n = (size.x * size.y) as usize;
-        let (sums, ranges) = (vec![ExactSum::default(); n], std::iter::once(0..0).collect());
-        Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence: TileConvergence::default() }
+    fn try_new(origin: UVec2, size: UVec2) -> Result<Self, TryReserveError> {
+        let n = size.x as usize * size.y as usize;
+        let (mut sums, mut convergence) = (Vec::new(), TileConvergence::default());
+        sums.try_reserve_exact(n)?;
+        sums.resize(n, ExactSum::default());
+        convergence.try_reserve(n)?;
+        let ranges = std::iter::once(0..0).collect();
+        Ok(Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence })
     }
 
     fn clear(&mut self) {
@@ -276,7 +311,7 @@ impl FilmTile {
         ranges.push(0..0);
         sums.fill(ExactSum::default());
         bad.clear();
-        *convergence = TileConvergence::default();
+        convergence.clear();
     }
 
     pub fn n_pixels(&self) -> usize {

@@ -25,6 +25,7 @@ mod paths;
 mod phong;
 mod region;
 mod renderer;
+mod room;
 mod snapshot;
 mod surface;
 mod techniques;
@@ -48,6 +49,7 @@ pub use region::Region;
 pub use renderer::{
     BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, advance_region, replay_sample,
 };
+pub use room::{NoRoom, Purpose, Room};
 pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};
 pub use techniques::Techniques;
 pub use texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};

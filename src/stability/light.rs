@@ -1,5 +1,6 @@
 //! Cases that render: hard materials, lights, lenses and long runs in scenes whose light is known on paper.
 
+use super::replay::{Replay, Told};
 use super::tally::{Energy, Tally};
 use crate::kdtree::Shape;
 use crate::render::{
@@ -29,7 +30,7 @@ impl Picture {
     pub fn run(&self, index: usize, spp: u32, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         let mut film = Film::new(self.width, self.height);
         let report = advance(&self.scene, &RenderSettings::default(), &mut film, spp, &|| false);
-        let samples = u64::from(self.width) * u64::from(self.height) * u64::from(spp);
+        let samples = self.samples(spp);
         tick(samples);
         let means: Vec<f64> = film.means().iter().map(|mean| f64::from(mean.element_sum()) / 3.0).collect();
         let n = means.len() as f64;
@@ -289,13 +290,25 @@ pub fn long_sums() -> Vec<Picture> {
 }
 
 impl Picture {
+    /// How many samples it has with `spp` of each pixel.
+    pub fn samples(&self, spp: u32) -> u64 {
+        u64::from(self.width) * u64::from(self.height) * u64::from(spp)
+    }
+
     /// One sample, by its number as [`Self::run`] tells it.
-    pub fn replay(&self, ray: u64) -> String {
+    pub fn replay(&self, ray: u64) -> Replay {
         let (x, row) = (ray % u64::from(self.width), ray / u64::from(self.width));
         let (y, sample) = (row % u64::from(self.height), row / u64::from(self.height));
         let at = BadSample { x: x as u32, y: y as u32, sample: sample as u32 };
         let size = UVec2::new(self.width, self.height);
         let radiance = replay_sample(&self.scene, &RenderSettings::default(), size, at);
-        format!("picture {}\nsample  {sample} of pixel {x}, {y}: {radiance}, expected {}\n", self.name, self.expected)
+        let mut told = Replay::default();
+        told.push("picture", Told::Text(self.name.clone()));
+        told.push("pixel_x", Told::Count(x));
+        told.push("pixel_y", Told::Count(y));
+        told.push("sample", Told::Count(sample));
+        told.push("radiance", Told::Vector(radiance));
+        told.push("expected_mean", Told::Double(self.expected));
+        told
     }
 }

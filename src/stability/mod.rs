@@ -3,18 +3,20 @@
 //!
 //! Rays are held against an `f64` judge that knows no tree ([`judge`]), light against answers on paper ([`light`]), and the
 //! same scene elsewhere against itself ([`anywhere`]). Every ray is a function of case, stage and index alone: the
-//! counts do not depend on threads, and the worst ray can be had again ([`replay`]). Start reading at [`CASES`].
+//! counts do not depend on threads, and the worst ray can be had again ([`Case::replay`]). Start reading at [`CASES`].
 
 mod anywhere;
 mod bounces;
 mod judge;
 mod light;
 mod random;
+mod replay;
 mod stage;
 mod surfaces;
 mod tally;
 
 pub use judge::{Judge, TEST_ERROR, Verdict};
+pub use replay::{Replay, ReplayError, Told};
 pub use tally::{Energy, Tally, Worst};
 
 use light::Picture;
@@ -142,20 +144,14 @@ impl Case {
         match self.kind {
             Kind::Rays(plans) => {
                 let plans = plans();
-                let each = n.div_ceil(plans.len() as u64).max(64);
+                let each = rays_of_plan(n, &plans);
                 let stages = plans.iter().enumerate().filter_map(|(i, plan)| Some((i, (plan.build)()?)));
                 stages.map(|(i, stage)| stage.run(i, each, tick)).fold(Tally::default(), Tally::merged)
             }
             Kind::Pictures(pictures) => {
                 let pictures = pictures();
-                let usual: u64 = pictures.iter().map(|p| u64::from(p.width * p.height) * u64::from(p.spp)).sum();
-                let factor = n as f64 / usual as f64;
-                let run = |(i, picture): (usize, &Picture)| {
-                    // More rays make the noise smaller; fewer than the usual number would let it decide.
-                    let spp = (f64::from(picture.spp) * factor).clamp(f64::from(picture.spp), 1e8) as u32;
-                    picture.run(i, spp, tick)
-                };
-                pictures.iter().enumerate().map(run).fold(Tally::default(), Tally::merged)
+                let run = |i: usize| pictures[i].run(i, spp_of_picture(n, &pictures, i), tick);
+                (0..pictures.len()).map(run).fold(Tally::default(), Tally::merged)
             }
             Kind::Bounces => bounces::run(n, tick),
             Kind::Anywhere => anywhere::run(n, tick),
@@ -168,21 +164,41 @@ impl Case {
         matches!(self.kind, Kind::Rays(_) | Kind::Pictures(_))
     }
 
-    /// How many stages there are to replay rays of.
-    pub fn n_stages(&self) -> usize {
+    /// Everything about one ray of the case.
+    ///
+    /// - `rays`: as for [`Self::run`]: how many rays each stage has depends on it, which ray is which does not.
+    pub fn replay(&self, stage: usize, ray: u64, rays: u64) -> Result<Replay, ReplayError> {
+        let n = self.rays(rays);
+        let no_stage = |count: usize| ReplayError::NoStage { stage, last: count - 1 };
+        let check =
+            |count: u64| if ray < count { Ok(()) } else { Err(ReplayError::NoRay { stage, ray, last: count - 1 }) };
         match self.kind {
-            Kind::Rays(plans) => plans().len(),
-            Kind::Pictures(pictures) => pictures().len(),
-            _ => 0,
+            Kind::Rays(plans) => {
+                let plans = plans();
+                let plan = plans.get(stage).ok_or(no_stage(plans.len()))?;
+                check(rays_of_plan(n, &plans))?;
+                Ok((plan.build)().ok_or(ReplayError::EmptyStage { stage })?.replay(stage, ray))
+            }
+            Kind::Pictures(pictures) => {
+                let pictures = pictures();
+                let picture = pictures.get(stage).ok_or(no_stage(pictures.len()))?;
+                check(picture.samples(spp_of_picture(n, &pictures, stage)))?;
+                Ok(picture.replay(ray))
+            }
+            _ => Err(ReplayError::NoRays),
         }
     }
+}
 
-    /// Everything about one ray of the case, for people; `None` if it has no such stage, or no rays of its own.
-    pub fn replay(&self, stage: usize, ray: u64) -> Option<String> {
-        match self.kind {
-            Kind::Rays(plans) => Some((plans().get(stage)?.build)()?.replay(stage, ray)),
-            Kind::Pictures(pictures) => Some(pictures().get(stage)?.replay(ray)),
-            _ => None,
-        }
-    }
+/// Of `n` rays of the case, those of each stage.
+fn rays_of_plan(n: u64, plans: &[Plan]) -> u64 {
+    n.div_ceil(plans.len() as u64).max(64)
+}
+
+/// Of `n` samples of the case, those of each pixel of a picture.
+fn spp_of_picture(n: u64, pictures: &[Picture], i: usize) -> u32 {
+    let usual: u64 = pictures.iter().map(|picture| picture.samples(picture.spp)).sum();
+    // More rays make the noise smaller; fewer than the usual number would let it decide.
+    let spp = f64::from(pictures[i].spp);
+    (spp * (n as f64 / usual as f64)).clamp(spp, 1e8) as u32
 }

@@ -2,6 +2,7 @@
 
 use super::judge::{Judge, Solid, Verdict};
 use super::random::Random;
+use super::replay::{Replay, Told};
 use super::tally::{Tally, hex, hex3};
 use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass, SceneTree};
@@ -148,21 +149,28 @@ impl Stage {
         }
     }
 
-    /// Everything about one ray, for people.
-    pub fn replay(&self, stage: usize, index: u64) -> String {
+    /// Everything about one ray.
+    pub fn replay(&self, stage: usize, index: u64) -> Replay {
         let (Probe { ray, must_hit }, mut random) = self.probe(stage, index);
         let hit = self.scene.closest_hit(&ray);
-        let naive = self.scene.closest_hit_naive(&ray);
-        let mut text = format!("stage  {}\nray    {}\n", self.name, tell(&ray, &hit));
-        text += &format!("       must hit: {must_hit}; any hit: {}\n", self.scene.any_hit(&ray));
-        text += &format!("naive  {naive:?}\njudge  {:?}\n", self.judge.check(&ray, hit.as_ref()));
+        let mut told = Replay::default();
+        told.push("stage", Told::Text(self.name.clone()));
+        told.push_ray("", &ray);
+        told.push("must_hit", Told::Flag(must_hit));
+        told.push("any_hit", Told::Flag(self.scene.any_hit(&ray)));
+        told.push_hit("", hit.as_ref());
+        told.push_hit("naive_", self.scene.closest_hit_naive(&ray).as_ref());
+        told.push_verdict(self.judge.check(&ray, hit.as_ref()));
         if let Some(hit) = &hit {
             let point = self.scene.surface_point(&ray, hit);
-            text += &format!("point  {} ± {}, normal {}\n", point.position, point.error, point.geometric_normal);
+            told.push("point", Told::Vector(point.position));
+            told.push("point_error", Told::Vector(point.error));
+            told.push("normal", Told::Vector(point.geometric_normal));
             let next = self.leaving(&ray, hit, &mut random);
-            text += &format!("next   {}\n", tell(&next, &self.scene.closest_hit(&next)));
+            told.push_ray("next_", &next);
+            told.push_hit("next_", self.scene.closest_hit(&next).as_ref());
         }
-        text
+        told
     }
 }
 

@@ -1,7 +1,11 @@
 //! The nearest point of a mesh: a tree of boxes, searched near side first.
+//!
+//! Boxes lie along the axes, and where that leaves them mostly empty, as with a fan of needles, turned ones beside them
+//! (as in OBB trees, Gottschalk, Lin and Manocha 1996): a point that lies in the boxes of all needles lies in the turned
+//! boxes of a few.
 
 use crate::mesh::Mesh;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Triangles a leaf.
 const LEAF: usize = 4;
@@ -9,6 +13,7 @@ const LEAF: usize = 4;
 #[derive(Debug)]
 pub(super) struct NearestTree {
     nodes: Vec<Node>,
+    frames: Vec<Frame>,
     /// In the order of the leaves.
     triangles: Vec<[DVec3; 3]>,
 }
@@ -21,6 +26,21 @@ struct Node {
     link: u32,
     /// 0 for an inner node.
     count: u32,
+    /// Index of a turned box that is much smaller, or `NONE`.
+    frame: u32,
+}
+
+const NONE: u32 = u32::MAX;
+
+/// A box in a direction of its own.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    /// Rows are the unit axes.
+    axes: DMat3,
+    center: DVec3,
+    /// Along the axes, from the center.
+    min: DVec3,
+    max: DVec3,
 }
 
 impl NearestTree {
@@ -28,14 +48,23 @@ impl NearestTree {
     pub fn build(mesh: &Mesh, offset: DVec3) -> Self {
         let mut triangles: Vec<[DVec3; 3]> =
             (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| p.as_dvec3() + offset)).collect();
-        let nodes = if triangles.is_empty() { Vec::new() } else { build(&mut triangles, 0) };
-        Self { nodes, triangles }
+        if triangles.is_empty() {
+            return Self { nodes: Vec::new(), frames: Vec::new(), triangles };
+        }
+        let Branch { nodes, frames, .. } = build(&mut triangles, 0);
+        Self { nodes, frames, triangles }
     }
 
     /// The squared distance to the nearest point; infinite for an empty mesh.
     ///
     /// - `guess`: the nearest triangle of a point close by, if known; set to this point's.
     pub fn nearest(&self, point: DVec3, guess: &mut Option<u32>) -> f64 {
+        self.search(point, guess, || ())
+    }
+
+    /// - `look`: called for each triangle that is looked at.
+    #[inline(always)]
+    fn search(&self, point: DVec3, guess: &mut Option<u32>, mut look: impl FnMut()) -> f64 {
         let Some(root) = self.nodes.first() else { return f64::INFINITY };
         let mut best = guess.map_or(f64::INFINITY, |t| distance2_to_triangle(point, &self.triangles[t as usize]));
         // Splits halve the count, so 64 levels hold any mesh.
@@ -51,6 +80,7 @@ impl NearestTree {
             let node = &self.nodes[index as usize];
             if node.count > 0 {
                 for t in node.link..node.link + node.count {
+                    look();
                     let distance2 = distance2_to_triangle(point, &self.triangles[t as usize]);
                     if distance2 < best {
                         best = distance2;
@@ -59,7 +89,7 @@ impl NearestTree {
                 }
                 continue;
             }
-            let children = [index + 1, node.link].map(|i| (distance2_to_box(point, &self.nodes[i as usize]), i));
+            let children = [index + 1, node.link].map(|i| (self.bound(point, &self.nodes[i as usize]), i));
             let [near, far] = if children[0].0 <= children[1].0 { children } else { [children[1], children[0]] };
             stack[top] = far;
             stack[top + 1] = near;
@@ -69,33 +99,121 @@ impl NearestTree {
     }
 }
 
-/// Depth-first nodes over `triangles`, which are reordered; `first` is the number of the first of them.
-fn build(triangles: &mut [[DVec3; 3]], first: u32) -> Vec<Node> {
+impl NearestTree {
+    /// No more than the squared distance of a point to what lies below a node.
+    #[inline(always)]
+    fn bound(&self, point: DVec3, node: &Node) -> f64 {
+        let straight = distance2_to_box(point, node);
+        if node.frame == NONE { straight } else { straight.max(self.frames[node.frame as usize].distance2(point)) }
+    }
+}
+
+/// Part of the tree: what lies below one node, depth first.
+struct Branch {
+    nodes: Vec<Node>,
+    frames: Vec<Frame>,
+    /// Of all triangles, doubled.
+    area: f64,
+}
+
+/// Nodes over `triangles`, which are reordered; `first` is the number of the first of them.
+fn build(triangles: &mut [[DVec3; 3]], first: u32) -> Branch {
     let corners = triangles.iter().flatten();
     let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), &p| (min.min(p), max.max(p)));
     let count = triangles.len();
-    if count <= LEAF {
-        return vec![Node { min, max, link: first, count: count as u32 }];
-    }
-    let size = max - min;
-    let axis = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
-    let middle = count / 2;
-    let key = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
-    triangles.select_nth_unstable_by(middle, |p, q| key(p).total_cmp(&key(q)));
-    let (left, right) = triangles.split_at_mut(middle);
-    let second = first + middle as u32;
-    let (left, right) = if count > 4096 {
-        rayon::join(|| build(left, first), || build(right, second))
+    let node = Node { min, max, link: first, count: count as u32, frame: NONE };
+    let mut branch = if count <= LEAF {
+        let area = triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).sum();
+        Branch { nodes: vec![node], frames: Vec::new(), area }
     } else {
-        (build(left, first), build(right, second))
+        // Where the centres differ most, not the corners: needles side by side are long the other way.
+        let size = extent_of_centers(triangles);
+        let axis = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
+        let middle = count / 2;
+        let key = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
+        triangles.select_nth_unstable_by(middle, |p, q| key(p).total_cmp(&key(q)));
+        let (left, right) = triangles.split_at_mut(middle);
+        let second = first + middle as u32;
+        let (left, right) = if count > 4096 {
+            rayon::join(|| build(left, first), || build(right, second))
+        } else {
+            (build(left, first), build(right, second))
+        };
+        join(node, left, right)
     };
-    let shift = left.len() as u32 + 1;
-    let mut nodes = Vec::with_capacity(left.len() + right.len() + 1);
-    nodes.push(Node { min, max, link: shift, count: 0 });
-    let moved = |by: u32| move |node: Node| if node.count == 0 { Node { link: node.link + by, ..node } } else { node };
-    nodes.extend(left.into_iter().map(moved(1)));
-    nodes.extend(right.into_iter().map(moved(shift)));
-    nodes
+    // A surface that fills its box as surfaces do is not looked at any further.
+    let DVec3 { x, y, z } = max - min;
+    let face = (x * y).max(y * z).max(z * x);
+    if 0.5 * branch.area < 0.25 * face
+        && let Some(frame) = Frame::around(triangles, 0.5 * (min + max))
+        && frame.area() < 0.5 * (x * y + y * z + z * x)
+    {
+        branch.nodes[0].frame = branch.frames.len() as u32;
+        branch.frames.push(frame);
+    }
+    branch
+}
+
+/// Sides of the box around the centres, times three.
+fn extent_of_centers(triangles: &[[DVec3; 3]]) -> DVec3 {
+    let centers = triangles.iter().map(|[a, b, c]| *a + *b + *c);
+    let (min, max) = centers.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
+    max - min
+}
+
+fn join(node: Node, left: Branch, right: Branch) -> Branch {
+    let shift = left.nodes.len() as u32 + 1;
+    let shift_frames = left.frames.len() as u32;
+    let moved = |by: u32, frames: u32| {
+        move |node: Node| Node {
+            link: if node.count == 0 { node.link + by } else { node.link },
+            frame: if node.frame == NONE { NONE } else { node.frame + frames },
+            ..node
+        }
+    };
+    let mut nodes = Vec::with_capacity(left.nodes.len() + right.nodes.len() + 1);
+    nodes.push(Node { link: shift, count: 0, ..node });
+    nodes.extend(left.nodes.into_iter().map(moved(1, 0)));
+    nodes.extend(right.nodes.into_iter().map(moved(shift, shift_frames)));
+    let mut frames = left.frames;
+    frames.extend(right.frames);
+    Branch { nodes, frames, area: left.area + right.area }
+}
+
+impl Frame {
+    /// Along the longest edge of the middle triangle, and in its plane; `None` if that has neither.
+    fn around(triangles: &[[DVec3; 3]], center: DVec3) -> Option<Self> {
+        let [a, b, c] = triangles[triangles.len() / 2];
+        let longest =
+            [b - a, c - b, a - c].into_iter().max_by(|p, q| p.length_squared().total_cmp(&q.length_squared()));
+        let along = longest?.try_normalize()?;
+        let normal = (b - a).cross(c - a);
+        // Twice, so that the axes stand on each other to rounding even for a needle.
+        let normal = (normal - along * along.dot(normal)).try_normalize()?;
+        let normal = (normal - along * along.dot(normal)).try_normalize()?;
+        let axes = DMat3::from_cols(along, normal, along.cross(normal)).transpose();
+        let places = triangles.iter().flatten().map(|&p| axes * (p - center));
+        let (min, max) = places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
+        Some(Self { axes, center, min, max })
+    }
+
+    /// Half the surface.
+    fn area(&self) -> f64 {
+        let DVec3 { x, y, z } = self.max - self.min;
+        x * y + y * z + z * x
+    }
+
+    /// No more than the squared distance of a point to anything in the box.
+    #[inline]
+    fn distance2(&self, point: DVec3) -> f64 {
+        let from_center = point - self.center;
+        let place = self.axes * from_center;
+        let outside = (place - place.clamp(self.min, self.max)).abs();
+        // Each number of `place`, and of the corners of the box, is right to four roundings of the lengths that are
+        // multiplied; the axes are as good.
+        let reach = from_center.abs().element_sum() + self.min.abs().max(self.max.abs()).element_sum();
+        (outside - 16.0 * f64::EPSILON * reach).max(DVec3::ZERO).length_squared()
+    }
 }
 
 #[inline]
@@ -159,6 +277,48 @@ mod tests {
             }
             let found = distance2_to_triangle(point, &triangle).sqrt();
             assert!(found <= expected + 1e-12 && expected - found < 0.02, "{point}: {found} {expected}");
+        }
+    }
+
+    /// Needles from one point to all sides: a cone, and the same flat and turned.
+    #[test]
+    fn agrees_with_looking_at_every_needle_and_looks_at_few() {
+        let turned = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.5, 0.9, 0.3);
+        let straight = glam::DQuat::IDENTITY;
+        // The last has its point on the rim.
+        let rim_point = DVec3::new(1.0, 0.0, 0.0);
+        let middle = DVec3::new(0.1, 0.2, 0.0);
+        for (point, height, turn) in
+            [(middle, 0.7, straight), (middle, 0.0, straight), (middle, 0.0, turned), (rim_point, 0.0, straight)]
+        {
+            let n = 2000_u32;
+            let rim = |i: u32| {
+                let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / f64::from(n)).sin_cos();
+                turn * DVec3::new(cos, sin, 0.0)
+            };
+            let points: Vec<DVec3> =
+                std::iter::once(turn * (point + DVec3::Z * height)).chain((0..n).map(rim)).collect();
+            let needles = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
+            let mesh = Mesh::from_f64(&points, needles).unwrap();
+            let tree = NearestTree::build(&mesh, DVec3::ZERO);
+            let (mut looked, queries) = (0, 300_u32);
+            for i in 0..queries {
+                let t = f64::from(i);
+                // Half of them on the surface.
+                let on = mesh.corners(i as usize * 5).map(|p| p.as_dvec3());
+                let on = on[0] + (t * 0.37).fract() * (on[1] - on[0]) * 0.9 + 0.05 * (on[2] - on[0]);
+                let off = DVec3::new((t * 0.37).sin(), (t * 0.71).cos(), (t * 0.13).sin());
+                let point = if i % 2 == 0 { on } else { off };
+                let expected = (0..mesh.triangles.len())
+                    .map(|t| distance2_to_triangle(point, &mesh.corners(t).map(|p| p.as_dvec3())))
+                    .fold(f64::INFINITY, f64::min);
+                // Those inside the cone are about as far from all needles.
+                let found = tree.search(point, &mut None, || looked += u32::from(i % 2 == 0));
+                // Where many needles are as near as rounding can tell, any of them will do.
+                assert!((found.sqrt() - expected.sqrt()).abs() < 1e-12, "{height} {i}: {found:e} {expected:e}");
+            }
+            let points = queries / 2;
+            assert!(10 * looked < n * points, "{height}: {looked} triangles for {points} points, of {n} each");
         }
     }
 

@@ -75,18 +75,26 @@ const ERROR_SAMPLES: usize = 100_000;
 /// The result has normals and texture coordinates if the mesh has them. Without either, vertices at one place are
 /// welded. The same mesh and options give the same bytes with any number of threads.
 pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, SimplifyError> {
+    check_target(target)?;
     let total = mesh.triangles.len();
     let faces = match target {
-        Target::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => return Err(SimplifyError::Ratio(ratio)),
         Target::Ratio(ratio) => ((total as f64 * ratio) as usize).max(1),
-        Target::Faces(0) => return Err(SimplifyError::NoFaces),
         Target::Faces(faces) => faces,
-        Target::Error(error) if !(error > 0.0 && error.is_finite()) => return Err(SimplifyError::Error(error)),
         Target::Error(error) => return within_error(mesh, method, error),
     };
     let mut prepared = prepare(mesh, method)?;
     run(&mut prepared, method, faces, f64::INFINITY, false);
     Ok(finish(mesh, prepared))
+}
+
+/// Whether the target means anything, whatever the mesh.
+pub fn check_target(target: Target) -> Result<(), SimplifyError> {
+    match target {
+        Target::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => Err(SimplifyError::Ratio(ratio)),
+        Target::Faces(0) => Err(SimplifyError::NoFaces),
+        Target::Error(error) if !(error > 0.0 && error.is_finite()) => Err(SimplifyError::Error(error)),
+        _ => Ok(()),
+    }
 }
 
 /// Records all collapses down to as few triangles as `faces`, for a slider: see [`CollapseOrder::mesh_with`].

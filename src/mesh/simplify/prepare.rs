@@ -25,6 +25,9 @@ pub(super) struct Prepared {
     pub scale: f32,
 }
 
+/// Triangles at a vertex that are looked through one by one.
+const FEW: usize = 32;
+
 impl Prepared {
     /// - `with_quadrics`: false leaves them empty.
     pub fn of(mesh: &Mesh, with_quadrics: bool) -> Self {
@@ -52,9 +55,8 @@ impl Prepared {
         };
         prepared.add_wedges(mesh);
         let mut around = Around::of(&prepared.triangles, prepared.positions.len());
-        let (mut kinds, suspicious) = prepared.find_kinds(&around);
-        // Only where three triangles meet at an edge can two of them be the same.
-        if suspicious && prepared.drop_duplicates() {
+        let (mut kinds, has_duplicates) = prepared.find_kinds(&around);
+        if has_duplicates && prepared.drop_duplicates() {
             around = Around::of(&prepared.triangles, prepared.positions.len());
             kinds = prepared.find_kinds(&around).0;
         }
@@ -99,24 +101,29 @@ impl Prepared {
         }
     }
 
-    /// The kind of each vertex, and whether any edge has more than two triangles or two that disagree.
+    /// The kind of each vertex, and whether any triangle is there twice.
     fn find_kinds(&self, around: &Around) -> (Vec<Kind>, bool) {
         let found: Vec<(Kind, bool)> = (0..self.positions.len())
             .into_par_iter()
-            .map_init(Vec::new, |spokes, vertex| self.kind_of(around.corners(vertex), spokes))
+            .map_init(Default::default, |memory, vertex| self.kind_of(around.corners(vertex), memory))
             .collect();
-        let suspicious = found.par_iter().any(|f| f.1);
-        (found.into_iter().map(|f| f.0).collect(), suspicious)
+        let has_duplicates = found.par_iter().any(|f| f.1);
+        (found.into_iter().map(|f| f.0).collect(), has_duplicates)
     }
 
-    /// - `spokes`: working memory.
-    fn kind_of(&self, corners: &[u32], spokes: &mut Vec<Spoke>) -> (Kind, bool) {
+    /// Also whether two of the triangles are the same.
+    ///
+    /// - `memory`: to work in.
+    fn kind_of(&self, corners: &[u32], (spokes, pairs): &mut (Vec<Spoke>, Vec<[u32; 2]>)) -> (Kind, bool) {
         if self.is_inside(corners) {
             return (Kind::Free, false);
         }
         spokes.clear();
+        pairs.clear();
         for &corner in corners {
             let [next, after] = ring(corner);
+            let [p, q] = [next, after].map(|c| self.triangles[c as usize / 3][c as usize % 3]);
+            pairs.push([p.min(q), p.max(q)]);
             for (other, leaves) in [(next, true), (after, false)] {
                 let vertex = self.triangles[other as usize / 3][other as usize % 3];
                 let wedges = if self.corner_wedges.is_empty() {
@@ -128,6 +135,8 @@ impl Prepared {
             }
         }
         spokes.sort_unstable();
+        pairs.sort_unstable();
+        let has_duplicates = pairs.windows(2).any(|pair| pair[0] == pair[1]);
         let (mut lines, mut faulty) = (0, false);
         for edge in spokes.chunk_by(|p, q| p.vertex == q.vertex) {
             match edge {
@@ -142,10 +151,11 @@ impl Prepared {
             2 => Kind::Curve,
             _ => Kind::Fixed,
         };
-        (kind, faulty)
+        (kind, has_duplicates)
     }
 
-    /// Whether the corners are one or more closed fans without a seam; by far the most common case, done fast.
+    /// Whether the corners are one or more closed fans without a seam, none of them one triangle and its back; by far
+    /// the most common case, done fast.
     fn is_inside(&self, corners: &[u32]) -> bool {
         const MAX: usize = 16;
         let count = corners.len();
@@ -159,7 +169,8 @@ impl Prepared {
             (next[i], after[i]) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
         }
         let times = |list: &[u32; MAX], vertex: u32| list[..count].iter().filter(|&&v| v == vertex).count();
-        (0..count).all(|i| times(&next, next[i]) == 1 && times(&after, next[i]) == 1)
+        let has_back = |i: usize| (0..count).any(|k| after[k] == next[i] && next[k] == after[i]);
+        (0..count).all(|i| times(&next, next[i]) == 1 && times(&after, next[i]) == 1 && !has_back(i))
             && (self.corner_wedges.is_empty() || self.has_one_wedge_an_edge(corners, &next, &after))
     }
 
@@ -237,10 +248,16 @@ impl Prepared {
     /// line through it: the triangle's plane and the one that stands on it there.
     fn add_edge_planes(&self, around: &Around, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
         let here = self.positions[vertex].as_dvec3();
+        // To look for each side among all others would take quadratic time at a hub.
+        let sides = (around.corners(vertex).len() > FEW).then(|| self.sorted_sides(around.corners(vertex)));
+        let is_line = |corner: u32, other: u32| match &sides {
+            Some(sides) => self.is_line_among(sides, corner, other),
+            None => self.is_line(around, corner, other),
+        };
         for &corner in around.corners(vertex) {
             for other in ring(corner) {
                 let end = self.triangles[other as usize / 3][other as usize % 3];
-                if self.kinds[end as usize] == Kind::Free || !self.is_line(around, corner, other) {
+                if self.kinds[end as usize] == Kind::Free || !is_line(corner, other) {
                     continue;
                 }
                 let along = self.positions[end as usize].as_dvec3() - here;
@@ -271,6 +288,29 @@ impl Prepared {
             }
         }
         matching != 2
+    }
+
+    /// The sides of triangles at the vertex of these corners: the other end, and the wedges at both.
+    fn sorted_sides(&self, corners: &[u32]) -> Vec<(u32, [u32; 2])> {
+        let pairs = corners.iter().flat_map(|&corner| ring(corner).map(|other| (corner, other)));
+        let mut sides: Vec<_> = pairs.map(|(corner, other)| self.side(corner, other)).collect();
+        sides.sort_unstable();
+        sides
+    }
+
+    fn side(&self, corner: u32, other: u32) -> (u32, [u32; 2]) {
+        let end = self.triangles[other as usize / 3][other as usize % 3];
+        (end, [corner, other].map(|c| self.corner_wedges.get(c as usize).copied().unwrap_or(0)))
+    }
+
+    /// The same as [`Self::is_line`] by a search in what [`Self::sorted_sides`] gave.
+    fn is_line_among(&self, sides: &[(u32, [u32; 2])], corner: u32, other: u32) -> bool {
+        let side = self.side(corner, other);
+        let first = sides.partition_point(|s| s.0 < side.0);
+        // Two alike and no more, and none that differs.
+        let [a, b] = [first, first + 1].map(|i| sides.get(i) == Some(&side));
+        let more = sides.get(first + 2).is_some_and(|s| s.0 == side.0);
+        !(a && b && !more)
     }
 
     fn doubled_area_normal(&self, triangle: &[u32; 3]) -> DVec3 {

@@ -36,6 +36,8 @@ impl Wedge {
 const MAX_VALENCE: u32 = 256;
 /// Cosine of the largest turn of a triangle, about 75°.
 const MIN_TURN: f64 = 0.25;
+/// Corners of dead triangles that a ring list may hold beyond its live ones.
+const MANY_DEAD: usize = 64;
 pub(super) const NONE: u32 = u32::MAX;
 
 #[derive(Debug)]
@@ -138,14 +140,31 @@ impl Surface {
     #[inline]
     pub fn fan(&self, vertex: u32) -> Fan<'_> {
         let first = self.first_corner[vertex as usize];
-        Fan { surface: self, first, corner: first }
+        Fan { surface: self, first, corner: first, dead: 0 }
+    }
+
+    /// The list of [`Self::fan`]. A ring list that is mostly dead corners is rid of them: around what was a hub, every
+    /// walk would go along all that it ever had.
+    #[inline]
+    fn fill_fan(&mut self, vertex: u32, fan: &mut Vec<(u32, u32, u32)>) {
+        fan.clear();
+        let mut walk = self.fan(vertex);
+        fan.extend(walk.by_ref());
+        if walk.dead as usize > MANY_DEAD + fan.len() {
+            for (i, &(corner, ..)) in fan.iter().enumerate() {
+                self.next_corner[corner as usize] = fan[(i + 1) % fan.len()].0;
+            }
+            self.first_corner[vertex as usize] = fan.first().map_or(NONE, |first| first.0);
+        }
     }
 
     /// Calls `f` once for each neighbour.
     pub fn for_each_neighbor(&mut self, vertex: u32, mut f: impl FnMut(u32)) {
         let stamp = self.new_stamps(1);
+        let mut fan = std::mem::take(&mut self.fans[0]);
+        self.fill_fan(vertex, &mut fan);
         let mut marks = std::mem::take(&mut self.marks);
-        for (_, b, c) in self.fan(vertex) {
+        for &(_, b, c) in &fan {
             for other in [b, c] {
                 if marks[other as usize] != stamp {
                     marks[other as usize] = stamp;
@@ -154,6 +173,7 @@ impl Surface {
             }
         }
         self.marks = marks;
+        self.fans[0] = fan;
     }
 
     /// Whether `from` may go into `to` and both be at `position`; keeps what [`Self::collapse`] needs to know.
@@ -169,8 +189,7 @@ impl Surface {
         // Walked once: all else goes along these lists.
         let mut fans = std::mem::take(&mut self.fans);
         for (fan, vertex) in fans.iter_mut().zip([from, to]) {
-            fan.clear();
-            fan.extend(self.fan(vertex));
+            self.fill_fan(vertex, fan);
         }
         let shared = self.shared_if_linked(from, to, &fans);
         let allowed = shared.is_some_and(|shared| {
@@ -335,6 +354,8 @@ pub(super) struct Fan<'a> {
     surface: &'a Surface,
     first: u32,
     corner: u32,
+    /// Corners of dead triangles that were skipped.
+    dead: u32,
 }
 
 impl Iterator for Fan<'_> {
@@ -357,6 +378,7 @@ impl Iterator for Fan<'_> {
                 };
                 return Some((corner, b, c));
             }
+            self.dead += 1;
         }
         None
     }

@@ -44,7 +44,7 @@ pub fn develop(film: &Film, display: &Display, width: u32, height: u32, rgba: &m
     if (width, height) == (film.width(), film.height()) {
         return develop_film(set, film, display, rgba);
     }
-    let mut small = vec![255; 4 * (film.width() * film.height()) as usize];
+    let mut small = vec![255; 4 * film.width() as usize * film.height() as usize];
     develop_film(set, film, display, &mut small);
     scale::scale(set, &small, [film.width(), film.height()], [width, height], rgba);
 }

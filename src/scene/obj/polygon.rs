@@ -2,21 +2,26 @@
 
 use glam::{DVec2, DVec3};
 
-/// Above this many corners a polygon is cut as a fan: clipping ears takes quadratic time.
+/// Above this many corners a polygon is halved again and again: clipping ears takes quadratic time, and a fan would have
+/// needles without number at one vertex, which is hard on whatever comes after.
 const MAX_EARS: usize = 1024;
 
 /// Cuts a polygon with at least 3 corners into `corners.len() - 2` triangles of indices into it, same orientation.
 ///
 /// Convex polygons become fans. Others lose one ear after another (Meisters 1975) in the plane of their Newell
-/// normal; what crosses itself or has no area falls back to the fan, so nothing fails.
+/// normal; what crosses itself or has no area falls back to the fan, so nothing fails. With more than [`MAX_EARS`]
+/// corners the polygon is taken for convex: a triangle on its two halves, and so on with each of them.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
     let count = corners.len();
     let fan = |from: &[usize], out: &mut Vec<[usize; 3]>| {
         out.extend((1..from.len().saturating_sub(1)).map(|i| [from[0], from[i], from[i + 1]]));
     };
     let all: Vec<usize> = (0..count).collect();
-    if count == 3 || count > MAX_EARS {
+    if count == 3 {
         return fan(&all, triangles);
+    }
+    if count > MAX_EARS {
+        return halve(0, count - 1, triangles);
     }
     // Corners relative to the first one: far from the origin the products below would lose their digits.
     let origin = corners[0];
@@ -47,6 +52,16 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
         ring.remove(ear);
     }
     fan(&ring, triangles);
+}
+
+/// Cuts the polygon of the corners `first..=last`: no corner gets more than two triangles a halving.
+fn halve(first: usize, last: usize, triangles: &mut Vec<[usize; 3]>) {
+    if last - first >= 2 {
+        let middle = first.midpoint(last);
+        triangles.push([first, middle, last]);
+        halve(first, middle, triangles);
+        halve(middle, last, triangles);
+    }
 }
 
 #[cfg(test)]
@@ -99,6 +114,31 @@ mod tests {
             assert!((found - 11.0).abs() < 1e-8, "start {start}: {found}");
             assert_eq!(triangles.len(), 10);
         }
+    }
+
+    #[test]
+    fn a_polygon_of_very_many_corners_has_no_hub_and_keeps_its_area() {
+        let count = 100_000;
+        let corner = |i: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * i as f64 / count as f64).sin_cos();
+            DVec3::new(cos + 3.0, sin - 2.0, 7.0)
+        };
+        let corners: Vec<DVec3> = (0..count).map(corner).collect();
+        let (found, triangles) = area(&corners);
+        assert!((found - std::f64::consts::PI).abs() < 1e-8, "{found}");
+        assert_eq!(triangles.len(), count - 2);
+        let mut valence = vec![0; count];
+        triangles.iter().flatten().for_each(|&i| valence[i] += 1);
+        assert!(valence.iter().all(|n| (1..=40).contains(n)), "{:?}", valence.iter().max());
+        // Each side of the polygon lies at one triangle, and all other edges at two that run along them both ways.
+        let mut sides = std::collections::HashMap::new();
+        for [a, b, c] in triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                assert!(sides.insert((from, to), ()).is_none(), "{from} {to} twice");
+            }
+        }
+        let open: Vec<_> = sides.keys().filter(|(a, b)| !sides.contains_key(&(*b, *a))).collect();
+        assert!(open.len() == count && open.iter().all(|(a, b)| (a + 1) % count == *b));
     }
 
     #[test]

@@ -1,0 +1,80 @@
+//! What lasts, told to whoever waits: a line every few seconds, on a terminal and off it.
+
+use super::console::remark;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Tells what is being done while this lives.
+pub struct Waiting {
+    stages: Option<Sender<String>>,
+    teller: Option<JoinHandle<()>>,
+}
+
+impl Waiting {
+    /// Time between two lines; what is done sooner is not told at all.
+    const EVERY: Duration = Duration::from_secs(5);
+
+    pub fn new(stage: impl Into<String>) -> Self {
+        Self::telling(stage, Self::EVERY, remark)
+    }
+
+    fn telling(stage: impl Into<String>, every: Duration, tell: impl Fn(String) + Send + 'static) -> Self {
+        let (stages, news) = mpsc::channel();
+        let start = Instant::now();
+        let (mut stage, mut next) = (stage.into(), start + every);
+        let work = move || {
+            loop {
+                match news.recv_timeout(next.saturating_duration_since(Instant::now())) {
+                    Ok(new) => stage = new,
+                    Err(RecvTimeoutError::Disconnected) => return,
+                    Err(RecvTimeoutError::Timeout) => {
+                        tell(format!("{:.0} s: {stage}", start.elapsed().as_secs_f64()));
+                        next += every;
+                    }
+                }
+            }
+        };
+        // Without a thread for it there is no telling, and the work is done all the same.
+        let teller = std::thread::Builder::new().name("waiting".to_owned()).spawn(work).ok();
+        Self { stages: Some(stages), teller }
+    }
+
+    /// What is done from now on.
+    pub fn next(&self, stage: impl Into<String>) {
+        if let Some(stages) = &self.stages {
+            // Nobody listens where there is no thread.
+            let _ = stages.send(stage.into());
+        }
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.stages = None;
+        if let Some(teller) = self.teller.take() {
+            // It has nothing to fail at but a panic, which has been told.
+            let _ = teller.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lasts_is_told_again_and_again_and_then_no_more() {
+        let (sender, lines) = mpsc::channel();
+        let waiting = Waiting::telling("reading", Duration::from_millis(5), move |line| {
+            // Whoever has heard enough is gone.
+            let _ = sender.send(line);
+        });
+        let heard = |what: &str| (0..1000).any(|_| lines.recv().expect("it tells on").ends_with(what));
+        assert!(heard("s: reading") && heard("s: reading"));
+        waiting.next("writing");
+        assert!(heard("s: writing"));
+        drop(waiting);
+        assert!(lines.iter().all(|line| line.ends_with("s: writing")), "and ends");
+    }
+}
