@@ -136,8 +136,13 @@ impl Simd for Avx2 {
 }
 
 /// For each child its plane's number: from `upper` where the bit is set, else from `lower`.
+///
+/// # Safety
+///
+/// The processor must have AVX2.
 #[inline(always)]
 unsafe fn sides<const UPPER: i32>(lower: __m256, planes: __m256i, upper: __m256) -> __m256 {
+    // SAFETY: the caller sees to it that the processor has AVX2; registers alone are read.
     unsafe {
         let (lower, upper) = (_mm256_permutevar8x32_ps(lower, planes), _mm256_permutevar8x32_ps(upper, planes));
         _mm256_blend_ps::<UPPER>(lower, upper)
