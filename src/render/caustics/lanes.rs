@@ -197,7 +197,7 @@ impl<S: Simd> Step<'_, S> {
         let &Self { at, place, ref sampler, dimension, .. } = self;
         let normal = place.geometric_normal;
         let surface = surface_of::<S, KIND>(s, at, place);
-        let bounce = sample::<S, KIND>(s, at, &surface, place, &HintLanes::NONE, sampler, dimension, self.media);
+        let bounce = sample::<S, KIND>(at, &surface, place, &HintLanes::NONE, sampler, dimension, self.media);
         let (along, wi) = (bounce.wi.dot(normal), bounce.wi);
         let smooth = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();

@@ -175,7 +175,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                 }
             }
         }
-        let bounce = sample::<S, KIND>(s, &at, &surface, &place, &hints, &sampler, dimension, &media);
+        let bounce = sample::<S, KIND>(&at, &surface, &place, &hints, &sampler, dimension, &media);
         let bounce = hints.follow::<S, KIND>(s, &surface, &place, &sampler, dimension, bounce);
         let beyond = bounce.wi.dot(place.geometric_normal).is_negative();
         let reached = bounce.wi.dot(place.reach_normal).is_positive();

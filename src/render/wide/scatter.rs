@@ -109,7 +109,6 @@ pub(in crate::render) fn eval<S: Simd, const KIND: usize>(
 
 #[inline(always)]
 pub(in crate::render) fn sample<S: Simd, const KIND: usize>(
-    s: S,
     at: &At<S>,
     surface: &Surface<S>,
     place: &Place<S>,
@@ -118,6 +117,7 @@ pub(in crate::render) fn sample<S: Simd, const KIND: usize>(
     dimension: u32,
     media: &[MediumStack; LANES],
 ) -> Bounce<S> {
+    let s = at.index.s;
     let infinite = Float::splat(s, f32::INFINITY);
     let normal = place.normal;
     let cos_o = normal.dot(place.wo);
