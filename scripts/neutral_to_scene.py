@@ -161,11 +161,20 @@ class Converter:
             for part in (blend["a"], blend["b"]):
                 if part not in self.scene["materials"]:
                     raise Refused(f"{where}: material {part!r} is not defined")
+            if self.holds(name, blend["a"]) or self.holds(name, blend["b"]):
+                raise Refused(f"{where}: is a part of itself")
             weight = number(where + ".weight", blend["weight"])
             said = f"blend(weight: {weight}, a: {text(blend['a'])}, b: {text(blend['b'])})"
         else:
             raise Refused(f"{where}: unknown type {kind!r}")
         return f"        {text(name)}: {said},"
+
+    def holds(self, name, part, seen=()):
+        """Whether a material is this part, or one of the parts that it is blended of."""
+        value = self.scene["materials"].get(part)
+        if part == name or part in seen or not isinstance(value, dict):
+            return part == name
+        return any(self.holds(name, value.get(key), (*seen, part)) for key in "ab" if isinstance(value.get(key), str))
 
     def uses_texture(self, name):
         value = self.scene["materials"][name]

@@ -340,7 +340,8 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     } else if std::io::stderr().is_terminal() {
         let (output, (width, height)) = (args.output.display(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
-        remark(format_args!("{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s"));
+        let error = error.map_or(String::new(), |error| format!(", error about {:.2} %", 100.0 * error));
+        remark(format_args!("{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}"));
     }
     match (stopped, film_path) {
         (false, _) => Ok(()),

@@ -9,7 +9,7 @@ use firstlight::report::{
     summary_text,
 };
 use firstlight::scene::whole_file::write_whole;
-use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs};
+use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs, Trees};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -102,7 +102,8 @@ fn measure_all(args: &ReportArgs, names: &[String], given: Option<&Reference>) -
 /// A scene, ready to be rendered.
 struct Prepared {
     title: String,
-    snapshot: Snapshot,
+    inputs: SceneInputs,
+    trees: Trees,
     settings: RenderSettings,
     developing: Developing,
     size: (u32, u32),
@@ -113,7 +114,8 @@ impl Prepared {
     fn new(args: &ReportArgs, scene: &LoadedScene, given: Option<&Reference>) -> Result<Self, Failure> {
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
-        let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
+        let inputs = SceneInputs::of(&mut world);
+        let extraction = Extraction::new(&inputs, &scene.trees);
         for problem in &extraction.problems {
             remark(format_args!("warning: {problem}"));
         }
@@ -135,7 +137,8 @@ impl Prepared {
         let settings = RenderSettings { seed: args.seed, ..world.resource::<Rendering>().0 };
         Ok(Self {
             title: scene.source.title(),
-            snapshot: extraction.snapshot,
+            inputs,
+            trees: scene.trees.clone(),
             settings,
             developing: *world.resource(),
             size,
@@ -188,10 +191,16 @@ impl Prepared {
         }
     }
 
+    /// A new one each time: what a render finds out about a scene and keeps (where caustics come from) must be found out,
+    /// and paid for, by each.
+    fn snapshot(&self) -> Snapshot {
+        Extraction::new(&self.inputs, &self.trees).snapshot
+    }
+
     fn climb(&self, limits: Limits, techniques: Techniques, what: &str, progress: &mut Progress) -> Vec<Rung> {
         let settings = RenderSettings { techniques, ..self.settings };
         let mut tell = progress.task(format!("{}, {what}", self.title), Progress::LADDER, self.size);
-        climb(&self.snapshot, &settings, self.size, limits, &mut tell)
+        climb(&self.snapshot(), &settings, self.size, limits, &mut tell)
     }
 
     fn reference(&self, spp: u32, progress: &mut Progress) -> Reference {
@@ -202,7 +211,7 @@ impl Prepared {
             tell(1.0);
             return kept;
         }
-        let (reference, trouble) = store.make(&self.key, &self.snapshot, &self.settings, spp, &mut tell);
+        let (reference, trouble) = store.make(&self.key, &self.snapshot(), &self.settings, spp, &mut tell);
         if let Some(trouble) = trouble {
             remark(format_args!("warning: {trouble}"));
         }

@@ -129,9 +129,10 @@ impl Step {
         self.distance.relative_mse.sqrt()
     }
 
-    /// What the renderer believed over what is true; 1 is perfect.
+    /// What the renderer believed over what is true; 1 is perfect. `None` where nothing is wrong.
     pub fn calibration(&self) -> Option<f64> {
-        self.estimate.map(|estimate| estimate.relative / self.error())
+        let estimate = self.estimate.filter(|_| self.error() > 0.0);
+        estimate.map(|estimate| estimate.relative / self.error())
     }
 
     /// relMSE times seconds: with independent samples the same at every step; smaller is better.

@@ -209,14 +209,14 @@ fn steps_table(ladder: &Ladder) -> String {
     let mut rows = String::new();
     for step in &ladder.steps {
         let estimate = step.estimate.map_or("<td>–</td><td>–</td>".to_owned(), |e| {
-            let ratio = e.relative / step.error();
+            let interval = format!("{} ({} – {})", percent(e.relative), percent(e.low), percent(e.high));
+            let Some(ratio) = step.calibration() else { return format!("<td>{interval}</td><td>–</td>") };
             // Below 16 samples nothing is promised.
             let class = match (step.spp >= 16, (1.0 / CALIBRATION..=CALIBRATION).contains(&ratio)) {
                 (false, _) => "soft",
                 (true, true) => "good",
                 (true, false) => "bad",
             };
-            let interval = format!("{} ({} – {})", percent(e.relative), percent(e.low), percent(e.high));
             format!("<td>{interval}</td><td class=\"{class}\">{ratio:.2}</td>")
         });
         let _ = writeln!(
