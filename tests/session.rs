@@ -1,6 +1,6 @@
 //! A session as a window drives it: pictures come, changes cancel, loading goes on beside, and at the end it sleeps.
 
-use firstlight::frame::{Command, MessageKind, Session, SessionOptions, StopAt, Target, render_offline};
+use firstlight::frame::{Command, MessageKind, Session, SessionOptions, Status, StopAt, Target, render_offline};
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::render::Film;
 use firstlight::scene::{
@@ -228,7 +228,10 @@ fn a_hasty_tree_gives_way_to_a_better_one_and_no_sample_is_lost() {
 fn the_number_of_threads_changes_live_and_nothing_else_does() {
     let mut driver = Driver::new(48, 48, spp(32));
     driver.open("cornell-balls");
-    driver.run_until(|session| session.picture().number > 0);
+    // The scene's own picture, not that of the empty world before it.
+    let is_there =
+        |status: &Status| status.scene.contains("cornell-balls") && status.loading.is_none() && status.spp > 0;
+    driver.run_until(|session| is_there(session.status()));
     let restarts = driver.session.status().restarts;
     for (step, threads) in [1, 3, 2, 1, 2].into_iter().enumerate() {
         // Also when there is nothing left to do.
