@@ -3,20 +3,19 @@
 //! Each scene is rendered twice in turns, as it is and with loops that are told that it might also have glass, absorbing
 //! media, textures and surroundings that shine. The pictures must be the same. `-- [SCENE]...` measures other scenes.
 
+mod common;
+
+use common::{scenes, world_of};
 use firstlight::render::{Features, Film, RenderSettings, Snapshot, advance};
 use firstlight::report::cpu_seconds;
-use firstlight::scene::{BUILTIN_SCENES, Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
+use firstlight::scene::{BUILTIN_SCENES, Extraction, Rendering, SceneInputs};
 use std::sync::Arc;
 
 const ROUNDS: usize = 9;
 const SPP: u32 = 16;
 
 fn main() {
-    // Cargo itself adds `--bench`.
-    let mut scenes: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
-    if scenes.is_empty() {
-        scenes = BUILTIN_SCENES.iter().map(|(name, _, _)| (*name).to_owned()).collect();
-    }
+    let scenes = scenes(|| BUILTIN_SCENES.iter().map(|(name, _, _)| (*name).to_owned()).collect());
     println!("| scene | uses | CPU s | told of everything | times as long |");
     println!("|---|---|---:|---:|---:|");
     for scene in &scenes {
@@ -25,10 +24,7 @@ fn main() {
 }
 
 fn row(name: &str) {
-    let source = SceneSource::parse(name).unwrap_or_else(|error| panic!("{error}"));
-    let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    let mut world = bevy_ecs::world::World::new();
-    scene.spawn(&mut world);
+    let (scene, mut world) = world_of(name);
     let settings = world.resource::<Rendering>().0;
     let inputs = SceneInputs::of(&mut world);
     let [needed, mut everything] = [(), ()].map(|()| Extraction::new(&inputs, &scene.trees).snapshot);

@@ -3,9 +3,12 @@
 //! `-- [SCENE]...` measures other scenes, built-in or files, at the size that each asks for. The median of many
 //! frames with their range, on all threads of the pool (`RAYON_NUM_THREADS`), and the CPU time of one.
 
+mod common;
+
+use common::{scenes, world_of};
 use firstlight::render::{Film, Integrator, RenderSettings, Snapshot, advance};
 use firstlight::report::cpu_seconds;
-use firstlight::scene::{Extraction, FilmSize, LoadOptions, SceneInputs, SceneSource, load};
+use firstlight::scene::{Extraction, FilmSize, SceneInputs};
 use std::time::Instant;
 
 /// Two mirrors across a corner and balls before them, on a matte checkered floor.
@@ -37,12 +40,10 @@ fn main() {
     let folder = tempfile::tempdir().expect("a folder for temporary files");
     let mirrors = folder.path().join("mirrors and balls.ron");
     std::fs::write(&mirrors, MIRRORS).expect("a file can be written there");
-    // Cargo itself adds `--bench`.
-    let mut scenes: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
-    if scenes.is_empty() {
+    let scenes = scenes(|| {
         let own = mirrors.display().to_string();
-        scenes = [own.as_str(), "ten-thousand-balls", "kd-tree", "ball"].map(str::to_owned).to_vec();
-    }
+        [own.as_str(), "ten-thousand-balls", "kd-tree", "ball"].map(str::to_owned).to_vec()
+    });
     println!("threads: {}", rayon::current_num_threads());
     println!("| scene | size | frames/s (range) | CPU s a frame | rays a pixel | ns a ray |");
     println!("|---|---|---:|---:|---:|---:|");
@@ -52,10 +53,7 @@ fn main() {
 }
 
 fn row(name: &str) {
-    let source = SceneSource::parse(name).unwrap_or_else(|error| panic!("{error}"));
-    let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    let mut world = bevy_ecs::world::World::new();
-    scene.spawn(&mut world);
+    let (scene, mut world) = world_of(name);
     let size = *world.resource::<FilmSize>();
     let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
     frame(&snapshot, size);

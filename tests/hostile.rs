@@ -5,7 +5,10 @@
 
 #[path = "../fuzz/drive.rs"]
 mod drive;
+#[path = "common/random.rs"]
+mod random;
 
+use random::Random;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -39,22 +42,6 @@ static ALLOCATOR: Counting = Counting;
 
 /// One format at a time, for memory is counted for the whole process.
 static ALONE: Mutex<()> = Mutex::new(());
-
-/// A small generator with a fixed sequence for each seed (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
-}
 
 /// What numbers turn into.
 const NUMBERS: [&[u8]; 16] = [

@@ -1,34 +1,19 @@
 //! Every tree, every preset and every traversal against trying all primitives: the same bits.
 
+#[path = "common/random.rs"]
+mod random;
+
 use firstlight::geometry::{Ray, robust::offset_ray_origin};
 use firstlight::kdtree::{
     BuildPreset, Hit, HitBatch, InstructionSet, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree,
 };
 use glam::{Affine3A, EulerRot, Quat, Vec3, vec3};
+use random::Random;
 use std::sync::Arc;
 
 const PRESETS: [BuildPreset; 3] = [BuildPreset::Quick, BuildPreset::Best, BuildPreset::Median];
 
-/// A small generator with a fixed sequence for each seed (SplitMix64).
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-
-    /// In -1..1.
-    fn signed(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    }
-
     fn point(&mut self) -> Vec3 {
         vec3(self.signed(), self.signed(), self.signed())
     }

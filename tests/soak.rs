@@ -2,30 +2,13 @@
 //!
 //! `FIRSTLIGHT_SOAK_SECONDS`: how long it is flown, instead of a few seconds.
 
+#[path = "common/random.rs"]
+mod random;
+
 use firstlight::frame::{Command as Do, MessageKind, Session, SessionOptions};
 use firstlight::scene::SceneSource;
+use random::Random;
 use std::time::{Duration, Instant};
-
-/// A small generator with a fixed sequence (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
-    }
-
-    /// In -1..1.
-    fn signed(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
 
 /// Resident memory in bytes.
 #[cfg(target_os = "linux")]
@@ -36,11 +19,11 @@ fn resident() -> u64 {
 
 /// One thing that somebody at the window may do, sensible or not.
 fn whim(random: &mut Random) -> Do {
-    let (a, b) = (random.signed(), random.signed());
+    let (a, b) = (f64::from(random.signed()), f64::from(random.signed()));
     let scenes = ["cornell", "glass-balls", "dof-balls", "veach-mis", "soft-shadow", "no-such-scene", "broken.obj"];
     match random.below(24) {
         0..3 => Do::Turn { yaw_deg: 400.0 * a, pitch_deg: 100.0 * b },
-        3..6 => Do::Fly { right: a, up: b, forward: 10.0 * random.signed() },
+        3..6 => Do::Fly { right: a, up: b, forward: 10.0 * f64::from(random.signed()) },
         6..8 => Do::Orbit { yaw_deg: 90.0 * a, pitch_deg: 200.0 * b },
         8 => Do::Pan { right: a, up: b },
         9 => Do::Dolly { factor: (20.0 * a).exp() },
@@ -55,8 +38,8 @@ fn whim(random: &mut Random) -> Do {
         18 => Do::SetExposure { stops: 200.0 * a as f32 },
         19 => Do::NextToneCurve,
         20..22 => Do::Resize { width: random.below(130) as u32, height: random.below(90) as u32 },
-        22 => Do::SetThreads { threads: 1 + random.below(4) as usize },
-        _ => Do::Open { path: scenes[random.below(scenes.len() as u64) as usize].into() },
+        22 => Do::SetThreads { threads: 1 + random.below(4) },
+        _ => Do::Open { path: scenes[random.below(scenes.len())].into() },
     }
 }
 
@@ -74,10 +57,8 @@ fn a_session_survives_whatever_is_done_to_it_without_growing() {
             session.send(whim(&mut random));
         }
         if random.below(40) == 0 {
-            session.send(
-                [Do::Pause, Do::Resume, Do::Restart, Do::Level, Do::ToggleDepthOfField][random.below(5) as usize]
-                    .clone(),
-            );
+            session
+                .send([Do::Pause, Do::Resume, Do::Restart, Do::Level, Do::ToggleDepthOfField][random.below(5)].clone());
             session.send(Do::Resume);
         }
         session.update(start.elapsed());

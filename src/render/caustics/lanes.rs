@@ -5,7 +5,8 @@
 
 use super::CausticPass;
 use super::aim::NO_CASTER;
-use super::trace::{Arrivals, DIM_LENS, DIM_ROULETTE, most_kept};
+use super::arrivals::Arrivals;
+use super::trace::{DIM_LENS, DIM_ROULETTE, most_kept};
 use crate::kdtree::{Hit, HitBatch, InstructionSet};
 use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
 use crate::render::Camera;

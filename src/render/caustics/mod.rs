@@ -3,7 +3,7 @@
 //! A path that starts at the eye finds such light only when a bounce off the matte surface happens to go through the
 //! glass and on to the lamp. So paths are traced from the lamps as well, aimed at what is smooth enough to gather
 //! light ([`aim`]); from every matte or rough vertex that they come to, they are joined to a point of the lens and
-//! their light is added to the pixels that see it ([`trace`], [`layer`]). Both ways find the same light: all paths whose
+//! their light is added to the pixels that see it ([`trace`], [`lanes`], [`layer`]). Both ways find the same light: all paths whose
 //! first vertex from the eye scatters in all directions and whose last before the lamp is perfectly smooth. Each is
 //! weighted by the power heuristic ([`weight`]), so the mean of the picture stays as it is. What is seen in a mirror or
 //! through glass cannot be joined to the lens: there, paths from the eye are told the way ([`guide`]).
@@ -12,6 +12,7 @@
 //! Start reading at [`CausticPass`].
 
 mod aim;
+mod arrivals;
 mod guide;
 mod lanes;
 mod layer;

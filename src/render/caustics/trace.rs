@@ -6,14 +6,14 @@
 //! own are taken sixteen at a time ([`super::lanes`]).
 
 use super::aim::LINE_DIMENSIONS;
+use super::arrivals::Arrivals;
 use super::guide::Trace;
 use super::lanes::{self, Group};
 use super::layer::Splat;
 use super::weight::{Bounce, Track, etendue_gain, is_reversible};
 use super::{CausticPass, aim};
 use crate::geometry::Ray;
-use crate::kdtree::{Hit, HitBatch, InstructionSet, RayBatch, RayClass, append};
-use crate::lanes::{Float, LANES, Mask, Simd, Vector};
+use crate::kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use crate::render::bsdf::{Blend, BsdfSample, Lobe, Scatter};
 use crate::render::medium::MediumStack;
 use crate::render::path::{DIM_DIRECTION, DIM_LOBE};
@@ -82,59 +82,6 @@ pub(super) struct LightWave {
     together: Vec<u32>,
     apart: Vec<u32>,
     arrivals: Arrivals,
-}
-
-/// Shadow rays to the lens, where in the film each leads, and with how much light.
-#[derive(Default)]
-pub(super) struct Arrivals {
-    rays: RayBatch,
-    film: [Vec<f32>; 2],
-    light: [Vec<f32>; 3],
-    occluded: Vec<bool>,
-}
-
-impl Arrivals {
-    /// Forgets all rays; there is room for `n` new ones afterwards.
-    fn start(&mut self, n: usize) {
-        self.rays.clear();
-        self.rays.make_room(n);
-        let least = n + LANES;
-        for array in self.film.iter_mut().chain(&mut self.light) {
-            if array.len() < least {
-                array.resize(least, 0.0);
-            }
-        }
-    }
-
-    fn push(&mut self, ray: &Ray, film: Vec2, light: Vec3) {
-        let i = self.rays.len();
-        self.film.iter_mut().zip(film.to_array()).for_each(|(array, x)| array[i] = x);
-        self.light.iter_mut().zip(light.to_array()).for_each(|(array, x)| array[i] = x);
-        self.rays.push(ray);
-    }
-
-    /// The same of the lanes of `mask`, whose rays end where `dir` does.
-    #[inline(always)]
-    pub fn append<S: Simd>(
-        &mut self,
-        mask: Mask,
-        [origin, dir]: [Vector<S>; 2],
-        film: [Float<S>; 2],
-        light: Vector<S>,
-    ) {
-        let at = self.rays.len();
-        append(&mut self.film[0], at, mask, film[0]);
-        append(&mut self.film[1], at, mask, film[1]);
-        append(&mut self.light[0], at, mask, light.x);
-        append(&mut self.light[1], at, mask, light.y);
-        append(&mut self.light[2], at, mask, light.z);
-        self.rays.append(mask, origin, dir, light.x.all(1.0));
-    }
-
-    fn get(&self, i: usize) -> (Vec2, Vec3) {
-        let [x, y, z] = &self.light;
-        (Vec2::new(self.film[0][i], self.film[1][i]), Vec3::new(x[i], y[i], z[i]))
-    }
 }
 
 /// One of the two kinds of scattering of a surface.
