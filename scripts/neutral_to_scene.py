@@ -3,253 +3,427 @@
 
     scripts/neutral_to_scene.py SCENE.json [-o SCENE.ron]
 
-Every field is either carried over or refused with its name: a scene that converts is the same scene. Paths of meshes
-and textures are written relative to the new file. Needs Python 3.8 and nothing else.
+Every field is either carried over or refused with its name: a scene that converts is the same scene, and firstlight
+takes it. A refusal is one line on the error output with exit status 1, and nothing is written. Paths of meshes and
+textures are written relative to the new file. Needs Python 3.8 and nothing else.
 """
 
 import argparse
 import json
 import math
 import os
+import struct
 import sys
+import zlib
 
 
 class Refused(Exception):
-    """Something in the file that the scene format cannot say, with the place where it stands."""
+    """Something in the file that is wrong or that cannot be said, with the place where it stands."""
 
 
-def fields(where, value, required, optional=()):
-    """The named fields of a JSON object; anything missing or unknown is refused."""
-    if not isinstance(value, dict):
-        raise Refused(f"{where}: expected an object, found {value!r}")
-    missing = [name for name in required if name not in value]
-    unknown = [name for name in value if name not in required and name not in optional]
-    if missing:
-        raise Refused(f"{where}: `{missing[0]}` is missing")
-    if unknown:
-        known = ", ".join(f"`{name}`" for name in (*required, *optional))
-        raise Refused(f"{where}: unknown field `{unknown[0]}` (known: {known})")
+# ---- Single values: each takes the place where a value stands and the value, and gives the text of the scene file. ----
+
+LARGEST = 1e12  # Metres that firstlight takes, and what it takes for a length that is not there.
+SMALLEST = 1e-12
+LARGEST_LIGHT = 3.4e38  # Radiance is kept in 32-bit floats.
+
+
+def quantity(where, value):
+    try:
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise Refused(f"{where}: expected a finite number, found {brief(value)}")
+    except OverflowError:
+        raise Refused(f"{where}: the number is too large") from None
     return value
 
 
-def number(where, value):
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise Refused(f"{where}: expected a finite number, found {value!r}")
-    return repr(value)
+def number(holds, rule):
+    """A reader of numbers that `holds` takes; `rule` says which in words."""
+    def read(where, value):
+        if not holds(quantity(where, value)):
+            raise Refused(f"{where} is {brief(value)}, but must be {rule}")
+        return repr(value if abs(value) < 2**53 else float(value))
+    return read
 
 
-def vector(where, value, n=3):
-    if not isinstance(value, list) or len(value) != n:
-        raise Refused(f"{where}: expected {n} numbers, found {value!r}")
-    return "(" + ", ".join(number(where, x) for x in value) + ")"
+def vector(one, n=3):
+    """A reader of lists of `n` values, each of them as `one` says."""
+    def read(where, value):
+        if not isinstance(value, list) or len(value) != n:
+            raise Refused(f"{where}: expected a list of {n} numbers, found {brief(value)}")
+        return "(" + ", ".join(one(where, x) for x in value) + ")"
+    return read
 
 
-def whole(where, value):
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise Refused(f"{where}: expected a whole number from 1 on, found {value!r}")
-    return repr(value)
+def whole(where, value, high):
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= high:
+        raise Refused(f"{where}: expected a whole number from 1 to {high}, found {brief(value)}")
+    return str(value)
 
 
-def kind_of(where, value):
+def string(where, value):
+    """Text on one line."""
+    if not isinstance(value, str):
+        raise Refused(f"{where}: expected text, found {brief(value)}")
+    if any(ord(c) < 32 or 0xD800 <= ord(c) < 0xE000 for c in value):
+        raise Refused(f"{where}: {value!a} has a character that cannot stand in a name")
+    return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def truth(where, value):
+    if not isinstance(value, bool):
+        raise Refused(f"{where}: expected true or false, found {brief(value)}")
+    return value
+
+
+any_number = number(lambda x: -LARGEST <= x <= LARGEST, "within 1e12")
+point = vector(any_number)
+size = number(lambda x: SMALLEST <= x <= LARGEST, "above 0 (1e-12 to 1e12 m)")
+share = number(lambda x: 0 <= x <= 1, "between 0 and 1")
+shares = vector(share)
+light = vector(number(lambda x: 0 <= x <= LARGEST_LIGHT, "0 or more, and finite in 32 bits"))
+
+
+def brief(value):
+    said = ascii(value)
+    return said if len(said) <= 60 else said[:57] + "..."
+
+
+def length(a):
+    return math.sqrt(sum(x * x for x in a))
+
+
+def cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+# ---- Objects of the file: which fields they have. ----
+
+def fields(where, value, required, optional=()):
+    """A JSON object with these fields; anything missing or unknown is refused."""
     if not isinstance(value, dict):
-        raise Refused(f"{where}: expected an object, found {value!r}")
-    return value.get("type")
+        raise Refused(f"{where}: expected an object, found {brief(value)}")
+    for name in required:
+        if name not in value:
+            raise Refused(f"{where}: `{name}` is missing")
+    for name in value:
+        if name not in required and name not in optional:
+            known = ", ".join(f"`{name}`" for name in (*required, *optional))
+            raise Refused(f"{where}: unknown field `{brief(name)[1:-1]}` (known: {known})")
+    return value
 
 
-def text(value):
-    return json.dumps(value, ensure_ascii=False)
+TEXTURES = {"checker": (("a", "b", "squares"), ()), "image": (("file",), ())}
+MATERIALS = {
+    "diffuse": (("albedo",), ()),
+    "mirror": (("reflectance",), ()),
+    "metal": (("alpha", "reflectance"), ()),
+    "glass": (("ior",), ()),
+    "blend": (("weight", "a", "b"), ()),
+    "emissive": (("radiance",), ()),
+}
+OBJECTS = {
+    "sphere": (("center", "radius", "material"), ()),
+    "spheres": (("centers", "radii", "material"), ()),
+    "quad": (("corner", "edge_u", "edge_v", "material"), ()),
+    "mesh": (("obj", "material"), ("scale", "rotate_y", "translate", "matrix", "smooth")),
+}
 
+
+def kind_of(where, value, kinds):
+    """The `type` of an object, after its fields have been looked at."""
+    if not isinstance(value, dict):
+        raise Refused(f"{where}: expected an object, found {brief(value)}")
+    kind = value.get("type")
+    if not isinstance(kind, str) or kind not in kinds:
+        raise Refused(f"{where}.type: {brief(kind)} is unknown (known: {', '.join(kinds)})")
+    required, optional = kinds[kind]
+    fields(where, value, ("type", *required), optional)
+    return kind
+
+
+def no_doubles(pairs):
+    seen = {}
+    for name, value in pairs:
+        if name in seen:
+            raise Refused(f"field `{brief(name)[1:-1]}` stands twice in one object")
+        seen[name] = value
+    return seen
+
+
+def no_constant(name):
+    raise Refused(f"{name} is not a number of JSON")
+
+
+# ---- Files that the scene points at. ----
+
+def check_png(where, path):
+    """The form asks for 8-bit sRGB PNGs. Grey, RGB and palettes have 8 bits a sample; opacity counts nowhere."""
+    with open(path, "rb") as file:
+        data = file.read()
+    if not data.startswith(b"\x89PNG\r\n\x1a\n"):
+        raise Refused(f"{where}: {path} is not a PNG")
+    at, kinds = 8, []
+    while at < len(data) and b"IEND" not in kinds:
+        head, body = data[at:at + 8], data[at + 8:at + 12 + int.from_bytes(data[at:at + 4], "big")]
+        kinds.append(head[4:])
+        if len(body) != int.from_bytes(head[:4], "big") + 4 or zlib.crc32(head[4:] + body[:-4]) != int.from_bytes(body[-4:], "big"):
+            raise Refused(f"{where}: {path} is damaged or cut short")
+        if len(kinds) == 1:
+            header = body[:-4]
+        at += 8 + len(body)
+    if kinds[:1] != [b"IHDR"] or len(header) != 13 or b"IDAT" not in kinds or b"IEND" not in kinds:
+        raise Refused(f"{where}: {path} is damaged or cut short")
+    width, height, bits, color = struct.unpack(">IIBB", header[:10])
+    palette = color == 3
+    if bits != 8 and not palette:
+        raise Refused(f"{where}: {path} has {bits} bits a sample, but must have 8")
+    if not (1 <= width <= 32768 and 1 <= height <= 32768 and width * height <= 1 << 27):
+        raise Refused(f"{where}: {path} has {width} x {height} pixels, but firstlight takes 32768 a side and 2^27 in all")
+
+
+def check_obj(where, path):
+    """Whether there is a face at all; what it says beyond positions and faces counts nowhere."""
+    with open(path, "rb") as file:
+        if not any(line.split()[:1] == [b"f"] for line in file):
+            raise Refused(f"{where}: {path} has no faces")
+
+
+# ---- The scene. ----
 
 class Converter:
+    MAX_PARTS = 8  # Plain materials of one blend, as firstlight counts them.
+
     def __init__(self, scene, source, target):
-        self.scene = scene
         self.source = os.path.dirname(os.path.abspath(source))
-        self.target = os.path.dirname(os.path.abspath(target))
-        # Textures need surface coordinates, which only quads have in this form.
-        self.textured = set()
-
-    def path(self, where, name):
-        full = os.path.join(self.source, name)
-        if not os.path.isfile(full):
-            raise Refused(f"{where}: no file {full}")
-        return text(os.path.relpath(full, self.target))
-
-    def convert(self):
-        scene = fields(
-            "scene", self.scene, ("camera", "materials", "objects"),
+        self.target = os.path.dirname(os.path.realpath(target))
+        self.scene = fields(
+            "scene", scene, ("camera", "materials", "objects"),
             ("name", "about", "filter", "environment", "textures", "max_depth", "ref"),
         )
+        self.tables = {}
+        for field, kind, said in (("textures", dict, "an object"), ("materials", dict, "an object"), ("objects", list, "a list")):
+            self.tables[field] = self.scene.get(field, {})
+            if not isinstance(self.tables[field], kind):
+                raise Refused(f"{field}: expected {said}, found {brief(self.tables[field])}")
+        self.parts_of = {}  # Material name -> the plain materials that it comes to.
+
+    def convert(self):
+        scene = self.scene
         if scene.get("filter", "box") != "box":
-            raise Refused(f"filter: only \"box\" is defined, found {scene['filter']!r}")
+            raise Refused(f"filter: only \"box\" is defined, found {brief(scene['filter'])}")
+        self.reference(scene.get("ref", {}))
         out = ["("]
-        for comment in (scene.get("name"), scene.get("about")):
-            out += [f"    // {line}" for line in str(comment or "").splitlines()]
+        for field in ("name", "about"):
+            comment = scene.get(field, "")
+            if not isinstance(comment, str):
+                raise Refused(f"{field}: expected text, found {brief(comment)}")
+            out += [f"    // {line}" for line in comment.splitlines()]
         out += self.camera(scene["camera"])
-        depth = scene.get("max_depth")
-        if depth is not None:
-            out.append(f"    max_depth: {whole('max_depth', depth)},")
+        if scene.get("max_depth") is not None:
+            depth = scene["max_depth"]
+            # No path has more segments than a 32-bit count can say.
+            out.append(f"    max_depth: {min(int(whole('max_depth', depth, 2**63)), 2**32 - 1)},")
         if scene.get("environment") is not None:
-            out.append(f"    environment: constant({vector('environment', scene['environment'])}),")
-        for field, kind in (("textures", dict), ("materials", dict), ("objects", list)):
-            if not isinstance(scene.get(field) or kind(), kind):
-                raise Refused(f"{field}: expected {'an object' if kind is dict else 'a list'}, found {scene[field]!r}")
-        textures = [self.texture(name, value) for name, value in (scene.get("textures") or {}).items()]
+            out.append(f"    environment: constant({light('environment', scene['environment'])}),")
+        textures = [self.texture(name, value) for name, value in self.tables["textures"].items()]
         out += ["    textures: {", *textures, "    },"] if textures else []
         out += ["    materials: {"]
-        out += [self.material(name, value) for name, value in scene["materials"].items()]
+        out += [self.material(name, value) for name, value in self.tables["materials"].items()]
+        for name in self.tables["materials"]:
+            self.parts(name)
         out += ["    },", "    objects: ["]
-        out += [self.object(f"objects[{i}]", value) for i, value in enumerate(scene["objects"])]
+        out += [self.object(f"objects[{i}]", value) for i, value in enumerate(self.tables["objects"])]
         return "\n".join([*out, "    ],", ")", ""])
+
+    def reference(self, value):
+        """How the reference was made says nothing of the scene, but must be what the form knows."""
+        # The form says "integrator, minimum spp" and leaves open how the second is spelt.
+        spellings = ("spp", "min_spp", "spp_min", "minimum_spp")
+        for name, said in fields("ref", value, (), ("integrator", *spellings)).items():
+            if name == "integrator":
+                string("ref.integrator", said)
+            else:
+                whole(f"ref.{name}", said, 2**63)
 
     def camera(self, value):
         names = ("origin", "look_at", "up", "vfov", "width", "height", "aperture_radius", "focus_distance")
         camera = fields("camera", value, names[:6], names[6:])
+        read = {
+            "origin": point, "look_at": point, "up": point,
+            "vfov": number(lambda x: 0 < x < 180, "above 0 and below 180 degrees"),
+            "aperture_radius": number(lambda x: 0 <= x <= LARGEST, "0 or more"), "focus_distance": size,
+        }
+        said = {name: read[name](f"camera.{name}", camera[name]) for name in read if camera.get(name) is not None}
+        for name in names[:4]:
+            if name not in said:
+                raise Refused(f"camera.{name}: expected a value, found null")
+        width, height = (whole(f"camera.{name}", camera[name], 65536) for name in ("width", "height"))
+        if camera["width"] * camera["height"] > 1 << 28:
+            raise Refused(f"camera.width: {width} x {height} pixels are more than the 2^28 that firstlight takes")
+        view = [to - start for start, to in zip(camera["origin"], camera["look_at"])]
+        if length(view) < SMALLEST:
+            raise Refused("camera.look_at: is the same point as `origin`")
+        if length(camera["up"]) < SMALLEST:
+            raise Refused("camera.up: has no length")
+        if length(cross(view, camera["up"])) <= 1e-9 * length(view) * length(camera["up"]):
+            raise Refused("camera.up: is parallel to the view")
         lines = [
             "    camera: (",
-            f"        eye: {vector('camera.origin', camera['origin'])},",
-            f"        look_at: {vector('camera.look_at', camera['look_at'])},",
-            f"        up: {vector('camera.up', camera['up'])},",
-            f"        vfov: {number('camera.vfov', camera['vfov'])},",
+            f"        eye: {said['origin']},",
+            f"        look_at: {said['look_at']},",
+            f"        up: {said['up']},",
+            f"        vfov: {said['vfov']},",
         ]
-        if camera.get("aperture_radius", 0):
-            if "focus_distance" not in camera:
-                raise Refused("camera: an aperture needs a `focus_distance`")
-            lines.append(f"        lens_radius: {number('camera.aperture_radius', camera['aperture_radius'])},")
-            lines.append(f"        focus_distance: {number('camera.focus_distance', camera['focus_distance'])},")
-        width, height = whole("camera.width", camera["width"]), whole("camera.height", camera["height"])
+        if camera.get("aperture_radius"):
+            if "focus_distance" not in said:
+                raise Refused("camera.focus_distance: an aperture needs one")
+            lines.append(f"        lens_radius: {said['aperture_radius']},")
+            lines.append(f"        focus_distance: {said['focus_distance']},")
         return [*lines, "    ),", f"    film: (width: {width}, height: {height}),"]
+
+    def path(self, where, name, check):
+        string(where, name)
+        full = os.path.join(self.source, name)
+        if not os.path.isfile(full):
+            raise Refused(f"{where}: no file {full}")
+        check(where, full)
+        return string(where, os.path.relpath(os.path.realpath(full), self.target).replace(os.sep, "/"))
 
     def texture(self, name, value):
         where = f"textures.{name}"
-        kind = kind_of(where, value)
-        if kind == "checker":
-            checker = fields(where, value, ("type", "a", "b", "squares"))
-            colors = ", ".join(f"{c}: {vector(f'{where}.{c}', checker[c])}" for c in "ab")
-            squares = vector(f"{where}.squares", checker["squares"], 2)
-            return f"        {text(name)}: checker({colors}, squares: {squares}),"
-        if kind == "image":
-            image = fields(where, value, ("type", "file"))
-            return f"        {text(name)}: image(file: {self.path(where, image['file'])}, smooth: false),"
-        raise Refused(f"{where}: unknown type {kind!r} (known: \"checker\", \"image\")")
+        if kind_of(where, value, TEXTURES) == "image":
+            # Clamped: rounding just outside of 0..1 must not fetch a texel of the opposite side.
+            return f"        {string(where, name)}: image(file: {self.path(where + '.file', value['file'], check_png)}, " \
+                   "smooth: false, wrap: clamp),"
+        colors = ", ".join(f"{c}: {shares(f'{where}.{c}', value[c])}" for c in "ab")
+        squares = vector(lambda where, n: whole(where, n, 2**31), 2)(f"{where}.squares", value["squares"])
+        return f"        {string(where, name)}: checker({colors}, squares: {squares}),"
 
-    def paint(self, where, value, material):
-        """A colour, or the name of a texture."""
-        if not isinstance(value, dict):
-            return vector(where, value)
-        name = fields(where, value, ("texture",))["texture"]
-        if name not in (self.scene.get("textures") or {}):
-            raise Refused(f"{where}: texture {name!r} is not defined")
-        self.textured.add(material)
-        return text(name)
+    def known(self, where, name, table):
+        """A name that the scene has a texture or a material for."""
+        if not isinstance(name, str) or name not in self.tables[table]:
+            raise Refused(f"{where}: {table[:-1]} {brief(name)} is not defined")
+        return string(where, name)
 
     def material(self, name, value):
         where = f"materials.{name}"
-        kind = kind_of(where, value)
-        if kind in ("diffuse", "mirror", "emissive"):
-            color = {"diffuse": "albedo", "mirror": "reflectance", "emissive": "radiance"}[kind]
-            given = fields(where, value, ("type", color))[color]
-            said = f"{kind}({color}: {self.paint(f'{where}.{color}', given, name)})"
-        elif kind == "metal":
-            metal = fields(where, value, ("type", "alpha", "reflectance"))
-            reflectance = self.paint(where + ".reflectance", metal["reflectance"], name)
-            alpha = number(where + ".alpha", metal["alpha"])
-            said = f"metal(alpha: {alpha}, reflectance: {reflectance}, fresnel: constant, compensate: false)"
-        elif kind == "glass":
-            said = f"glass(ior: {number(where + '.ior', fields(where, value, ('type', 'ior'))['ior'])})"
-        elif kind == "blend":
-            blend = fields(where, value, ("type", "weight", "a", "b"))
-            for part in (blend["a"], blend["b"]):
-                if part not in self.scene["materials"]:
-                    raise Refused(f"{where}: material {part!r} is not defined")
-            if self.holds(name, blend["a"]) or self.holds(name, blend["b"]):
-                raise Refused(f"{where}: is a part of itself")
-            weight = number(where + ".weight", blend["weight"])
-            said = f"blend(weight: {weight}, a: {text(blend['a'])}, b: {text(blend['b'])})"
-        else:
-            raise Refused(f"{where}: unknown type {kind!r}")
-        return f"        {text(name)}: {said},"
+        kind = kind_of(where, value, MATERIALS)
+        say = {
+            "albedo": self.albedo,
+            "reflectance": shares,
+            "radiance": light,
+            "alpha": number(lambda x: 0 < x <= 1, "above 0, and at most 1"),
+            "ior": number(lambda x: 0 < x <= LARGEST, "above 0"),
+            "weight": share,
+            "a": lambda where, part: self.known(where, part, "materials"),
+            "b": lambda where, part: self.known(where, part, "materials"),
+        }
+        said = [f"{field}: {say[field](f'{where}.{field}', value[field])}" for field in MATERIALS[kind][0]]
+        said += ["fresnel: constant", "compensate: false"] if kind == "metal" else []
+        return f"        {string(where, name)}: {kind}({', '.join(said)}),"
 
-    def holds(self, name, part, seen=()):
-        """Whether a material is this part, or one of the parts that it is blended of."""
-        value = self.scene["materials"].get(part)
-        if part == name or part in seen or not isinstance(value, dict):
-            return part == name
-        return any(self.holds(name, value.get(key), (*seen, part)) for key in "ab" if isinstance(value.get(key), str))
+    def albedo(self, where, value):
+        """A colour, or the name of a texture."""
+        if not isinstance(value, dict):
+            return shares(where, value)
+        name = fields(where, value, ("texture",))["texture"]
+        return self.known(where + ".texture", name, "textures")
 
-    def uses_texture(self, name):
-        value = self.scene["materials"][name]
-        parts = [value["a"], value["b"]] if value.get("type") == "blend" else []
-        return name in self.textured or any(self.uses_texture(part) for part in parts)
+    def parts(self, name, around=()):
+        """The plain materials of a material, one or those of a blend; all materials have been read."""
+        if name in around:
+            raise Refused(f"materials.{name}: is a part of itself")
+        if name not in self.parts_of:
+            value = self.tables["materials"][name]
+            found = [value]
+            if value["type"] == "blend":
+                if len(around) >= self.MAX_PARTS:
+                    raise Refused(f"materials.{around[0]}: blends more than {self.MAX_PARTS} plain materials")
+                found = [part for key in "ab" for part in self.parts(value[key], (*around, name))]
+            if len(found) > self.MAX_PARTS:
+                raise Refused(f"materials.{name}: blends more than {self.MAX_PARTS} plain materials")
+            if len(found) > 1 and sum(part["type"] == "emissive" for part in found) > 1:
+                raise Refused(f"materials.{name}: blends more than one emissive material")
+            self.parts_of[name] = found
+        return self.parts_of[name]
+
+    # ---- Objects. ----
 
     def object(self, where, value):
-        kind = kind_of(where, value)
-        names = {
-            "sphere": ("type", "center", "radius", "material"),
-            "spheres": ("type", "centers", "radii", "material"),
-            "quad": ("type", "corner", "edge_u", "edge_v", "material"),
-            "mesh": ("type", "obj", "material"),
-        }
-        if kind not in names:
-            raise Refused(f"{where}: unknown type {kind!r} (known: {', '.join(names)})")
-        placed = ("scale", "rotate_y", "translate", "matrix", "smooth")
-        part = fields(where, value, names[kind], placed if kind == "mesh" else ())
-        material = part["material"]
-        if material not in self.scene["materials"]:
-            raise Refused(f"{where}: material {material!r} is not defined")
-        if kind != "quad" and self.uses_texture(material):
-            raise Refused(f"{where}: a {kind} has no surface coordinates for the texture of {material!r}")
-        if kind == "sphere":
-            center, radius = vector(where + ".center", part["center"]), number(where + ".radius", part["radius"])
-            said = f"sphere(center: {center}, radius: {radius}"
-        elif kind == "spheres":
-            said = self.spheres(where, part)
-        elif kind == "quad":
-            edges = ", ".join(f"{edge}: {vector(f'{where}.{edge}', part[edge])}" for edge in ("edge_u", "edge_v"))
-            said = f"quad(corner: {vector(where + '.corner', part['corner'])}, {edges}"
-        else:
-            said = self.mesh(where, part)
-        return f"        {said}, material: {text(material)}),"
+        kind = kind_of(where, value, OBJECTS)
+        material = self.known(f"{where}.material", value["material"], "materials")
+        is_textured = any(isinstance(part.get("albedo"), dict) for part in self.parts(value["material"]))
+        if kind != "quad" and is_textured:
+            raise Refused(f"{where}.material: a {kind} has no surface coordinates for the texture of {material}")
+        said = getattr(self, kind)(where, value)
+        return f"        {kind}({said}, material: {material}),"
+
+    def sphere(self, where, part):
+        return f"center: {point(where + '.center', part['center'])}, radius: {size(where + '.radius', part['radius'])}"
 
     def spheres(self, where, part):
         flat, radii = part["centers"], part["radii"]
-        if not isinstance(flat, list) or len(flat) % 3:
+        if not isinstance(flat, list) or not flat or len(flat) % 3:
             raise Refused(f"{where}.centers: expected x, y, z of each ball in one list")
-        if isinstance(radii, list) and len(radii) != len(flat) // 3:
-            raise Refused(f"{where}.radii: {len(radii)} radii for {len(flat) // 3} balls")
-        centers = ", ".join(vector(where + ".centers", flat[i:i + 3]) for i in range(0, len(flat), 3))
-        if isinstance(radii, list):
-            said = f"each([{', '.join(number(where + '.radii', r) for r in radii)}])"
-        else:
-            said = f"all({number(where + '.radii', radii)})"
-        return f"spheres(centers: [{centers}], radii: {said}"
+        if not isinstance(radii, list) or len(radii) != len(flat) // 3:
+            raise Refused(f"{where}.radii: expected a list of {len(flat) // 3} radii, one for each ball")
+        centers = ", ".join(point(where + ".centers", flat[i:i + 3]) for i in range(0, len(flat), 3))
+        return f"centers: [{centers}], radii: each([{', '.join(size(where + '.radii', r) for r in radii)}])"
+
+    def quad(self, where, part):
+        said = [f"{field}: {point(f'{where}.{field}', part[field])}" for field in ("corner", "edge_u", "edge_v")]
+        u, v = part["edge_u"], part["edge_v"]
+        for field, edge in (("edge_u", u), ("edge_v", v)):
+            if length(edge) < SMALLEST:
+                raise Refused(f"{where}.{field}: has no length, so the quad has no area")
+        angle = math.degrees(math.atan2(length(cross(u, v)), dot(u, v)))
+        # Edges that were written with four decimals are off by a few hundredths of a degree.
+        if abs(angle - 90) > 0.05:
+            raise Refused(f"{where}.edge_v: edges must be at right angles, but stand at {angle:.2f} degrees")
+        return ", ".join(said)
 
     def mesh(self, where, part):
-        shading = "smooth" if part.get("smooth", False) else "flat"
-        said = f"mesh(source: obj({self.path(where, part['obj'])}), shading: {shading}"
-        if part.get("matrix") is not None:
-            if any(part.get(name) is not None for name in ("scale", "rotate_y", "translate")):
-                raise Refused(f"{where}: `matrix` stands alone, without scale, rotate_y or translate")
-            return f"{said}, transform: (matrix: {self.matrix(where, part['matrix'])})"
+        shading = "smooth" if truth(where + ".smooth", part.get("smooth", False)) else "flat"
+        said = f"source: obj({self.path(where + '.obj', part['obj'], check_obj)}), shading: {shading}"
+        given = {name: part[name] for name in ("scale", "rotate_y", "translate", "matrix") if part.get(name) is not None}
+        if "matrix" in given:
+            if len(given) > 1:
+                raise Refused(f"{where}.matrix: stands alone, without scale, rotate_y or translate")
+            return f"{said}, transform: (matrix: {self.matrix(where + '.matrix', given['matrix'])})"
         steps = []
-        scale = part.get("scale")
-        if scale is not None:
-            said_scale = vector(where + ".scale", scale) if isinstance(scale, list) else number(where + ".scale", scale)
-            steps.append(f"scale: {said_scale}")
-        if part.get("rotate_y"):
-            steps.append(f"rotate: (0, {number(where + '.rotate_y', part['rotate_y'])}, 0)")
-        if part.get("translate") is not None:
-            steps.append(f"translate: {vector(where + '.translate', part['translate'])}")
+        for name, value in given.items():
+            at = f"{where}.{name}"
+            if name == "scale":
+                factors = value if isinstance(value, list) else [value]
+                steps.append(f"scale: {point(at, value) if isinstance(value, list) else any_number(at, value)}")
+                if min(abs(factor) for factor in factors) < SMALLEST:
+                    raise Refused(f"{at}: 0 squeezes the mesh flat")
+            elif name == "rotate_y":
+                steps.append(f"rotate: (0, {any_number(at, value)}, 0)")
+            else:
+                steps.append(f"translate: {point(at, value)}")
         return f"{said}, transform: ({', '.join(steps)})" if steps else said
 
     def matrix(self, where, value):
         """Rows of an affine map: 3 or 4 rows of 4, nested or flat; a fourth row must be 0 0 0 1."""
-        nested = bool(value) and isinstance(value[0], list)
-        rows = value if nested else [value[i:i + 4] for i in range(0, len(value), 4)]
-        if len(rows) not in (3, 4) or any(len(row) != 4 for row in rows):
-            raise Refused(f"{where}.matrix: expected 3 or 4 rows of 4 numbers")
-        if len(rows) == 4 and [float(x) for x in rows[3]] != [0.0, 0.0, 0.0, 1.0]:
-            raise Refused(f"{where}.matrix: the last row must be 0 0 0 1, translation stands in the last column")
-        return "(" + ", ".join(vector(f"{where}.matrix", row, 4) for row in rows[:3]) + ")"
+        if not isinstance(value, list) or len(value) not in (3, 4, 12, 16):
+            raise Refused(f"{where}: expected 3 or 4 rows of 4 numbers, found {brief(value)}")
+        rows = value if len(value) < 12 else [value[i:i + 4] for i in range(0, len(value), 4)]
+        said = [vector(any_number, 4)(where, row) for row in rows]
+        if len(rows) == 4 and rows[3] != [0, 0, 0, 1]:
+            raise Refused(f"{where}: the last row must be 0 0 0 1, translation stands in the last column")
+        columns = [[row[k] for row in rows[:3]] for k in range(3)]
+        lengths = [length(column) for column in columns]
+        # Against the volume of a box of these edges: a map that turns and scales keeps all of it.
+        volume = abs(dot(columns[0], cross(columns[1], columns[2])))
+        if min(lengths) < SMALLEST or volume <= 1e-9 * lengths[0] * lengths[1] * lengths[2]:
+            raise Refused(f"{where}: squeezes the mesh flat")
+        return "(" + ", ".join(said[:3]) + ")"
 
 
 def main():
@@ -259,16 +433,32 @@ def main():
     args = parser.parse_args()
     output = args.output or os.path.splitext(args.scene)[0] + ".ron"
     try:
-        with open(args.scene, encoding="utf-8") as file:
-            scene = json.load(file)
-        converted = Converter(scene, args.scene, output).convert()
-        with open(output + ".tmp", "w", encoding="utf-8") as file:
-            file.write(converted)
-        os.replace(output + ".tmp", output)
-    except (OSError, json.JSONDecodeError, Refused) as error:
+        if os.path.realpath(output) == os.path.realpath(args.scene):
+            raise Refused("the new file would replace it: name another with -o")
+        with open(args.scene, encoding="utf-8-sig") as file:
+            scene = json.load(file, object_pairs_hook=no_doubles, parse_constant=no_constant)
+        converted = Converter(scene, args.scene, output).convert().encode("utf-8")
+        write_whole(output, converted)
+    except RecursionError:
+        print(f"error: {args.scene}: is nested too deeply", file=sys.stderr)
+        return 1
+    # Text that is not UTF-8 and numbers of too many digits are value errors too.
+    except (OSError, ValueError, Refused) as error:
         print(f"error: {args.scene}: {error}", file=sys.stderr)
         return 1
     return 0
+
+
+def write_whole(path, data):
+    """All of the file or nothing of it."""
+    try:
+        with open(path + ".tmp", "wb") as file:
+            file.write(data)
+        os.replace(path + ".tmp", path)
+    except OSError:
+        if os.path.isfile(path + ".tmp"):
+            os.remove(path + ".tmp")
+        raise
 
 
 if __name__ == "__main__":

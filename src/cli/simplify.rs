@@ -72,7 +72,7 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
         model = load_obj_with(&args.input, &options).map_err(|error| failed(&error))?;
     }
-    for warning in &model.warnings {
+    for warning in model.warnings.iter().chain(&model.material_warnings) {
         remark(format_args!("warning: {warning}"));
     }
     for fault in faults(&model) {

@@ -31,13 +31,21 @@ impl Mesh {
 
     /// Area-weighted normals of stored vertices, doubled vertices kept apart: the sum of the triangles'
     /// unnormalised normals, as the 2013 program and the neutral reference format define `smooth`.
-    pub fn with_vertex_normals(mut self) -> Self {
-        let mut sums = vec![DVec3::ZERO; self.positions.len()];
+    pub fn with_vertex_normals(self) -> Self {
+        self.with_normals_of_vertices(|vertex| vertex)
+    }
+
+    /// The same where several of the stored vertices stand for one: `origin` has the number of that one, no larger
+    /// than that of the last stored vertex.
+    pub fn with_normals_of_vertices(mut self, origin: impl Fn(u32) -> u32) -> Self {
+        let n = self.positions.len();
+        let n_origins = (0..n as u32).map(&origin).max().map_or(0, |last| last as usize + 1);
+        let mut sums = vec![DVec3::ZERO; n_origins];
         for (t, corners) in self.triangles.iter().enumerate() {
             let normal = self.doubled_area_normal(t);
-            corners.iter().for_each(|&vertex| sums[vertex as usize] += normal);
+            corners.iter().for_each(|&vertex| sums[origin(vertex) as usize] += normal);
         }
-        self.normals = sums.into_iter().map(|sum| unit_or(sum, DVec3::Z)).collect();
+        self.normals = (0..n as u32).map(|vertex| unit_or(sums[origin(vertex) as usize], DVec3::Z)).collect();
         self
     }
 

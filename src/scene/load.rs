@@ -158,7 +158,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
             scene.balls = scene.file.objects.iter().map(|_| None).collect();
-            scene.warnings.extend(mesh.warnings.iter().cloned());
+            scene.warnings.extend(mesh.warnings.iter().chain(&mesh.material_warnings).cloned());
             let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
             scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
             scene.add_mesh_pictures(options);
@@ -287,6 +287,13 @@ fn resolve(
         }
     }
     scene.add_mesh_pictures(options);
+    let mut of_materials: Vec<String> = Vec::new();
+    for warning in scene.meshes_with_own_materials().flat_map(|mesh| &mesh.material_warnings) {
+        if !of_materials.contains(warning) {
+            of_materials.push(warning.clone());
+        }
+    }
+    scene.warnings.extend(of_materials);
     if problems.is_empty() { Ok(scene) } else { Err(SceneError { problems }) }
 }
 
@@ -332,9 +339,17 @@ impl LoadedScene {
         Ok(())
     }
 
+    /// Meshes of objects that say nothing of materials and so take those of the mesh's file.
+    fn meshes_with_own_materials(&self) -> impl Iterator<Item = &LoadedMesh> {
+        let objects = self.file.objects.iter().zip(&self.meshes);
+        objects
+            .filter(|(object, _)| object.material().is_none() && object.slot_materials().is_none())
+            .filter_map(|(_, mesh)| mesh.as_ref())
+    }
+
     /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
     fn add_mesh_pictures(&mut self, options: &LoadOptions) {
-        let textures = self.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
+        let textures = self.meshes_with_own_materials().flat_map(|mesh| &mesh.textures);
         let files: Vec<(String, PathBuf)> = textures.map(|(name, _, file)| (name.clone(), file.clone())).collect();
         for (name, path) in files {
             if let Err(error) = self.add_picture(&name, &path, options) {

@@ -51,6 +51,8 @@ pub struct LoadedMesh {
     /// Textures that `slots` name, and where their pictures lie.
     pub textures: Vec<(String, TexturePart, PathBuf)>,
     pub warnings: Vec<String>,
+    /// About `slots`, for those who use them.
+    pub material_warnings: Vec<String>,
     /// What was read for it, and what that was then.
     pub files: Vec<(PathBuf, Stamp)>,
 }
@@ -71,6 +73,7 @@ pub fn load_mesh(
                 slots: Vec::new(),
                 textures: Vec::new(),
                 warnings: Vec::new(),
+                material_warnings: Vec::new(),
                 files: Vec::new(),
             })
         }
@@ -140,9 +143,9 @@ fn finish(
     crease: Option<f32>,
 ) -> Result<Mesh, SceneError> {
     let mesh = simplified(mesh, simplify)?;
-    // Normals that a file gave are what automatic shading shows.
+    // Normals that reading gave are those that were asked for.
     let keeps =
-        shading == MeshShadingPart::Auto && matches!(source, MeshSourcePart::Obj(_)) && !mesh.normals.is_empty();
+        shading != MeshShadingPart::Flat && matches!(source, MeshSourcePart::Obj(_)) && !mesh.normals.is_empty();
     Ok(if keeps { mesh } else { shaded(mesh, shading, crease) })
 }
 
@@ -160,8 +163,9 @@ fn read_obj(
     let files = std::iter::once((path.to_owned(), before))
         .chain(imported.libraries.iter().map(|library| (library.clone(), stamp(library))))
         .collect();
-    let (slots, textures, warnings) = (Vec::new(), Vec::new(), imported.warnings);
-    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, files };
+    let (slots, textures) = (Vec::new(), Vec::new());
+    let (warnings, material_warnings) = (imported.warnings, imported.material_warnings);
+    let mut loaded = LoadedMesh { mesh, slots, textures, warnings, material_warnings, files };
     // A file without any material leaves the choice to whoever uses it.
     if imported.materials.iter().any(|material| !material.name.is_empty()) {
         for material in &imported.materials {
@@ -189,7 +193,11 @@ fn read_obj_base(
     };
     let computed = ObjOptions::default().normals;
     let ObjNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
-    let mut imported = read(if shading == MeshShadingPart::Auto { computed } else { ObjNormals::Ignore })?;
+    let mut imported = read(match shading {
+        MeshShadingPart::Auto => computed,
+        MeshShadingPart::Smooth if !simplify => ObjNormals::OfPositions,
+        MeshShadingPart::Smooth | MeshShadingPart::Flat => ObjNormals::Ignore,
+    })?;
     // Normals that were computed would hold simplification back at every crease; they are computed after it.
     if shading == MeshShadingPart::Auto && simplify && !imported.normals_from_file {
         imported.mesh = read(ObjNormals::Ignore)?.mesh;

@@ -39,6 +39,8 @@ pub struct ImportedObj {
     pub polygons: usize,
     /// What was left out or replaced, one sentence each.
     pub warnings: Vec<String>,
+    /// The same of the materials, which matter only to those who use them.
+    pub material_warnings: Vec<String>,
 }
 
 /// Where shading normals come from.
@@ -47,6 +49,9 @@ pub enum ObjNormals {
     /// From the file; where it has none, computed with angle weights. Computed edges stay hard where triangles
     /// meet at more than `crease_angle` radians.
     FileOrComputed { crease_angle: f32 },
+    /// Area-weighted at each position of the file, whatever normals it has and however texture coordinates split
+    /// its vertices.
+    OfPositions,
     /// None: the mesh has no normals, and vertices are split only where texture coordinates differ.
     Ignore,
 }
@@ -109,7 +114,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     if screened.lines_and_points > 0 {
         warnings.push(format!("{}: {} lines or points were left out", path.display(), screened.lines_and_points));
     }
-    if options.normals == ObjNormals::Ignore {
+    if !matches!(options.normals, ObjNormals::FileOrComputed { .. }) {
         parsed.normals.clear();
         parsed.normal_indices.clear();
     }
@@ -131,12 +136,16 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     mesh.uvs = corners.uvs;
     let (mesh, normals_from_file) = match options.normals {
         ObjNormals::FileOrComputed { crease_angle } => with_normals(mesh, &corners.normals, crease_angle),
+        ObjNormals::OfPositions if corners.origins.is_empty() => (mesh.with_vertex_normals(), false),
+        ObjNormals::OfPositions => (mesh.with_normals_of_vertices(|vertex| corners.origins[vertex as usize]), false),
         ObjNormals::Ignore => (mesh, false),
     };
     mesh.validate().map_err(mesh_error)?;
-    let (materials, libraries) = find_materials(path, screened, options.max_library_bytes, &mut warnings);
+    let mut of_materials = Warnings::default();
+    let (materials, libraries) = find_materials(path, screened, options.max_library_bytes, &mut of_materials);
     let polygons = parsed.face_arities.iter().filter(|&&corners| corners > 3).count();
-    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, polygons, warnings: warnings.into_list() })
+    let (warnings, material_warnings) = (warnings.into_list(), of_materials.into_list());
+    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, polygons, warnings, material_warnings })
 }
 
 /// Differences and products of `f32` numbers are exact enough in `f64` for corners on a line to give exactly nothing.
@@ -174,6 +183,8 @@ struct Corners {
     /// The vertex of each corner, in file order.
     vertices: Vec<u32>,
     positions: Vec<DVec3>,
+    /// Which position of the file each vertex has; empty where they are the same.
+    origins: Vec<u32>,
     uvs: Vec<Vec2>,
     /// As the file has them: any length, zero where missing.
     normals: Vec<Vec3>,
@@ -185,10 +196,17 @@ impl Corners {
         if parsed.texcoords.is_empty() && parsed.normals.is_empty() {
             let count = parsed.positions.len() as u32 / 3;
             let positions = (0..count).map(position).collect();
-            return Self { vertices: parsed.indices.clone(), positions, uvs: Vec::new(), normals: Vec::new() };
+            let vertices = parsed.indices.clone();
+            return Self { vertices, positions, origins: Vec::new(), uvs: Vec::new(), normals: Vec::new() };
         }
         let mut found: HashMap<(u32, u32, u32), u32> = HashMap::with_capacity(parsed.positions.len() / 3);
-        let mut corners = Self { vertices: Vec::new(), positions: Vec::new(), uvs: Vec::new(), normals: Vec::new() };
+        let mut corners = Self {
+            vertices: Vec::new(),
+            positions: Vec::new(),
+            origins: Vec::new(),
+            uvs: Vec::new(),
+            normals: Vec::new(),
+        };
         for (k, &index) in parsed.indices.iter().enumerate() {
             let uv = parsed.texcoord_indices.get(k).copied();
             let normal = parsed.normal_indices.get(k).copied();
@@ -197,6 +215,7 @@ impl Corners {
             corners.vertices.push(vertex);
             if vertex == next {
                 corners.positions.push(position(index));
+                corners.origins.push(index);
                 if let Some(i) = uv {
                     let at = 2 * i as usize;
                     corners.uvs.push(Vec2::new(parsed.texcoords[at] as f32, parsed.texcoords[at + 1] as f32));
