@@ -77,6 +77,7 @@ fn time_and_error_end_a_render() {
     assert!(samples >= 1 && (0.2..5.0).contains(&seconds), "{samples} samples in {seconds} s");
     let (samples, _, error) = spp(["--error", "0.05"]);
     assert!(samples >= 4 && error.is_some_and(|error| error <= 0.05), "{error:?} after {samples}");
+    assert_eq!(spp(["--error", "5%"]).0, samples, "5% is not 0.05");
     // Who asked for an error and got another is told.
     for (limits, missed) in [(["--error", "1e-6", "--spp", "8"], true), (["--error", "0.05", "--spp", "9999"], false)] {
         let mut command = Command::cargo_bin("firstlight").unwrap();

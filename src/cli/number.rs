@@ -19,6 +19,18 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A relative error to stop at: `0.05`, or the same as `5%`.
+pub fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.trim_end().strip_suffix('%') {
+        Some(number) => (number.trim_end(), 0.01),
+        None => (text, 1.0),
+    };
+    match number.parse::<f64>().map(|value| value * unit) {
+        Ok(share) if share > 0.0 && share.is_finite() => Ok(share),
+        _ => Err("must be a positive number: five per cent is 0.05 or 5%".to_owned()),
+    }
+}
+
 /// Stops of exposure: any number that is one.
 pub fn parse_stops(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
@@ -46,4 +58,19 @@ pub fn parse_error(text: &str) -> Result<f64, String> {
     let error = text.parse().map_err(|_| "must be a length above 0")?;
     check_target(Target::Error(error)).map_err(|error| error.to_string())?;
     Ok(error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_numbers_or_per_cent() {
+        for (text, share) in [("0.05", 0.05), ("5%", 0.05), ("0.5 %", 0.005), ("1e-3", 1e-3), ("150%", 1.5)] {
+            assert!((parse_share(text).unwrap() - share).abs() < 1e-15, "{text}");
+        }
+        for text in ["", "%", "5%%", "5 per cent", "-5%", "0%", "nan%", "inf", "%5"] {
+            assert!(parse_share(text).unwrap_err().contains("0.05 or 5%"), "{text}");
+        }
+    }
 }

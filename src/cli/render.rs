@@ -2,7 +2,7 @@
 
 use super::animate::animate;
 use super::console::{print, remark};
-use super::number::parse_stops;
+use super::number::{parse_share, parse_stops};
 use super::stop::Stop;
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
 use bevy_ecs::prelude::World;
@@ -70,8 +70,8 @@ pub struct RenderArgs {
     /// Stop after so many seconds of rendering.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     pub time: Option<f64>,
-    /// Stop when the picture's relative error, by its own estimate, is down to this: 0.01 is one per cent.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = parse_positive)]
+    /// Stop when the picture's relative error, by its own estimate, is down to this: 0.01 or 1% is one per cent.
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = parse_share)]
     pub error: Option<f64>,
     /// Worker threads; all cores when not given. The picture does not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
