@@ -75,7 +75,8 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
     let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
     let size = (32, 24);
     let mut told = Vec::new();
-    let rungs = climb(&room, &settings, size, Limits { spp: 48, seconds: None }, &mut |share| told.push(share));
+    let rungs =
+        climb(&room, &settings, size, Limits { spp: 48, seconds: None }, &mut |share| told.push(share), &|| false);
     assert_eq!(rungs.iter().map(|rung| rung.spp).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
     assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
     let truth = LinearPicture::of(&render(&room, &RenderSettings { seed: 2, ..settings }, size.0, size.1, 2048).0);
@@ -92,7 +93,7 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
         assert_eq!(pair[1].spent.camera_paths, 2 * pair[0].spent.camera_paths);
     }
     assert!(ladder.last().distance.flip < ladder.steps[0].distance.flip);
-    let short = climb(&room, &settings, size, Limits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| ());
+    let short = climb(&room, &settings, size, Limits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| (), &|| false);
     assert_eq!(short.len(), 1, "the first step is always taken, and no other fits");
 }
 
@@ -103,7 +104,7 @@ fn references_are_kept_and_found_again() {
     let (room, settings) = (room(), RenderSettings { seed: 1, ..RenderSettings::default() });
     let key = Key::new("scenes/my room.ron", Fingerprint(7), &settings, (16, 8));
     assert!(store.find(&key, 1).is_none());
-    let (made, trouble) = store.make(&key, &room, &settings, 16, &mut |_| ());
+    let (made, trouble) = store.make(&key, &room, &settings, 16, &mut |_| (), &|| false).unwrap();
     assert_eq!(trouble, None);
     assert_ne!(made.picture, LinearPicture::of(&render(&room, &settings, 16, 8, 16).0), "its seed is another");
     let found = store.find(&key, 8).expect("more samples than asked for are fine");
@@ -122,7 +123,8 @@ fn references_are_kept_and_found_again() {
     std::fs::write(&path, b"half").unwrap();
     assert!(store.find(&key, 1).is_none());
     // Where nothing can be kept, the picture is there all the same.
-    let (unkept, trouble) = ReferenceStore::in_folder(&path).make(&key, &room, &settings, 16, &mut |_| ());
+    let (unkept, trouble) =
+        ReferenceStore::in_folder(&path).make(&key, &room, &settings, 16, &mut |_| (), &|| false).unwrap();
     assert_eq!(unkept.picture, made.picture);
     assert!(trouble.is_some_and(|text| text.contains("could not be kept")));
 }
@@ -156,6 +158,74 @@ fn the_command_writes_a_page_and_a_table() {
     assert!(fail(&["cornel"]).contains("cornell"));
 }
 
+/// A program in `folder` that keeps its references there.
+fn report_in(folder: &std::path::Path, line: &str) -> std::process::Command {
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("firstlight"));
+    command.current_dir(folder).env("XDG_CACHE_HOME", folder.join("cache")).args(line.split(' '));
+    command
+}
+
+#[test]
+fn a_reference_of_another_scene_is_told_from_a_noisy_one() {
+    let folder = tempfile::tempdir().unwrap();
+    for (reference, line) in [
+        ("good", "render cornell --size 64x64 --spp 1024 --seed 5"),
+        ("noisy", "render cornell --size 64x64 --spp 4 --seed 5"),
+        ("other", "render cornell-balls --size 64x64 --spp 64 --seed 5"),
+        ("classic", "render cornell --size 64x64 --spp 64 --seed 5 --integrator phong"),
+    ] {
+        assert!(report_in(folder.path(), &format!("{line} -o {reference}.exr")).status().unwrap().success());
+        let line = format!("report cornell --reference {reference}.exr --spp 16 --no-ablation --out {reference}");
+        let output = report_in(folder.path(), &line).output().unwrap();
+        assert!(output.status.success());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let page = std::fs::read_to_string(folder.path().join(reference).join("index.html")).unwrap();
+        let table = std::fs::read_to_string(folder.path().join(reference).join("steps.csv")).unwrap();
+        let share: f64 = table.lines().last().unwrap().rsplit(',').next().unwrap().parse().unwrap();
+        let is_foreign = !matches!(reference, "good" | "noisy");
+        assert_eq!(said.contains("does not look like a picture of cornell"), is_foreign, "{reference}: {said}");
+        assert_eq!(page.contains("does not look like a picture of cornell"), is_foreign, "{reference}");
+        assert_eq!(share >= 0.05, is_foreign, "{reference}: {share}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_writes_what_was_measured_and_leaves_no_empty_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let truth = "render cornell --size 48x48 --spp 64 -o truth.exr";
+    assert!(report_in(folder.path(), truth).status().unwrap().success());
+    // Without a reference there is nothing to measure against yet; with one there are some steps.
+    for (more, is_written) in [("--size 48x48", false), ("--reference truth.exr", true)] {
+        // A busy machine may need a while until Ctrl+C is heard, and for the first step.
+        let output = [1.0, 5.0, 25.0].into_iter().find_map(|seconds| {
+            let line = format!("report cornell {more} --spp 1048576 --out deep/page");
+            let mut command = report_in(folder.path(), &line);
+            let child =
+                command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+            std::thread::sleep(std::time::Duration::from_secs_f64(seconds));
+            let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+            assert!(kill.success());
+            let output = child.wait_with_output().unwrap();
+            let was_heard = output.status.code().is_some();
+            (was_heard && folder.path().join("deep/page/index.html").exists() == is_written).then_some(output)
+        });
+        let output = output.expect("half a minute is enough for a step");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(130), "{said}");
+        if is_written {
+            assert!(said.contains("what was measured is written"), "{said}");
+            let page = std::fs::read_to_string(folder.path().join("deep/page/index.html")).unwrap();
+            assert!(page.contains("was interrupted") && page.contains("<svg"), "{page}");
+            let table = std::fs::read_to_string(folder.path().join("deep/page/steps.csv")).unwrap();
+            assert!(table.lines().count() > 1, "{table}");
+        } else {
+            assert!(said.contains("nothing is written"), "{said}");
+            assert!(!folder.path().join("deep").exists(), "an empty folder is left");
+        }
+    }
+}
+
 /// Where no rare, bright samples carry the error (no glint of a small lamp, no caustic), the estimate agrees with the true
 /// error within ×1.25 from 16 samples a pixel on: as root of the mean of squares over several renders. Elsewhere, what
 /// was not drawn yet cannot be told from the picture, and at this size the ratio is anything between 0.7 and 26.
@@ -175,7 +245,7 @@ fn estimated_error_is_the_true_error_where_no_rare_light_rules() {
         let mut sums = [(0.0, 0.0); 8];
         for seed in 0..6 {
             let settings = RenderSettings { seed, ..settings };
-            let rungs = climb(&snapshot, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| ());
+            let rungs = climb(&snapshot, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| (), &|| false);
             let ladder = Ladder::measure(&rungs, &truth, &Display::default());
             for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
                 sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));

@@ -1,24 +1,28 @@
 //! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
 
 use super::console::{print, remark};
+use super::stop::Stop;
 use super::{Failure, SceneArgs, parse_positive, parse_size};
 use clap::Args;
 use firstlight::render::{Purpose, RenderSettings, Room, Snapshot, Techniques};
 use firstlight::report::{
-    Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv, page,
-    summary_text,
+    Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv,
+    foreign_share, page, summary_text,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs, Trees};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Samples per pixel of the last step, unless given.
 const DEFAULT_SPP: u32 = 256;
 
 /// How many times the samples of the last step an own reference has.
 const REFERENCE_FACTOR: u32 = 16;
+
+/// The same for one that was stopped: a fifth of what is measured against it is then its own error.
+const LEAST_REFERENCE_FACTOR: u32 = 4;
 
 /// Pixels of a picture, about, unless a size is given: enough to tell, few enough to wait for.
 const DEFAULT_PIXELS: f64 = 50_000.0;
@@ -28,7 +32,8 @@ pub struct ReportArgs {
     /// Built-in scenes, scene files (.ron) or models (.obj); all built-in scenes when not given.
     #[arg(value_name = "SCENES")]
     scenes: Vec<String>,
-    /// A converged linear picture (.exr) of the one scene; a long render of its own, kept for next time, when not given.
+    /// A converged linear picture (.exr) of the one scene; a long render of its own, kept for next time, when not given:
+    /// 16 times the samples of the last step, and so about 16 times as long.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Folder for the page, the table and the plots; made when it is not there.
@@ -37,7 +42,8 @@ pub struct ReportArgs {
     /// Most samples per pixel; 256 unless a time is given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
-    /// Most seconds of rendering for a scene; the same again for each technique that is switched off.
+    /// Most seconds of rendering for a scene; the same again for each technique that is switched off, and 16 times as long
+    /// for the scene's own reference, unless it is given or was kept.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     time: Option<f64>,
     /// Width and height in pixels; that of the reference, or the scene's own shape with about 50,000 pixels.
@@ -67,24 +73,70 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
         )));
     }
     let given = args.reference.as_deref().map(Reference::read).transpose().map_err(Failure::Failed)?;
-    // A page that cannot be written is not worth the wait.
-    std::fs::create_dir_all(&args.out)
-        .and_then(|()| tempfile::tempfile_in(&args.out))
-        .map_err(|error| Failure::Failed(format!("{}: cannot be written to: {error}", args.out.display())))?;
+    let folder = OutFolder::new(&args.out)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
-    let outcomes = pool.install(|| measure_all(args, &names, given.as_ref()))?;
+    let stop = Stop::on_interrupt();
+    let (outcomes, missing) = pool.install(|| measure_all(args, &names, given.as_ref(), &stop))?;
+    if let (true, Some(missing)) = (outcomes.is_empty(), &missing) {
+        return Err(Failure::Stopped(format!("stopped before anything was measured: nothing is written ({missing})")));
+    }
+    folder.keep();
 
     let (html, table) = (args.out.join("index.html"), args.out.join("steps.csv"));
-    write_whole(&html, page(&outcomes, &command_line()).as_bytes()).map_err(Failure::Failed)?;
+    write_whole(&html, page(&outcomes, &command_line(), missing.as_deref()).as_bytes()).map_err(Failure::Failed)?;
     write_whole(&table, csv(&outcomes).as_bytes()).map_err(Failure::Failed)?;
     print(summary_text(&outcomes).trim_end())?;
-    print(format_args!("{}\n{}", html.display(), table.display()))
+    print(format_args!("{}\n{}", html.display(), table.display()))?;
+    for mismatch in outcomes.iter().filter_map(SceneOutcome::mismatch) {
+        remark(format_args!("warning: {mismatch}"));
+    }
+    match missing {
+        None => Ok(()),
+        Some(missing) => Err(Failure::Stopped(format!("stopped: what was measured is written; {missing}"))),
+    }
 }
 
-fn measure_all(args: &ReportArgs, names: &[String], given: Option<&Reference>) -> Result<Vec<SceneOutcome>, Failure> {
+/// The folder of the report, taken away again where nothing came of it and it was not there before.
+struct OutFolder {
+    /// Those that were made, the innermost first.
+    made: Vec<PathBuf>,
+}
+
+impl OutFolder {
+    /// A page that cannot be written is not worth the wait.
+    fn new(path: &Path) -> Result<Self, Failure> {
+        let made = path.ancestors().take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+        let folder = Self { made: made.map(Path::to_path_buf).collect() };
+        std::fs::create_dir_all(path)
+            .and_then(|()| tempfile::tempfile_in(path))
+            .map_err(|error| Failure::Failed(format!("{}: cannot be written to: {error}", path.display())))?;
+        Ok(folder)
+    }
+
+    fn keep(mut self) {
+        self.made.clear();
+    }
+}
+
+impl Drop for OutFolder {
+    fn drop(&mut self) {
+        for folder in &self.made {
+            // Not if somebody else has put something there.
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+}
+
+/// What was measured, and what is missing if somebody has stopped it.
+fn measure_all(
+    args: &ReportArgs,
+    names: &[String],
+    given: Option<&Reference>,
+    stop: &Stop,
+) -> Result<(Vec<SceneOutcome>, Option<String>), Failure> {
     // Every scene is read first: a mistake in the last name should not cost the wait for the others.
     let mut scenes = Vec::new();
     for name in names {
@@ -94,9 +146,33 @@ fn measure_all(args: &ReportArgs, names: &[String], given: Option<&Reference>) -
     let limits =
         Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
     let mut progress = Progress::new(&scenes, !args.no_ablation, given.is_some());
-    let outcomes = scenes.iter().map(|scene| scene.measure(args, limits, given, &mut progress)).collect();
+    if let (Some(seconds), None) = (limits.seconds, given) {
+        let longest = duration(f64::from(REFERENCE_FACTOR) * seconds * scenes.len() as f64);
+        progress.bar.println(format!("references that were not kept take up to {longest} in all, beside --time"));
+    }
+    let mut outcomes = Vec::new();
+    let mut missing: Option<String> = None;
+    for (i, scene) in scenes.iter().enumerate() {
+        let (outcome, lacks) = scene.measure(args, limits, given, &mut progress, stop);
+        outcomes.extend(outcome);
+        if let Some(lacks) = lacks {
+            let others: Vec<&str> = scenes[i + 1..].iter().map(|scene| scene.title.as_str()).collect();
+            let others = if others.is_empty() { String::new() } else { format!("; not begun: {}", others.join(", ")) };
+            missing = Some(format!("{}: {lacks}{others}", scene.title));
+            break;
+        }
+    }
     progress.bar.finish_and_clear();
-    Ok(outcomes)
+    Ok((outcomes, missing))
+}
+
+/// Some seconds as people say it.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        ..90.0 => format!("{seconds:.0} s"),
+        ..5400.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
 }
 
 /// A scene, ready to be rendered.
@@ -146,18 +222,24 @@ impl Prepared {
         })
     }
 
+    /// What was found out, if it was enough to tell anything, and what is missing because somebody has stopped it.
     fn measure(
         &self,
         args: &ReportArgs,
         limits: Limits,
         given: Option<&Reference>,
         progress: &mut Progress,
-    ) -> SceneOutcome {
-        let rungs = self.climb(limits, Techniques::default(), "all techniques", progress);
-        let last_spp = rungs.last().map_or(1, |rung| rung.spp);
+        stop: &Stop,
+    ) -> (Option<SceneOutcome>, Option<String>) {
+        let rungs = self.climb(limits, Techniques::default(), "all techniques", progress, stop);
+        let mut missing = stop.is_asked().then(|| "its later steps, and what each technique is worth".to_owned());
+        let Some(last_rung) = rungs.last() else { return (None, Some("no step was finished".to_owned())) };
         let reference = match given {
             Some(given) => given.clone(),
-            None => self.reference(last_spp.saturating_mul(REFERENCE_FACTOR), progress),
+            None => match self.reference(last_rung, progress, stop) {
+                Some(reference) => reference,
+                None => return (None, Some("it has no reference to be measured against yet".to_owned())),
+            },
         };
         let display = self.developing.0;
         let measure = |rungs: &[Rung]| Ladder::measure(rungs, &reference.picture, &display);
@@ -168,15 +250,21 @@ impl Prepared {
         } else {
             Techniques::ablations()
                 .into_iter()
-                .map(|(technique, techniques)| {
-                    let others = self.climb(limits, techniques, &format!("without {technique}"), progress);
+                .map_while(|(technique, techniques)| {
+                    let others = self.climb(limits, techniques, &format!("without {technique}"), progress, stop);
+                    // Half a ladder would be compared with a whole one.
+                    if stop.is_asked() {
+                        missing
+                            .get_or_insert_with(|| format!("what {technique} and the techniques after it are worth"));
+                        return None;
+                    }
                     // Only a step that both have can tell.
                     let is_unused = rungs.iter().zip(&others).all(|(a, b)| a.picture == b.picture);
-                    Ablation { technique, ladder: measure(&others), is_unused }
+                    Some(Ablation { technique, ladder: measure(&others), is_unused })
                 })
                 .collect()
         };
-        SceneOutcome {
+        let outcome = SceneOutcome {
             title: self.title.clone(),
             width: self.size.0,
             height: self.size.1,
@@ -184,11 +272,13 @@ impl Prepared {
             ladder: measure(&rungs),
             ablations,
             early: picture(rungs.iter().rfind(|rung| rung.spp <= 4)).unwrap_or_else(|| last.clone()),
+            foreign_share: given.map(|given| foreign_share(&last, &given.picture)),
             last,
             reference: reference.picture,
             reference_made: reference.made,
             reference_path: reference.path,
-        }
+        };
+        (Some(outcome), missing)
     }
 
     /// A new one each time: what a render finds out about a scene and keeps (where caustics come from) must be found out,
@@ -197,25 +287,42 @@ impl Prepared {
         Extraction::new(&self.inputs, &self.trees).snapshot
     }
 
-    fn climb(&self, limits: Limits, techniques: Techniques, what: &str, progress: &mut Progress) -> Vec<Rung> {
+    fn climb(
+        &self,
+        limits: Limits,
+        techniques: Techniques,
+        what: &str,
+        progress: &mut Progress,
+        stop: &Stop,
+    ) -> Vec<Rung> {
         let settings = RenderSettings { techniques, ..self.settings };
         let mut tell = progress.task(format!("{}, {what}", self.title), Progress::LADDER, self.size);
-        climb(&self.snapshot(), &settings, self.size, limits, &mut tell)
+        climb(&self.snapshot(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
 
-    fn reference(&self, spp: u32, progress: &mut Progress) -> Reference {
+    /// One that was kept, or a new one; `None` when somebody stops it before it is good for anything.
+    fn reference(&self, last: &Rung, progress: &mut Progress, stop: &Stop) -> Option<Reference> {
         let store = ReferenceStore::of_platform();
-        let title = format!("{}, reference with {spp} samples per pixel", self.title);
+        let spp = last.spp.saturating_mul(REFERENCE_FACTOR);
+        let time = duration(f64::from(REFERENCE_FACTOR) * last.spent.wall_seconds);
+        let title = format!("{}, reference with {spp} samples per pixel, about {time}", self.title);
         let mut tell = progress.task(title, Progress::REFERENCE, self.size);
         if let Some(kept) = store.find(&self.key, spp) {
             tell(1.0);
-            return kept;
+            return Some(kept);
         }
-        let (reference, trouble) = store.make(&self.key, &self.snapshot(), &self.settings, spp, &mut tell);
-        if let Some(trouble) = trouble {
-            remark(format_args!("warning: {trouble}"));
+        let asked = || stop.is_asked();
+        let made = store.make(&self.key, &self.snapshot(), &self.settings, spp, &mut tell, &asked);
+        let least = last.spp.saturating_mul(LEAST_REFERENCE_FACTOR);
+        match made {
+            Some((reference, trouble)) if reference.made.is_some_and(|made| made.spp >= least) => {
+                if let Some(trouble) = trouble {
+                    remark(format_args!("warning: {trouble}"));
+                }
+                Some(reference)
+            }
+            _ => store.find(&self.key, least),
         }
-        reference
     }
 }
 

@@ -28,6 +28,22 @@ pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     (logs.len() >= 2 && spread > 0.0).then(|| common / spread)
 }
 
+/// Seconds that `spp` samples a pixel will take, after (samples, seconds) of some steps, each twice the samples of the one
+/// before it; at least one step.
+///
+/// The first samples take longer: each step pays for what is done once a doubling, whatever its size, and for what is done
+/// once. The two latest differences tell both apart from what a sample takes: t(n) = a·n + b·log₂ n + c.
+pub fn seconds_at(steps: &[(f64, f64)], spp: f64) -> f64 {
+    let (n, seconds) = *steps.last().expect("at least one step");
+    let [.., (n_first, t_first), (n_before, t_before), _] = *steps else { return seconds * spp / n };
+    let (earlier, later) = (t_before - t_first, seconds - t_before);
+    // Noise must make neither of them negative: a sample takes between half and all of what it took last.
+    let whole = later / (n - n_before);
+    let sample = ((later - earlier) / ((n - n_before) - (n_before - n_first))).clamp(0.5 * whole, whole);
+    let doubling = later - sample * (n - n_before);
+    seconds + sample * (spp - n) + doubling * (spp / n).log2()
+}
+
 /// When `points` (seconds, error), rising in seconds, come down to `target`, and stay there.
 ///
 /// Between two points along the line that joins them, beyond them along `slope`; `None` where that never gets there.
@@ -64,6 +80,18 @@ mod tests {
                 "{outside:?}"
             );
         }
+    }
+
+    #[test]
+    fn start_up_is_not_extended() {
+        let time = |n: f64| 0.3 + 0.01 * n + 0.02 * n.log2();
+        let steps: Vec<(f64, f64)> = [1.0, 2.0, 4.0, 8.0].map(|n| (n, time(n))).to_vec();
+        for n in [8.0, 24.0, 64.0, 1000.0] {
+            assert!((seconds_at(&steps, n) / time(n) - 1.0).abs() < 1e-9, "{n}: {}", seconds_at(&steps, n));
+        }
+        assert_eq!(seconds_at(&steps[..1], 2.0), 2.0 * time(1.0));
+        // A late step that was held up does not turn time around.
+        assert!(seconds_at(&[(1.0, 1.0), (2.0, 9.0), (4.0, 10.0)], 64.0) > 10.0);
     }
 
     #[test]

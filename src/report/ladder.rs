@@ -1,6 +1,6 @@
 //! One scene at 1, 2, 4 … samples per pixel: what each step took, and how far from the truth it was.
 
-use super::curve::{Seconds, seconds_to, slope};
+use super::curve::{Seconds, seconds_at, seconds_to, slope};
 use super::{Distance, LinearPicture};
 use crate::render::{Display, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
 use std::time::{Duration, Instant};
@@ -50,12 +50,15 @@ impl Spent {
 }
 
 /// Renders `snapshot` on the current rayon pool until `limits`. `progress` is told the share that is done, 0..1.
+///
+/// When `stop` says so, the step in hand is given up, and those before it are the answer: none, perhaps.
 pub fn climb(
     snapshot: &Snapshot,
     settings: &RenderSettings,
     (width, height): (u32, u32),
     limits: Limits,
     progress: &mut dyn FnMut(f64),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Rung> {
     let mut film = Film::new(width, height);
     let mut rungs: Vec<Rung> = Vec::new();
@@ -68,7 +71,10 @@ pub fn climb(
             let goal = film.spp().saturating_add(pace.spp()).min(spp);
             let (start, cpu_start) = (Instant::now(), cpu_seconds());
             let before = film.spp();
-            rays += advance(snapshot, settings, &mut film, goal, &|| false).rays;
+            rays += advance(snapshot, settings, &mut film, goal, stop).rays;
+            if stop() && film.spp() < goal {
+                return rungs;
+            }
             let elapsed = start.elapsed();
             wall += elapsed;
             cpu = cpu.zip(cpu_start.zip(cpu_seconds())).map(|(sum, (from, to))| sum + to - from);
@@ -169,11 +175,15 @@ impl Ladder {
         self.steps.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect()
     }
 
-    /// Fitted slope of log relMSE on log seconds from 4 samples a pixel on; −1 is that of independent samples.
+    /// Fitted slope of log relMSE on log seconds over the later half of the steps; −1 is that of independent samples.
+    ///
+    /// The first steps take longer a sample than later ones (tables and caches are filled, waves are not full), and errors
+    /// fall faster at first than later on: with them the line would be steeper than what the curve goes on with.
     pub fn slope(&self) -> Option<f64> {
-        // The first steps are over before the processor and its caches have warmed up.
-        let warm = self.steps.iter().filter(|step| step.spp >= 4);
-        slope(&warm.map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect::<Vec<_>>())
+        let later = &self.steps[self.steps.len() / 2..];
+        // A line needs two points.
+        let later = if later.len() < 2 { &self.steps[..] } else { later };
+        slope(&later.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect::<Vec<_>>())
     }
 
     /// Seconds that the renderer foretold for the error that it tells in the end, over those that it took; 1 is perfect.
@@ -181,10 +191,10 @@ impl Ladder {
     pub fn foresight(&self) -> Option<f64> {
         let (last, _) = self.steps.split_last()?;
         let is_early = |step: &&Step| step.spent.seconds() >= 0.1 * last.spent.seconds() && step.spp < last.spp;
-        let early = self.steps.iter().find(is_early)?;
-        let spp = early.estimate?.spp_for(last.estimate?.relative);
-        let foretold = early.spent.seconds() * f64::from(spp) / f64::from(early.spp);
-        Some(foretold / last.spent.seconds())
+        let early = self.steps.iter().position(|step| is_early(&step))?;
+        let spp = self.steps[early].estimate?.spp_for(last.estimate?.relative);
+        let times = self.steps[..=early].iter().map(|step| (f64::from(step.spp), step.spent.seconds()));
+        Some(seconds_at(&times.collect::<Vec<_>>(), f64::from(spp)) / last.spent.seconds())
     }
 
     /// Seconds until the relative error is down to `error`; `None` where the curve does not lead there.

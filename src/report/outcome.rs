@@ -1,6 +1,6 @@
 //! What a report found out about one scene.
 
-use super::{Ladder, LinearPicture, Made};
+use super::{Ladder, LinearPicture, Made, is_another_scene};
 use crate::render::Display;
 use std::path::PathBuf;
 
@@ -18,6 +18,9 @@ pub struct SceneOutcome {
     /// Of an own reference; `None` for a given one.
     pub reference_made: Option<Made>,
     pub reference_path: Option<PathBuf>,
+    /// Of a given reference, the share of the picture that differs from it by more than noise can
+    /// ([`super::foreign_share`]); `None` for an own one.
+    pub foreign_share: Option<f64>,
     /// After 4 samples a pixel, or fewer if there are no more: what framing a shot looks like.
     pub early: LinearPicture,
     pub last: LinearPicture,
@@ -41,6 +44,18 @@ impl Ablation {
 }
 
 impl SceneOutcome {
+    /// What to say of a reference that shows something else.
+    pub fn mismatch(&self) -> Option<String> {
+        let share = self.foreign_share.filter(|share| is_another_scene(*share))?;
+        let path = self.reference_path.as_ref().map_or(String::new(), |path| path.display().to_string());
+        Some(format!(
+            "{path} does not look like a picture of {}: {:.0} % of the picture differs from it by more than noise can, \
+             and more samples do not help; is it another scene, view, exposure or light?",
+            self.title,
+            100.0 * share
+        ))
+    }
+
     /// The part of the last step's relMSE that may be the reference's own.
     pub fn share_of_reference(&self) -> Option<f64> {
         let error = self.reference_made?.relative_error?;

@@ -15,8 +15,9 @@ const TARGETS: [f64; 3] = [0.10, 0.03, 0.01];
 /// How far an estimate may be off before the page says so.
 const CALIBRATION: f64 = 1.25;
 
-/// The page; `command` is what was asked for, so that it can be asked for again.
-pub fn page(outcomes: &[SceneOutcome], command: &str) -> String {
+/// The page; `command` is what was asked for, so that it can be asked for again. `interrupted` says what is missing where
+/// the report was stopped before its end.
+pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>) -> String {
     let threads = outcomes.first().map_or(0, |outcome| outcome.ladder.last().spent.threads);
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
@@ -25,13 +26,17 @@ pub fn page(outcomes: &[SceneOutcome], command: &str) -> String {
          <p class=\"soft\">firstlight {} · {threads} threads · <code>{}</code></p>\n\
          <p>The error is √relMSE, the root of the mean of (x − ref)² / (ref² + 0.01) over pixels and channels of linear \
          light. Seconds are CPU seconds a thread (wall time on a quiet machine) spent on rendering alone. Times in \
-         brackets lie beyond the measured steps and follow the fitted slope. A slope of −1 means: twice the time, half \
+         brackets lie beyond the measured steps and follow the slope, which is fitted to the later half of the steps. A slope \
+         of −1 means: twice the time, half \
          the squared error. Time foretold: by the renderer, when a tenth of the time had passed, until the error that \
          it told in the end.</p>\n",
         include_str!("page.css"),
         env!("CARGO_PKG_VERSION"),
         escape(command),
     );
+    if let Some(missing) = interrupted {
+        let _ = writeln!(html, "<p class=\"bad\">This report was interrupted: {}.</p>", escape(missing));
+    }
     html.push_str(&summary(outcomes));
     for outcome in outcomes {
         html.push_str(&section(outcome));
@@ -135,6 +140,9 @@ fn section(outcome: &SceneOutcome) -> String {
 }
 
 fn about_reference(outcome: &SceneOutcome) -> String {
+    if let Some(mismatch) = outcome.mismatch() {
+        return format!("<p class=\"bad\">{}</p>\n", escape(&mismatch));
+    }
     let Some(made) = outcome.reference_made else {
         let path = outcome.reference_path.as_ref().map_or(String::new(), |path| path.display().to_string());
         return format!("<p>Reference: <code>{}</code>.</p>\n", escape(&path));

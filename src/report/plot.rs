@@ -187,15 +187,29 @@ impl Axis {
         self.start + (value.log10() - self.low) / (self.high - self.low) * (self.end - self.start)
     }
 
-    /// Lines of the grid, and whether each is named.
+    /// Lines of the grid, and whether each is named: at least three are.
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = self.high - self.low;
-        let named = |digit: u32| digit == 1 || (decades < 2.5 && matches!(digit, 2 | 5));
         let all = (self.low.floor() as i32..=self.high.ceil() as i32)
             .flat_map(|decade| (1..10).map(move |digit| (digit, f64::from(digit) * 10f64.powi(decade))));
-        all.filter(|(_, value)| (self.low..=self.high).contains(&value.log10()))
-            .map(|(digit, value)| (value, named(digit)))
-            .collect()
+        let shown: Vec<(u32, f64)> = all.filter(|(_, value)| (self.low..=self.high).contains(&value.log10())).collect();
+        let wanted: [&[u32]; 3] = [&[1], &[1, 2, 5], &[1, 2, 3, 4, 5, 6, 7, 8, 9]];
+        let n_named = |digits: &&&[u32]| shown.iter().filter(|(digit, _)| digits.contains(digit)).count() >= 3;
+        match wanted[usize::from(decades < 2.5)..].iter().find(n_named) {
+            Some(digits) => shown.iter().map(|(digit, value)| (*value, digits.contains(digit))).collect(),
+            None => self.even_ticks().into_iter().map(|value| (value, true)).collect(),
+        }
+    }
+
+    /// Where the axis is so short that it is nearly even: from three lines on, at 1, 2 or 5 times a power of ten.
+    fn even_ticks(&self) -> Vec<f64> {
+        let (low, high) = (10f64.powf(self.low), 10f64.powf(self.high));
+        let power = 10f64.powf((high - low).log10().ceil());
+        let lines =
+            |step: f64| ((low / step).ceil() as i64..=(high / step).floor() as i64).map(move |k| k as f64 * step);
+        let steps = [0.5, 0.2, 0.1, 0.05].map(|share| share * power);
+        let step = steps.into_iter().find(|&step| lines(step).count() >= 3).unwrap_or(0.02 * power);
+        lines(step).collect()
     }
 }
 
@@ -277,6 +291,25 @@ mod tests {
         assert!((x.at(0.1) - 0.5 * (LEFT + WIDTH - RIGHT)).abs() < 1e-9);
         let named: Vec<f64> = x.ticks().into_iter().filter(|t| t.1).map(|t| t.0).collect();
         assert!(named.iter().any(|t| (t - 0.1).abs() < 1e-12) && named.iter().any(|t| (t - 0.5).abs() < 1e-12));
+    }
+
+    #[test]
+    fn short_axes_have_names_too() {
+        for (low, high) in
+            [(0.21, 0.48), (0.11, 0.12), (0.9, 1.1), (3.0, 70.0), (0.06, 0.16), (9.0, 14.0), (1e-9, 8e-9)]
+        {
+            let axis = Axis::over([low, high].into_iter(), LEFT, WIDTH - RIGHT);
+            let ticks = axis.ticks();
+            let named: Vec<f64> = ticks.iter().filter(|tick| tick.1).map(|tick| tick.0).collect();
+            assert!((3..12).contains(&named.len()), "{low}..{high}: {named:?}");
+            assert!(
+                ticks.iter().all(|tick| (LEFT..=WIDTH - RIGHT).contains(&axis.at(tick.0))),
+                "{low}..{high}: {ticks:?}"
+            );
+            // Names that are told apart.
+            let texts: std::collections::HashSet<String> = named.iter().map(|value| number(*value)).collect();
+            assert_eq!(texts.len(), named.len(), "{low}..{high}: {texts:?}");
+        }
     }
 
     #[test]

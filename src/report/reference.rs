@@ -79,7 +79,8 @@ impl ReferenceStore {
 
     /// Renders with `spp` samples a pixel and keeps the picture; `progress` is told the share that is done.
     ///
-    /// The second part of the answer says why the picture could not be kept, if so.
+    /// The second part of the answer says why the picture could not be kept, if so. When `stop` says so, the samples so
+    /// far are the answer, and not kept; `None` before the first.
     pub fn make(
         &self,
         key: &Key,
@@ -87,23 +88,30 @@ impl ReferenceStore {
         settings: &RenderSettings,
         spp: u32,
         progress: &mut dyn FnMut(f64),
-    ) -> (Reference, Option<String>) {
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<(Reference, Option<String>)> {
         // Any seed but the one that is measured: a picture agrees too well with itself.
         let settings = RenderSettings { seed: !settings.seed, techniques: Default::default(), ..*settings };
         let mut film = Film::new(key.size.0, key.size.1);
         let mut slice = 4;
         while film.spp() < spp {
             let (start, goal) = (Instant::now(), film.spp().saturating_add(slice).min(spp));
-            advance(snapshot, &settings, &mut film, goal, &|| false);
+            advance(snapshot, &settings, &mut film, goal, stop);
+            if stop() && film.spp() < goal {
+                break;
+            }
             progress(f64::from(film.spp()) / f64::from(spp));
             slice = (f64::from(slice) * 0.25 / start.elapsed().as_secs_f64().max(1e-6)).clamp(4.0, 1024.0) as u32;
         }
-        let made = Made { spp, relative_error: film.error_estimate().map(|estimate| estimate.relative) };
-        let (path, trouble) = match self.keep(key, &film, &made) {
+        if film.spp() == 0 {
+            return None;
+        }
+        let made = Made { spp: film.spp(), relative_error: film.error_estimate().map(|estimate| estimate.relative) };
+        let (path, trouble) = match if film.spp() < spp { Ok(None) } else { self.keep(key, &film, &made) } {
             Ok(path) => (path, None),
             Err(reason) => (None, Some(format!("the reference could not be kept for next time: {reason}"))),
         };
-        (Reference { picture: LinearPicture::of(&film), made: Some(made), path }, trouble)
+        Some((Reference { picture: LinearPicture::of(&film), made: Some(made), path }, trouble))
     }
 
     fn keep(&self, key: &Key, film: &Film, made: &Made) -> Result<Option<PathBuf>, String> {

@@ -4,9 +4,10 @@ use super::{Ladder, SceneOutcome};
 use std::fmt::Write;
 
 const HEADER: &str = "scene,width,height,without,spp,wall_s,cpu_s,threads,camera_paths,rays,relmse,rmse,flip,\
-    estimated_error,estimated_low,estimated_high\n";
+    estimated_error,estimated_low,estimated_high,reference_differs\n";
 
-/// One row a step; `without` names the technique that is switched off. Empty fields are not known.
+/// One row a step; `without` names the technique that is switched off, `reference_differs` is the share of the picture
+/// that differs from a given reference by more than noise can. Empty fields are not known.
 pub fn csv(outcomes: &[SceneOutcome]) -> String {
     let mut text = HEADER.to_owned();
     for outcome in outcomes {
@@ -24,7 +25,7 @@ fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, ladder
         let (spent, distance, estimate) = (step.spent, step.distance, step.estimate);
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             field(&outcome.title),
             outcome.width,
             outcome.height,
@@ -41,6 +42,7 @@ fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, ladder
             optional(estimate.map(|e| e.relative)),
             optional(estimate.map(|e| e.low)),
             optional(estimate.map(|e| e.high)),
+            optional(outcome.foreign_share),
         );
     }
 }
