@@ -17,10 +17,11 @@ use std::collections::TryReserveError;
 pub struct ErrorEstimate {
     /// Root of relMSE, the mean over pixels and channels of variance / (mean² + 0.01).
     pub relative: f64,
-    /// Bounds of an interval that holds the true value with about 95 % probability.
+    /// Bounds of an interval that holds the true value of this picture with a probability of about 95 %, and more where
+    /// the slope is well known; it is wide as long as only few doublings tell how fast the error falls.
     pub low: f64,
     pub high: f64,
-    /// relMSE falls as samples^−`exponent` from doubling to doubling; 1 for independent samples.
+    /// relMSE is expected to fall as samples^−`exponent` from here on, from doubling to doubling; 1 for independent samples.
     pub exponent: f64,
     /// relMSE of a single sample, extended down from what was seen last.
     variance_of_one: f64,
@@ -62,25 +63,36 @@ impl ErrorEstimate {
             let scatter: f64 = tiles.clone().map(|tile| (tile.steps[k] - mean * tile.n_values).powi(2)).sum();
             (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * mean)
         };
-        // The first steps say little of how fast later ones fall; independent samples where there is only one.
-        let earliest = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
-        let exponent = match (earliest..level).find(is_known) {
+        let slope = |earliest: usize, expected: &Expected| match (earliest..level).find(is_known) {
             Some(first) if last > 0.0 => {
                 let span = (level - first) as f64;
                 let seen = (step(first) / last).log2() / span;
-                // A slope from few bright pixels is worth little: it is drawn towards that of independent samples by as
-                // much as it is uncertain, where slopes of pictures lie about half around it.
                 let of_tiles = sigma(first).hypot(sigma(level)) / std::f64::consts::LN_2;
-                let uncertainty = of_tiles.hypot(WOBBLE) / span;
-                let trust = 0.25 / (0.25 + uncertainty * uncertainty);
-                (MIN_EXPONENT + trust * (seen - MIN_EXPONENT)).clamp(MIN_EXPONENT, MAX_EXPONENT)
+                expected.and_seen(seen, of_tiles.hypot(WOBBLE) / span)
             }
-            _ => MIN_EXPONENT,
+            _ => *expected,
         };
-        let spp_at_level = f64::from(2u32 << level);
-        let variance_of_one = last / (exponent.exp2() - 1.0) * spp_at_level.powf(exponent);
-        // On the logarithm, where the sum of positive terms is closer to symmetric.
-        let factor = (0.5 * 1.96 * sigma(level)).exp();
+        // The first steps say little of how fast later ones fall; independent samples where there is only one.
+        let so_far = slope(level.saturating_sub(2).max(level.saturating_sub(1).min(2)), &SO_FAR);
+        // Further on all that is known helps.
+        let exponent = slope(level.saturating_sub(2), &FROM_HERE_ON).exponent;
+        let (spp_at_level, growth) = (f64::from(2u32 << level), so_far.exponent.exp2());
+        let variance_of_one = last / (growth - 1.0) * spp_at_level.powf(exponent);
+
+        // On the logarithm, where the sum of positive terms is closer to symmetric. Two looks at the same tiles, from one
+        // doubling to the next, scatter as this one and the truth do; of a first one only the tiles themselves are known.
+        let of_noise = match level.checked_sub(1).filter(is_known) {
+            Some(before) if n_tiles >= 2.0 && last > 0.0 && step(before) > 0.0 => {
+                let fall = last / step(before);
+                let scatter: f64 =
+                    tiles.clone().map(|tile| (tile.steps[level] - fall * tile.steps[before]).powi(2)).sum();
+                (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * last)
+            }
+            _ => sigma(level),
+        };
+        // And the slope of the last doubling, that the difference is made an error with, is not known for sure.
+        let of_slope = growth * std::f64::consts::LN_2 / (growth - 1.0) * so_far.uncertainty;
+        let factor = (0.5 * student_t(n_tiles - 1.0) * of_noise).hypot(0.5 * 1.96 * of_slope).exp();
         let mut estimate = Self { relative: 0.0, low: 0.0, high: 0.0, exponent, variance_of_one };
         estimate.relative = estimate.relative_at(spp);
         (estimate.low, estimate.high) = (estimate.relative / factor, estimate.relative * factor);
@@ -91,6 +103,41 @@ impl ErrorEstimate {
 /// Between plain random sampling and the best that scrambled nets do on smooth integrands (Owen 1997).
 const MIN_EXPONENT: f64 = 1.0;
 const MAX_EXPONENT: f64 = 3.0;
+
+/// An exponent and its standard deviation.
+#[derive(Clone, Copy, Debug)]
+struct Expected {
+    exponent: f64,
+    uncertainty: f64,
+}
+
+/// Of pictures so far, before anything is seen: about that of independent samples, which errs on the side of caution.
+const SO_FAR: Expected = Expected { exponent: MIN_EXPONENT, uncertainty: 0.5 };
+
+/// From eight samples on: mean and deviation of how the true error of the built-in scenes falls to 64, a little rounded
+/// towards caution (1.28 and 0.20).
+const FROM_HERE_ON: Expected = Expected { exponent: 1.2, uncertainty: 0.316 };
+
+impl Expected {
+    /// After an exponent was seen that is as uncertain as that: a slope from few bright pixels is worth little.
+    fn and_seen(&self, seen: f64, uncertainty: f64) -> Self {
+        let (expected, of_seen) = (self.uncertainty.powi(2), uncertainty.powi(2));
+        let trust = expected / (expected + of_seen);
+        let exponent = (self.exponent + trust * (seen - self.exponent)).clamp(MIN_EXPONENT, MAX_EXPONENT);
+        Self { exponent, uncertainty: (trust * of_seen).sqrt() }
+    }
+}
+
+/// What a normal variable's 1.96 becomes when its deviation is itself known from `freedom` + 1 values only: 97.5 % of
+/// Student's t lie below. To half a per cent (Cornish and Fisher's expansion from four degrees on).
+fn student_t(freedom: f64) -> f64 {
+    match freedom {
+        ..1.5 => 12.706,
+        ..2.5 => 4.303,
+        ..3.5 => 3.182,
+        _ => 1.96 + 2.372 / freedom + 2.823 / freedom.powi(2) + 2.556 / freedom.powi(3),
+    }
+}
 
 /// How far the slope of a single doubling lies from the long one where edges rule, even without any noise: nets of odd
 /// and of even powers of two divide the square differently.
@@ -245,6 +292,13 @@ mod tests {
         // Its neighbours count a ninth of it at most, and a tile of one pixel has itself alone.
         assert_eq!(local_level(&around(10.05), dark, width, 0), dark);
         assert_eq!(local_level(&[dark], dark, 1, 0), dark);
+    }
+
+    #[test]
+    fn few_tiles_are_worth_less() {
+        for (freedom, t) in [(1.0, 12.706), (3.0, 3.182), (4.0, 2.776), (9.0, 2.262), (30.0, 2.042), (1e6, 1.96)] {
+            assert!((student_t(freedom) / t - 1.0).abs() < 5e-3, "{freedom}: {}", student_t(freedom));
+        }
     }
 
     #[test]
