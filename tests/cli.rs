@@ -89,6 +89,29 @@ fn time_and_error_end_a_render() {
 }
 
 #[test]
+fn the_error_of_each_pixel_is_written_as_the_picture_tells_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "render cornell -o a.png --size 50x40 --spp 24 --error-picture e.exr --json";
+    let out = firstlight(folder.path(), &line.split(' ').collect::<Vec<_>>());
+    let json: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
+    let told = json["estimated_error"].as_f64().unwrap();
+    let errors = image::open(folder.path().join("e.exr")).unwrap().into_rgb32f();
+    assert_eq!(errors.dimensions(), (50, 40));
+    let squares: f64 = errors.pixels().map(|pixel| f64::from(pixel[0]).powi(2)).sum();
+    let mean = (squares / 2000.0).sqrt();
+    assert!((mean / told - 1.0).abs() < 1e-4, "{mean} for {told}");
+    assert!(errors.pixels().all(|pixel| pixel[0] >= 0.0 && pixel[0] == pixel[2]));
+    for (name, why) in [("e.png", "end the name in .exr"), ("b.exr", "a name of its own")] {
+        let line = format!("render cornell -o b.exr --spp 2 --error-picture {name}");
+        let mut command = Command::cargo_bin("firstlight").unwrap();
+        let output = command.current_dir(folder.path()).args(line.split(' ')).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.contains(why), "{said}");
+        assert!(!folder.path().join("b.exr").exists());
+    }
+}
+
+#[test]
 fn without_a_display_the_scene_becomes_a_picture() {
     let folder = tempfile::tempdir().unwrap();
     let scene = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), film: (width: 8, height: 8))";

@@ -10,7 +10,7 @@ use clap::Args;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
     FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, render_region_until,
-    write_film_file,
+    write_errors, write_film_file,
 };
 use firstlight::render::{Display, Film, NoRoom, Purpose, Region, RenderSettings, Room};
 use firstlight::report::cpu_seconds;
@@ -51,6 +51,10 @@ pub struct RenderArgs {
     /// Keep the film as well, an .exr to go on from.
     #[arg(long, value_name = "FILE.exr")]
     pub film: Option<PathBuf>,
+    /// The relative error of each pixel as well, as the picture itself tells it: an .exr in which 0.05 is 5 %, the mean over
+    /// 5 x 5 pixels. The root of the mean of its squares is the error of the whole picture.
+    #[arg(long, value_name = "FILE.exr", conflicts_with_all = ["turntable", "bookmarks", "region"])]
+    pub error_picture: Option<PathBuf>,
     /// Once around what the camera looks at, in so many pictures: FILE-0001.png and so on.
     #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
@@ -104,6 +108,18 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let film_path = film_path(args)?;
     // A picture that cannot be written is not worth the wait.
     check_writable(&args.output).map_err(Failure::Failed)?;
+    if let Some(path) = &args.error_picture {
+        if !is_exr(path) {
+            return Err(Failure::Usage(format!(
+                "{}: errors are written as OpenEXR: end the name in .exr",
+                path.display()
+            )));
+        }
+        if path == &args.output || Some(path) == film_path.as_ref() {
+            return Err(Failure::Usage("--error-picture needs a name of its own".to_owned()));
+        }
+        check_writable(path).map_err(Failure::Failed)?;
+    }
     if let Some(path) = &film_path {
         check_writable(path).map_err(Failure::Failed)?;
         if path.exists() && !args.resume {
@@ -119,9 +135,12 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     pool.install(|| render(args, film_path.as_deref(), &stop))
 }
 
+fn is_exr(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+}
+
 /// Where the film is kept, if it is.
 fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
-    let is_exr = |path: &Path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
     match &args.film {
         Some(path) if !is_exr(path) => {
             Err(Failure::Usage(format!("{}: films are OpenEXR pictures: end the name in .exr", path.display())))
@@ -323,6 +342,9 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
         write_film_file(&film, &job.note(&film, path), path).map_err(Failure::Failed)?;
     }
     job.write(&film, &args.output)?;
+    if let Some(path) = &args.error_picture {
+        write_errors(&film, path).map_err(Failure::Failed)?;
+    }
     if film.n_bad() > bad_before {
         let total = report.rays.camera;
         let n_bad = film.n_bad() - bad_before;

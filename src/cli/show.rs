@@ -133,6 +133,7 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         spp: None,
         time: None,
         error: None,
+        error_picture: None,
         threads: args.threads,
         seed: args.seed,
         integrator: None,

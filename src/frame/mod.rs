@@ -49,7 +49,7 @@ pub use film_file::{FilmFile, read_film_file, read_film_file_within, write_film_
 pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
-pub use picture_file::{PictureFormat, Print, write_film};
+pub use picture_file::{PictureFormat, Print, write_errors, write_film};
 pub use recording::{ReplayOptions, Replayed, replay};
 pub use remesh::MeshMeasure;
 pub use reset::{Change, Changes, Level, compare, compare_settings};

@@ -2,7 +2,7 @@
 //!
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
-use crate::render::{Display, Film, Purpose, Room, develop};
+use crate::render::{Display, Film, Purpose, Room, develop, relative_errors};
 use crate::scene::shot::NOTE_KEY;
 use crate::scene::whole_file::{WholeFile, unwritable};
 use exr::prelude::{
@@ -56,6 +56,21 @@ pub struct Print<'a> {
 /// Writes a film as its name asks, without a note.
 pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), String> {
     Print { film, display, size: (film.width(), film.height()), note: None }.write(path)
+}
+
+/// Writes the relative error of each pixel ([`relative_errors`]) as a grey EXR: 0.05 is 5 %.
+///
+/// # Errors
+/// When it is not known yet, or the file cannot be written.
+pub fn write_errors(film: &Film, path: &Path) -> Result<(), String> {
+    let errors = relative_errors(film)
+        .ok_or_else(|| format!("{}: no error is known before every pixel has two samples", path.display()))?;
+    let channel = |name: &str| AnyChannel::new(name, FlatSamples::F32(errors.clone()));
+    let channels = ["R", "G", "B"].map(channel).into_iter().collect();
+    let bytes = encode(film, channels, None).map_err(|error| unwritable(path, &error))?;
+    let mut out = WholeFile::begin(path)?;
+    out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
+    out.finish()
 }
 
 impl Print<'_> {
@@ -113,18 +128,26 @@ impl Print<'_> {
     }
 
     fn exr(&self) -> Result<Vec<u8>, exr::error::Error> {
-        let size = (self.film.width() as usize, self.film.height() as usize);
-        let attributes = LayerAttributes::named(env!("CARGO_PKG_NAME"));
-        let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(mean_channels(self.film)));
-        let mut image = Image::from_layer(layer);
-        if let Some(note) = self.note {
-            image.attributes.other.insert(Text::from(NOTE_KEY), AttributeValue::Text(Text::from(note)));
-        }
-        // The encoder seeks, so it writes to memory first.
-        let mut memory = std::io::Cursor::new(Vec::new());
-        image.write().non_parallel().to_buffered(&mut memory)?;
-        Ok(memory.into_inner())
+        encode(self.film, mean_channels(self.film), self.note)
     }
+}
+
+/// Channels of the size of `film` as an EXR in memory, because the encoder seeks.
+fn encode(
+    film: &Film,
+    channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
+    note: Option<&str>,
+) -> Result<Vec<u8>, exr::error::Error> {
+    let size = (film.width() as usize, film.height() as usize);
+    let attributes = LayerAttributes::named(env!("CARGO_PKG_NAME"));
+    let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels));
+    let mut image = Image::from_layer(layer);
+    if let Some(note) = note {
+        image.attributes.other.insert(Text::from(NOTE_KEY), AttributeValue::Text(Text::from(note)));
+    }
+    let mut memory = std::io::Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut memory)?;
+    Ok(memory.into_inner())
 }
 
 /// What the film shows, as the red, green and blue channels of an EXR.

@@ -170,6 +170,19 @@ pub fn inspect(
 /// Luminance of linear Rec. 709.
 const REC_709: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
+/// Relative error of each pixel, row by row from the top, as its last doubling of samples tells it: the mean over 5 × 5
+/// pixels, all of them scaled so that the root of the mean of their squares is the error of the whole picture. `None`
+/// where that is not known yet.
+pub fn relative_errors(film: &Film) -> Option<Vec<f32>> {
+    let told = film.error_estimate()?.relative;
+    let size = UVec2::new(film.width(), film.height());
+    let steps = smoothed(&film_values(film, |film, x, y| film.doubling_step(x, y)), size);
+    let mean = steps.iter().map(|&step| f64::from(step)).sum::<f64>() / steps.len() as f64;
+    // Nothing is wrong where nothing moved.
+    let scale = if mean > 0.0 { told * told / mean } else { 0.0 };
+    Some(steps.iter().map(|&step| (scale * f64::from(step)).sqrt() as f32).collect())
+}
+
 /// Metres along the view axis to what each pixel shows; infinite where it shows nothing.
 pub fn depths(snapshot: &Snapshot, size: UVec2, stop: &(dyn Fn() -> bool + Sync)) -> Option<Vec<f32>> {
     let forward = snapshot.camera.forward;

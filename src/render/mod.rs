@@ -42,7 +42,7 @@ pub use explain::{
 pub use film::Film;
 pub use film_record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
 pub use filter::PixelFilter;
-pub use inspect::{Inspected, Inspection, Legend, depths, inspect, scale_color, tint_sharp_zone};
+pub use inspect::{Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone};
 pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
 pub use region::Region;
