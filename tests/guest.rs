@@ -4,7 +4,7 @@
 
 mod desktop;
 
-use desktop::{Desktop, Program, until};
+use desktop::{Desktop, Losing, Loss, Program, until};
 use std::path::Path;
 use std::time::Duration;
 
@@ -13,6 +13,12 @@ fn has_content(program: &Program) -> bool {
     let picture = program.pixels();
     let first = *picture.get_pixel(picture.width() / 2, picture.height() / 2);
     picture.pixels().filter(|pixel| **pixel != first).count() > 50
+}
+
+/// By more than noise and figures.
+fn differ(a: &image::RgbImage, b: &image::RgbImage) -> bool {
+    let far = |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 48);
+    20 * a.pixels().zip(b.pixels()).filter(|pair| far(*pair)).count() > a.pixels().len()
 }
 
 fn seen(program: &Program) {
@@ -197,4 +203,33 @@ fn the_number_of_threads_is_that_of_the_panel_at_once() {
     until("three workers", || (workers(&program) == 3).then_some(()));
     program.key("ctrl+q");
     assert!(program.ended().success());
+}
+
+#[test]
+fn a_driver_that_loses_the_window_or_itself_costs_no_samples() {
+    let Some(desktop) = Desktop::start() else { return };
+    let losing = Losing::new(desktop.folder());
+    let environment = losing.environment();
+    let mut environment: Vec<(&str, &str)> = environment.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    environment.push(("RUST_LOG", "error,firstlight::frame=debug"));
+    let mut program = desktop.open(&["cornell", "--size", "320x240"], &environment);
+    seen(&program);
+    for loss in [Loss::OutOfDate, Loss::Surface, Loss::Device, Loss::Surface] {
+        let restarts = |program: &Program| program.errors().matches("restart ").count();
+        let before = restarts(&program);
+        losing.lose(loss);
+        std::thread::sleep(Duration::from_millis(500));
+        program.must_live();
+        assert_eq!(restarts(&program), before, "{loss:?}: all samples stay\n{}", program.errors());
+        // It draws: what is asked for now is to be seen.
+        let shown = program.pixels();
+        program.key("h");
+        let differs = || differ(&shown, &program.pixels());
+        until(&format!("the keys to be shown after {loss:?}"), || differs().then_some(()));
+        program.key("Escape");
+        until("the keys to go", || (!differs()).then_some(()));
+    }
+    program.key("ctrl+q");
+    let (status, said) = program.left();
+    assert!(status.success() && !said.contains("panicked"), "{said}");
 }

@@ -196,6 +196,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         seed: header.seed,
         target: idle,
         up,
+        yielding: false,
         waker: None,
     })?;
     session.open(source);

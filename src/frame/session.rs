@@ -39,6 +39,8 @@ pub struct SessionOptions {
     pub threads: Option<usize>,
     pub seed: u32,
     pub target: Target,
+    /// Workers give way to other threads, for one that draws a window too.
+    pub yielding: bool,
     /// Which axis of models points up; guessed when not given.
     pub up: Option<UpAxis>,
     /// Called from another thread when [`Session::update`] would find something new.
@@ -80,7 +82,7 @@ impl Session {
     /// When the threads cannot be started.
     pub fn new(options: SessionOptions) -> Result<Self, String> {
         let threads = options.threads.unwrap_or(0);
-        let worker = Worker::start(threads, options.target, options.waker.clone())?;
+        let worker = Worker::start(threads, options.yielding, options.target, options.waker.clone())?;
         let mut world = World::new();
         world.insert_resource(Renderer(worker));
         let waker = options.waker;
@@ -184,6 +186,12 @@ impl Session {
     /// The newest picture; empty before the first.
     pub fn picture(&self) -> &Picture {
         self.world.resource()
+    }
+
+    /// The picture of this generation is on the window. A session that is told holds its workers back until the first
+    /// picture after a change can be seen; one that is never told does not.
+    pub fn note_seen(&self, generation: u64) {
+        self.world.resource::<Renderer>().0.note_seen(generation);
     }
 
     pub fn status(&self) -> &Status {

@@ -84,7 +84,7 @@ impl Saver {
             // Threads of its own: those of the window belong to what is seen, and must not wait for this.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| failed(format!("no threads can be started: {error}")))?;
-            let mut film = Film::new(size.0, size.1);
+            let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(error.to_string()))?;
             let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
             pool.install(|| render_offline_until(&snapshot, &settings, &mut film, target, &stop, |_| true));
             if film.spp() == 0 {

@@ -13,8 +13,10 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 mod drop;
+mod loss;
 mod scale;
 
+pub use loss::{Losing, Loss};
 pub use scale::Scale;
 
 const TOOLS: &[&str] = &["Xvfb", "openbox", "xdotool", "wmctrl", "import"];

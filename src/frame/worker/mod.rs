@@ -15,11 +15,15 @@ use crate::render::{
     BadSample, Display, Explanation, Film, Inspection, Legend, RayCounts, Region, RenderSettings, Snapshot,
 };
 use glam::DVec3;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+
+/// Of yielding workers: a third of the weight of other threads.
+#[cfg(target_os = "linux")]
+const NICENESS: i32 = 5;
 
 /// Called whenever there is something new to be looked at.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -158,10 +162,13 @@ struct Shared {
     interrupt: AtomicBool,
     /// The thread waits for a message.
     sleeping: AtomicBool,
+    /// Generation of the newest picture that is on a window; 0 when nobody tells.
+    seen: AtomicU64,
     outbox: Mutex<Outbox>,
     pool: Mutex<Arc<rayon::ThreadPool>>,
     cancels: Mutex<Waits>,
     waker: Option<Waker>,
+    yielding: bool,
 }
 
 /// The near end of the thread.
@@ -172,16 +179,19 @@ pub struct Worker {
 
 impl Worker {
     /// `threads`: 0 is one a processor.
-    pub fn start(threads: usize, target: Target, waker: Option<Waker>) -> Result<Self, String> {
+    /// With `yielding`, workers give way to other threads, such as those that draw a window.
+    pub fn start(threads: usize, yielding: bool, target: Target, waker: Option<Waker>) -> Result<Self, String> {
         let shared = Arc::new(Shared {
             inbox: Mutex::default(),
             arrived: Condvar::new(),
             interrupt: AtomicBool::new(false),
             sleeping: AtomicBool::new(false),
+            seen: AtomicU64::new(0),
             outbox: Mutex::default(),
-            pool: Mutex::new(make_pool(threads)?),
+            pool: Mutex::new(make_pool(threads, yielding)?),
             cancels: Mutex::default(),
             waker,
+            yielding,
         });
         let thread = std::thread::Builder::new()
             .name("firstlight render".to_owned())
@@ -270,6 +280,15 @@ impl Worker {
         lock(&self.shared.outbox).fresh
     }
 
+    /// The picture of this generation is on the window.
+    pub fn note_seen(&self, generation: u64) {
+        // Under the lock, as with any message; but it is no reason to drop anything.
+        let inbox = lock(&self.shared.inbox);
+        self.shared.seen.store(generation, Ordering::Release);
+        drop(inbox);
+        self.shared.arrived.notify_all();
+    }
+
     /// Whether there is nothing to do, and no message that could change that.
     pub fn is_asleep(&self) -> bool {
         self.shared.sleeping.load(Ordering::Acquire) && !self.shared.interrupt.load(Ordering::Acquire)
@@ -295,13 +314,28 @@ impl Drop for Worker {
     }
 }
 
-fn make_pool(threads: usize) -> Result<Arc<rayon::ThreadPool>, String> {
+fn make_pool(threads: usize, yielding: bool) -> Result<Arc<rayon::ThreadPool>, String> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("firstlight {i}"))
+        .start_handler(move |_| {
+            if yielding {
+                yield_to_others();
+            }
+        })
         .build()
         .map(Arc::new)
         .map_err(|error| format!("{threads} worker threads cannot be started: {error}"))
+}
+
+/// From now on this thread takes what others leave of the processor, most of it while there are others.
+fn yield_to_others() {
+    // Elsewhere than on Linux a thread's own niceness cannot be set.
+    #[cfg(target_os = "linux")]
+    {
+        // It may always be raised, and without it all is as it was.
+        let _ = rustix::process::setpriority_process(None, NICENESS);
+    }
 }
 
 /// The data behind a lock is whole at every moment at which a thread could panic.

@@ -10,7 +10,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// So long a coarse picture is given to get onto the window before the workers go on.
+const LONGEST_DRAW: Duration = Duration::from_millis(33);
 
 /// What the thread itself holds.
 pub struct Loop<'a> {
@@ -36,6 +39,8 @@ pub struct Loop<'a> {
     pub(super) spare: Picture,
     /// The picture that was shown last is not of these settings.
     pub(super) redraw: bool,
+    /// Generation of which a first picture was let to be seen.
+    let_seen: u64,
     /// Who waits for a film worth keeping.
     to_keep: Vec<Sender<Film>>,
 }
@@ -59,6 +64,7 @@ impl<'a> Loop<'a> {
             stats: Stats { asleep: true, ..Stats::default() },
             spare: Picture::default(),
             redraw: false,
+            let_seen: 0,
             to_keep: Vec::new(),
         }
     }
@@ -203,7 +209,7 @@ impl<'a> Loop<'a> {
     }
 
     fn set_threads(&mut self, threads: usize) {
-        match make_pool(threads) {
+        match make_pool(threads, self.shared.yielding) {
             Ok(pool) => {
                 self.stats.threads = pool.current_num_threads();
                 *lock(&self.shared.pool) = pool;
@@ -225,7 +231,10 @@ impl<'a> Loop<'a> {
                     lock(&self.shared.pool).install(|| film.clear());
                     film
                 }
-                None => Film::new(size.0, size.1),
+                None => match Film::try_new(size.0, size.1) {
+                    Ok(film) => film,
+                    Err(error) => return self.give_up(error.to_string()),
+                },
             };
             if let Some(old) = self.film.replace((divider, film)).filter(|(_, old)| old.spp() > 0) {
                 self.previous = Some(old);
@@ -287,7 +296,25 @@ impl<'a> Loop<'a> {
         self.answer(false);
         if !replaced && (self.redraw || self.previous.is_none()) {
             self.show(false);
+            if divider > 1 {
+                self.let_it_be_seen();
+            }
         }
+    }
+
+    /// The first picture after a change has the processors to itself until it is on the window: where they have to
+    /// draw that too, more samples for a coarse film would only keep it waiting.
+    fn let_it_be_seen(&mut self) {
+        let generation = self.stats.generation;
+        let seen = || self.shared.seen.load(Ordering::Acquire);
+        if self.let_seen == generation || seen() == 0 {
+            return;
+        }
+        self.let_seen = generation;
+        let inbox = lock(&self.shared.inbox);
+        let waits = |_: &mut _| seen() < generation && !self.shared.interrupt.load(Ordering::Acquire);
+        // Whether the window drew it in time or not, the next step follows.
+        drop(self.shared.arrived.wait_timeout_while(inbox, LONGEST_DRAW, waits));
     }
 
     /// Gives the film to who wants to keep it: at full resolution, or as it is if there will be `no_better` one.
@@ -338,7 +365,12 @@ impl<'a> Loop<'a> {
     /// A bug in the renderer must not take the window down: say so, and render nothing until something changes.
     fn fail(&mut self, panic: &(dyn std::any::Any + Send)) {
         let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-        self.stats.failure = Some(format!("the renderer failed: {}", text.unwrap_or("no reason given")));
+        self.give_up(format!("the renderer failed: {}", text.unwrap_or("no reason given")));
+    }
+
+    /// Renders nothing until something changes, and says why.
+    fn give_up(&mut self, reason: String) {
+        self.stats.failure = Some(reason);
         (self.job, self.film, self.previous) = (None, None, None);
         lock(&self.shared.outbox).stats = Stats { asleep: true, ..self.stats.clone() };
         self.wake();

@@ -63,13 +63,20 @@ impl App {
                 overlay::help(context, help);
             }
         })?;
-        self.reaction.shown(self.session.picture().generation, Instant::now());
+        if !presented.again {
+            let generation = self.session.picture().generation;
+            self.session.note_seen(generation);
+            self.reaction.shown(generation, Instant::now());
+            // A movement may have waited for it.
+            self.stirred |= generation > self.seen;
+            self.seen = generation;
+        }
         tracing::trace!("drawn in {:.1} ms", now.elapsed().as_secs_f64() * 1e3);
         if presented.again {
             window.request_redraw();
         }
         self.repaint_at = now.checked_add(presented.repaint_after).filter(|_| presented.repaint_after < Duration::MAX);
-        self.last_draw = Some(now);
+        (self.last_draw, self.unseen_since) = (Some(now), None);
         self.shown_figures = figures;
         // The overlays may have asked for a time that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();

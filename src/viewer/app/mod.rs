@@ -177,7 +177,11 @@ struct App {
     occluded: bool,
     /// Something happened since the last tick.
     stirred: bool,
-    /// The picture on the window.
+    /// Generation of the picture on the window.
+    seen: u64,
+    /// Since when, or since the last drawing, there is a change that cannot be seen yet.
+    unseen_since: Option<Instant>,
+    /// The picture that the window draws.
     shown_picture: Option<u64>,
     shown_figures: String,
     last_tick: Option<Instant>,
@@ -203,6 +207,7 @@ impl App {
             threads: options.threads,
             seed: options.seed,
             target: GOOD_ENOUGH,
+            yielding: true,
             up: options.up,
             waker: Some(waker.clone()),
         })
@@ -237,6 +242,8 @@ impl App {
             keep_size_at: None,
             occluded: false,
             stirred: true,
+            seen: 0,
+            unseen_since: None,
             shown_picture: None,
             shown_figures: String::new(),
             last_tick: None,
@@ -325,6 +332,9 @@ impl App {
         if self.session.status().restarts != restarts {
             (self.restarted_at, self.done_at) = (now, None);
         }
+        if self.session.status().restarts > self.seen {
+            self.unseen_since.get_or_insert(now);
+        }
         self.done_at = if self.session.status().done { self.done_at.or(Some(now)) } else { None };
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
@@ -365,16 +375,17 @@ impl App {
         let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES);
         let new_figures = self.overlays && self.figures() != self.shown_figures;
         let repaint = self.repaint_at.is_some_and(|at| now >= at) || self.toasts.len() != n_toasts;
-        // The picture that the last change asked for comes first: drawing the old one again would only keep it waiting.
-        let comes = !self.is_rendered() && now < self.restarted_at + LATEST;
-        if !self.occluded && (new_picture || !comes && (repaint || (new_figures && figures_due))) {
+        // The picture that the last change asked for comes first: drawing an older one would only keep it waiting.
+        let unseen_since = self.unseen_since.filter(|_| !self.is_rendered());
+        let comes = unseen_since.is_some_and(|since| now < since + LATEST);
+        if !self.occluded && !comes && (new_picture || repaint || (new_figures && figures_due)) {
             window.request_redraw();
         }
         let moving = match answered {
             true => soon.or_else(|| self.input.is_moving().then(|| now + FRAME)),
             false => Some(self.steered_at + LATEST),
         };
-        let late = comes.then(|| self.restarted_at + LATEST);
+        let late = unseen_since.filter(|_| comes).map(|since| since + LATEST);
         let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
         let session = self.session.next_wake(clock).map(|at| self.start + at);
@@ -390,9 +401,11 @@ impl App {
         follows && self.presenter.as_ref().is_some_and(|presenter| !presenter.egui_context().is_pointer_over_area())
     }
 
-    /// The last change of the view has been rendered, or that takes too long to wait for.
+    /// The last change of the view can be seen, or that takes too long to wait for. To render the next while this one
+    /// is being drawn would keep both waiting where one processor has to do all.
     fn is_answered(&self, now: Instant) -> bool {
-        self.is_rendered() || now >= self.steered_at + LATEST
+        let restarts = self.session.status().restarts;
+        self.seen >= restarts || (self.occluded && self.is_rendered()) || now >= self.steered_at + LATEST
     }
 
     /// There is a picture of what the scene is now.
