@@ -231,7 +231,7 @@ impl LeafBlock for QuadBlock {
     fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
         let [a, b, c, d] = &block.corners;
         let corners = [ray.shear(s, a), ray.shear(s, b), ray.shear(s, c), ray.shear(s, d)];
-        quad_hits(s, Mask::MAX, &corners, s.splat(ray.sz))
+        quad_hits(s, Mask::MAX, corners.each_ref(), s.splat(ray.sz))
     }
 }
 

@@ -88,8 +88,7 @@ pub(super) fn resolve<S: Simd>(
 ///
 /// - `corners`: `a`, `b`, `c`, `d` around the quad.
 #[inline(always)]
-pub(super) fn quad_hits<S: Simd>(s: S, lanes: Mask, corners: &[Sheared<S>; 4], sz: S::F) -> LaneHits<S> {
-    let [a, b, c, d] = corners;
+pub(super) fn quad_hits<S: Simd>(s: S, lanes: Mask, [a, b, c, d]: [&Sheared<S>; 4], sz: S::F) -> LaneHits<S> {
     let diagonal = plain(s, a, c);
     let back = s.sub(s.splat(0.0), diagonal);
     let first = lanes & same_sign(s, plain(s, c, b), diagonal, plain(s, b, a));

@@ -10,7 +10,7 @@ use crate::geometry::{Aabb, quad_corners};
 use glam::Vec3;
 
 /// Up to this many simple objects are tested by every ray; a tree pays above.
-const MAX_SIMPLE: usize = 48;
+pub(super) const MAX_SIMPLE: usize = 48;
 
 /// Trees over spheres, quads and triangles. What their leaves hold are the numbers of the objects.
 #[derive(Debug, Default)]

@@ -17,6 +17,7 @@ mod nodes;
 mod objects;
 mod ray;
 mod scene_tree;
+mod sieve;
 mod simd;
 mod sphere_tree;
 mod split;

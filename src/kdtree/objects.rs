@@ -5,7 +5,9 @@
 
 use super::batch::{HitBatch, RayBatch};
 use super::lanes::{LaneHits, Sheared, dot, may_hit, quad_hits, resolve, shear, sphere_hits};
+use super::loose::MAX_SIMPLE;
 use super::scene_tree::Shape;
+use super::sieve::{SieveRays, SievedQuad};
 use super::simd::{LANES, Mask, Simd};
 use super::sphere_tree::SphereTree;
 use crate::geometry::quad_corners;
@@ -22,6 +24,42 @@ fn point(p: Vec3) -> Point {
 struct Quad {
     corners: [Point; 4],
     object: u32,
+}
+
+/// Quads of which each ray is expected to meet few: those that can be the nearest are found first.
+#[derive(Debug, Default)]
+struct QuadSieve {
+    quads: Vec<SievedQuad>,
+    /// Of these, for lanes to look up: four corners, and which of the scene's objects.
+    corners: [[Vec<f32>; 3]; 4],
+    objects: Vec<u32>,
+    /// Places among the quads of the scene of the sieved ones, and of those that always have to be tested.
+    sieved: Vec<u32>,
+    others: Vec<u32>,
+}
+
+/// From so many quads on it is quicker to sieve them.
+const MIN_SIEVED: usize = 5;
+
+impl QuadSieve {
+    fn add(&mut self, place: u32, object: u32, [corner, edge_u, edge_v]: [Vec3; 3]) {
+        let Some(quad) = SievedQuad::new(corner, edge_u, edge_v) else { return self.others.push(place) };
+        self.quads.push(quad);
+        self.sieved.push(place);
+        self.objects.push(object);
+        for (table, corner) in self.corners.iter_mut().zip(quad_corners(corner, edge_u, edge_v)) {
+            table.iter_mut().zip(corner.to_array()).for_each(|(table, x)| table.push(x));
+        }
+    }
+
+    /// Sixteen and thirty-two numbers are looked up fastest.
+    fn padded(mut self) -> Option<Self> {
+        let n = self.quads.len();
+        let length = [LANES, 2 * LANES, n].into_iter().find(|&length| length >= n)?;
+        self.corners.iter_mut().flatten().for_each(|table| table.resize(length, 0.0));
+        self.objects.resize(length, 0);
+        (n >= MIN_SIEVED).then_some(self)
+    }
 }
 
 #[derive(Debug)]
@@ -48,6 +86,7 @@ struct Plane {
 #[derive(Debug, Default)]
 pub(super) struct SimpleObjects {
     quads: Vec<Quad>,
+    sieve: Option<QuadSieve>,
     triangles: Vec<Triangle>,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
@@ -56,10 +95,11 @@ pub(super) struct SimpleObjects {
 impl SimpleObjects {
     /// - `objects`: which shapes to take.
     pub fn new(shapes: &[Shape], objects: impl Iterator<Item = u32>) -> Self {
-        let mut simple = Self::default();
+        let (mut simple, mut sieve) = (Self::default(), QuadSieve::default());
         for object in objects {
             match &shapes[object as usize] {
                 Shape::Quad { corner, edge_u, edge_v } => {
+                    sieve.add(simple.quads.len() as u32, object, [*corner, *edge_u, *edge_v]);
                     let corners = quad_corners(*corner, *edge_u, *edge_v).map(point);
                     simple.quads.push(Quad { corners, object });
                 }
@@ -77,6 +117,7 @@ impl SimpleObjects {
                 Shape::Mesh { .. } | Shape::Spheres { .. } => {}
             }
         }
+        simple.sieve = sieve.padded();
         simple
     }
 }
@@ -155,11 +196,13 @@ impl<S: Simd> Packet<S> {
     pub fn test_objects<const ANY: bool>(&mut self, s: S, objects: &SimpleObjects) {
         if !objects.quads.is_empty() || !objects.triangles.is_empty() {
             let frame = ShearFrame::new(s, &self.origin, &self.dir);
-            for quad in &objects.quads {
-                self.test_quad(s, &frame, quad);
-                if self.is_done::<ANY>() {
-                    return;
-                }
+            match &objects.sieve {
+                Some(sieve) if ANY => self.sift_any(s, &frame, &objects.quads, sieve),
+                Some(sieve) => self.sift(s, &frame, &objects.quads, sieve),
+                None => self.test_quads::<ANY>(s, &frame, &objects.quads),
+            }
+            if self.is_done::<ANY>() {
+                return;
             }
             for triangle in &objects.triangles {
                 let [a, b, c] = &triangle.vertices;
@@ -223,10 +266,84 @@ impl<S: Simd> Packet<S> {
     }
 
     #[inline(always)]
+    fn test_quads<const ANY: bool>(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad]) {
+        for quad in quads {
+            self.test_quad(s, frame, quad);
+            if self.is_done::<ANY>() {
+                return;
+            }
+        }
+    }
+
+    /// The nearest of many quads, in rays that have met nothing yet: each tests the one that comes first by the sieve, and
+    /// only where that leaves a doubt all of them.
+    #[inline(always)]
+    fn sift(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadSieve) {
+        let rays = SieveRays::new(s, &self.origin, &self.dir);
+        // The earliest times at which the two nearest may be met.
+        let (mut first, mut second) = (self.t, self.t);
+        let mut which = s.splat_u(0);
+        for (k, quad) in (0..).zip(&sieve.quads) {
+            let earliest = rays.look::<false>(s, quad).earliest;
+            second = s.min(s.max(earliest, first), second);
+            which = s.select_u(s.lt(earliest, first), s.splat_u(k), which);
+            first = s.min(earliest, first);
+        }
+        let some = self.lanes & s.lt(first, self.t);
+        if some != 0 {
+            let [a, b, c, d] = &sieve.corners;
+            let (a, b) = (frame.shear_each(s, a, which), frame.shear_each(s, b, which));
+            let (c, d) = (frame.shear_each(s, c, which), frame.shear_each(s, d, which));
+            let hits = quad_hits(s, some, [&a, &b, &c, &d], frame.sz);
+            let take = hits.mask & s.lt(s.splat(0.0), hits.t) & s.lt(hits.t, second);
+            self.t = s.select(take, hits.t, self.t);
+            self.u = s.select(take, hits.u, self.u);
+            self.v = s.select(take, hits.v, self.v);
+            self.object = s.select_u(take, s.gather_u(&sieve.objects, which), self.object);
+            self.found |= take;
+            let all = std::mem::replace(&mut self.lanes, some & !take);
+            if self.lanes != 0 {
+                self.test_quads::<false>(s, frame, quads);
+            }
+            self.lanes = all;
+        }
+        for &place in &sieve.others {
+            self.test_quad(s, frame, &quads[place as usize]);
+        }
+    }
+
+    /// The same for any hit: a quad is tested only where the sieve cannot tell.
+    #[inline(always)]
+    fn sift_any(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadSieve) {
+        let rays = SieveRays::new(s, &self.origin, &self.dir);
+        let mut doubts = [0; MAX_SIMPLE];
+        for (quad, doubt) in sieve.quads.iter().zip(&mut doubts) {
+            let seen = rays.look::<true>(s, quad);
+            let sure = seen.hits & s.lt(seen.latest, self.t);
+            self.found |= self.lanes & sure;
+            *doubt = !s.le(self.t, seen.earliest) & !sure;
+        }
+        let all = self.lanes;
+        for (&place, &doubt) in sieve.sieved.iter().zip(&doubts) {
+            self.lanes = all & doubt & !self.found;
+            if self.lanes != 0 {
+                self.test_quad(s, frame, &quads[place as usize]);
+            }
+        }
+        self.lanes = all;
+        if self.is_done::<true>() {
+            return;
+        }
+        for &place in &sieve.others {
+            self.test_quad(s, frame, &quads[place as usize]);
+        }
+    }
+
+    #[inline(always)]
     fn test_quad(&mut self, s: S, frame: &ShearFrame<S>, quad: &Quad) {
         let [a, b, c, d] = &quad.corners;
         let corners = [frame.shear(s, a), frame.shear(s, b), frame.shear(s, c), frame.shear(s, d)];
-        let hits = quad_hits(s, self.lanes, &corners, frame.sz);
+        let hits = quad_hits(s, self.lanes, corners.each_ref(), frame.sz);
         if hits.mask != 0 {
             self.offer(s, hits, quad.object);
         }
@@ -247,6 +364,8 @@ impl<S: Simd> Packet<S> {
 pub(super) struct ShearFrame<S: Simd> {
     /// For each lane the axes across, across and along.
     axes: [S::U; 3],
+    along_x: Mask,
+    along_y: Mask,
     /// The origin along these axes.
     origin: [S::F; 3],
     sx: S::F,
@@ -280,13 +399,25 @@ impl<S: Simd> ShearFrame<S> {
             s.select_u(along_x, zero, s.select_u(along_y, one, two)),
         ];
         let (sx, sy, sz) = (s.div(d[0], d[2]), s.div(d[1], d[2]), s.div(s.splat(1.0), d[2]));
-        Self { axes, origin: o, sx, sy, sz }
+        Self { axes, along_x, along_y, origin: o, sx, sy, sz }
     }
 
     #[inline(always)]
     fn shear(&self, s: S, vertex: &Point) -> Sheared<S> {
         let [kx, ky, kz] = self.axes;
         let vertex = [s.pick(vertex, kx), s.pick(vertex, ky), s.pick(vertex, kz)];
+        shear(s, vertex, self.origin, self.sx, self.sy)
+    }
+
+    /// A point for each lane, from a table.
+    #[inline(always)]
+    fn shear_each(&self, s: S, [x, y, z]: &[Vec<f32>; 3], which: S::U) -> Sheared<S> {
+        let (x, y, z) = (s.gather(x, which), s.gather(y, which), s.gather(z, which));
+        let vertex = [
+            by_axis(s, self.along_x, self.along_y, y, z, x),
+            by_axis(s, self.along_x, self.along_y, z, x, y),
+            by_axis(s, self.along_x, self.along_y, x, y, z),
+        ];
         shear(s, vertex, self.origin, self.sx, self.sy)
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Kernels are generic over [`Simd`], compiled once for each implementation inside a function that enables its
 //! instructions, and [`InstructionSet::detect`] picks one when the program first asks. All operations round like
-//! the scalar ones, nothing is contracted or approximated, so all builds give the same bits.
+//! the scalar ones, nothing is contracted or approximated, so all builds give the same bits; but for the three whose
+//! name ends in `about`, which only help to decide what need not be computed.
 
 use std::sync::OnceLock;
 
@@ -41,6 +42,12 @@ pub(crate) trait Simd: Copy {
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `c - a · b`, rounded once.
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `a · b + c`, rounded once or twice, as is quickest: for bounds, since the bits depend on the build.
+    fn mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `c - a · b` in the same way.
+    fn neg_mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `1 / a` within 2⁻²² of itself, for bounds too. NaN or infinite where `a` is 0 or subnormal.
+    fn reciprocal_about(self, a: Self::F) -> Self::F;
     /// Lanes whose sign bit is set.
     fn negative(self, a: Self::F) -> Mask;
     fn lt(self, a: Self::F, b: Self::F) -> Mask;
@@ -255,6 +262,18 @@ impl Simd for Portable {
     #[inline(always)]
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         std::array::from_fn(|i| (-a[i]).mul_add(b[i], c[i]))
+    }
+    #[inline(always)]
+    fn mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|i| a[i] * b[i] + c[i])
+    }
+    #[inline(always)]
+    fn neg_mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|i| c[i] - a[i] * b[i])
+    }
+    #[inline(always)]
+    fn reciprocal_about(self, a: Self::F) -> Self::F {
+        a.map(f32::recip)
     }
     #[inline(always)]
     fn negative(self, a: Self::F) -> Mask {

@@ -71,6 +71,13 @@ impl Simd for Avx512 {
         fn abs(a: __m512) -> __m512 { _mm512_abs_ps(a) }
         fn mul_sub(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmsub_ps(a, b, c) }
         fn neg_mul_add(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fnmadd_ps(a, b, c) }
+        fn mul_add_about(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmadd_ps(a, b, c) }
+        fn neg_mul_add_about(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fnmadd_ps(a, b, c) }
+        fn reciprocal_about(a: __m512) -> __m512 {
+            // One step of Newton's from 14 bits.
+            let r = _mm512_rcp14_ps(a);
+            _mm512_mul_ps(r, _mm512_fnmadd_ps(a, r, _mm512_set1_ps(2.0)))
+        }
         fn negative(a: __m512) -> Mask { _mm512_movepi32_mask(_mm512_castps_si512(a)) }
         fn lt(a: __m512, b: __m512) -> Mask { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) }
         fn le(a: __m512, b: __m512) -> Mask { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) }
@@ -244,6 +251,14 @@ impl Simd for Avx2 {
         }
         fn mul_sub(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fmsub_ps(a, b, c)) }
         fn neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fnmadd_ps(a, b, c)) }
+        fn mul_add_about(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fmadd_ps(a, b, c)) }
+        fn neg_mul_add_about(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fnmadd_ps(a, b, c)) }
+        fn reciprocal_about(a: Self::F) -> Self::F {
+            // One step of Newton's from 11 bits.
+            let (r, two) = (halves!(_mm256_rcp_ps(a)), [_mm256_set1_ps(2.0); 2]);
+            let rest = halves!(_mm256_fnmadd_ps(a, r, two));
+            halves!(_mm256_mul_ps(r, rest))
+        }
         fn negative(a: Self::F) -> Mask { bits_of(a[0], a[1]) }
         fn lt(a: Self::F, b: Self::F) -> Mask {
             bits_of(_mm256_cmp_ps::<_CMP_LT_OQ>(a[0], b[0]), _mm256_cmp_ps::<_CMP_LT_OQ>(a[1], b[1]))

@@ -16,8 +16,12 @@ mod drop;
 mod loss;
 mod scale;
 
-pub use loss::{Losing, Loss};
-pub use scale::Scale;
+// Nor does every test lose or scale anything.
+#[allow(unused_imports)]
+pub use {
+    loss::{Losing, Loss},
+    scale::Scale,
+};
 
 const TOOLS: &[&str] = &["Xvfb", "openbox", "xdotool", "wmctrl", "import"];
 /// Far more than anything here takes, even where other work holds the processors.
