@@ -346,6 +346,46 @@ fn scenes_of_all_shapes_agree() {
     }
 }
 
+/// A room with boxes in it, turned and upright, whose walls meet at shared corners; some quads twice, some needles, one
+/// without area. All corners are returned too, for rays to aim at.
+fn room(seed: u64, n: usize, scale: f32, offset: Vec3) -> (SceneTree, Soup) {
+    let mut random = Random(seed);
+    let mut quads: Vec<[Vec3; 3]> = Vec::new();
+    let mut size = 1.0;
+    while quads.len() < n {
+        let turn = if quads.is_empty() { Quat::IDENTITY } else { Quat::from_rotation_y(random.signed() * 3.0) };
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis * (2.0 * size));
+        let o = if quads.is_empty() { Vec3::ZERO } else { random.point() * 0.6 } - 0.5 * (x + y + z);
+        quads.extend([[o, x, y], [o + z, x, y], [o, y, z], [o + x, y, z], [o, z, x], [o + y, z, x]]);
+        quads.push(match quads.len() / 7 % 3 {
+            0 => quads[random.below(quads.len())],
+            1 => [o, x * 1e-7, y],
+            _ => [o, x, x],
+        });
+        size = 0.2 + 0.2 * random.signed().abs();
+    }
+    quads.truncate(n);
+    let mut corners = Soup::default();
+    let shapes = quads.iter().map(|quad| {
+        let [corner, edge_u, edge_v] = [quad[0] * scale + offset, quad[1] * scale, quad[2] * scale];
+        corners.positions.extend([corner, corner + edge_u, corner + edge_v, corner + 0.3 * edge_u + 0.6 * edge_v]);
+        Shape::Quad { corner, edge_u, edge_v }
+    });
+    (SceneTree::build(shapes.collect()), corners)
+}
+
+#[test]
+fn rooms_of_quads_agree() {
+    let places = [(1.0, Vec3::ZERO), (1e-4, vec3(0.3, -0.2, 0.1)), (3e3, vec3(1e4, -2e4, 5e3)), (1e-12, Vec3::ZERO)];
+    for (seed, n) in [(1, 5), (2, 6), (3, 16), (4, 17), (5, 32), (6, 33), (7, 48), (8, 49)] {
+        for (scale, offset) in places {
+            let (scene, corners) = room(seed, n, scale, offset);
+            let what = format!("room {seed} of {n}, {scale} at {offset}");
+            assert_agrees(&scene, &awkward_rays(seed, &corners, 4000), &what);
+        }
+    }
+}
+
 /// The shapes that a ray leaves, at one scale and place.
 fn surfaces(scale: f32, offset: Vec3) -> Vec<(&'static str, Shape)> {
     let (a, b, c) = (vec3(-0.7, -0.2, 0.3), vec3(0.9, 0.1, -0.4), vec3(0.2, 0.8, 0.5));
