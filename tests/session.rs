@@ -103,6 +103,31 @@ fn a_scene_is_read_shown_and_finished_and_then_everything_sleeps() {
 }
 
 #[test]
+fn no_picture_waits_for_what_is_made_beside_it() {
+    let mut driver = Driver::new(64, 48, spp(4));
+    driver.open("dof-balls");
+    driver.run_until(|session| session.status().done && session.is_idle());
+    // Something takes all threads that trees are built on.
+    let pool = driver.session.pool();
+    let (release, held) = std::sync::mpsc::channel::<()>();
+    let held = std::sync::Mutex::new(held);
+    let (begun, has_begun) = std::sync::mpsc::channel();
+    let busy = std::thread::spawn(move || {
+        pool.broadcast(|_| {
+            begun.send(()).expect("the test listens");
+            // Ends when the other side is dropped.
+            let _ = held.lock().unwrap().recv();
+        })
+    });
+    (0..2).for_each(|_| has_begun.recv_timeout(Duration::from_secs(60)).expect("a thread"));
+    let restarts = driver.session.status().restarts;
+    driver.session.send(Command::Orbit { yaw_deg: 20.0, pitch_deg: 3.0 });
+    driver.run_until(|session| session.status().restarts > restarts && session.status().done);
+    drop(release);
+    busy.join().expect("no thread has panicked");
+}
+
+#[test]
 fn the_window_and_the_command_line_render_the_same_bits() {
     let mut driver = Driver::new(48, 48, spp(8));
     driver.open("cornell-balls");

@@ -243,7 +243,7 @@ impl Session {
         })
     }
 
-    /// The workers' threads.
+    /// As many threads as the workers have, for work beside them.
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {
         self.world.resource::<Renderer>().0.pool()
     }

@@ -21,9 +21,15 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Of yielding workers: a third of the weight of other threads.
-#[cfg(target_os = "linux")]
-const NICENESS: i32 = 5;
+/// Threads that trees are built on, beside those that render. Were they the same, a picture would wait for a tree: who waits
+/// for a part of the one may be given a part of the other to do.
+const BESIDE: &str = "beside";
+const WORKERS: &str = "firstlight";
+
+/// How far yielding threads give way: a third of the weight of others for workers, a third of that beside them.
+fn niceness(name: &str) -> i32 {
+    if name == BESIDE { 10 } else { 5 }
+}
 
 /// Called whenever there is something new to be looked at.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -166,6 +172,7 @@ struct Shared {
     seen: AtomicU64,
     outbox: Mutex<Outbox>,
     pool: Mutex<Arc<rayon::ThreadPool>>,
+    beside: Mutex<Arc<rayon::ThreadPool>>,
     cancels: Mutex<Waits>,
     waker: Option<Waker>,
     yielding: bool,
@@ -188,7 +195,8 @@ impl Worker {
             sleeping: AtomicBool::new(false),
             seen: AtomicU64::new(0),
             outbox: Mutex::default(),
-            pool: Mutex::new(make_pool(threads, yielding)?),
+            pool: Mutex::new(make_pool(threads, WORKERS, yielding)?),
+            beside: Mutex::new(make_pool(threads, BESIDE, yielding)?),
             cancels: Mutex::default(),
             waker,
             yielding,
@@ -241,9 +249,9 @@ impl Worker {
         lock(&self.shared.cancels).clone()
     }
 
-    /// The pool that renders, for work beside it such as building trees.
+    /// As many threads as render, for work beside them such as building trees.
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {
-        lock(&self.shared.pool).clone()
+        lock(&self.shared.beside).clone()
     }
 
     /// A copy of the film as it is now; waits until the workers have dropped what they are at, some milliseconds.
@@ -314,13 +322,13 @@ impl Drop for Worker {
     }
 }
 
-fn make_pool(threads: usize, yielding: bool) -> Result<Arc<rayon::ThreadPool>, String> {
+fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<rayon::ThreadPool>, String> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
-        .thread_name(|i| format!("firstlight {i}"))
+        .thread_name(move |i| format!("{name} {i}"))
         .start_handler(move |_| {
             if yielding {
-                yield_to_others();
+                yield_to_others(niceness(name));
             }
         })
         .build()
@@ -329,13 +337,15 @@ fn make_pool(threads: usize, yielding: bool) -> Result<Arc<rayon::ThreadPool>, S
 }
 
 /// From now on this thread takes what others leave of the processor, most of it while there are others.
-fn yield_to_others() {
+fn yield_to_others(niceness: i32) {
     // Elsewhere than on Linux a thread's own niceness cannot be set.
     #[cfg(target_os = "linux")]
     {
         // It may always be raised, and without it all is as it was.
-        let _ = rustix::process::setpriority_process(None, NICENESS);
+        let _ = rustix::process::setpriority_process(None, niceness);
     }
+    #[cfg(not(target_os = "linux"))]
+    let _ = niceness;
 }
 
 /// The data behind a lock is whole at every moment at which a thread could panic.

@@ -1,7 +1,7 @@
 //! The far end: takes over what has arrived, does the scheduler's next step, hands over, and sleeps.
 
 use super::show::Views;
-use super::{Answer, Job, Look, Question, Shared, Stats, lock, make_pool};
+use super::{Answer, BESIDE, Job, Look, Question, Shared, Stats, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{Scheduler, Step, StepReport};
 use crate::frame::{Picture, Target};
 use crate::render::{Display, Film, Region, advance_region, explain};
@@ -209,10 +209,14 @@ impl<'a> Loop<'a> {
     }
 
     fn set_threads(&mut self, threads: usize) {
-        match make_pool(threads, self.shared.yielding) {
-            Ok(pool) => {
+        let yielding = self.shared.yielding;
+        let pools =
+            make_pool(threads, WORKERS, yielding).and_then(|pool| Ok((pool, make_pool(threads, BESIDE, yielding)?)));
+        match pools {
+            Ok((pool, beside)) => {
                 self.stats.threads = pool.current_num_threads();
                 *lock(&self.shared.pool) = pool;
+                *lock(&self.shared.beside) = beside;
                 self.scheduler.forget_speed();
             }
             Err(error) => self.stats.failure = Some(error),
