@@ -317,11 +317,17 @@ impl<S: Simd> Packet<S> {
     fn sift_any(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadSieve) {
         let rays = SieveRays::new(s, &self.origin, &self.dir);
         let mut doubts = [0; MAX_SIMPLE];
-        for (quad, doubt) in sieve.quads.iter().zip(&mut doubts) {
-            let seen = rays.look::<true>(s, quad);
-            let sure = seen.hits & s.lt(seen.latest, self.t);
-            self.found |= self.lanes & sure;
-            *doubt = !s.le(self.t, seen.earliest) & !sure;
+        // To ask after each whether that was enough would cost more than to look at a few in vain.
+        for (quads, doubts) in sieve.quads.chunks(4).zip(doubts.chunks_mut(4)) {
+            for (quad, doubt) in quads.iter().zip(doubts) {
+                let seen = rays.look::<true>(s, quad);
+                let sure = seen.hits & s.lt(seen.latest, self.t);
+                self.found |= self.lanes & sure;
+                *doubt = !s.le(self.t, seen.earliest) & !sure;
+            }
+            if self.is_done::<true>() {
+                return;
+            }
         }
         let all = self.lanes;
         for (&place, &doubt) in sieve.sieved.iter().zip(&doubts) {
@@ -331,9 +337,6 @@ impl<S: Simd> Packet<S> {
             }
         }
         self.lanes = all;
-        if self.is_done::<true>() {
-            return;
-        }
         for &place in &sieve.others {
             self.test_quad(s, frame, &quads[place as usize]);
         }
