@@ -228,6 +228,12 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
     std::fs::write(&room, ROOM.replace("zenith: 1", "zenith: 2")).unwrap();
     let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
     assert!(status == Some(0) && said.contains("room.ron has changed since the recording"), "{said}");
+    // A scene that was edited while it was recorded does not come again: it is played as it is now, and that is told.
+    let edited = format!("{cut}\n").replace("End(", "Opened(99999,3,\"0123456789abcdef0123456789abcdef\")\nEnd(");
+    std::fs::write(&recording, edited.lines().filter(|line| !line.starts_with("En")).collect::<Vec<_>>().join("\n"))
+        .unwrap();
+    let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
+    assert!(status == Some(0) && said.contains("was edited while it was recorded"), "{said}");
     std::fs::write(path.join("no.rec"), "hello").unwrap();
     let (status, said) = run(&["--replay", "no.rec"]);
     assert!(status == Some(1) && said.contains("no.rec: is no recording"), "{said}");

@@ -200,7 +200,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         waker: None,
     })?;
     session.open(source);
-    let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new() };
+    let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };
     let mut end = None;
     for line in lines {
         if stop() {
@@ -208,7 +208,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         }
         match line {
             Line::Do(frame, at, command) => player.command(frame, at, command),
-            Line::Opened(frame, number, print) => player.wait_for_scene(frame, number, &print).map_err(failed)?,
+            Line::Opened(frame, number, print) => player.wait_for_scene(frame, number, &print, stop).map_err(failed)?,
             Line::End(_, spp) => end = Some(spp),
         }
     }
@@ -246,6 +246,8 @@ struct Player {
     frame: u64,
     clock: Duration,
     warnings: Vec<String>,
+    /// How often a file was edited while it was recorded.
+    edited: u64,
 }
 
 impl Player {
@@ -272,8 +274,15 @@ impl Player {
         }
     }
 
-    /// Runs frames until the scene with this number is there.
-    fn wait_for_scene(&mut self, frame: u64, number: u64, print: &str) -> Result<(), String> {
+    /// Runs frames until the scene with this number is there. One that was read again because its file was edited
+    /// does not come again: the file is what it is now.
+    fn wait_for_scene(
+        &mut self,
+        frame: u64,
+        number: u64,
+        print: &str,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), String> {
         /// Reading a scene may take long, but not for ever.
         const PATIENCE: Duration = Duration::from_secs(600);
         self.frame = frame;
@@ -281,8 +290,15 @@ impl Player {
         loop {
             self.update();
             let world = self.session.world();
-            if world.resource::<Adopted>().0 >= number {
+            if world.resource::<Adopted>().0 + self.edited >= number {
                 break;
+            }
+            if world.contains_resource::<CurrentScene>() && world.resource::<Beside>().is_idle() {
+                self.edited += 1;
+                break;
+            }
+            if stop() {
+                return Err("the replay was stopped".to_owned());
             }
             let errors = self.session.status().messages.iter().filter(|message| message.kind == MessageKind::Error);
             let lines: Vec<&str> = errors.map(|message| message.text.as_str()).collect();
@@ -298,8 +314,12 @@ impl Player {
         self.frame = frame + 1;
         let current = self.session.world().resource::<CurrentScene>();
         let now = current.0.content_fingerprint().to_string();
-        if now != print {
-            let title = current.0.source.title();
+        let title = current.0.source.title();
+        if now != print && self.edited > 0 {
+            self.warnings.push(format!(
+                "{title} was edited while it was recorded, and is played as it is now: the picture is another one"
+            ));
+        } else if now != print {
             self.warnings.push(format!("{title} has changed since the recording, so the picture is another one"));
         }
         Ok(())

@@ -33,6 +33,8 @@ pub struct HotReload {
     watched: Option<(Arc<LoadedScene>, Option<PathBuf>)>,
     /// Something is being read again.
     busy: Arc<Mutex<bool>>,
+    /// What is on disk could not be read the last time.
+    failed: bool,
 }
 
 impl HotReload {
@@ -148,9 +150,16 @@ fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
 }
 
 fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) {
+    let had_failed = std::mem::replace(&mut world.resource_mut::<HotReload>().failed, result.is_err());
     let mut scene = match result {
         Ok(Some(scene)) => scene,
-        Ok(None) => return,
+        Ok(None) => {
+            if had_failed {
+                let text = format!("{} can be read again, and is what is shown", old.source.title());
+                world.resource_mut::<Status>().say(now, MessageKind::Note, text);
+            }
+            return;
+        }
         Err(error) => {
             let mut status = world.resource_mut::<Status>();
             for problem in &error.problems {

@@ -1,13 +1,13 @@
 //! What a session has to show: the picture, and how it is getting on.
 
 use super::navigation::Rig;
-use crate::render::{BadSample, Display, Integrator, Legend, RayCounts, Region};
+use crate::render::{BadSample, Display, Inspection, Integrator, Legend, RayCounts, Region};
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
 use std::time::Duration;
 
 /// A developed picture, as large as the session's size when it was asked for.
-#[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct Picture {
     /// sRGB-encoded, row by row from the top, 4 bytes a pixel; empty before the first picture.
     pub rgba: Vec<u8>,
@@ -19,6 +19,10 @@ pub struct Picture {
     pub divider: u32,
     /// Samples per pixel of the film behind it.
     pub spp: u32,
+    /// What it shows, which may not be what was asked for last.
+    pub inspection: Inspection,
+    /// Of that inspection, where colours stand for numbers.
+    pub legend: Option<Legend>,
     /// Grows with every picture, also within a generation.
     pub number: u64,
 }
@@ -64,8 +68,6 @@ pub struct Status {
     /// The first few of them.
     pub bad: Vec<BadSample>,
     pub threads: usize,
-    /// Of the inspection that is shown.
-    pub legend: Option<Legend>,
     pub paused: bool,
     /// The target is reached.
     pub done: bool,

@@ -478,7 +478,6 @@ pub fn present(
     status.bounce_mrays = per_second(stats.recent_rays.bounce);
     status.shadow_mrays = per_second(stats.recent_rays.shadow);
     (status.film_width, status.film_height, status.divider) = (stats.film_width, stats.film_height, stats.divider);
-    status.legend = stats.legend;
     status.n_bad = stats.n_bad;
     status.bad = stats.bad;
     status.threads = stats.threads;

@@ -17,6 +17,10 @@ impl Seconds {
     }
 }
 
+/// relMSE of independent samples falls with slope −1. One that falls by less than this does not fall by samples, but keeps a
+/// distance from a reference that shows something else, and its line promises nothing.
+pub const STUCK: f64 = -0.25;
+
 /// Slope of the least-squares line through (log x, log y); `None` with fewer than two usable points.
 pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> =
@@ -46,10 +50,10 @@ pub fn seconds_at(steps: &[(f64, f64)], spp: f64) -> f64 {
 
 /// When `points` (seconds, error), rising in seconds, come down to `target`, and stay there.
 ///
-/// Between two points along the line that joins them, beyond them along `slope`; `None` where that never gets there.
+/// Between two points along the line that joins them, beyond them along `slope`; `None` where that hardly falls ([`STUCK`]).
 pub fn seconds_to(points: &[(f64, f64)], slope: Option<f64>, target: f64) -> Option<Seconds> {
     let along = |(seconds, error): (f64, f64), slope: f64| seconds * (target / error).powf(1.0 / slope);
-    let falling = slope.filter(|slope| *slope < 0.0);
+    let falling = slope.filter(|slope| *slope < STUCK);
     match points.iter().rposition(|&(_, error)| error > target) {
         None => Some(Seconds::Extrapolated(along(*points.first()?, falling?))),
         Some(last) if last + 1 == points.len() => Some(Seconds::Extrapolated(along(points[last], falling?))),
@@ -98,6 +102,7 @@ mod tests {
     fn what_does_not_fall_never_gets_there() {
         let flat = [(1.0, 0.5), (2.0, 0.5), (4.0, 0.5)];
         assert_eq!(seconds_to(&flat, slope(&flat), 0.1), None);
+        assert_eq!(seconds_to(&flat, Some(-0.01), 0.1), None, "stuck");
         assert_eq!(slope(&flat[..1]), None);
         assert_eq!(seconds_to(&[], None, 0.1), None);
     }

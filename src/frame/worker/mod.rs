@@ -11,9 +11,7 @@ mod show;
 mod thread;
 
 use super::{Picture, Target, Waits};
-use crate::render::{
-    BadSample, Display, Explanation, Film, Inspection, Legend, RayCounts, Region, RenderSettings, Snapshot,
-};
+use crate::render::{BadSample, Display, Explanation, Film, Inspection, RayCounts, Region, RenderSettings, Snapshot};
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -99,8 +97,6 @@ pub struct Stats {
     pub asleep: bool,
     /// The target is reached.
     pub done: bool,
-    /// Of the inspection that is shown.
-    pub legend: Option<Legend>,
     /// What went wrong in the renderer itself.
     pub failure: Option<String>,
 }

@@ -78,11 +78,11 @@ impl Loop<'_> {
             self.views.depths = Some((key, depths));
         }
         (picture.width, picture.height) = (width, height);
+        (picture.inspection, picture.legend) = (self.look.inspection, legend);
         (picture.generation, picture.divider, picture.spp) = (job.generation, *divider, film.spp());
         {
             let mut outbox = lock(&self.shared.outbox);
             std::mem::swap(&mut outbox.picture, &mut self.spare);
-            outbox.stats.legend = legend;
             outbox.fresh = true;
         }
         tracing::trace!("developed in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);

@@ -1,7 +1,7 @@
 //! Picture and overlays onto the window.
 
 use super::App;
-use crate::frame::{Around, Explaining, Looking, Projector};
+use crate::frame::{Around, Explaining, Projector};
 use crate::render::Inspection;
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::{overlay, panel, status, story};
@@ -52,9 +52,9 @@ impl App {
                 if panel.shown {
                     panel::show(context, panel, session, &around, &mut asked);
                 }
-                let inspection = session.world().resource::<Looking>().0.inspection;
-                if inspection != Inspection::Picture {
-                    overlay::legend(context, inspection.label(), session.status().legend);
+                let picture = session.picture();
+                if picture.inspection != Inspection::Picture {
+                    overlay::legend(context, picture.inspection.label(), picture.legend);
                 }
                 overlay::status_line(context, left, right);
                 overlay::toasts(context, toasts);

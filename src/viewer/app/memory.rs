@@ -43,8 +43,15 @@ impl Memory {
             return troubles;
         }
         let bookmarks = *session.world().resource::<Bookmarks>();
+        let saved = session.scene_file().map(SceneSource::Scene);
+        let is_renamed = saved.is_some() && saved != self.scene;
+        if is_renamed && let Some(saved) = saved {
+            // From the saving on it is known by that file, and takes its views along.
+            troubles.extend(self.remember(&saved));
+            self.scene = Some(saved);
+        }
         if let Some(source) = &self.scene
-            && bookmarks != self.bookmarks
+            && (bookmarks != self.bookmarks || is_renamed)
         {
             let views = (1..).zip(bookmarks.0).filter_map(|(slot, rig)| Some((slot, rig?))).collect();
             let kept = SceneBookmarks { views, ..SceneBookmarks::default() };
@@ -64,13 +71,19 @@ impl Memory {
         // A command, so that a recording of the session knows them too.
         session.send(Command::SetBookmarks(Box::new(bookmarks)));
         *session.world_mut().resource_mut::<Bookmarks>() = bookmarks;
+        let troubles = trouble.into_iter().chain(self.remember(&source)).collect();
+        self.scene = Some(source);
+        troubles
+    }
+
+    /// Puts it first among what was opened lately.
+    fn remember(&mut self, source: &SceneSource) -> Vec<String> {
         // The file anew: another window may have written to it.
         let (mut settings, unreadable) = self.store.settings();
-        settings.remember(&source);
+        settings.remember(source);
         let unkept = self.store.keep_settings(&settings).err();
         self.recent = settings.recent;
-        self.scene = Some(source);
-        trouble.into_iter().chain(unreadable).chain(unkept).collect()
+        unreadable.into_iter().chain(unkept).collect()
     }
 
     /// For the next window, logical pixels.
@@ -123,8 +136,25 @@ mod tests {
         follow(&mut session, &mut second);
         assert_eq!(*session.world().resource::<Bookmarks>(), kept);
         assert_eq!(second.recent(), ["cornell", "ball"]);
+        // A scene that is saved takes its views along, and is among what was opened lately.
+        let path = folder.path().join("room.ron");
+        session.send(Command::SaveScene { path: path.clone() });
+        for _ in 0..2000 {
+            follow(&mut session, &mut second);
+            if session.scene_file().is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        follow(&mut session, &mut second);
+        assert!(second.recent()[0].ends_with("room.ron") && second.recent().len() == 3, "{:?}", second.recent());
+        let mut session = Session::new(SessionOptions::default()).unwrap();
+        let mut third = memory();
+        session.adopt(load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap());
+        follow(&mut session, &mut third);
+        assert_eq!(*session.world().resource::<Bookmarks>(), kept);
         assert_eq!(second.keep_window((700, 500)), None);
         assert_eq!(second.store.settings().0.window, Some((700, 500)));
-        assert_eq!(second.store.settings().0.recent, ["cornell", "ball"]);
+        assert_eq!(second.store.settings().0.recent[1..], ["cornell", "ball"]);
     }
 }

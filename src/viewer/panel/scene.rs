@@ -87,7 +87,7 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
                 }
             }
         });
-        let field = ui.add(egui::TextEdit::singleline(path).hint_text("model.obj").desired_width(96.0));
+        let field = ui.add(egui::TextEdit::singleline(path).hint_text("model.obj").desired_width(72.0));
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if ui.button("…").on_hover_text("choose a file").clicked() {
             asked.dialog = Some(Purpose::AddMesh);

@@ -14,13 +14,14 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("samples", format!("{} per pixel, {}", status.spp, seconds(status.seconds)));
         figure("rays", format!("{:.2} M/s", status.mrays()));
         let (camera, bounce, shadow) = (status.camera_mrays, status.bounce_mrays, status.shadow_mrays);
-        figure("", format!("{camera:.2} eye, {bounce:.2} bounce, {shadow:.2} light"));
+        figure("", format!("{camera:.2} eye, {bounce:.2} bounce"));
+        figure("", format!("{shadow:.2} light"));
         figure("error", status.estimated_error.map_or("–".to_owned(), percent));
         figure("left out", format!("{} samples not finite", status.n_bad));
         let milliseconds = |waits: &Waits| {
             let of =
                 |share| waits.quantile(share).map_or("–".to_owned(), |w| format!("{:.0}", w.as_secs_f64() * 1e3));
-            format!("{} ms; {} ms in 99 of 100", of(0.5), of(0.99))
+            format!("{} ms, 1 % over {} ms", of(0.5), of(0.99))
         };
         figure("reaction", milliseconds(around.reaction.waits()));
         figure("to cancel", milliseconds(&session.cancels()));
