@@ -212,22 +212,26 @@ fn a_driver_that_loses_the_window_or_itself_costs_no_samples() {
     let environment = losing.environment();
     let mut environment: Vec<(&str, &str)> = environment.iter().map(|(name, value)| (*name, value.as_str())).collect();
     environment.push(("RUST_LOG", "error,firstlight::frame=debug"));
-    let mut program = desktop.open(&["cornell", "--size", "320x240"], &environment);
+    let mut program = desktop.open(&["ball", "--size", "320x240"], &environment);
     seen(&program);
+    // Done, and all messages gone.
+    until("the window to rest", || {
+        let before = program.pixels();
+        std::thread::sleep(Duration::from_millis(1500));
+        (program.pixels() == before).then_some(())
+    });
+    let (shown, restarts) = (program.pixels(), program.errors().matches("restart ").count());
     for loss in [Loss::OutOfDate, Loss::Surface, Loss::Device, Loss::Surface] {
-        let restarts = |program: &Program| program.errors().matches("restart ").count();
-        let before = restarts(&program);
-        losing.lose(loss);
-        std::thread::sleep(Duration::from_millis(500));
-        program.must_live();
-        assert_eq!(restarts(&program), before, "{loss:?}: all samples stay\n{}", program.errors());
+        losing.lose_next(loss);
         // It draws: what is asked for now is to be seen.
-        let shown = program.pixels();
         program.key("h");
-        let differs = || differ(&shown, &program.pixels());
-        until(&format!("the keys to be shown after {loss:?}"), || differs().then_some(()));
+        losing.has_lost();
+        until(&format!("the keys to be shown after {loss:?}"), || differ(&shown, &program.pixels()).then_some(()));
         program.key("Escape");
-        until("the keys to go", || (!differs()).then_some(()));
+        until("the keys to go", || (!differ(&shown, &program.pixels())).then_some(()));
+        program.must_live();
+        let now = program.errors().matches("restart ").count();
+        assert_eq!(now, restarts, "{loss:?}: all samples stay\n{}", program.errors());
     }
     program.key("ctrl+q");
     let (status, said) = program.left();

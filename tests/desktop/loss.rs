@@ -55,12 +55,16 @@ impl Losing {
         ]
     }
 
-    /// Loses it, and waits until the program has been told.
-    pub fn lose(&self, loss: Loss) {
+    /// Loses it with the next image of the window that the program asks for.
+    pub fn lose_next(&self, loss: Loss) {
         let new = self.folder.join("lose.new");
         std::fs::write(&new, (loss as i64).to_string()).expect("an order");
         std::fs::rename(&new, self.order()).expect("an order");
-        until(&format!("{loss:?} to happen"), || (!self.order().exists()).then_some(()));
+    }
+
+    /// Waits until the program has been told.
+    pub fn has_lost(&self) {
+        until("the loss to happen", || (!self.order().exists()).then_some(()));
     }
 
     fn order(&self) -> PathBuf {

@@ -19,9 +19,8 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("error", status.estimated_error.map_or("–".to_owned(), percent));
         figure("left out", format!("{} samples not finite", status.n_bad));
         let milliseconds = |waits: &Waits| {
-            let of =
-                |share| waits.quantile(share).map_or("–".to_owned(), |w| format!("{:.0}", w.as_secs_f64() * 1e3));
-            format!("{} ms, 1 % over {} ms", of(0.5), of(0.99))
+            let of = |share| waits.quantile(share).map(|wait| format!("{:.0} ms", wait.as_secs_f64() * 1e3));
+            of(0.5).zip(of(0.99)).map_or("–".to_owned(), |(half, most)| format!("{half}, 1 % over {most}"))
         };
         figure("reaction", milliseconds(around.reaction.waits()));
         figure("to cancel", milliseconds(&session.cancels()));
