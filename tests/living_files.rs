@@ -234,6 +234,10 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
         .unwrap();
     let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
     assert!(status == Some(0) && said.contains("was edited while it was recorded"), "{said}");
+    // One that cannot be opened is no edited one.
+    std::fs::remove_file(&room).unwrap();
+    let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
+    assert!(status == Some(1) && said.contains("room.ron") && !said.contains("edited"), "{said}");
     std::fs::write(path.join("no.rec"), "hello").unwrap();
     let (status, said) = run(&["--replay", "no.rec"]);
     assert!(status == Some(1) && said.contains("no.rec: is no recording"), "{said}");

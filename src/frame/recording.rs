@@ -287,16 +287,14 @@ impl Player {
         const PATIENCE: Duration = Duration::from_secs(600);
         self.frame = frame;
         let start = Instant::now();
+        let mut was_edited = false;
         loop {
             self.update();
             let world = self.session.world();
             if world.resource::<Adopted>().0 + self.edited >= number {
                 break;
             }
-            if world.contains_resource::<CurrentScene>() && world.resource::<Beside>().is_idle() {
-                self.edited += 1;
-                break;
-            }
+            let nothing_comes = world.contains_resource::<CurrentScene>() && world.resource::<Beside>().is_idle();
             if stop() {
                 return Err("the replay was stopped".to_owned());
             }
@@ -304,6 +302,10 @@ impl Player {
             let lines: Vec<&str> = errors.map(|message| message.text.as_str()).collect();
             if !lines.is_empty() && self.session.status().loading.is_none() {
                 return Err(lines.join("\n"));
+            }
+            if nothing_comes {
+                (self.edited, was_edited) = (self.edited + 1, true);
+                break;
             }
             if start.elapsed() > PATIENCE {
                 return Err("the scene did not come".to_owned());
@@ -315,7 +317,7 @@ impl Player {
         let current = self.session.world().resource::<CurrentScene>();
         let now = current.0.content_fingerprint().to_string();
         let title = current.0.source.title();
-        if now != print && self.edited > 0 {
+        if now != print && was_edited {
             self.warnings.push(format!(
                 "{title} was edited while it was recorded, and is played as it is now: the picture is another one"
             ));

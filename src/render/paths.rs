@@ -230,17 +230,17 @@ fn restart<T>(list: &mut Option<Vec<T>>, wanted: bool) {
 }
 
 #[inline]
-fn get(arrays: &[Vec<f32>; 3], i: usize) -> Vec3 {
+pub(super) fn get(arrays: &[Vec<f32>; 3], i: usize) -> Vec3 {
     Vec3::new(arrays[0][i], arrays[1][i], arrays[2][i])
 }
 
 #[inline]
-fn set(arrays: &mut [Vec<f32>; 3], i: usize, v: Vec3) {
+pub(super) fn set(arrays: &mut [Vec<f32>; 3], i: usize, v: Vec3) {
     (arrays[0][i], arrays[1][i], arrays[2][i]) = (v.x, v.y, v.z);
 }
 
 #[inline(always)]
-fn append_vector<S: Simd>(to: &mut [Vec<f32>; 3], at: usize, mask: Mask, lanes: Vector<S>) {
+pub(super) fn append_vector<S: Simd>(to: &mut [Vec<f32>; 3], at: usize, mask: Mask, lanes: Vector<S>) {
     append(&mut to[0], at, mask, lanes.x);
     append(&mut to[1], at, mask, lanes.y);
     append(&mut to[2], at, mask, lanes.z);

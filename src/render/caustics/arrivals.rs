@@ -3,6 +3,7 @@
 use crate::geometry::Ray;
 use crate::kdtree::{RayBatch, append};
 use crate::lanes::{Float, LANES, Mask, Simd, Vector};
+use crate::render::paths::{append_vector, get, set};
 use glam::{Vec2, Vec3};
 
 /// Shadow rays to the lens, where in the film each leads, and with how much light.
@@ -30,7 +31,7 @@ impl Arrivals {
     pub fn push(&mut self, ray: &Ray, film: Vec2, light: Vec3) {
         let i = self.rays.len();
         self.film.iter_mut().zip(film.to_array()).for_each(|(array, x)| array[i] = x);
-        self.light.iter_mut().zip(light.to_array()).for_each(|(array, x)| array[i] = x);
+        set(&mut self.light, i, light);
         self.rays.push(ray);
     }
 
@@ -46,15 +47,12 @@ impl Arrivals {
         let at = self.rays.len();
         append(&mut self.film[0], at, mask, film[0]);
         append(&mut self.film[1], at, mask, film[1]);
-        append(&mut self.light[0], at, mask, light.x);
-        append(&mut self.light[1], at, mask, light.y);
-        append(&mut self.light[2], at, mask, light.z);
+        append_vector(&mut self.light, at, mask, light);
         self.rays.append(mask, origin, dir, light.x.all(1.0));
     }
 
     /// Where in the film a ray leads, and its light.
     pub fn get(&self, i: usize) -> (Vec2, Vec3) {
-        let [x, y, z] = &self.light;
-        (Vec2::new(self.film[0][i], self.film[1][i]), Vec3::new(x[i], y[i], z[i]))
+        (Vec2::new(self.film[0][i], self.film[1][i]), get(&self.light, i))
     }
 }
