@@ -2,32 +2,31 @@
 
 use super::Failure;
 use super::console::remark;
+use super::progress::Progress;
 use super::render::{Job, RenderArgs};
 use super::stop::Stop;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{SettingsStore, along, turntable};
-use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
 /// Renders every frame to `FILE-0001.png` and so on; each is a picture as any other, and opens as one.
-pub(super) fn animate(args: &RenderArgs, mut job: Job, bar: &ProgressBar, stop: &Stop) -> Result<(), Failure> {
+pub(super) fn animate(args: &RenderArgs, mut job: Job, mut progress: Progress, stop: &Stop) -> Result<(), Failure> {
     let rigs = way(args, &mut job)?;
     let target = job.target(args);
     let digits = rigs.len().to_string().len().max(4);
     for (i, rig) in rigs.iter().enumerate() {
-        bar.set_position((i * 1000 / rigs.len()) as u64);
-        bar.set_message(format!("picture {} of {}", i + 1, rigs.len()));
+        progress.at(i as f64 / rigs.len() as f64, format!("picture {} of {}", i + 1, rigs.len()));
         job.set_rig(rig);
         let film = job.picture(args, target, stop)?;
         if stop.is_asked() {
-            bar.finish_and_clear();
+            progress.finish();
             return Err(Failure::Stopped(format!("stopped after {i} of {} pictures", rigs.len())));
         }
         job.write(&film, &numbered(&args.output, i + 1, digits))?;
     }
-    bar.finish_and_clear();
+    progress.finish();
     let (first, last) = (numbered(&args.output, 1, digits), numbered(&args.output, rigs.len(), digits));
-    remark(format_args!("{} to {}", first.display(), last.display()));
+    remark(format_args!("{} to {}: {} pictures", first.display(), last.display(), rigs.len()));
     Ok(())
 }
 

@@ -7,6 +7,7 @@ mod explain;
 mod info;
 mod merge;
 mod number;
+mod progress;
 mod render;
 mod report;
 mod save;

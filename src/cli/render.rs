@@ -3,6 +3,7 @@
 use super::animate::animate;
 use super::console::{print, remark};
 use super::number::{parse_share, parse_stops};
+use super::progress::Progress;
 use super::stop::Stop;
 use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
 use bevy_ecs::prelude::World;
@@ -20,8 +21,7 @@ use firstlight::scene::{
     ShotSamples,
 };
 use glam::UVec2;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -170,11 +170,11 @@ pub(super) struct Job {
 }
 
 impl Job {
-    fn new(args: &RenderArgs, kept: Option<&Shot>, bar: &ProgressBar) -> Result<Self, Failure> {
+    fn new(args: &RenderArgs, kept: Option<&Shot>, progress: &Progress) -> Result<Self, Failure> {
         let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
-        let scene = args.scene.load(aspect, &|text| bar.set_message(text.to_owned()))?;
+        let scene = args.scene.load(aspect, &|text| progress.stage(text.to_owned()))?;
         if let Some(announcement) = &args.announcement {
-            bar.suspend(|| remark(announcement));
+            progress.suspend(|| remark(announcement));
         }
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
@@ -287,20 +287,24 @@ impl Job {
 }
 
 fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<(), Failure> {
-    let bar = progress_bar();
+    let mut progress = Progress::new();
     let kept = match film_path.filter(|_| args.resume) {
         Some(path) => Some((read_film_file(path).map_err(Failure::Failed)?, path)),
         None => None,
     };
-    let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), &bar)?;
+    let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), &progress)?;
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
         let message = format!("the picture was stopped in the middle of a pass; the new one has {} samples", shot.spp);
-        bar.suspend(|| remark(format_args!("warning: {message} in every pixel")));
+        progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
     if args.turntable.is_some() || args.bookmarks.is_some() {
-        return animate(args, job, &bar, stop);
+        return animate(args, job, progress, stop);
     }
     let mut film = job.film(args, kept)?;
+    if let Some(path) = film_path.filter(|_| args.resume) {
+        let (path, spp) = (path.display(), film.spp());
+        progress.suspend(|| remark(format_args!("going on with {path}, which has {spp} samples per pixel")));
+    }
     let room = room_to_write(args, job.size)?;
     let target = job.target(args);
     let bad_before = film.n_bad();
@@ -321,13 +325,13 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
             .error
             .zip(now.error)
             .map_or(0.0, |(goal, error)| f64::from(now.spp) / f64::from(error.spp_for(goal)));
-        bar.set_position((by_spp.max(by_time).max(by_error).min(1.0) * 1000.0) as u64);
         let mrays = now.rays.total() as f64 / now.seconds.max(1e-9) * 1e-6;
-        bar.set_message(format!("{} samples per pixel, {mrays:.1} Mrays/s", now.spp));
+        let share = by_spp.max(by_time).max(by_error);
+        progress.at(share, format!("{} samples per pixel, {mrays:.1} Mrays/s", now.spp));
         true
     });
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
-    bar.finish_and_clear();
+    progress.finish();
     let error = film.error_estimate_in(region).map(|error| error.relative);
     let reached = target.reached(film.spp_in(region), report.seconds, error);
     let stopped = stop.is_asked() && !reached;
@@ -359,11 +363,12 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     }
     if args.json {
         print(json(&job, &report, cpu_seconds, &film, stopped))?;
-    } else if std::io::stderr().is_terminal() {
+    } else {
         let (output, (width, height)) = (args.output.display(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
         let error = error.map_or(String::new(), |error| format!(", error about {:.2} %", 100.0 * error));
-        remark(format_args!("{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}"));
+        let kept = film_path.map_or(String::new(), |path| format!(", the film kept in {}", path.display()));
+        remark(format_args!("{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{kept}"));
     }
     match (stopped, film_path) {
         (false, _) => Ok(()),
@@ -468,13 +473,4 @@ fn json(job: &Job, report: &OfflineReport, cpu_seconds: Option<f64>, film: &Film
         "bad_samples": report.n_bad,
         "bad_samples_at": bad,
     })
-}
-
-/// Quiet when nobody watches.
-fn progress_bar() -> ProgressBar {
-    let target =
-        if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
-        .expect("the template is well formed");
-    ProgressBar::with_draw_target(Some(1000), target).with_style(style)
 }

@@ -1,0 +1,57 @@
+//! How far a rendering is: a bar on a terminal, a line every few seconds in a pipe or a log.
+
+use super::waiting::Waiting;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+
+/// Ends by itself when it is dropped.
+pub struct Progress {
+    bar: ProgressBar,
+    lines: Option<Waiting>,
+}
+
+impl Progress {
+    pub fn new() -> Self {
+        let is_watched = std::io::stderr().is_terminal();
+        let target = if is_watched { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
+            .expect("the template is well formed");
+        let bar = ProgressBar::with_draw_target(Some(1000), target).with_style(style);
+        Self { bar, lines: (!is_watched).then(|| Waiting::new("reading")) }
+    }
+
+    /// What is being done, before it is known how long it takes.
+    pub fn stage(&self, text: String) {
+        if let Some(lines) = &self.lines {
+            lines.next(text.clone());
+        }
+        self.bar.set_message(text);
+    }
+
+    /// `share` of all is done, 0..1.
+    pub fn at(&self, share: f64, text: String) {
+        let share = share.clamp(0.0, 1.0);
+        self.bar.set_position((share * 1000.0) as u64);
+        if let Some(lines) = &self.lines {
+            lines.next(format!("{:.0} %, {text}", 100.0 * share));
+        }
+        self.bar.set_message(text);
+    }
+
+    /// Prints past the bar.
+    pub fn suspend(&self, print: impl FnOnce()) {
+        self.bar.suspend(print);
+    }
+
+    /// From here on nothing is told.
+    pub fn finish(&mut self) {
+        self.bar.finish_and_clear();
+        self.lines = None;
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
