@@ -3,8 +3,8 @@
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
-    Bookmarks, Command, Edit, Focus, FocusTarget, MaterialKind, MeshMeasure, NewThing, Property, Selection, Session,
-    SessionOptions, Target,
+    Bookmarks, Command, Edit, Focus, FocusTarget, MaterialKind, MeshMeasure, NewThing, Projector, Property, Selection,
+    Session, SessionOptions, Target,
 };
 use firstlight::render::Inspection;
 use firstlight::scene::file::{MeshShadingPart, MeshSourcePart, Rgb, TexturePart, WrapPart};
@@ -185,6 +185,54 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
         driver.edit([Edit::Set { id, property, value }]);
     }
     assert_eq!(driver.get::<Material>("red"), material);
+}
+
+/// Each stands on something, in sight, and within nothing that was there before, not even when many were added.
+#[test]
+fn new_things_find_room() {
+    let mut driver = Driver::open("cornell-balls");
+    for round in 0..6 {
+        driver.edit([Edit::Add(NewThing::Sphere)]);
+        let new = driver.selected().active().expect("what is new is selected");
+        let spheres: Vec<(Entity, DVec3, f64)> = (driver.session.inputs().objects.iter())
+            .filter_map(|object| match object.shape {
+                Shape::Sphere { radius } => Some((object.entity, object.placement.translation, radius)),
+                _ => None,
+            })
+            .collect();
+        let &(_, place, radius) = spheres.iter().find(|(entity, ..)| *entity == new).expect("it is a ball");
+        for (other, center, other_radius) in spheres.iter().filter(|(entity, ..)| *entity != new) {
+            let gap = (place - *center).length() - radius - other_radius;
+            assert!(gap > -0.05 * radius, "round {round}: {gap} to {other} at {center}, new at {place}, {radius}");
+        }
+        let rig = driver.session.status().rig;
+        let seen = Projector::new(&rig, DVec2::new(480.0, 320.0)).place(place).expect("in front of the eye");
+        assert!(seen.cmpge(DVec2::ZERO).all() && seen.cmple(DVec2::new(480.0, 320.0)).all(), "{seen}");
+        let depth = (place - rig.view.eye).dot(rig.view.forward);
+        assert!((0.01..0.2).contains(&(radius / depth)), "{radius} at {depth}");
+        driver.session.send(Command::Orbit { yaw_deg: 4.0, pitch_deg: 1.0 });
+        driver.frame();
+    }
+}
+
+#[test]
+fn what_comes_back_is_selected_as_it_was_when_it_came() {
+    let mut driver = Driver::open("gallery");
+    driver.select("gold ball");
+    let original = driver.selected().0.clone();
+    driver.edit([Edit::Duplicate]);
+    let copy = driver.selected().0.clone();
+    assert_ne!(copy, original);
+    driver.edit([Edit::Undo]);
+    assert_eq!(driver.selected().0, original, "the copy is gone: what it was made of is selected again");
+    driver.edit([Edit::SelectNone, Edit::Redo]);
+    assert_eq!(driver.selected().0, copy);
+    driver.edit([Edit::Delete, Edit::Undo]);
+    assert_eq!(driver.selected().0, copy, "what was deleted is back, and selected");
+    // Nothing came or went: the selection is nobody's business.
+    let red = driver.named("red").to_bits();
+    driver.edit([Edit::Set { id: red, property: Property::Color, value: DVec3::ONE }, Edit::SelectNone, Edit::Undo]);
+    assert_eq!(driver.selected().0, []);
 }
 
 #[test]

@@ -108,6 +108,7 @@ fn what_changes_on_disk_is_read_again_and_nothing_else_is() {
     let after = driver.meshes();
     assert!(!Arc::ptr_eq(&before[0], &after[0]) && before[0].positions != after[0].positions);
     assert!(Arc::ptr_eq(&before[1], &after[1]), "what has not changed is not read again");
+    assert_eq!(driver.session.status().restart_cause, "tent.obj read again");
     assert_eq!((driver.eye(), driver.session.status().display.exposure_stops), (eye, 1.5));
 
     // A file that cannot be read is a message, and everything stays as it was.

@@ -6,7 +6,7 @@ use super::status::{MessageKind, Status};
 use super::systems::{Clock, Renderer, Shown};
 use super::worker::{Answer, Question};
 use crate::render::{Explanation, FoundBy, Integrator, LightSource, Place};
-use crate::scene::{Extraction, SceneInputs, Shape};
+use crate::scene::{Extraction, SceneInputs};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use glam::{DVec3, UVec2};
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 /// What made a pixel what it is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PixelStory {
     pub pixel: UVec2,
     pub film_size: UVec2,
@@ -104,7 +104,7 @@ impl SnapshotNames {
         let objects: BTreeMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
         let lights: BTreeMap<_, _> = inputs.lights.iter().map(|light| (light.entity, light)).collect();
         let name = |(i, entity): (usize, _)| match (objects.get(entity), lights.get(entity)) {
-            (Some(object), _) => object.name.clone().unwrap_or_else(|| format!("{} {i}", kind(&object.shape))),
+            (Some(object), _) => object.name.clone().unwrap_or_else(|| format!("{} {i}", object.shape.kind())),
             (_, Some(light)) => light.name.clone().unwrap_or_else(|| format!("point light {i}")),
             _ => format!("object {i}"),
         };
@@ -130,17 +130,6 @@ impl SnapshotNames {
             }
             Place::Sky { direction } => End::Sky { direction: direction.as_dvec3() },
         }
-    }
-}
-
-fn kind(shape: &Shape) -> &'static str {
-    match shape {
-        Shape::Sphere { .. } => "sphere",
-        Shape::Plane { .. } => "plane",
-        Shape::Quad { .. } => "quad",
-        Shape::Triangle { .. } => "triangle",
-        Shape::Mesh(_) => "mesh",
-        Shape::Spheres(_) => "cloud",
     }
 }
 

@@ -8,6 +8,7 @@
 //! States share what is equal between them, entity by entity, and meshes and pictures are shared anyway.
 
 use super::navigation::Rig;
+use super::selection::Selection;
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
     Developing, Lens, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection, Rendering,
@@ -15,7 +16,8 @@ use crate::scene::{
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{
-    Changed, Component, DetectChanges, Entity, Local, Or, Query, RemovedComponents, Res, ResMut, Resource, With, World,
+    Changed, Component, DetectChanges, Entity, Local, Mut, Or, Query, RemovedComponents, Res, ResMut, Resource, With,
+    World,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -47,6 +49,8 @@ struct State {
 #[derive(Clone, Debug)]
 struct Step {
     before: State,
+    /// What was selected then.
+    selected: Vec<Entity>,
     label: String,
     /// Steps of one kind that follow each other are one.
     merge: Option<String>,
@@ -55,6 +59,8 @@ struct Step {
 #[derive(Resource, Default)]
 pub struct History {
     now: Option<State>,
+    /// What was selected when that was read.
+    selected: Vec<Entity>,
     undo: Vec<Step>,
     redo: Vec<Step>,
     /// A change is under way; what the entities were when it began, and whether it has a step yet.
@@ -115,6 +121,7 @@ impl History {
         history.redo.push(Step { before: now.clone(), ..step.clone() });
         history.begun = None;
         restore(world, &now, &step.before);
+        select_what_came(world, &now, &step.before, &step.selected);
         Some(())
     }
 
@@ -127,6 +134,7 @@ impl History {
         history.undo.push(Step { before: now.clone(), ..step.clone() });
         history.begun = None;
         restore(world, &now, &step.before);
+        select_what_came(world, &now, &step.before, &[]);
         Some(())
     }
 
@@ -146,7 +154,7 @@ impl History {
             None => merge.is_some() && self.redo.is_empty() && self.undo.last().is_some_and(|last| last.merge == merge),
         };
         if !goes_on {
-            self.undo.push(Step { before: old, label, merge });
+            self.undo.push(Step { before: old, selected: self.selected.clone(), label, merge });
             if self.undo.len() > Self::MAX_STEPS {
                 self.undo.remove(0);
             }
@@ -204,7 +212,7 @@ pub fn remember(world: &mut World) {
     let mut history = world.resource_mut::<History>();
     let (touched, camera_touched) = (std::mem::take(&mut history.touched), std::mem::take(&mut history.camera_touched));
     if !touched && !camera_touched && history.now.is_some() {
-        return;
+        return remember_selection(world);
     }
     let old = history.now.clone().unwrap_or_default();
     let entities = if touched || old.entities.is_empty() { read_entities(world, &old.entities) } else { old.entities };
@@ -221,6 +229,16 @@ pub fn remember(world: &mut World) {
         camera,
     };
     world.resource_mut::<History>().record(state);
+    remember_selection(world);
+}
+
+fn remember_selection(world: &mut World) {
+    world.resource_scope(|world, mut history: Mut<History>| {
+        let selected = &world.resource::<Selection>().0;
+        if history.selected != *selected {
+            history.selected.clone_from(selected);
+        }
+    });
 }
 
 fn read_entities(
@@ -286,6 +304,22 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
         put(world, entity, &Some(rig.view));
         put(world, entity, &Some(rig.projection));
         put(world, entity, &Some(rig.lens));
+    }
+}
+
+/// What has come is selected, as it was when it came first. Where things only went, what was `selected` before is.
+fn select_what_came(world: &mut World, now: &State, wanted: &State, selected: &[Entity]) {
+    let is_thing = |state: &State, entity: &Entity| {
+        state.entities.get(entity).is_some_and(|state| state.shape.is_some() || state.light.is_some())
+    };
+    let missing = |of: &State, other: &State| -> Vec<Entity> {
+        of.entities.keys().copied().filter(|entity| is_thing(of, entity) && !is_thing(other, entity)).collect()
+    };
+    let came = missing(wanted, now);
+    if !came.is_empty() {
+        world.resource_mut::<Selection>().0 = came;
+    } else if !selected.is_empty() && !missing(now, wanted).is_empty() {
+        world.resource_mut::<Selection>().0 = selected.to_vec();
     }
 }
 

@@ -123,7 +123,7 @@ impl Desk<'_, '_> {
             Command::ToggleFocusLock => self.toggle_focus_lock(),
             Command::FocusFollows { x, y } if x.is_finite() && y.is_finite() => {
                 if !matches!(self.focus.target, FocusTarget::Cursor(_)) {
-                    self.note("focus follows the mouse".to_owned());
+                    self.note("focus tracks what is under the mouse".to_owned());
                 }
                 self.focus.target = FocusTarget::Cursor([x, y]);
             }
@@ -131,12 +131,12 @@ impl Desk<'_, '_> {
                 if let Some(rig) = self.rig()
                     && self.bookmarks.set(slot, rig)
                 {
-                    self.note(format!("view kept under {slot}"));
+                    self.note(format!("view saved under {slot}"));
                 }
             }
             Command::GoToBookmark { slot } => match self.bookmarks.get(slot) {
                 Some(rig) => self.set_rig(rig),
-                None => self.note(format!("no view is kept under {slot}: Ctrl+{slot} keeps this one")),
+                None => self.note(format!("no view is saved under {slot}: Ctrl+{slot} saves this one")),
             },
             Command::SetBookmarks(bookmarks) => drop(self.bookmarks.set_if_neq(*bookmarks)),
             Command::PreviousView => match self.trail.previous() {
@@ -261,10 +261,10 @@ impl Desk<'_, '_> {
             _ => FocusTarget::Camera,
         };
         self.note(match self.focus.target {
-            FocusTarget::Camera => "focus moves with the camera".to_owned(),
-            FocusTarget::Point(_) => "focus stays with a point".to_owned(),
-            FocusTarget::Object(..) => "focus stays with the object".to_owned(),
-            FocusTarget::Cursor(_) => "focus follows the mouse".to_owned(),
+            FocusTarget::Camera => "focus keeps its distance".to_owned(),
+            FocusTarget::Point(_) => "focus tracks a point".to_owned(),
+            FocusTarget::Object(..) => "focus tracks the object".to_owned(),
+            FocusTarget::Cursor(_) => "focus tracks what is under the mouse".to_owned(),
         });
     }
 

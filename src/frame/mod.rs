@@ -43,7 +43,7 @@ mod worker;
 
 pub use camera_path::{along, turntable};
 pub use command::Command;
-pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, textures};
+pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PixelStory, SnapshotNames, Stop, Way, brightness};
 pub use film_file::{FilmFile, read_film_file, read_film_file_within, write_film_file};
 pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};

@@ -31,6 +31,8 @@ pub struct HotReload {
     waker: Option<Waker>,
     /// Whose files are looked after, and the scene file it is known by.
     watched: Option<(Arc<LoadedScene>, Option<PathBuf>)>,
+    /// Which files are the reason for what is being read again.
+    reading: Vec<PathBuf>,
     /// Something is being read again.
     busy: Arc<Mutex<bool>>,
     /// What is on disk could not be read the last time.
@@ -70,8 +72,8 @@ pub fn reload(world: &mut World) {
     if changed.is_empty() {
         return;
     }
-    let names: Vec<String> = changed.iter().map(|path| path.display().to_string()).collect();
     if has_unsaved_changes(world, &current) {
+        let names: Vec<String> = changed.iter().map(|path| path.display().to_string()).collect();
         let message = "changed on disk, but the scene has changes that are not saved: save it, or open it again";
         return world.resource_mut::<Status>().say(
             now,
@@ -79,6 +81,7 @@ pub fn reload(world: &mut World) {
             format!("{} {message}", names.join(", ")),
         );
     }
+    world.resource_mut::<HotReload>().reading = changed;
     let reload = world.resource::<HotReload>();
     *lock(&reload.busy) = true;
     let (loaded, waker) = (reload.loaded.clone(), reload.waker.clone());
@@ -175,10 +178,12 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
         == (old.file.integrator, old.file.max_depth, old.file.film.filter);
     let rendering = same_settings.then(|| *world.resource::<Rendering>());
     scene.shot = None;
-    let title = scene.source.title();
     let trees = scene.trees.clone();
     adopt(world, scene, now);
-    world.resource_mut::<Shown>().trees.extend(trees);
+    let names = names_of(&world.resource::<HotReload>().reading);
+    let mut shown = world.resource_mut::<Shown>();
+    shown.trees.extend(trees);
+    shown.adopted = Some(format!("{names} read again"));
     if let Some(camera) = camera
         && let Some(new) = SceneInputs::of(world).camera
     {
@@ -190,5 +195,19 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
     if let Some(rendering) = rendering {
         world.insert_resource(rendering);
     }
-    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{title} was read again"));
+    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{names} changed and was read again"));
+}
+
+/// Files by their names alone, no more than two of them.
+fn names_of(paths: &[PathBuf]) -> String {
+    let name = |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    let mut names: Vec<String> = paths.iter().map(name).collect();
+    names.sort_unstable();
+    names.dedup();
+    match &names[..] {
+        [] => "scene".to_owned(),
+        [one] => one.clone(),
+        [one, other] => format!("{one}, {other}"),
+        [first, rest @ ..] => format!("{first} and {} more", rest.len()),
+    }
 }

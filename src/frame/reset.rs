@@ -36,6 +36,8 @@ pub struct Change {
     pub level: Level,
     /// For the log and the status line.
     pub cause: String,
+    /// It says it all: of a new scene everything is new.
+    pub is_all: bool,
 }
 
 /// All that changed since the last frame.
@@ -44,7 +46,12 @@ pub struct Changes(pub Vec<Change>);
 
 impl Changes {
     pub fn add(&mut self, level: Level, cause: impl Into<String>) {
-        self.0.push(Change { level, cause: cause.into() });
+        self.0.push(Change { level, cause: cause.into(), is_all: false });
+    }
+
+    /// Another scene, or another state of the files of this one.
+    pub fn add_scene(&mut self, cause: impl Into<String>) {
+        self.0.push(Change { level: Level::Restart, cause: cause.into(), is_all: true });
     }
 
     pub fn has(&self, level: Level) -> bool {
@@ -68,15 +75,14 @@ impl Changes {
     }
 }
 
-/// The cause that says it all.
+/// The cause when a scene has been opened.
 pub const SCENE_OPENED: &str = "scene opened";
 
 impl fmt::Display for Changes {
     /// The causes of the restart, the weightiest first, no more than three.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Of a new scene everything is new.
-        if self.0.iter().any(|change| change.cause == SCENE_OPENED) {
-            return f.write_str(SCENE_OPENED);
+        if let Some(all) = self.0.iter().find(|change| change.is_all) {
+            return f.write_str(&all.cause);
         }
         let mut causes: Vec<&Change> = self.0.iter().filter(|change| change.level >= Level::Restart).collect();
         causes.sort_by_key(|change| std::cmp::Reverse(change.level));

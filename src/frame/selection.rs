@@ -169,6 +169,13 @@ impl Projector {
         Some([self.place(a)?, self.place(b)?])
     }
 
+    /// Which way a point lies that is outside of the window, from the middle of the window, unit; `None` for what is
+    /// straight behind.
+    pub fn way_to(&self, point: DVec3) -> Option<DVec2> {
+        let offset = point - self.eye;
+        DVec2::new(offset.dot(self.right), -offset.dot(self.up)).try_normalize()
+    }
+
     /// The direction, not unit, in which a place of the window is seen.
     pub fn direction(&self, place: DVec2) -> DVec3 {
         let offset = (place - self.middle) / self.scale;
@@ -216,6 +223,10 @@ mod tests {
             assert!((projector.place(point).unwrap() - place).length() < 1e-6);
         }
         assert_eq!(projector.place(view.eye - view.forward), None);
+        // Behind the eye and to its right is to the right.
+        let behind = view.eye - 3.0 * view.forward + view.right();
+        assert!((projector.way_to(behind).unwrap() - DVec2::X).length() < 1e-6);
+        assert_eq!(projector.way_to(view.eye), None);
     }
 
     #[test]

@@ -20,7 +20,9 @@ use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, Target, Waits};
 use crate::render::{Film, RenderSettings, Snapshot};
-use crate::scene::{Developing, Extent, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis};
+use crate::scene::{
+    Developing, Extent, Inventory, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis,
+};
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
 use bevy_ecs::system::ScheduleSystem;
@@ -256,6 +258,16 @@ impl Session {
     /// The scene as the picture shows it.
     pub fn inputs(&self) -> &SceneInputs {
         &self.world.resource::<Shown>().inputs
+    }
+
+    /// Lists of what is in the scene, which stay right for as long as [`revision`](Self::revision) does not change.
+    pub fn inventory(&self) -> Inventory {
+        Inventory::of(&self.world, self.inputs())
+    }
+
+    /// Grows when anything but the camera has been touched.
+    pub fn revision(&self) -> u64 {
+        self.world.resource::<Shown>().revision()
     }
 
     /// The box around an object or a light, along its own axes.

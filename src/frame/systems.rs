@@ -121,14 +121,23 @@ pub struct Shown {
     improving: Vec<Shape>,
     /// Drop all samples at the next frame, for this reason.
     pub(super) restart: Option<&'static str>,
+    /// A scene has taken its place, for this reason.
+    pub(super) adopted: Option<String>,
     generation: u64,
     pictures: u64,
+    /// Grows when anything but the camera has been touched.
+    revision: u64,
 }
 
 impl Shown {
     /// Of the picture that is rendered now.
     pub(super) fn generation(&self) -> u64 {
         self.generation
+    }
+
+    /// Grows whenever lists of what is in the scene may have become wrong; a camera that moves makes none wrong.
+    pub fn revision(&self) -> u64 {
+        self.revision
     }
 
     pub(super) fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
@@ -238,7 +247,7 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<super::Explaining>().forget();
     let mut shown = world.resource_mut::<Shown>();
     shown.trees.extend(scene.trees.clone());
-    shown.restart = Some(SCENE_OPENED);
+    shown.adopted = Some(SCENE_OPENED.to_owned());
     let mut status = world.resource_mut::<Status>();
     status.scene = scene.source.title();
     for warning in &scene.warnings {
@@ -272,6 +281,9 @@ pub fn rebuild(
     if let Some(cause) = shown.restart.take() {
         changes.add(Level::Restart, cause);
     }
+    if let Some(cause) = shown.adopted.take() {
+        changes.add_scene(cause);
+    }
     // Touched values are often equal to what they were; only a difference counts.
     let environment_changed = queries.environment() != shown.inputs.environment;
     if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
@@ -286,6 +298,9 @@ pub fn rebuild(
         let part = differences.part();
         let structure = differences.0.iter().any(|change| change.level >= Level::TopTree);
         changes.0.extend(differences.0);
+        if is_another_list(&shown.inputs, &inputs) {
+            shown.revision += 1;
+        }
         shown.inputs = inputs;
         let Shown { inputs, extraction, trees, extents, .. } = &mut *shown;
         let rebuilt = match (extraction.as_mut(), part) {
@@ -321,6 +336,12 @@ pub fn rebuild(
     }
     improve_trees(&mut shown, &beside, &renderer);
     found.0 = changes;
+}
+
+/// Not when the camera alone has moved. What was touched and looks the same here may be a material that nothing uses.
+fn is_another_list(old: &SceneInputs, new: &SceneInputs) -> bool {
+    let as_before = old.objects == new.objects && old.materials == new.materials && old.lights == new.lights;
+    !as_before || old.camera == new.camera
 }
 
 /// What has been built in a hurry is built again at leisure, once it is seen.

@@ -42,6 +42,20 @@ pub enum Shape {
     Spheres(Arc<Balls>),
 }
 
+impl Shape {
+    /// What people call it.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Sphere { .. } => "sphere",
+            Self::Plane { .. } => "plane",
+            Self::Quad { .. } => "quad",
+            Self::Triangle { .. } => "triangle",
+            Self::Mesh(_) => "mesh",
+            Self::Spheres(_) => "spheres",
+        }
+    }
+}
+
 impl PartialEq for Shape {
     /// Meshes and clouds are equal when they are the same one in memory.
     fn eq(&self, other: &Self) -> bool {

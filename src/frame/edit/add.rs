@@ -3,17 +3,17 @@
 //! What is removed keeps its entity and loses its components, so that an undone removal comes back as the same entity
 //! and everything that names it is right again.
 
-use crate::frame::selection::{Selection, pick};
-use crate::frame::systems::{PictureSize, Shown};
+use super::spot::{self, Spot};
+use crate::frame::selection::Selection;
 use crate::mesh::procedural;
 use crate::scene::file::{MeshShadingPart, MeshSourcePart};
-use crate::scene::{Material, MaterialSlots, MeshOrigin, Ordinal, Paint, Placement, PointLight, Shape, View};
+use crate::scene::{Material, MaterialSlots, MeshOrigin, Ordinal, Paint, Placement, PointLight, Shape};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// What can be added. It comes to stand on what the middle of the picture shows, as large as a tenth of its distance.
+/// What can be added. It comes to stand where [`spot`] finds room for it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NewThing {
     Sphere,
@@ -31,19 +31,8 @@ pub fn is_thing(world: &World, entity: Entity) -> bool {
     world.get::<Shape>(entity).is_some() || world.get::<PointLight>(entity).is_some()
 }
 
-/// Where new things go: the place, and how large they should be, metres.
-pub fn spot(world: &mut World) -> (DVec3, f64) {
-    let view = world.resource::<Shown>().inputs.camera.map_or_else(View::default, |camera| camera.view);
-    let aspect = world.resource::<PictureSize>().aspect();
-    let hit = world.resource::<Shown>().extraction.as_ref().and_then(|scene| pick(scene, 0.5, 0.5, aspect));
-    // What lies far behind the pivot is a wall or the floor at the horizon.
-    let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
-    let (place, distance) = hit.map_or((view.pivot(), view.pivot_distance), |hit| (hit.point, hit.depth));
-    (place, 0.1 * distance)
-}
-
 pub fn add(world: &mut World, new: &NewThing) {
-    let (place, size) = spot(world);
+    let Spot { foot: place, size } = spot::find(world);
     let up = DVec3::Y * size;
     let entity = match new {
         NewThing::Sphere => {
@@ -66,13 +55,18 @@ pub fn add(world: &mut World, new: &NewThing) {
             let edge = 2.0 * size;
             // u × v looks down.
             let shape = Shape::Quad { edge_u: edge * DVec3::X, edge_v: edge * DVec3::Z };
-            let corner = place + 6.0 * up - 0.5 * edge * (DVec3::X + DVec3::Z);
+            let corner =
+                place + spot::headroom(world, place, 6.0 * size) * DVec3::Y - 0.5 * edge * (DVec3::X + DVec3::Z);
             spawn(world, "lamp", (shape, Placement::at(corner), MaterialSlots(vec![material])))
         }
         NewThing::PointLight => {
             let intensity = Vec3::splat((50.0 * size * size) as f32);
             let light = PointLight { intensity, radius: 0.1 * size };
-            spawn(world, "point light", (light, Placement::at(place + 5.0 * up)))
+            spawn(
+                world,
+                "point light",
+                (light, Placement::at(place + spot::headroom(world, place, 5.0 * size) * DVec3::Y)),
+            )
         }
         NewThing::Cube => {
             let material =
@@ -144,13 +138,13 @@ pub fn bury(world: &mut World, entity: Entity) {
 
 pub fn duplicate(world: &mut World) {
     let selected = world.resource::<Selection>().0.clone();
-    let (_, size) = spot(world);
+    let step = spot::find(world).size;
     let mut copies = Vec::new();
     for entity in selected {
         let name = world.get::<Name>(entity).map_or("copy".to_owned(), |name| plain_name(name.as_str()).to_owned());
         let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
         // Beside the old one, or nobody would see it.
-        placement.translation.x += size;
+        placement.translation.x += step;
         let copy = spawn(world, &name, placement);
         if let Some(shape) = world.get::<Shape>(entity).cloned() {
             let slots = world.get::<MaterialSlots>(entity).cloned().unwrap_or_default();

@@ -7,19 +7,23 @@
 //! | file | what it does |
 //! |---|---|
 //! | `mod` | the list of edits, and the system that empties the queue |
-//! | `property` | numbers of materials, lights, shapes and sky |
+//! | `property` | numbers of materials, lights and shapes |
+//! | `sky` | colours, strength and turn of the surroundings |
 //! | `texture` | textures in the place of colours |
 //! | `place` | moving, turning and scaling what is selected |
-//! | `add` | new things, copies, removal |
+//! | `add`, `spot` | new things and where they go, copies, removal |
 
 mod add;
 mod place;
 mod property;
+mod sky;
+mod spot;
 mod texture;
 
 pub use add::NewThing;
 pub(super) use add::{clay, spawn};
 pub use property::{MaterialKind, Property, paint_of};
+pub use sky::strength as sky_strength;
 pub(super) use texture::take as take_picture;
 pub use texture::textures;
 
@@ -27,8 +31,8 @@ use super::history::History;
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
 use super::systems::{Clock, PictureSize, Shown};
-use crate::scene::MaterialSlots;
 use crate::scene::file::{MeshShadingPart, TexturePart};
+use crate::scene::{MaterialSlots, users_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
@@ -53,6 +57,10 @@ pub enum Edit {
     },
     SelectAll,
     SelectNone,
+    /// All objects that use this material, directly or in a blend.
+    SelectUsers {
+        material: Id,
+    },
     /// From here to [`Edit::End`] everything is one step to undo, and [`Edit::Move`], [`Edit::Turn`] and
     /// [`Edit::Scale`] count from here.
     Begin,
@@ -164,11 +172,19 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             let all = objects.chain(inputs.lights.iter().map(|light| light.entity)).collect();
             world.resource_mut::<Selection>().0 = all;
         }
+        Edit::SelectUsers { material } => {
+            let material = existing(world, material)?;
+            let users = users_of(world, &world.resource::<Shown>().inputs, material);
+            if users.is_empty() {
+                return Err("nothing uses this material".to_owned());
+            }
+            world.resource_mut::<Selection>().0 = users;
+        }
         Edit::SelectNone => world.resource_mut::<Selection>().0.clear(),
         Edit::Begin => History::begin(world),
         Edit::End => History::end(world),
         Edit::Undo => History::step_back(world).ok_or("there is nothing to undo")?,
-        Edit::Redo => History::step_on(world).ok_or("there is nothing to do again")?,
+        Edit::Redo => History::step_on(world).ok_or("there is nothing to redo")?,
         Edit::Delete => add::delete(world),
         Edit::Duplicate => add::duplicate(world),
         Edit::Add(new) => add::add(world, &new),

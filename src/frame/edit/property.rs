@@ -1,8 +1,8 @@
-//! The numbers and colours of materials, lights, shapes and sky, one at a time.
+//! The numbers and colours of materials, lights and shapes, one at a time; those of the sky are in [`super::sky`].
 
-use crate::render::{Environment, Fresnel};
-use crate::scene::file::{EnvironmentPart, Rgb};
-use crate::scene::{Amount, Linear, Material, Paint, Placement, PointLight, SceneEnvironment, Shape};
+use super::sky;
+use crate::render::Fresnel;
+use crate::scene::{Amount, Linear, Material, Paint, Placement, PointLight, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,18 @@ pub enum Property {
     Zenith,
     Horizon,
     Ground,
+    /// The brightest channel of the sky's colours, or the factor of its picture: all others keep their proportion to it.
+    SkyStrength,
+    /// Of a picture of the sky, degrees about +Y.
+    SkyRotation,
+}
+
+impl Property {
+    /// Of the surroundings, which are no entity.
+    fn is_of_sky(self) -> bool {
+        use Property::{Ground, Horizon, Sky, SkyRotation, SkyStrength, Zenith};
+        matches!(self, Sky | Zenith | Horizon | Ground | SkyStrength | SkyRotation)
+    }
 }
 
 /// The kinds of [`Material`] that one can be turned into.
@@ -108,8 +120,8 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
     if !value.is_finite() {
         return Err("a number must be finite".to_owned());
     }
-    if matches!(property, Property::Sky | Property::Zenith | Property::Horizon | Property::Ground) {
-        return set_sky(world, property, value.max(DVec3::ZERO).as_vec3());
+    if property.is_of_sky() {
+        return sky::set(world, property, value);
     }
     let entity = entity.filter(|&entity| world.get_entity(entity).is_ok());
     let entity = entity.ok_or("what was to be changed is gone")?;
@@ -231,27 +243,5 @@ pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result
         },
         MaterialKind::Emissive => Material::Emissive { radiance: color },
     });
-    Ok(())
-}
-
-fn set_sky(world: &mut World, property: Property, value: Vec3) -> Result<(), String> {
-    let sky = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default();
-    let (light, part) = match (property, &sky.light) {
-        (Property::Sky, Environment::Black | Environment::Constant(_)) => {
-            (Environment::Constant(value), EnvironmentPart::Constant(Rgb(value)))
-        }
-        (_, &Environment::Gradient { zenith, horizon, ground }) => {
-            let pick = |which, old| if property == which { value } else { old };
-            let zenith = pick(Property::Zenith, zenith);
-            let (horizon, ground) = (pick(Property::Horizon, horizon), pick(Property::Ground, ground));
-            let part = EnvironmentPart::Gradient { zenith: Rgb(zenith), horizon: Rgb(horizon), ground: Rgb(ground) };
-            (Environment::Gradient { zenith, horizon, ground }, part)
-        }
-        _ => return Err(format!("this sky has no {property:?}")),
-    };
-    let changed = SceneEnvironment { light, part, air: sky.air };
-    if changed != sky {
-        world.insert_resource(changed);
-    }
     Ok(())
 }

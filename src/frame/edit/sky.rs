@@ -1,0 +1,87 @@
+//! The sky: its colours, how strong they are together, and how its picture is turned.
+
+use super::Property;
+use crate::render::Environment;
+use crate::scene::SceneEnvironment;
+use crate::scene::file::{EnvironmentPart, Rgb};
+use bevy_ecs::prelude::World;
+use glam::{DVec3, Vec3};
+
+/// The brightest channel of the sky's colours, or the factor of its picture.
+pub fn strength(light: &Environment) -> f32 {
+    match light {
+        Environment::Black => 0.0,
+        Environment::Constant(radiance) => radiance.max_element(),
+        Environment::Gradient { zenith, horizon, ground } => zenith.max(*horizon).max(*ground).max_element(),
+        Environment::Image { scale, .. } => scale.max_element(),
+    }
+}
+
+/// Sets one property of the sky.
+pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), String> {
+    let sky = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default();
+    let light = match property {
+        Property::SkyStrength => with_strength(&sky.light, (value.x as f32).max(0.0)),
+        Property::SkyRotation => turned(&sky.light, value.x.to_radians() as f32),
+        _ => with_color(&sky.light, property, value.max(DVec3::ZERO).as_vec3()),
+    };
+    let light = light.ok_or_else(|| format!("this sky has no {property:?}"))?;
+    let angle_deg = (property == Property::SkyRotation).then_some(value.x);
+    let changed = SceneEnvironment { part: part_of(&light, &sky.part, angle_deg), light, air: sky.air };
+    if changed != sky {
+        world.insert_resource(changed);
+    }
+    Ok(())
+}
+
+fn with_color(sky: &Environment, property: Property, value: Vec3) -> Option<Environment> {
+    match (property, sky) {
+        (Property::Sky, Environment::Black | Environment::Constant(_)) => Some(Environment::Constant(value)),
+        (Property::Zenith, &Environment::Gradient { horizon, ground, .. }) => {
+            Some(Environment::Gradient { zenith: value, horizon, ground })
+        }
+        (Property::Horizon, &Environment::Gradient { zenith, ground, .. }) => {
+            Some(Environment::Gradient { zenith, horizon: value, ground })
+        }
+        (Property::Ground, &Environment::Gradient { zenith, horizon, .. }) => {
+            Some(Environment::Gradient { zenith, horizon, ground: value })
+        }
+        _ => None,
+    }
+}
+
+/// What was black becomes grey, since it has no colour to keep.
+fn with_strength(sky: &Environment, wanted: f32) -> Option<Environment> {
+    let old = strength(sky);
+    let scaled = |color: Vec3| if old > 0.0 { color * (wanted / old) } else { Vec3::splat(wanted) };
+    Some(match sky {
+        Environment::Black => Environment::Constant(Vec3::splat(wanted)),
+        Environment::Constant(radiance) => Environment::Constant(scaled(*radiance)),
+        Environment::Gradient { zenith, horizon, ground } => {
+            Environment::Gradient { zenith: scaled(*zenith), horizon: scaled(*horizon), ground: scaled(*ground) }
+        }
+        Environment::Image { image, scale, rotation } => {
+            Environment::Image { image: image.clone(), scale: scaled(*scale), rotation: *rotation }
+        }
+    })
+}
+
+fn turned(sky: &Environment, angle: f32) -> Option<Environment> {
+    let Environment::Image { image, scale, .. } = sky else { return None };
+    Some(Environment::Image { image: image.clone(), scale: *scale, rotation: angle })
+}
+
+/// What a scene file says of it; a picture keeps its file, and its turn as it was written unless there is a new one.
+fn part_of(light: &Environment, old: &EnvironmentPart, angle_deg: Option<f64>) -> EnvironmentPart {
+    match (light, old) {
+        (Environment::Black, _) => EnvironmentPart::Black,
+        (Environment::Constant(radiance), _) => EnvironmentPart::Constant(Rgb(*radiance)),
+        (Environment::Gradient { zenith, horizon, ground }, _) => {
+            EnvironmentPart::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
+        }
+        (Environment::Image { scale, .. }, EnvironmentPart::Image { file, rotate, .. }) => {
+            EnvironmentPart::Image { file: file.clone(), scale: Rgb(*scale), rotate: angle_deg.unwrap_or(*rotate) }
+        }
+        (Environment::Image { .. }, old) => old.clone(),
+    }
+}

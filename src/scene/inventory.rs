@@ -1,0 +1,147 @@
+//! What a scene holds, as a person would list it: objects, materials with who uses them, and everything that emits light.
+//!
+//! Made when somebody looks at a list, and only again when the scene has changed; numbers and colours are read from the
+//! world when they are shown, since they change more often than what there is.
+
+use super::components::{Material, Ordinal, Shape};
+use super::inputs::SceneInputs;
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::{Entity, World};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Everything in the order of the scene file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inventory {
+    /// Objects and point lights.
+    pub objects: Vec<ObjectEntry>,
+    /// Also those that nothing uses.
+    pub materials: Vec<MaterialEntry>,
+    pub lights: Vec<LightEntry>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectEntry {
+    pub entity: Entity,
+    /// Its name, or its kind and a number.
+    pub label: String,
+    pub kind: &'static str,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialEntry {
+    pub entity: Entity,
+    /// Its name, or that of what uses it.
+    pub label: String,
+    /// The objects that use it, directly or in a blend, each once.
+    pub users: Vec<Entity>,
+    /// Blends that have it as a part.
+    pub blends: Vec<Entity>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightEntry {
+    /// What stands in the scene and can be selected.
+    pub entity: Entity,
+    pub label: String,
+    pub kind: &'static str,
+    /// The emissive material, which may be a part of a blend; none for a point light, which has an intensity of its own.
+    pub material: Option<Entity>,
+}
+
+impl Inventory {
+    /// `inputs`: of the same world.
+    pub fn of(world: &World, inputs: &SceneInputs) -> Self {
+        let mut users: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
+        let mut parts: BTreeMap<Entity, BTreeSet<Entity>> = BTreeMap::new();
+        let (mut objects, mut lights) = (Vec::new(), Vec::new());
+        for (i, object) in inputs.objects.iter().enumerate() {
+            let kind = object.shape.kind();
+            let label = object.name.clone().unwrap_or_else(|| format!("{kind} {i}"));
+            let mut of_object = BTreeSet::new();
+            for slot in &object.slots {
+                of_object.extend(parts.entry(*slot).or_insert_with(|| parts_of(world, *slot)).iter().copied());
+            }
+            for &material in &of_object {
+                users.entry(material).or_default().push(object.entity);
+                if let Some(Material::Emissive { .. }) = world.get(material) {
+                    let kind = light_kind(&object.shape);
+                    let (entity, label) = (object.entity, label.clone());
+                    lights.push(LightEntry { entity, label, kind, material: Some(material) });
+                }
+            }
+            objects.push(ObjectEntry { entity: object.entity, label, kind });
+        }
+        for (i, light) in inputs.lights.iter().enumerate() {
+            let (entity, kind) = (light.entity, "point light");
+            let label = light.name.clone().unwrap_or_else(|| format!("{kind} {i}"));
+            lights.push(LightEntry { entity, label: label.clone(), kind, material: None });
+            objects.push(ObjectEntry { entity, label, kind });
+        }
+        let labels: BTreeMap<Entity, &str> = objects.iter().map(|entry| (entry.entity, entry.label.as_str())).collect();
+        let mut blends: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
+        let all = materials_of(world);
+        for (entity, _) in &all {
+            if let Some(Material::Blend { a, b, .. }) = world.get(*entity) {
+                blends.entry(*a).or_default().push(*entity);
+                blends.entry(*b).or_default().push(*entity);
+            }
+        }
+        let materials = all.into_iter().map(|(entity, name)| {
+            let users = users.remove(&entity).unwrap_or_default();
+            let label = name.unwrap_or_else(|| match users.first().and_then(|user| labels.get(user)) {
+                Some(user) => format!("of {user}"),
+                None => "no name".to_owned(),
+            });
+            MaterialEntry { entity, label, users, blends: blends.remove(&entity).unwrap_or_default() }
+        });
+        Self { materials: materials.collect(), objects, lights }
+    }
+
+    pub fn material(&self, entity: Entity) -> Option<&MaterialEntry> {
+        self.materials.iter().find(|entry| entry.entity == entity)
+    }
+}
+
+/// The objects that use a material, directly or in a blend.
+pub fn users_of(world: &World, inputs: &SceneInputs, material: Entity) -> Vec<Entity> {
+    let mut uses: BTreeMap<Entity, bool> = BTreeMap::new();
+    let mut uses = |slot: &Entity| *uses.entry(*slot).or_insert_with(|| parts_of(world, *slot).contains(&material));
+    inputs.objects.iter().filter(|object| object.slots.iter().any(&mut uses)).map(|object| object.entity).collect()
+}
+
+/// A material and, if it is a blend, all that it is blended of.
+fn parts_of(world: &World, material: Entity) -> BTreeSet<Entity> {
+    let (mut found, mut open) = (BTreeSet::new(), vec![material]);
+    while let Some(entity) = open.pop() {
+        if found.insert(entity)
+            && let Some(Material::Blend { a, b, .. }) = world.get(entity)
+        {
+            open.extend([*a, *b]);
+        }
+    }
+    found
+}
+
+/// All materials of the world with their names, in the order of the scene file.
+fn materials_of(world: &World) -> Vec<(Entity, Option<String>)> {
+    // Before the first frame of a session nothing is known of any component, and there is nothing to list.
+    let Some(mut query) = world.try_query::<(Entity, Option<&Ordinal>, Option<&Name>, &Material)>() else {
+        return Vec::new();
+    };
+    let mut all: Vec<_> = (query.iter(world))
+        .map(|(entity, rank, name, _)| {
+            (rank.map_or(u32::MAX, |rank| rank.0), entity, name.map(|name| name.as_str().to_owned()))
+        })
+        .collect();
+    all.sort_unstable_by_key(|(rank, entity, _)| (*rank, *entity));
+    all.into_iter().map(|(_, entity, name)| (entity, name)).collect()
+}
+
+fn light_kind(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Sphere { .. } => "sphere light",
+        Shape::Quad { .. } | Shape::Triangle { .. } | Shape::Plane { .. } => "area light",
+        Shape::Mesh(_) => "mesh light",
+        Shape::Spheres(_) => "sphere lights",
+    }
+}
