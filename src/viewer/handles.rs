@@ -3,7 +3,8 @@
 use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
 use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
 use crate::scene::Placement;
-use egui::{Align2, Color32, Context, FontId, Pos2, Stroke};
+use bevy_ecs::name::Name;
+use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke};
 use glam::{DVec2, DVec3};
 
 const SELECTED: Color32 = Color32::from_rgb(255, 178, 70);
@@ -21,6 +22,8 @@ pub struct Handles {
     projector: Option<Projector>,
     hovered: Option<Handle>,
     grabbed: Option<Grabbed>,
+    /// What is selected and cannot be seen: its name, and its middle.
+    out_of_view: Option<(String, DVec3)>,
 }
 
 /// A drag under way. The handles stay where they were grabbed, so that the measure does not move with what it measures.
@@ -40,6 +43,13 @@ impl Handles {
         let projector = Projector::new(&session.status().rig, size);
         self.projector = Some(projector);
         self.gizmo = None;
+        self.out_of_view = match (self.boxes.last(), selected.last()) {
+            (Some(own), Some(&active)) if !is_seen(own, &projector, size) => {
+                let name = session.world().get::<Name>(active).map_or("selected", |name| name.as_str());
+                Some((name.to_owned(), own.middle()))
+            }
+            _ => None,
+        };
         if let (Some(mode), Some(own), Some(&active)) = (mode, self.boxes.last(), selected.last()) {
             let axes = match (mode, selected.len()) {
                 (Mode::Scale, 1) => own_axes(session.world().get::<Placement>(active)),
@@ -89,6 +99,37 @@ impl Handles {
 
     pub fn is_grabbed(&self) -> bool {
         self.grabbed.is_some()
+    }
+
+    /// An arrow at the edge of `free`, the part of the window that nothing covers, if what is selected is out of view.
+    pub fn draw_hint(&self, context: &Context, free: Rect) {
+        let (Some(projector), Some((name, middle))) = (&self.projector, &self.out_of_view) else { return };
+        let inner = free.shrink(16.0);
+        if !inner.is_positive() {
+            return;
+        }
+        let center = inner.center();
+        // What is straight behind can be reached by turning either way.
+        let way = projector.way_to(*middle).map_or(egui::Vec2::DOWN, |way| egui::vec2(way.x as f32, way.y as f32));
+        let part = (inner.width() / 2.0 / way.x.abs()).min(inner.height() / 2.0 / way.y.abs());
+        let tip = center + part * way;
+        let painter = context.layer_painter(egui::LayerId::background());
+        let across = egui::vec2(-way.y, way.x);
+        let arrow = vec![tip, tip - 15.0 * way + 8.0 * across, tip - 15.0 * way - 8.0 * across];
+        painter.add(egui::Shape::convex_polygon(arrow, SELECTED, Stroke::new(1.0, Color32::BLACK)));
+        let text = format!("{name} is out of view: F frames it");
+        let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
+        // A window this small shows the arrow alone.
+        if inner.width() < galley.size().x + 8.0 || inner.height() < galley.size().y + 8.0 {
+            return;
+        }
+        let room = inner.shrink2(galley.size() / 2.0 + egui::Vec2::splat(4.0));
+        // Behind the arrow, which nothing hides.
+        let half = 0.5 * (galley.size().x * way.x.abs() + galley.size().y * way.y.abs());
+        let at = (tip - (24.0 + half) * way).clamp(room.min, room.max);
+        let rect = Rect::from_center_size(at, galley.size());
+        painter.rect_filled(rect.expand(4.0), 3.0, super::overlay::GLASS);
+        painter.galley(rect.min, galley, Color32::WHITE);
     }
 
     pub fn draw(&self, context: &Context) {
@@ -145,6 +186,26 @@ impl Handles {
     }
 }
 
+/// Whether any part of the box may be in the window. What has no end is everywhere.
+fn is_seen(own: &OwnBox, projector: &Projector, size: DVec2) -> bool {
+    if own.min == own.max {
+        return true;
+    }
+    let corners = own.corners();
+    // A box around the eye is seen, or what is in it; one that reaches behind the eye may be.
+    let places: Vec<Option<DVec2>> = corners.iter().map(|&corner| projector.place(corner)).collect();
+    let in_front: Vec<DVec2> = places.iter().copied().flatten().collect();
+    if in_front.is_empty() {
+        return false;
+    }
+    if in_front.len() < places.len() {
+        return true;
+    }
+    let (min, max) =
+        in_front.iter().fold((in_front[0], in_front[0]), |(min, max), &place| (min.min(place), max.max(place)));
+    max.x > 0.0 && max.y > 0.0 && min.x < size.x && min.y < size.y
+}
+
 fn own_axes(placement: Option<&Placement>) -> [DVec3; 3] {
     let matrix = placement.map(Placement::linear).unwrap_or_default();
     [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.try_normalize().unwrap_or(DVec3::X))
@@ -180,4 +241,29 @@ fn draw_arrow(painter: &egui::Painter, start: Pos2, end: Pos2, color: Color32) {
 
 fn pos(place: DVec2) -> Pos2 {
     Pos2::new(place.x as f32, place.y as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::navigation::Rig;
+    use crate::scene::View;
+    use glam::DAffine3;
+
+    #[test]
+    fn what_is_beside_the_picture_or_behind_the_eye_is_not_seen() {
+        let view = View::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y).unwrap();
+        let (rig, size) = (Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));
+        let projector = Projector::new(&rig, size);
+        let seen = |x: f64, z: f64, half: f64| {
+            let world_from_box = DAffine3::from_translation(DVec3::new(x, 0.0, z));
+            let own = OwnBox { min: DVec3::splat(-half), max: DVec3::splat(half), world_from_box };
+            is_seen(&own, &projector, size)
+        };
+        assert!(seen(0.0, 0.0, 1.0) && seen(0.0, 10.0, 50.0), "in the middle, and around the eye");
+        assert!(!seen(100.0, 0.0, 1.0) && !seen(-100.0, 0.0, 1.0), "to either side");
+        assert!(!seen(0.0, 20.0, 1.0), "behind");
+        assert!(seen(100.0, 0.0, 99.0), "its edge reaches into the picture");
+        assert!(seen(0.0, 0.0, 0.0), "what has no size is a plane");
+    }
 }

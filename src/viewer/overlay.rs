@@ -1,6 +1,6 @@
 //! What is written over the picture: the status line, messages, and the list of keys.
 
-use super::keys::{BINDINGS, Binding, Group};
+use super::keys::{BINDINGS, Binding, Group, finds};
 use super::toasts::{Toast, Tone};
 use crate::render::{Legend, scale_color};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
@@ -91,6 +91,11 @@ impl Help {
     pub fn toggle(&mut self) {
         *self = Self { open: !self.open, search: String::new(), fresh: true };
     }
+
+    /// It is about to be drawn for the first time.
+    pub fn is_fresh(&self) -> bool {
+        self.open && self.fresh
+    }
 }
 
 /// The list of keys, in the middle, to be searched and scrolled.
@@ -107,18 +112,14 @@ pub fn help(context: &Context, help: &mut Help) {
         .resizable(false)
         .fixed_size(Vec2::new(columns as f32 * column_width + 20.0, height))
         .show(context, |ui| {
-            let field = egui::TextEdit::singleline(search).hint_text("find: focus, undo, depth …").desired_width(220.0);
+            let field = egui::TextEdit::singleline(search).hint_text("find: blur, undo, video …").desired_width(220.0);
             let field = ui.add(field);
             if std::mem::take(fresh) {
                 field.request_focus();
             }
             ui.add_space(4.0);
-            let words: Vec<String> = search.to_lowercase().split_whitespace().map(str::to_owned).collect();
             let found = |group: &Group| -> Vec<&'static Binding> {
-                let is_found = |binding: &&Binding| {
-                    let line = format!("{} {} {}", group.title, binding.keys(), binding.effect).to_lowercase();
-                    words.iter().all(|word| line.contains(word))
-                };
+                let is_found = |binding: &&Binding| finds(&binding.line(group.title), search);
                 group.bindings.iter().filter(is_found).collect()
             };
             let groups: Vec<(&str, Vec<&Binding>)> = BINDINGS

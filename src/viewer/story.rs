@@ -1,12 +1,12 @@
-//! The story of a pixel, over the picture: its paths where they ran, and a table of what each light brought.
+//! The story of a pixel, over the picture: its paths where they ran, and a [`table`] of what each light brought.
 //!
-//! Paths are drawn through everything, since what is behind a wall is often what one is looking for. A table that says
-//! luminance is read at a glance; `firstlight explain` has the three channels.
+//! Paths are drawn through everything, since what is behind a wall is often what one is looking for. All of them at
+//! once are a tangle, so the strongest are shown, of one light or of one number of bounces if that is asked for.
 
-use super::overlay::GLASS;
-use super::status::percent;
-use crate::frame::{End, PixelStory, Projector, brightness};
-use egui::{Align2, Color32, Context, FontId, Frame, Margin, Order, Pos2, RichText, Stroke, Ui};
+mod table;
+
+use crate::frame::{End, PixelStory, Projector, Way, brightness};
+use egui::{Color32, Context, Pos2, Stroke};
 use glam::{DVec2, DVec3};
 
 /// By segment, from the eye on; the last one is that of all further ones.
@@ -20,16 +20,71 @@ const SEGMENTS: [Color32; 6] = [
 ];
 /// From a vertex to the lamp that it asked.
 const ASKED: Color32 = Color32::from_rgb(140, 230, 150);
-/// More would be a tangle.
-const WAYS_SHOWN: usize = 24;
-/// Lights in the table; the others are counted together.
-const LIGHTS_SHOWN: usize = 9;
-const TEXT_SIZE: f32 = 12.5;
+
+/// Which paths are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaysShown {
+    /// So many of those that bring most; all when not given, also those that bring nothing.
+    strongest: Option<usize>,
+    /// Only light from what is called so.
+    light: Option<String>,
+    /// Only light after so many bounces.
+    bounces: Option<usize>,
+}
+
+impl Default for WaysShown {
+    fn default() -> Self {
+        Self { strongest: Some(Self::STRONGEST[1]), light: None, bounces: None }
+    }
+}
+
+impl WaysShown {
+    const STRONGEST: [usize; 3] = [3, 12, 32];
+
+    fn is_filtered(&self) -> bool {
+        self.light.is_some() || self.bounces.is_some()
+    }
+
+    /// Forgets a light that this pixel does not know.
+    fn fit(&mut self, story: &PixelStory) {
+        self.light = self.light.take().filter(|name| story.lights.iter().any(|light| light.name == *name));
+        self.bounces = self.bounces.filter(|bounces| *bounces < story.by_bounces.len());
+    }
+
+    /// How bright the part of a path is that was asked for.
+    fn strength(&self, way: &Way) -> f64 {
+        let is_asked_for = |end: &End, bounces: usize| {
+            let light = match end {
+                End::At { what, .. } => what.as_str(),
+                End::Sky { .. } => "sky",
+            };
+            self.light.as_ref().is_none_or(|name| name == light) && self.bounces.is_none_or(|n| n == bounces)
+        };
+        let parts = way.stops.iter().enumerate().flat_map(|(i, stop)| {
+            let itself = (&stop.end, i, stop.radiance);
+            let asked = stop.asked.as_ref().map(|(lamp, radiance)| (lamp, i + 1, *radiance));
+            [Some(itself), asked].into_iter().flatten()
+        });
+        parts.filter(|(end, bounces, _)| is_asked_for(end, *bounces)).map(|(.., radiance)| brightness(radiance)).sum()
+    }
+
+    /// The paths to draw, the strongest last so that nothing hides them.
+    fn of<'a>(&self, story: &'a PixelStory) -> Vec<&'a Way> {
+        let mut ways: Vec<(f64, &Way)> = story.ways.iter().map(|way| (self.strength(way), way)).collect();
+        if self.is_filtered() {
+            ways.retain(|(strength, _)| *strength > 0.0);
+        }
+        ways.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let n = self.strongest.unwrap_or(ways.len()).min(ways.len());
+        ways.split_off(ways.len() - n).into_iter().map(|(_, way)| way).collect()
+    }
+}
 
 /// Draws both; `reach`: how far a path that leaves the scene is drawn, metres.
-pub fn draw(context: &Context, story: &PixelStory, projector: &Projector, reach: f64) {
+pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown, projector: &Projector, reach: f64) {
+    shown.fit(story);
     let painter = context.layer_painter(egui::LayerId::background());
-    for way in story.ways.iter().take(WAYS_SHOWN) {
+    for way in shown.of(story) {
         let mut from = way.origin;
         for (segment, stop) in way.stops.iter().enumerate() {
             let to = point_of(&stop.end, from, reach);
@@ -53,7 +108,7 @@ pub fn draw(context: &Context, story: &PixelStory, projector: &Projector, reach:
         painter.circle_stroke(pos(place), 7.0, Stroke::new(3.0, Color32::from_black_alpha(140)));
         painter.circle_stroke(pos(place), 7.0, Stroke::new(1.5, Color32::WHITE));
     }
-    table(context, story);
+    table::draw(context, story, shown);
 }
 
 fn point_of(end: &End, from: DVec3, reach: f64) -> DVec3 {
@@ -73,118 +128,41 @@ fn pos(place: DVec2) -> Pos2 {
     Pos2::new(place.x as f32, place.y as f32)
 }
 
-/// In the upper left corner, under the messages; it takes no mouse.
-fn table(context: &Context, story: &PixelStory) {
-    let all = brightness(story.total());
-    egui::Area::new("story".into())
-        .order(Order::Middle)
-        .interactable(false)
-        .fixed_pos(context.content_rect().left_top() + egui::vec2(10.0, 44.0))
-        .show(context, |ui| {
-            Frame::NONE.fill(GLASS).corner_radius(4.0).inner_margin(Margin::symmetric(10, 7)).show(ui, |ui| {
-                let (x, y, n) = (story.pixel.x, story.pixel.y, story.samples.len());
-                text(ui, format!("pixel {x}, {y}: {n} samples, brightness {all:.4}"), true);
-                ui.add_space(3.0);
-                egui::Grid::new("story").num_columns(6).spacing([14.0, 2.0]).show(ui, |ui| {
-                    for title in ["light", "seen", "direct", "indirect", "together", "share"] {
-                        cell(ui, title.to_owned(), title != "light", Color32::from_gray(165));
-                    }
-                    ui.end_row();
-                    for light in story.lights.iter().take(LIGHTS_SHOWN) {
-                        row(ui, &light.name, light.parts(), all);
-                    }
-                    let others = story.lights.get(LIGHTS_SHOWN..).unwrap_or_default();
-                    if !others.is_empty() {
-                        let sum = |part: usize| others.iter().map(|light| light.parts()[part]).sum();
-                        row(ui, &format!("{} others", others.len()), [sum(0), sum(1), sum(2)], all);
-                    }
-                    if let Some(from_lamps) = story.from_lamps.filter(|light| *light != DVec3::ZERO) {
-                        let total = brightness(from_lamps);
-                        cell(ui, "paths from the lamps".to_owned(), false, Color32::from_gray(228));
-                        (0..3).for_each(|_| drop(ui.label("")));
-                        cell(ui, figure(total), true, Color32::from_gray(228));
-                        cell(ui, percent(total / all), true, Color32::from_gray(228));
-                        ui.end_row();
-                    }
-                });
-                ui.add_space(4.0);
-                bounces(ui, story);
-                if story.n_bad > 0 {
-                    text(ui, format!("{} samples were not finite and are left out", story.n_bad), false);
-                }
-            });
-        });
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Stop;
 
-fn row(ui: &mut Ui, name: &str, parts: [DVec3; 3], all: f64) {
-    let parts = parts.map(brightness);
-    let total: f64 = parts.iter().sum();
-    // Names are as long as people like.
-    let name: String =
-        if name.chars().count() > 24 { name.chars().take(23).chain(['…']).collect() } else { name.into() };
-    cell(ui, name, false, Color32::from_gray(228));
-    for part in parts {
-        let color = Color32::from_gray(if part == 0.0 { 110 } else { 228 });
-        cell(ui, figure(part), true, color);
+    /// A path that runs into `lamp` after its bounces, with this radiance.
+    fn way(lamp: &str, bounces: usize, radiance: f64) -> Way {
+        let stop = |what: &str, radiance: f64| Stop {
+            end: End::At { point: DVec3::ZERO, what: what.to_owned() },
+            throughput: DVec3::ONE,
+            radiance: DVec3::splat(radiance),
+            asked: None,
+        };
+        let mut stops: Vec<Stop> = (0..bounces).map(|_| stop("wall", 0.0)).collect();
+        stops.push(stop(lamp, radiance));
+        Way { sample: 0, radiance: DVec3::splat(radiance), origin: DVec3::ZERO, stops }
     }
-    cell(ui, figure(total), true, Color32::from_gray(228));
-    cell(ui, percent(total / all), true, Color32::from_gray(228));
-    ui.end_row();
-}
 
-/// What came after how many bounces, as a bar in the colours of the paths: light that the eye sees directly has the
-/// colour of the first segment.
-fn bounces(ui: &mut Ui, story: &PixelStory) {
-    let parts: Vec<f64> = story.by_bounces.iter().map(|part| brightness(*part).max(0.0)).collect();
-    let sum: f64 = parts.iter().sum();
-    if sum <= 0.0 {
-        return;
-    }
-    let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.min_rect().width().max(220.0), 14.0), egui::Sense::hover());
-    let mut left = rect.left();
-    for (bounces, part) in parts.iter().enumerate() {
-        let width = rect.width() * (part / sum) as f32;
-        let color = SEGMENTS[bounces.min(SEGMENTS.len() - 1)];
-        let bar = egui::Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(width, rect.height()));
-        ui.painter().rect_filled(bar, 0.0, color.gamma_multiply(0.85));
-        if width > 16.0 {
-            let font = FontId::proportional(TEXT_SIZE - 1.5);
-            ui.painter().text(bar.center(), Align2::CENTER_CENTER, bounces.to_string(), font, Color32::BLACK);
-        }
-        left += width;
-    }
-    let (itself, asked) = (brightness(story.by_itself) / sum, brightness(story.by_asking) / sum);
-    let noise = percent(brightness(story.deviation) / brightness(story.mean));
-    text(
-        ui,
-        format!(
-            "bounces   run into {}   asked for {}   noise of the mean {noise}   J: another, Esc: none",
-            percent(itself),
-            percent(asked)
-        ),
-        false,
-    );
-}
-
-fn cell(ui: &mut Ui, content: String, is_figure: bool, color: Color32) {
-    let text = RichText::new(content).size(TEXT_SIZE).color(color);
-    if is_figure {
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| ui.label(text));
-    } else {
-        ui.label(text);
-    }
-}
-
-fn text(ui: &mut Ui, content: String, strong: bool) {
-    let text = RichText::new(content).size(TEXT_SIZE);
-    ui.label(if strong { text.strong() } else { text.color(Color32::from_gray(165)) });
-}
-
-fn figure(value: f64) -> String {
-    match value {
-        0.0 => "–".to_owned(),
-        v if v.abs() >= 100.0 => format!("{v:.0}"),
-        v if v.abs() >= 0.01 => format!("{v:.3}"),
-        v => format!("{v:.1e}"),
+    #[test]
+    fn the_strongest_paths_of_a_light_or_of_a_bounce_are_shown() {
+        let mut asked = way("sky", 1, 0.0);
+        asked.stops[0].asked = Some((End::Sky { direction: DVec3::Y }, DVec3::splat(7.0)));
+        let story = PixelStory {
+            ways: vec![way("lamp", 1, 2.0), way("lamp", 2, 5.0), way("bulb", 1, 9.0), way("bulb", 1, 0.0), asked],
+            ..PixelStory::default()
+        };
+        let strengths = |shown: &WaysShown| -> Vec<f64> {
+            shown.of(&story).into_iter().map(|way| shown.strength(way).round()).collect()
+        };
+        let all = WaysShown { strongest: None, light: None, bounces: None };
+        assert_eq!(strengths(&all), [0.0, 2.0, 5.0, 7.0, 9.0]);
+        assert_eq!(strengths(&WaysShown { strongest: Some(2), ..all.clone() }), [7.0, 9.0]);
+        let of_lamp = WaysShown { light: Some("lamp".to_owned()), ..all.clone() };
+        assert_eq!(strengths(&of_lamp), [2.0, 5.0]);
+        assert_eq!(strengths(&WaysShown { bounces: Some(1), ..of_lamp }), [2.0]);
+        assert_eq!(strengths(&WaysShown { light: Some("sky".to_owned()), ..all }), [7.0], "what was asked counts");
     }
 }

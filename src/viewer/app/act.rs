@@ -146,7 +146,7 @@ impl App {
 
     fn toggle_drag(&mut self, now: Instant) {
         let orbits = self.input.toggle_orbits();
-        self.toasts.add(Tone::News, if orbits { "a drag moves around the pivot" } else { "a drag looks about" }, now);
+        self.toasts.add(Tone::News, if orbits { "a drag orbits around the pivot" } else { "a drag looks around" }, now);
     }
 
     /// The mouse turns the view without a button from now on, or points again.

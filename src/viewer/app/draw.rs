@@ -1,12 +1,15 @@
 //! Picture and overlays onto the window.
 
 use super::App;
-use crate::frame::{Around, Explaining, Projector};
+use crate::frame::{Around, Explaining, Looking, Projector};
 use crate::render::Inspection;
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::{overlay, panel, status, story};
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
+
+/// An inspection that takes longer is told to be under way; until then there is another picture.
+const SLOW: Duration = Duration::from_millis(150);
 
 impl App {
     pub(super) fn figures(&self) -> String {
@@ -23,12 +26,20 @@ impl App {
             tracing::debug!("picture {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
+        let wanted = self.session.world().resource::<Looking>().0.inspection;
+        self.inspected_since = match self.inspected_since {
+            _ if wanted == self.session.picture().inspection || wanted == Inspection::Picture => None,
+            Some((same, since)) if same == wanted => Some((same, since)),
+            _ => Some((wanted, now)),
+        };
+        let is_late = self.inspected_since.filter(|(_, since)| now >= *since + SLOW);
         let scale = f64::from(presenter.pixels_per_point());
         let size = window.inner_size();
         let size = glam::DVec2::new(f64::from(size.width), f64::from(size.height)) / scale;
         self.handles.update(&mut self.session, self.panel.gizmo, size);
         let projector = Projector::new(&self.session.status().rig, size);
         let (session, handles, brush, panel) = (&self.session, &self.handles, &self.brush, &mut self.panel);
+        let ways = &mut self.ways;
         let around = panel::Around {
             reaction: &self.reaction,
             speed: self.input.speed(),
@@ -45,15 +56,21 @@ impl App {
         let presented = presenter.present(|context| {
             if overlays {
                 if let Some(story) = &session.world().resource::<Explaining>().story {
-                    story::draw(context, story, &projector, session.world().resource::<Around>().extent.radius);
+                    story::draw(context, story, ways, &projector, session.world().resource::<Around>().extent.radius);
                 }
                 handles.draw(context);
                 brush.draw(context, session.status());
                 if panel.shown {
                     panel::show(context, panel, session, &around, &mut asked);
                 }
+                // Beside the panel, above the status line.
+                let mut free = context.available_rect();
+                free.max.y -= 30.0;
+                handles.draw_hint(context, free);
                 let picture = session.picture();
-                if picture.inspection != Inspection::Picture {
+                if let Some((inspection, _)) = is_late {
+                    overlay::legend(context, &format!("{}: working …", inspection.label()), None);
+                } else if picture.inspection != Inspection::Picture {
                     overlay::legend(context, picture.inspection.label(), picture.legend);
                 }
                 overlay::status_line(context, left, right);
@@ -75,7 +92,9 @@ impl App {
         if presented.again {
             window.request_redraw();
         }
-        self.repaint_at = now.checked_add(presented.repaint_after).filter(|_| presented.repaint_after < Duration::MAX);
+        let repaint_at = now.checked_add(presented.repaint_after).filter(|_| presented.repaint_after < Duration::MAX);
+        let late_at = self.inspected_since.filter(|_| is_late.is_none()).map(|(_, since)| since + SLOW);
+        self.repaint_at = repaint_at.into_iter().chain(late_at).min();
         (self.last_draw, self.unseen_since) = (Some(now), None);
         self.shown_figures = figures;
         // The overlays may have asked for a time that the last tick did not know.

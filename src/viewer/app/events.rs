@@ -1,7 +1,7 @@
 //! What winit tells: most of it is only noted, and carried out by the next tick.
 
 use super::{App, FRAME, Wake};
-use crate::frame::{Command, Edit};
+use crate::frame::{Command, Edit, Explaining};
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -41,7 +41,8 @@ impl ApplicationHandler<Wake> for App {
         let response = presenter.on_window_event(&event);
         // Overlays take the keyboard only while somebody types into them; they always want Tab, which is ours.
         let typing = presenter.egui_context().wants_keyboard_input();
-        let has_widgets = self.help.open || self.panel.shown && self.overlays;
+        let explains = self.session.world().resource::<Explaining>().story.is_some();
+        let has_widgets = self.help.open || self.overlays && (self.panel.shown || explains);
         if response.repaint && has_widgets && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
@@ -64,9 +65,11 @@ impl ApplicationHandler<Wake> for App {
             }
             WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
                 let pressed = event.state.is_pressed();
-                // Typing into the list of keys must not keep a person in it.
-                let leaves = event.logical_key == Key::Named(NamedKey::Escape);
-                if pressed && typing && !(leaves && self.help.open) {
+                // Typing into the list of keys must not keep a person in it; and what is typed while it opens, before
+                // its field has the keyboard, is meant for it.
+                let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
+                let is_for_help = self.help.is_fresh() && matches!(event.logical_key, Key::Character(_));
+                if pressed && (typing || is_for_help) && !(leaves && self.help.open) {
                     return;
                 }
                 if pressed {

@@ -28,8 +28,10 @@ use super::panel::PanelState;
 use super::presenter::{PresentError, Presenter};
 use super::reaction::Reaction;
 use super::saver::Saver;
+use super::story::WaysShown;
 use super::toasts::{Toasts, Tone};
 use crate::frame::{Command, Focus, FocusTarget, MessageKind, Session, SessionOptions, Target, Waits, Waker};
+use crate::render::Inspection;
 use crate::scene::{SceneSource, UpAxis};
 use memory::Memory;
 use serde_json::json;
@@ -163,6 +165,8 @@ struct App {
     panel: PanelState,
     handles: Handles,
     brush: Brush,
+    /// Which paths of an explained pixel are drawn.
+    ways: WaysShown,
     memory: Memory,
     reaction: Reaction,
     overlays: bool,
@@ -184,6 +188,8 @@ struct App {
     /// The picture that the window draws.
     shown_picture: Option<u64>,
     shown_figures: String,
+    /// What is to be shown in place of the picture and is not there yet, and since when.
+    inspected_since: Option<(Inspection, Instant)>,
     last_tick: Option<Instant>,
     /// When a movement was last handed over.
     steered_at: Instant,
@@ -232,6 +238,7 @@ impl App {
             panel: PanelState::default(),
             handles: Handles::default(),
             brush: Brush::default(),
+            ways: WaysShown::default(),
             memory: Memory::of_platform(),
             reaction: Reaction::default(),
             overlays: true,
@@ -246,6 +253,7 @@ impl App {
             unseen_since: None,
             shown_picture: None,
             shown_figures: String::new(),
+            inspected_since: None,
             last_tick: None,
             last_draw: None,
             wake_at: None,

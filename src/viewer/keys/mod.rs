@@ -6,9 +6,11 @@
 
 mod page;
 mod table;
+mod words;
 
 pub use page::markdown;
 pub use table::BINDINGS;
+pub use words::finds;
 
 use crate::frame::Command;
 use crate::render::Inspection;
@@ -18,6 +20,13 @@ use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 pub struct Binding {
     pub triggers: &'static [Trigger],
     pub effect: &'static str,
+}
+
+impl Binding {
+    /// All that a search looks at.
+    pub fn line(&self, title: &str) -> String {
+        format!("{title} {} {}", self.keys(), self.effect)
+    }
 }
 
 /// A heading and its lines.

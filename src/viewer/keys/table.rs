@@ -76,10 +76,10 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding { triggers: &[Trigger::Mouse("Shift")], effect: "four times as fast, while held" },
             Binding { triggers: &[Trigger::Mouse("Wheel")], effect: "flying speed" },
-            Binding { triggers: &[Trigger::Mouse("Drag")], effect: "look about" },
+            Binding { triggers: &[Trigger::Mouse("Drag")], effect: "look around" },
             Binding {
                 triggers: &[named(NamedKey::Space, Action::ToggleDrag)],
-                effect: "a drag moves around the pivot, or looks about again",
+                effect: "a drag orbits around the pivot, or looks around again",
             },
             Binding {
                 triggers: &[named(NamedKey::Enter, Action::CaptureMouse)],
@@ -97,11 +97,11 @@ pub static BINDINGS: &[Group] = &[
                     hold(KeyCode::ArrowUp, Motion::OrbitUp),
                     hold(KeyCode::ArrowDown, Motion::OrbitDown),
                 ],
-                effect: "move around the pivot",
+                effect: "orbit around the pivot",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Middle drag"), Trigger::Mouse("Alt+drag")],
-                effect: "move around the pivot",
+                effect: "orbit around the pivot",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Right drag"), Trigger::Mouse("Shift+arrows")],
@@ -132,7 +132,7 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding {
                 triggers: &[hold(KeyCode::KeyZ, Motion::RollLeft), hold(KeyCode::KeyC, Motion::RollRight)],
-                effect: "lean left, right",
+                effect: "roll (lean) left, right",
             },
             Binding { triggers: &[send("x", Command::Level)], effect: "level the horizon" },
             Binding {
@@ -160,7 +160,7 @@ pub static BINDINGS: &[Group] = &[
                     shift: false,
                     action: |slot| Action::Send(Command::SetBookmark { slot }),
                 }],
-                effect: "keep this view under a number",
+                effect: "save this view under a number",
             },
             Binding {
                 triggers: &[Trigger::Digit {
@@ -168,7 +168,7 @@ pub static BINDINGS: &[Group] = &[
                     shift: true,
                     action: |slot| Action::Send(Command::GoToBookmark { slot }),
                 }],
-                effect: "go to the view of that number",
+                effect: "go to the view that is saved under that number",
             },
             Binding { triggers: &[text("u", Action::ToggleSpin)], effect: "turntable: go around the pivot, or stop" },
             Binding { triggers: &[text("v", Action::PrintView)], effect: "print the view as a scene file's camera" },
@@ -190,11 +190,11 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[Trigger::Mouse("Double click")], effect: "focus there, and orbit at that depth" },
             Binding {
                 triggers: &[shifted(Typed::Text("l"), false, Action::Send(Command::ToggleFocusLock))],
-                effect: "focus stays with what was focused on, or moves with the camera",
+                effect: "focus tracks what was focused on, or keeps its distance",
             },
             Binding {
                 triggers: &[shifted(Typed::Text("l"), true, Action::FocusFollows)],
-                effect: "focus follows the mouse, or stays where it is",
+                effect: "focus tracks what is under the mouse, or stays where it is",
             },
             Binding {
                 triggers: &[text("y", Action::ToggleSharpZone)],
@@ -206,14 +206,11 @@ pub static BINDINGS: &[Group] = &[
         title: "Select and edit",
         bindings: &[
             Binding { triggers: &[Trigger::Mouse("Click")], effect: "select what is under the mouse" },
-            Binding {
-                triggers: &[Trigger::Mouse("Ctrl+click")],
-                effect: "select it beside the others, or leave it out",
-            },
+            Binding { triggers: &[Trigger::Mouse("Ctrl+click")], effect: "add it to the selection, or take it out" },
             Binding { triggers: &[edit("a", None, Edit::SelectAll)], effect: "select everything" },
             Binding {
                 triggers: &[text("g", Action::NextGizmo)],
-                effect: "handles to move, turn or scale what is selected, or none",
+                effect: "handles to move, turn (rotate) or scale what is selected, or none",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Ctrl, dragging a handle")],
@@ -225,7 +222,7 @@ pub static BINDINGS: &[Group] = &[
                 effect: "delete what is selected",
             },
             Binding { triggers: &[edit("z", Some(false), Edit::Undo)], effect: "undo" },
-            Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "do again" },
+            Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "redo" },
         ],
     },
     Group {
@@ -265,29 +262,29 @@ pub static BINDINGS: &[Group] = &[
                 triggers: &[text("i", Action::ToggleIntegrator)],
                 effect: "path tracing or the classic Phong model",
             },
-            Binding { triggers: &[text("p", Action::TogglePause)], effect: "pause, go on" },
+            Binding { triggers: &[text("p", Action::TogglePause)], effect: "pause, resume" },
             Binding {
                 triggers: &[shifted(Typed::Text("b"), false, Action::Brush), Trigger::Mouse("then drag")],
-                effect: "give all samples to a rectangle",
+                effect: "region: give all samples to a rectangle",
             },
             Binding {
                 triggers: &[shifted(Typed::Text("b"), true, Action::ClearRegion)],
-                effect: "give them to the whole picture again",
+                effect: "no region: give them to the whole picture again",
             },
-            Binding { triggers: &[send("r", Command::Restart)], effect: "begin again" },
+            Binding { triggers: &[send("r", Command::Restart)], effect: "restart: drop all samples and begin again" },
             Binding {
                 triggers: &[
                     shifted(Typed::Named(NamedKey::F12), false, Action::Screenshot { linear: false }),
                     shifted(Typed::Text("k"), false, Action::Screenshot { linear: false }),
                 ],
-                effect: "keep the picture as a new PNG file",
+                effect: "save the picture as a new PNG file (screenshot)",
             },
             Binding {
                 triggers: &[
                     shifted(Typed::Named(NamedKey::F12), true, Action::Screenshot { linear: true }),
                     shifted(Typed::Text("k"), true, Action::Screenshot { linear: true }),
                 ],
-                effect: "keep its linear light as a new EXR file",
+                effect: "save its linear light as a new EXR file",
             },
             Binding {
                 triggers: &[ctrl_shifted("s", false, Action::SaveScene { new: false })],
@@ -303,7 +300,7 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
-                effect: "open a scene (.ron), a model (.obj) or a picture that was kept (.png, .exr)",
+                effect: "open a scene (.ron), a model (.obj) or a picture that was saved (.png, .exr)",
             },
         ],
     },
@@ -332,15 +329,19 @@ pub static BINDINGS: &[Group] = &[
         bindings: &[
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Render")],
-                effect: "light model, when to stop (error, time, samples), threads, size of pictures that are kept",
+                effect: "light model, when to stop (error, time, samples), threads, size of pictures that are saved",
             },
             Binding {
-                triggers: &[Trigger::Mouse("Panel: View")],
-                effect: "eye, pivot, field of view, fly speed, what a drag does, kept views",
+                triggers: &[Trigger::Mouse("Panel: Camera")],
+                effect: "position, what it looks at, field of view, fly speed, what a drag does",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Views")],
+                effect: "frame, home, level, previous and next view, turntable, saved views",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Lens")],
-                effect: "focus distance and what it stays with, f-stop, radius, blades of the aperture",
+                effect: "focus distance and what it tracks, f-stop, radius, blades of the aperture",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Display")],
@@ -348,18 +349,57 @@ pub static BINDINGS: &[Group] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Selected")],
-                effect: "name, place, turn, scale, material, texture, light, smooth or flat, simplified, by numbers",
+                effect: "name, position, rotation, scale, material, texture and light of what is selected, by numbers",
             },
-            Binding { triggers: &[Trigger::Mouse("Panel: Objects")], effect: "select by name" },
-            Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "a file by dialog, or what was open before" },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Mesh")],
+                effect: "of what is selected: smooth or flat, simplified, and what that changes",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Objects")],
+                effect: "all objects and lights: find one by name, select it",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Materials")],
+                effect: "all materials: edit one for all objects that share it, select or assign",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Lights")],
+                effect: "everything that emits light: colour and strength, select, add; strength of the sky",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Panel: Sky")],
+                effect: "colours of the surroundings, or strength and rotation of their picture",
+            },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Add")],
                 effect: "a sphere, a plane, a cube, a light, a built-in mesh or an OBJ file",
             },
-            Binding { triggers: &[Trigger::Mouse("Panel: Sky")], effect: "colours of the surroundings" },
+            Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "a file by dialog, or what was open before" },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Statistics")],
                 effect: "samples, rays, error, samples left out, reaction, triangles, memory, undo, last restart",
+            },
+        ],
+    },
+    Group {
+        title: "Without the window",
+        bindings: &[
+            Binding {
+                triggers: &[Trigger::Mouse("render SCENE -o frame.png --turntable 120")],
+                effect: "numbered pictures of a camera that goes around the pivot, for a video",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("render … --bookmarks 1,2,3 --frames 120")],
+                effect: "numbered pictures of a camera that goes through saved views",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("render … --film FILE.exr"), Trigger::Mouse("--resume")],
+                effect: "a picture that can be gone on with later",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("--record FILE"), Trigger::Mouse("--replay FILE")],
+                effect: "write down what is done in the window, and render it again",
             },
         ],
     },

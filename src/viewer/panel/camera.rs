@@ -1,21 +1,22 @@
-//! Where the camera stands, what its lens makes sharp, and the views that were kept.
+//! Where the camera stands, what its lens makes sharp, and the views that were saved.
 
-use super::{Around, Asked, number, row, rows, slider, vector, whole};
+use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
+use super::{Around, Asked};
 use crate::frame::{Bookmarks, Command, Focus, FocusTarget, Looking, Session, f_stop, radius_of_f_stop, sharp_zone};
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::status::metres;
 use egui::Ui;
 
-pub fn view(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
+pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     let rig = session.status().rig;
     let step = 0.005 * rig.view.pivot_distance;
-    rows(ui, "view", |ui| {
-        row(ui, "eye", |ui| {
+    rows(ui, "camera", |ui| {
+        row(ui, "position", |ui| {
             if let Some(eye) = vector(ui, rig.view.eye, step) {
                 asked.send(Command::SetView(View { eye, ..rig.view }));
             }
         });
-        row(ui, "looks at", |ui| {
+        row_with_hint(ui, "look at", "the pivot, which orbiting goes around", |ui| {
             if let Some(target) = vector(ui, rig.view.pivot(), step)
                 && let Ok(view) = View::look_at(rig.view.eye, target, rig.view.up)
             {
@@ -28,9 +29,9 @@ pub fn view(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
             }
         });
         row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
-        row(ui, "a drag", |ui| {
+        row_with_hint(ui, "drag", "what the left button of the mouse does on the picture (Space)", |ui| {
             ui.horizontal(|ui| {
-                for (label, orbits) in [("looks about", false), ("orbits", true)] {
+                for (label, orbits) in [("look around", false), ("orbit", true)] {
                     if ui.selectable_label(around.orbits == orbits, label).clicked() {
                         asked.toggle_drag |= around.orbits != orbits;
                     }
@@ -38,33 +39,41 @@ pub fn view(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
             })
         });
     });
+}
+
+/// Views to go to, and the turntable.
+pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
-        for (label, command) in [
-            ("Frame", Command::FrameAll),
-            ("Home", Command::Home),
-            ("Level", Command::Level),
-            ("Back", Command::PreviousView),
-            ("Forth", Command::NextView),
+        for (label, hint, command) in [
+            ("Frame", "what is selected, or the whole scene (F)", Command::FrameAll),
+            ("Home", "the view that the scene opened with", Command::Home),
+            ("Level", "makes the horizon horizontal (X)", Command::Level),
+            ("Previous", "the view before (Backspace)", Command::PreviousView),
+            ("Next", "the view after (Shift+Backspace)", Command::NextView),
         ] {
-            if ui.button(label).clicked() {
+            if ui.button(label).on_hover_text(hint).clicked() {
                 asked.send(command);
             }
         }
-        asked.toggle_spin |= ui.selectable_label(around.spinning, "Turntable").clicked();
+        let turntable = ui.selectable_label(around.spinning, "Turntable");
+        asked.toggle_spin |= turntable.on_hover_text("goes around the pivot, or stops (U)").clicked();
     });
     let bookmarks = session.world().resource::<Bookmarks>();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.weak("kept");
+        ui.weak("saved");
         for slot in 1..=9 {
             let kept = bookmarks.get(slot).is_some();
-            let hint = if kept { "go there; Ctrl+click keeps this view" } else { "click keeps this view" };
+            let hint = if kept { "go there; Ctrl+click saves this view here" } else { "click saves this view" };
             if ui.selectable_label(kept, slot.to_string()).on_hover_text(hint).clicked() {
                 let keep = !kept || ui.input(|input| input.modifiers.command);
                 asked.send(if keep { Command::SetBookmark { slot } } else { Command::GoToBookmark { slot } });
             }
         }
     });
+    let hint = "a video program makes a film of them: firstlight render SCENE -o frame.png --turntable 120, or \
+                --bookmarks 1,2,3 --frames 120 for a way through the saved views";
+    ui.weak("numbered frames: render --turntable, --frames").on_hover_text(hint);
 }
 
 pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
@@ -85,15 +94,15 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
         });
     });
     rows(ui, "lens", |ui| {
-        row(ui, "focus", |ui| {
+        row(ui, "focus distance", |ui| {
             ui.horizontal(|ui| {
                 let distance = lens.focus_distance.min(1e9);
-                if let Some(distance) = number(ui, distance, 0.005 * distance, 1e-6..=1e9, " m") {
+                if let Some(distance) = number(ui, distance, proportional(distance), 1e-6..=1e9, " m") {
                     asked.send(Command::SetFocus { distance });
                 }
             })
         });
-        row(ui, "stays with", |ui| {
+        row_with_hint(ui, "track", "what the focal plane stays with", |ui| {
             ui.horizontal(|ui| {
                 let kind = match session.world().resource::<Focus>().target {
                     FocusTarget::Camera => 0,
@@ -102,9 +111,9 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 };
                 let [x, y] = around.place;
                 for (i, (label, hint)) in [
-                    ("camera", "the distance stays as it is"),
-                    ("thing", "with what was focused on last, however it and the camera move"),
-                    ("mouse", "with whatever is under the mouse"),
+                    ("off", "the focus distance stays as it is"),
+                    ("object", "what was focused on last, however it and the camera move (L)"),
+                    ("mouse", "whatever is under the mouse (Shift+L)"),
                 ]
                 .into_iter()
                 .enumerate()
@@ -138,7 +147,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
         });
         row(ui, "radius", |ui| {
             // In the unit that scenes of any size need: millimetres have enough digits down to a mouse's eye.
-            if let Some(mm) = number(ui, 1e3 * lens.radius, 10.0 * lens.radius, 1e-6..=1e9, " mm") {
+            if let Some(mm) = number(ui, 1e3 * lens.radius, proportional(1e3 * lens.radius), 1e-6..=1e9, " mm") {
                 asked.send(Command::SetAperture { radius: 1e-3 * mm });
             }
         });
@@ -147,17 +156,23 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 if let Some(blades) = whole(ui, lens.blades, 0..=16) {
                     set(asked, Lens { blades, ..lens });
                 }
-                if lens.blades >= 3 {
-                    if let Some(turn) = number(ui, lens.blade_rotation_deg, 0.5, -360.0..=360.0, "°") {
-                        set(asked, Lens { blade_rotation_deg: turn, ..lens });
-                    }
-                } else {
-                    ui.weak("round");
-                }
+                ui.weak(if lens.blades < 3 { "round" } else { "polygon" });
             })
         });
+        row(ui, "blade rotation", |ui| {
+            // A round aperture looks the same however it is turned.
+            ui.add_enabled_ui(lens.blades >= 3, |ui| {
+                if let Some(turn) = number(ui, lens.blade_rotation_deg, 0.5, -360.0..=360.0, "°") {
+                    set(asked, Lens { blade_rotation_deg: turn, ..lens });
+                }
+            })
+            .response
+            .on_disabled_hover_text("with 3 blades or more the aperture is a polygon that can be rotated");
+        });
         if let Some(zone) = sharp_zone(&lens, &rig.projection, session.picture().height) {
-            row(ui, "sharp", |ui| ui.label(format!("{} – {}", metres(zone.near), metres(zone.far))));
+            row_with_hint(ui, "in focus", "what is sharp to a pixel", |ui| {
+                ui.label(format!("{} – {}", metres(zone.near), metres(zone.far)))
+            });
         }
     });
 }

@@ -6,26 +6,38 @@
 //! | file | about |
 //! |---|---|
 //! | `picture` | rendering, display, what is shown in place of the picture |
-//! | `camera` | pose, lens, kept views |
-//! | `scene` | the list of things, adding, sky |
-//! | `selected` | place, material, light and mesh of what is selected |
-//! | `texture` | the texture of a material |
+//! | `camera` | pose, lens, saved views |
+//! | `selected` | name, place, material and light of what is selected |
+//! | `mesh` | its mesh: normals, simplification |
+//! | `scene` | the list of objects, adding, opening |
+//! | `materials`, `lights` | the lists of materials and of lights; the sky |
+//! | `material`, `texture` | the editor of a material |
 //! | `statistics` | figures |
+//! | `list`, `swatch`, `widgets` | what the others are made of |
 
 mod camera;
+mod lights;
+mod list;
+mod material;
+mod materials;
+mod mesh;
 mod picture;
 mod scene;
 mod selected;
 mod statistics;
+mod swatch;
 mod texture;
+mod widgets;
 
 use super::change::PictureChange;
 use super::dialog::Purpose;
 use super::reaction::Reaction;
 use crate::frame::{Command, Edit, Session, gizmo};
+use crate::scene::Inventory;
 use bevy_ecs::prelude::Entity;
 use egui::{Context, RichText, Ui};
-use glam::DVec3;
+use list::ListState;
+use std::rc::Rc;
 
 /// What the panel itself remembers.
 pub struct PanelState {
@@ -41,6 +53,23 @@ pub struct PanelState {
     pub scale: u32,
     /// The mouse went down in here and has not come up.
     pressed: bool,
+    /// Lists of what is in the scene, and of which state of it they are.
+    inventory: Option<(u64, Rc<Inventory>)>,
+    object_list: ListState,
+    material_list: ListState,
+    light_list: ListState,
+    /// The material whose editor is open in the list.
+    material: Option<Entity>,
+}
+
+impl PanelState {
+    /// Made anew only when somebody looks at it and the scene has changed.
+    fn inventory(&mut self, session: &Session) -> Rc<Inventory> {
+        let revision = session.revision();
+        let known = self.inventory.take().filter(|(of, _)| *of == revision);
+        let (_, inventory) = self.inventory.insert(known.unwrap_or_else(|| (revision, Rc::new(session.inventory()))));
+        inventory.clone()
+    }
 }
 
 impl Default for PanelState {
@@ -53,6 +82,11 @@ impl Default for PanelState {
             mesh_path: String::new(),
             scale: 1,
             pressed: false,
+            inventory: None,
+            object_list: ListState::default(),
+            material_list: ListState::default(),
+            light_list: ListState::default(),
+            material: None,
         }
     }
 }
@@ -98,8 +132,22 @@ impl Asked {
 }
 
 /// The parts of the panel, from above; the list of keys tells of each.
-pub const SECTIONS: [&str; 10] =
-    ["Render", "View", "Lens", "Display", "Selected", "Objects", "Open", "Add", "Sky", "Statistics"];
+pub const SECTIONS: [&str; 14] = [
+    "Render",
+    "Camera",
+    "Views",
+    "Lens",
+    "Display",
+    "Selected",
+    "Mesh",
+    "Objects",
+    "Materials",
+    "Lights",
+    "Sky",
+    "Add",
+    "Open",
+    "Statistics",
+];
 
 const WIDTH: f32 = 288.0;
 /// Room for the status line.
@@ -122,22 +170,32 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Beside the scroll bar.
             ui.set_width((ui.available_width() - 8.0).max(0.0));
-            let [render, view, lens, display, selected, objects, open, add, sky, statistics] = SECTIONS;
+            let [render, camera, views, lens, display, selected, mesh, ..] = SECTIONS;
             section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
-            section(ui, view, false, |ui| camera::view(ui, session, around, asked));
+            section(ui, camera, false, |ui| camera::camera(ui, session, around, asked));
+            section(ui, views, false, |ui| camera::views(ui, session, around, asked));
             section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));
             section(ui, display, false, |ui| picture::display(ui, session, asked));
             section(ui, selected, true, |ui| selected::selected(ui, state, session, asked));
-            section(ui, objects, true, |ui| scene::objects(ui, session, asked));
-            section(ui, open, false, |ui| scene::open(ui, session, around.recent, asked));
+            section(ui, mesh, true, |ui| mesh::mesh(ui, state, session, asked));
+            let [.., objects, materials, lights, sky, add, open, statistics] = SECTIONS;
+            section(ui, objects, true, |ui| scene::objects(ui, state, session, asked));
+            section(ui, materials, false, |ui| materials::materials(ui, state, session, asked));
+            section(ui, lights, false, |ui| lights::lights(ui, state, session, asked));
+            section(ui, sky, false, |ui| lights::sky(ui, session, asked));
             section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
-            section(ui, sky, false, |ui| scene::sky(ui, session, asked));
+            section(ui, open, false, |ui| scene::open(ui, session, around.recent, asked));
             section(ui, statistics, true, |ui| statistics::statistics(ui, session, around));
         });
     });
-    // From pressing a button of the mouse to letting go is one step to undo.
+    // From pressing a button of the mouse to letting go is one step to undo, also where a picker of colours or a menu
+    // hangs out of the panel.
+    let is_over = context.pointer_latest_pos().is_some_and(|place| {
+        let in_panel = response.response.rect.contains(place);
+        in_panel || egui::Popup::is_any_open(context) && context.is_pointer_over_area()
+    });
     let (pressed, released) = context.input(|input| (input.pointer.any_pressed(), input.pointer.any_released()));
-    if pressed && context.pointer_latest_pos().is_some_and(|place| response.response.rect.contains(place)) {
+    if pressed && is_over {
         state.pressed = true;
         asked.commands.insert(before, Command::Edit(Edit::Begin));
     }
@@ -159,75 +217,4 @@ fn style(ui: &mut Ui) {
 
 fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
     egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open).show(ui, contents);
-}
-
-/// Rows of a name and what it names, aligned through the panel.
-fn rows<R>(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
-    egui::Grid::new(id).num_columns(2).min_col_width(74.0).spacing([8.0, 4.0]).show(ui, contents).inner
-}
-
-fn row<R>(ui: &mut Ui, name: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
-    ui.label(RichText::new(name).color(egui::Color32::from_gray(170)));
-    let result = contents(ui);
-    ui.end_row();
-    result
-}
-
-/// A number that is dragged or typed. Typing takes effect at the end, dragging at once.
-fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f64>, suffix: &str) -> Option<f64> {
-    let mut new = value;
-    let drag = egui::DragValue::new(&mut new)
-        .speed(speed)
-        .range(range)
-        .suffix(suffix)
-        .max_decimals(4)
-        .update_while_editing(false);
-    ui.add(drag).changed().then_some(new)
-}
-
-/// A whole number, in the same way.
-fn whole(ui: &mut Ui, value: u32, range: std::ops::RangeInclusive<u32>) -> Option<u32> {
-    let mut new = value;
-    let drag = egui::DragValue::new(&mut new).speed(0.05).range(range).update_while_editing(false);
-    ui.add(drag).changed().then_some(new)
-}
-
-/// Three numbers; the speed of dragging suits `scale`.
-fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
-    let mut new = value;
-    let mut changed = false;
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 3.0;
-        ui.spacing_mut().interact_size.x = 52.0;
-        for axis in 0..3 {
-            let drag = egui::DragValue::new(&mut new[axis]).speed(speed).max_decimals(3).update_while_editing(false);
-            changed |= ui.add(drag).changed();
-        }
-    });
-    changed.then_some(new)
-}
-
-/// A number on a sliding scale.
-fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, logarithmic: bool) -> Option<f64> {
-    let mut new = value;
-    let slider = egui::Slider::new(&mut new, range)
-        .logarithmic(logarithmic)
-        .update_while_editing(false)
-        .max_decimals(4)
-        .smart_aim(true);
-    ui.add(slider).changed().then_some(new)
-}
-
-/// A linear colour. What is brighter than white is a colour and a strength beside it.
-fn color(ui: &mut Ui, value: glam::Vec3, bright: bool) -> Option<DVec3> {
-    let strength = if bright { value.max_element().max(1.0) } else { 1.0 };
-    let mut rgb = (value / strength).to_array();
-    let changed_color = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed();
-    let mut new_strength = f64::from(strength);
-    let mut changed_strength = false;
-    if bright {
-        let drag = egui::DragValue::new(&mut new_strength).speed(0.02 * strength).range(1.0..=1e6).prefix("× ");
-        changed_strength = ui.add(drag.max_decimals(3).update_while_editing(false)).changed();
-    }
-    (changed_color || changed_strength).then(|| glam::Vec3::from(rgb).as_dvec3() * new_strength)
 }

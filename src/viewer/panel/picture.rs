@@ -1,6 +1,7 @@
 //! How the picture is made and shown.
 
-use super::{Around, Asked, number, row, rows, slider, whole};
+use super::widgets::{number, row, rows, slider, whole};
+use super::{Around, Asked};
 use crate::frame::{Command, Looking, Session, StopAt, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::viewer::status::tone_curve;
@@ -9,9 +10,9 @@ use egui::Ui;
 pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, asked: &mut Asked) {
     let status = session.status();
     rows(ui, "render", |ui| {
-        row(ui, "light", |ui| {
+        row(ui, "light model", |ui| {
             ui.horizontal(|ui| {
-                for (integrator, label) in [(Integrator::Path, "path"), (Integrator::Phong, "Phong")] {
+                for (integrator, label) in [(Integrator::Path, "path tracing"), (Integrator::Phong, "Phong")] {
                     if ui.selectable_label(status.integrator == integrator, label).clicked() {
                         asked.send(Command::SetIntegrator(integrator));
                     }
@@ -19,20 +20,20 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
             })
         });
         let target = session.world().resource::<StopAt>().0;
-        row(ui, "until error", |ui| {
+        row(ui, "stop at error", |ui| {
             let shown = 100.0 * target.error.unwrap_or(0.0);
             limit(ui, target.error.is_some(), shown, 0.01, 0.5, " %", |on, value| {
                 let error = on.then_some((value / 100.0).max(1e-5));
                 asked.send(Command::SetTarget(Target { error, ..target }));
             });
         });
-        row(ui, "until time", |ui| {
+        row(ui, "stop at time", |ui| {
             limit(ui, target.seconds.is_some(), target.seconds.unwrap_or(0.0), 1.0, 60.0, " s", |on, value| {
                 let seconds = on.then_some(value.max(0.1));
                 asked.send(Command::SetTarget(Target { seconds, ..target }));
             });
         });
-        row(ui, "until samples", |ui| {
+        row(ui, "stop at samples", |ui| {
             limit(ui, target.spp.is_some(), f64::from(target.spp.unwrap_or(0)), 4.0, 1024.0, "", |on, value| {
                 let spp = on.then_some((value.round() as u32).max(1));
                 asked.send(Command::SetTarget(Target { spp, ..target }));
@@ -45,25 +46,27 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
         });
     });
     ui.horizontal(|ui| {
-        if ui.button(if status.paused { "Go on" } else { "Pause" }).clicked() {
+        if ui.button(if status.paused { "Resume" } else { "Pause" }).clicked() {
             asked.send(if status.paused { Command::Resume } else { Command::Pause });
         }
-        if ui.button("Begin again").clicked() {
+        if ui.button("Restart").clicked() {
             asked.send(Command::Restart);
         }
         if ui.selectable_label(around.brush, "Region").on_hover_text("drag a rectangle that gets all samples").clicked()
         {
             asked.toggle_brush = true;
         }
-        if status.region.is_some() && ui.button("All").on_hover_text("samples for the whole picture").clicked() {
+        if status.region.is_some()
+            && ui.button("Whole picture").on_hover_text("samples for the whole picture").clicked()
+        {
             asked.send(Command::SetRegion { region: None });
         }
     });
     ui.horizontal(|ui| {
-        if ui.button("Keep PNG").clicked() {
+        if ui.button("Save PNG").on_hover_text("the picture as a new file, as it is seen (K)").clicked() {
             asked.screenshot = Some(false);
         }
-        if ui.button("Keep EXR").clicked() {
+        if ui.button("Save EXR").on_hover_text("its linear light as a new file (Shift+K)").clicked() {
             asked.screenshot = Some(true);
         }
         let drag = egui::DragValue::new(scale).speed(0.03).range(1..=16).prefix("× ").update_while_editing(false);
@@ -83,7 +86,7 @@ fn limit(ui: &mut Ui, on: bool, value: f64, speed: f64, first: f64, suffix: &str
                 set(true, value);
             }
         } else {
-            ui.weak("no limit");
+            ui.weak("off");
         }
     });
 }

@@ -1,51 +1,43 @@
-//! What is in the scene: the list of things, new ones, and the sky.
+//! What is in the scene: the list of objects, new ones, and other scenes.
 
-use super::{Asked, color, row, rows};
-use crate::frame::{Command, Edit, NewThing, Property, Selection, Session};
-use crate::render::Environment;
-use crate::scene::Shape;
+use super::list::{Listed, Which, list};
+use super::widgets::choice;
+use super::{Asked, PanelState};
+use crate::frame::{Command, Edit, NewThing, Selection, Session};
+use crate::scene::ObjectEntry;
 use crate::scene::file::MeshSourcePart;
 use crate::viewer::dialog::Purpose;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use std::path::Path;
 
-pub fn objects(ui: &mut Ui, session: &Session, asked: &mut Asked) {
-    let (inputs, selection) = (session.inputs(), session.world().resource::<Selection>());
-    let things: Vec<(Entity, Option<&str>, &str)> = (inputs.objects.iter())
-        .map(|object| (object.entity, object.name.as_deref(), kind(&object.shape)))
-        .chain(inputs.lights.iter().map(|light| (light.entity, light.name.as_deref(), "point light")))
-        .collect();
-    let height = ui.text_style_height(&egui::TextStyle::Body) + 4.0;
-    let list = egui::ScrollArea::vertical().id_salt("objects").max_height(9.0 * height).auto_shrink([false, true]);
-    // Only the rows that are seen are made, so that a thousand cost no more than ten.
-    list.show_rows(ui, height, things.len(), |ui, range| {
-        for &(entity, name, kind) in &things[range] {
-            ui.horizontal(|ui| {
-                ui.set_height(height);
-                let name = name.map_or_else(|| entity.to_string(), str::to_owned);
-                let is_selected = selection.0.contains(&entity);
-                if ui.selectable_label(is_selected, name).clicked() {
-                    let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
-                    asked.edit(Edit::Select { id: entity.to_bits(), add });
-                }
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.label(RichText::new(kind).small().weak());
-                });
-            });
-        }
-    });
+impl Listed for ObjectEntry {
+    fn entity(&self) -> Entity {
+        self.entity
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn kind(&self) -> &str {
+        self.kind
+    }
 }
 
-fn kind(shape: &Shape) -> &'static str {
-    match shape {
-        Shape::Sphere { .. } => "sphere",
-        Shape::Plane { .. } => "plane",
-        Shape::Quad { .. } => "quad",
-        Shape::Triangle { .. } => "triangle",
-        Shape::Mesh(_) => "mesh",
-        Shape::Spheres(_) => "balls",
-    }
+pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
+    let inventory = state.inventory(session);
+    let selection = session.world().resource::<Selection>();
+    let which = Which { id: "objects", revision: session.revision(), chosen: selection.active() };
+    list(ui, &mut state.object_list, &which, &inventory.objects, |ui, entry| {
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.label(RichText::new(entry.kind).size(11.0).weak());
+            if choice(ui, selection.0.contains(&entry.entity), &entry.label).clicked() {
+                let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
+                asked.edit(Edit::Select { id: entry.entity.to_bits(), add });
+            }
+        });
+    });
 }
 
 /// A file by dialog, or what was opened before, which a click opens again.
@@ -95,37 +87,5 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
         if (ui.button("Add").clicked() || entered) && !path.trim().is_empty() {
             asked.edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path.trim().to_owned()))));
         }
-    });
-}
-
-pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
-    let mut edit = |property, value| asked.edit(Edit::Set { id: 0, property, value });
-    rows(ui, "sky", |ui| match &session.inputs().environment.light {
-        Environment::Black => row(ui, "sky", |ui| {
-            if let Some(value) = color(ui, glam::Vec3::ZERO, true) {
-                edit(Property::Sky, value);
-            }
-        }),
-        Environment::Constant(radiance) => row(ui, "sky", |ui| {
-            if let Some(value) = color(ui, *radiance, true) {
-                edit(Property::Sky, value);
-            }
-        }),
-        Environment::Gradient { zenith, horizon, ground } => {
-            for (name, property, value) in [
-                ("zenith", Property::Zenith, zenith),
-                ("horizon", Property::Horizon, horizon),
-                ("ground", Property::Ground, ground),
-            ] {
-                row(ui, name, |ui| {
-                    ui.horizontal(|ui| {
-                        if let Some(value) = color(ui, *value, true) {
-                            edit(property, value);
-                        }
-                    })
-                });
-            }
-        }
-        Environment::Image { .. } => row(ui, "sky", |ui| drop(ui.label("a picture"))),
     });
 }

@@ -1,10 +1,10 @@
 //! Figures: how fast, how good, how much, how prompt.
 
-use super::selected::thousands;
-use super::{Around, row, rows};
+use super::Around;
+use super::widgets::{row, rows};
 use crate::frame::{History, Session, Waits};
 use crate::scene::Shape;
-use crate::viewer::status::{bytes, percent, seconds};
+use crate::viewer::status::{bytes, percent, seconds, thousands};
 use egui::Ui;
 
 pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
@@ -14,21 +14,21 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("samples", format!("{} per pixel, {}", status.spp, seconds(status.seconds)));
         figure("rays", format!("{:.2} M/s", status.mrays()));
         let (camera, bounce, shadow) = (status.camera_mrays, status.bounce_mrays, status.shadow_mrays);
-        figure("", format!("{camera:.2} eye, {bounce:.2} bounce"));
-        figure("", format!("{shadow:.2} light"));
+        figure("", format!("{camera:.2} camera, {bounce:.2} bounce"));
+        figure("", format!("{shadow:.2} shadow"));
         figure("error", status.estimated_error.map_or("–".to_owned(), percent));
-        figure("left out", format!("{} samples not finite", status.n_bad));
+        figure("bad samples", format!("{} not finite, left out", status.n_bad));
         let milliseconds = |waits: &Waits| {
             let of = |share| waits.quantile(share).map(|wait| format!("{:.0} ms", wait.as_secs_f64() * 1e3));
             of(0.5).zip(of(0.99)).map_or("–".to_owned(), |(half, most)| format!("{half}, 1 % over {most}"))
         };
-        figure("reaction", milliseconds(around.reaction.waits()));
-        figure("to cancel", milliseconds(&session.cancels()));
+        figure("input latency", milliseconds(around.reaction.waits()));
+        figure("cancel latency", milliseconds(&session.cancels()));
         let faces: usize = (session.inputs().objects.iter())
             .map(|object| if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 0 })
             .sum();
         figure("triangles", thousands(faces));
-        figure("trees", bytes(session.tree_bytes() as u64));
+        figure("kd-trees", bytes(session.tree_bytes() as u64));
         if let Some(memory) = around.memory {
             figure("memory", bytes(memory));
         }
@@ -37,8 +37,8 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
             figure("undo", label.to_owned());
         }
         if let Some(label) = history.redo_label() {
-            figure("do again", label.to_owned());
+            figure("redo", label.to_owned());
         }
-        figure("restarted", status.restart_cause.clone());
+        figure("last restart", status.restart_cause.clone());
     });
 }

@@ -1,6 +1,7 @@
 //! The texture of a material: which one, and its numbers.
 
-use super::{Asked, color, number, row};
+use super::Asked;
+use super::widgets::{color, number, row};
 use crate::frame::{Edit, Property, Session, paint_of};
 use crate::scene::Paint;
 use crate::scene::file::{Rgb, TexturePart, WrapPart};
@@ -33,7 +34,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &Paint, asked: &mut 
             asked.edit(Edit::Paint { id, part });
             ui.close();
         }
-        if ui.button("picture …").clicked() {
+        if ui.button("image …").clicked() {
             asked.dialog = Some(Purpose::Texture { id });
             ui.close();
         }
@@ -50,7 +51,7 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TexturePart, asked: &mut Asked) {
     let mut new = part.clone();
     match &mut new {
         TexturePart::Checker { a, b, squares, offset, rotate } => {
-            row(ui, "squares of", |ui| {
+            row(ui, "colours", |ui| {
                 ui.horizontal(|ui| {
                     for paint in [a, b] {
                         if let Some(value) = color(ui, paint.0, false) {
@@ -62,11 +63,11 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TexturePart, asked: &mut Asked) {
             lie(ui, "squares", squares, offset, rotate);
         }
         TexturePart::Image { repeat, offset, rotate, wrap, smooth, .. } => {
-            lie(ui, "repeated", repeat, offset, rotate);
-            row(ui, "beyond", |ui| {
+            lie(ui, "repeat", repeat, offset, rotate);
+            row(ui, "wrap", |ui| {
                 ui.horizontal(|ui| {
                     let kinds =
-                        [(WrapPart::Repeat, "again"), (WrapPart::Mirror, "mirrored"), (WrapPart::Clamp, "edge")];
+                        [(WrapPart::Repeat, "repeat"), (WrapPart::Mirror, "mirror"), (WrapPart::Clamp, "clamp")];
                     for (kind, label) in kinds {
                         if ui.selectable_label(*wrap == kind, label).clicked() {
                             *wrap = kind;
@@ -95,8 +96,8 @@ fn lie(ui: &mut Ui, name: &str, scale: &mut DVec2, offset: &mut DVec2, rotate: &
         });
     };
     two(ui, name, scale, 0.05);
-    two(ui, "moved", offset, 0.01);
-    row(ui, "turned", |ui| {
+    two(ui, "offset", offset, 0.01);
+    row(ui, "rotation", |ui| {
         if let Some(new) = number(ui, *rotate, 0.5, -360.0..=360.0, "°") {
             *rotate = new;
         }

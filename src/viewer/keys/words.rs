@@ -1,0 +1,137 @@
+//! Which lines of the list a word finds: its own words, and others that people use for the same thing.
+
+/// What people look for, and the words of the lines that have it.
+const SYNONYMS: &[(&str, &[&str])] = &[
+    ("animation", &["turntable", "numbered pictures"]),
+    ("backdrop", &["surroundings"]),
+    ("background", &["surroundings"]),
+    ("blur", &["aperture", "depth of field", "focus"]),
+    ("bokeh", &["aperture", "blades"]),
+    ("brightness", &["brighter", "exposure", "strength"]),
+    ("bsdf", &["material"]),
+    ("camera", &["view", "fly", "orbit"]),
+    ("clone", &["duplicate"]),
+    ("color", &["colour"]),
+    ("copy", &["duplicate"]),
+    ("dark", &["darker", "exposure"]),
+    ("denoise", &["error", "samples"]),
+    ("dof", &["depth of field", "focus"]),
+    ("emission", &["light"]),
+    ("emitter", &["light"]),
+    ("environment", &["surroundings", "sky"]),
+    ("export", &["save", "png", "exr", "numbered pictures"]),
+    ("filter", &["find", "samples"]),
+    ("firefly", &["samples left out", "paths"]),
+    ("first person", &["look around", "capture the mouse"]),
+    ("fov", &["field of view"]),
+    ("frames", &["numbered pictures"]),
+    ("fullscreen", &["full screen"]),
+    ("gizmo", &["handles"]),
+    ("hdr", &["exr"]),
+    ("hdri", &["surroundings", "sky"]),
+    ("heatmap", &["kd-tree", "false colour"]),
+    ("image", &["picture"]),
+    ("import", &["open", "obj"]),
+    ("iso", &["exposure"]),
+    ("lamp", &["light"]),
+    ("load", &["open"]),
+    ("lod", &["simplified"]),
+    ("lookat", &["looks at", "pivot"]),
+    ("lens", &["aperture", "focal", "focus"]),
+    ("magnify", &["nearer", "narrower"]),
+    ("manipulator", &["handles"]),
+    ("menu", &["panel"]),
+    ("model", &["obj", "mesh"]),
+    ("move", &["handles", "fly", "position"]),
+    ("movie", &["turntable", "numbered pictures"]),
+    ("new", &["add", "as a new"]),
+    ("noise", &["error", "samples"]),
+    ("object", &["what is selected", "objects"]),
+    ("options", &["panel", "setting"]),
+    ("pan", &["sideways"]),
+    ("photo", &["picture as a new"]),
+    ("pick", &["select"]),
+    ("polygon", &["triangles", "mesh"]),
+    ("preferences", &["panel", "setting"]),
+    ("quality", &["when to stop", "error"]),
+    ("record", &["--record", "numbered pictures"]),
+    ("reduce", &["simplified"]),
+    ("refresh", &["restart"]),
+    ("remove", &["delete"]),
+    ("reset", &["restart", "view that the scene opened"]),
+    ("resize", &["scale"]),
+    ("resolution", &["size of pictures"]),
+    ("revert", &["undo"]),
+    ("rotate", &["turn", "rotation", "pivot"]),
+    ("screenshot", &["png", "exr"]),
+    ("settings", &["panel", "setting"]),
+    ("shader", &["material"]),
+    ("shortcut", &["keys"]),
+    ("simplify", &["simplified"]),
+    ("speed", &["speed", "threads"]),
+    ("store", &["save", "view under a number"]),
+    ("surface", &["material"]),
+    ("tilt", &["lean", "roll"]),
+    ("tonemap", &["tone curve"]),
+    ("transform", &["handles", "position"]),
+    ("video", &["turntable", "numbered pictures"]),
+    ("walk", &["fly"]),
+    ("wireframe", &["normals", "triangles"]),
+    ("zoom", &["field of view", "nearer"]),
+];
+
+/// Whether a line has what is looked for: every word of it, or another word for the same.
+pub fn finds(line: &str, search: &str) -> bool {
+    let line = line.to_lowercase();
+    search.to_lowercase().split_whitespace().all(|word| line.contains(word) || means(&line, word))
+}
+
+/// Words are found as they are typed, from the third letter on.
+fn means(line: &str, word: &str) -> bool {
+    let is_meant = |(said, _): &&(&str, &[&str])| *said == word || word.len() >= 3 && said.starts_with(word);
+    SYNONYMS.iter().filter(is_meant).any(|(_, written)| written.iter().any(|written| line.contains(written)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::BINDINGS;
+    use super::*;
+
+    fn lines() -> Vec<String> {
+        let line = |title: &str, binding: &super::super::Binding| binding.line(title);
+        BINDINGS.iter().flat_map(|group| group.bindings.iter().map(move |one| line(group.title, one))).collect()
+    }
+
+    #[test]
+    fn every_other_word_leads_somewhere() {
+        let lines: Vec<String> = lines().into_iter().map(|line| line.to_lowercase()).collect();
+        for (said, written) in SYNONYMS {
+            for written in *written {
+                assert!(lines.iter().any(|line| line.contains(written)), "{said}: no line has {written:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn ordinary_words_find_what_they_mean() {
+        for (search, wanted) in [
+            ("blur", "depth of field on, off"),
+            ("bokeh", "aperture narrower, wider"),
+            ("brightness", "brighter, darker by a third of a stop"),
+            ("video", "--turntable"),
+            ("frames", "--frames"),
+            ("screenshot", "PNG"),
+            ("export", "PNG"),
+            ("denoise", "relative error"),
+            ("pan", "move sideways"),
+            ("simplify mesh", "Panel: Mesh"),
+            ("fov", "field of view"),
+            ("copy", "duplicate"),
+            ("SHADER", "Panel: Materials"),
+            ("undo", "undo"),
+        ] {
+            assert!(lines().iter().any(|line| line.contains(wanted) && finds(line, search)), "{search}: {wanted}");
+        }
+        assert!(!lines().iter().any(|line| finds(line, "xyzzy")));
+    }
+}

@@ -1,0 +1,138 @@
+//! The list of everything that emits light, and the sky.
+
+use super::list::{Listed, Which, list};
+use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
+use super::{Asked, PanelState};
+use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
+use crate::render::Environment;
+use crate::scene::file::EnvironmentPart;
+use crate::scene::{LightEntry, Material, Paint, PointLight};
+use bevy_ecs::prelude::Entity;
+use egui::{RichText, Ui};
+use glam::{DVec3, Vec3};
+
+impl Listed for LightEntry {
+    fn entity(&self) -> Entity {
+        self.entity
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn kind(&self) -> &str {
+        self.kind
+    }
+}
+
+pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
+    let inventory = state.inventory(session);
+    let selection = session.world().resource::<Selection>();
+    let which = Which { id: "lights", revision: session.revision(), chosen: selection.active() };
+    list(ui, &mut state.light_list, &which, &inventory.lights, |ui, entry| {
+        emission(ui, session, entry, asked);
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.label(RichText::new(entry.kind).size(11.0).weak());
+            if choice(ui, selection.0.contains(&entry.entity), &entry.label).clicked() {
+                let add = ui.input(|input| input.modifiers.command || input.modifiers.shift);
+                asked.edit(Edit::Select { id: entry.entity.to_bits(), add });
+            }
+        });
+    });
+    let light = &session.inputs().environment.light;
+    rows(ui, "sky strength", |ui| {
+        let hint = "radiance of the brightest colour of the sky, or the factor of its picture";
+        row_with_hint(ui, "sky", hint, |ui| {
+            ui.horizontal(|ui| {
+                if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "× ", "") {
+                    set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
+                }
+                ui.label(RichText::new(kind_of_sky(light)).size(11.0).weak());
+            })
+        });
+    });
+    ui.horizontal(|ui| {
+        ui.weak("add");
+        for (label, thing) in [("Area light", NewThing::AreaLight), ("Point light", NewThing::PointLight)] {
+            if ui.button(label).clicked() {
+                asked.edit(Edit::Add(thing));
+            }
+        }
+    });
+}
+
+/// Colour and strength of a light, to be changed in its row.
+fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Asked) {
+    let world = session.world();
+    ui.spacing_mut().interact_size.x = 30.0;
+    if let Some(light) = world.get::<PointLight>(entry.entity) {
+        if let Some(value) = color(ui, light.intensity, true) {
+            asked.edit(Edit::Set { id: entry.entity.to_bits(), property: Property::Intensity, value });
+        }
+        return;
+    }
+    let Some(material) = entry.material else { return };
+    match world.get::<Material>(material) {
+        Some(Material::Emissive { radiance: Paint::Rgb(rgb) }) => {
+            if let Some(value) = color(ui, *rgb, true) {
+                asked.edit(Edit::Set { id: material.to_bits(), property: Property::Color, value });
+            }
+        }
+        Some(Material::Emissive { radiance: Paint::Texture(texture) }) => drop(ui.weak(&texture.name)),
+        _ => {}
+    }
+}
+
+fn kind_of_sky(light: &Environment) -> &'static str {
+    match light {
+        Environment::Black => "no sky",
+        Environment::Constant(_) => "one colour",
+        Environment::Gradient { .. } => "gradient",
+        Environment::Image { .. } => "picture",
+    }
+}
+
+fn set_sky(asked: &mut Asked, property: Property, value: DVec3) {
+    asked.edit(Edit::Set { id: 0, property, value });
+}
+
+fn one_color(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: Property) {
+    row(ui, name, |ui| {
+        ui.horizontal(|ui| {
+            if let Some(value) = color(ui, value, true) {
+                set_sky(asked, property, value);
+            }
+        })
+    });
+}
+
+/// The colours of the surroundings one by one, or their picture.
+pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+    let environment = &session.inputs().environment;
+    rows(ui, "sky", |ui| match &environment.light {
+        Environment::Black => one_color(ui, asked, "radiance", Vec3::ZERO, Property::Sky),
+        Environment::Constant(radiance) => one_color(ui, asked, "radiance", *radiance, Property::Sky),
+        Environment::Gradient { zenith, horizon, ground } => {
+            one_color(ui, asked, "zenith", *zenith, Property::Zenith);
+            one_color(ui, asked, "horizon", *horizon, Property::Horizon);
+            one_color(ui, asked, "ground", *ground, Property::Ground);
+        }
+        Environment::Image { scale, rotation, .. } => {
+            let (file, angle_deg) = match &environment.part {
+                EnvironmentPart::Image { file, rotate, .. } => (file.as_str(), *rotate),
+                _ => ("?", f64::from(rotation.to_degrees())),
+            };
+            row(ui, "picture", |ui| ui.add(egui::Label::new(file).truncate()));
+            row(ui, "strength", |ui| {
+                if let Some(strength) = strength_drag(ui, f64::from(scale.max_element()), "× ", "") {
+                    set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
+                }
+            });
+            row(ui, "rotation", |ui| {
+                if let Some(angle_deg) = number(ui, angle_deg, 0.5, -360.0..=360.0, "°") {
+                    set_sky(asked, Property::SkyRotation, DVec3::splat(angle_deg));
+                }
+            });
+        }
+    });
+}

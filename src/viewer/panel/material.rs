@@ -1,0 +1,192 @@
+//! The editor of a material: its kind, its colour or texture, and its numbers.
+//!
+//! A material belongs to all objects that use it, and so does every change of it; whoever shows the editor says how many
+//! they are ([`shared_by`]).
+
+use super::Asked;
+use super::texture;
+use super::widgets::{color, row, row_with_hint, rows, slider, vector};
+use crate::frame::{Edit, MaterialKind, Property, Session, paint_of};
+use crate::render::Fresnel;
+use crate::scene::{Amount, Inventory, Material, MaterialEntry, ObjectInput, Paint};
+use crate::viewer::status::thousands;
+use bevy_ecs::prelude::Entity;
+use egui::Ui;
+use glam::DVec3;
+use std::ops::RangeInclusive;
+
+/// Which material an object has, and the editor of it.
+pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: &ObjectInput, asked: &mut Asked) {
+    let id = object.entity.to_bits();
+    let slot = object.slots.first().copied();
+    let current = slot.and_then(|slot| inventory.material(slot));
+    rows(ui, "which material", |ui| {
+        row(ui, "material", |ui| {
+            let text = current.map_or("plain grey", |entry| entry.label.as_str());
+            let combo = egui::ComboBox::from_id_salt("material").selected_text(text).width(150.0).truncate();
+            combo.show_ui(ui, |ui| {
+                for entry in &inventory.materials {
+                    if ui.selectable_label(Some(entry.entity) == slot, &entry.label).clicked() {
+                        asked.edit(Edit::Assign { id, material: entry.entity.to_bits() });
+                    }
+                }
+            });
+        });
+    });
+    if current.is_none_or(|entry| entry.users.len() > 1 || !entry.blends.is_empty()) {
+        ui.horizontal_wrapped(|ui| {
+            if let Some(current) = current {
+                ui.weak(shared_by(current));
+            }
+            let hint = "gives this object a copy of the material, so that a change does not show on others";
+            if ui.small_button("Make unique").on_hover_text(hint).clicked() {
+                asked.edit(Edit::OwnMaterial { id });
+            }
+        });
+    }
+    let Some(current) = current else { return };
+    if object.slots.len() > 1 {
+        ui.weak(format!("the first of {}: see Materials for the others", object.slots.len()));
+    }
+    editor(ui, session, inventory, current.entity, asked);
+}
+
+/// Who sees a change of it.
+pub fn shared_by(entry: &MaterialEntry) -> String {
+    match entry.users.len() {
+        0 => "no object uses it".to_owned(),
+        1 => "one object uses it".to_owned(),
+        n => format!("shared by {} objects: edits show on all", thousands(n)),
+    }
+}
+
+/// Kind, colour and numbers of a material, under the rows of the same width.
+pub fn editor(ui: &mut Ui, session: &Session, inventory: &Inventory, entity: Entity, asked: &mut Asked) {
+    let Some(material) = session.world().get::<Material>(entity) else { return };
+    let id = entity.to_bits();
+    ui.push_id(id, |ui| {
+        rows(ui, "material", |ui| {
+            row(ui, "kind", |ui| match MaterialKind::of(material) {
+                Some(kind) => {
+                    egui::ComboBox::from_id_salt("kind").selected_text(kind.label()).width(104.0).show_ui(ui, |ui| {
+                        for other in MaterialKind::ALL {
+                            if ui.selectable_label(kind == other, other.label()).clicked() {
+                                asked.edit(Edit::SetKind { id, kind: other });
+                            }
+                        }
+                    });
+                }
+                None => drop(ui.label("blend")),
+            });
+            paint(ui, session, id, material, asked);
+            numbers(ui, inventory, id, material, asked);
+        });
+    });
+}
+
+fn paint(ui: &mut Ui, session: &Session, id: u64, material: &Material, asked: &mut Asked) {
+    let Some(paint) = paint_of(material) else { return };
+    let is_light = matches!(material, Material::Emissive { .. });
+    row(ui, if is_light { "radiance" } else { "colour" }, |ui| {
+        ui.horizontal(|ui| {
+            match paint {
+                Paint::Rgb(rgb) => {
+                    if let Some(value) = color(ui, *rgb, is_light) {
+                        asked.edit(Edit::Set { id, property: Property::Color, value });
+                    }
+                }
+                Paint::Texture(texture) => drop(ui.label(&texture.name)),
+            }
+            texture::menu(ui, session, id, paint, asked);
+        })
+    });
+    if let Paint::Texture(texture) = paint {
+        texture::numbers(ui, id, &texture.part, asked);
+    }
+}
+
+/// A number with the name and the meaning that people know it by.
+struct Scale {
+    name: &'static str,
+    hint: &'static str,
+    property: Property,
+    range: RangeInclusive<f64>,
+}
+
+impl Scale {
+    const fn new(name: &'static str, hint: &'static str, property: Property, range: RangeInclusive<f64>) -> Self {
+        Self { name, hint, property, range }
+    }
+
+    fn show(self, ui: &mut Ui, id: u64, value: f64, asked: &mut Asked) {
+        let is_alpha = self.property == Property::Alpha;
+        // What people call roughness is the root of the width of the lobe.
+        let shown = if is_alpha { value.sqrt() } else { value };
+        let logarithmic = *self.range.end() > 10.0;
+        row_with_hint(ui, self.name, self.hint, |ui| {
+            if let Some(new) = slider(ui, shown, self.range, logarithmic) {
+                let value = if is_alpha { new * new } else { new };
+                asked.edit(Edit::Set { id, property: self.property, value: DVec3::splat(value) });
+            }
+        });
+    }
+}
+
+const IOR: Scale =
+    Scale::new("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", Property::Ior, 1.0..=2.5);
+
+fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, asked: &mut Asked) {
+    let number = |amount: &Amount| if let Amount::Number(value) = amount { Some(f64::from(*value)) } else { None };
+    match material {
+        Material::Metal { alpha, fresnel, .. } => {
+            if let Some(alpha) = number(alpha) {
+                let hint = "0: a mirror, 1: matte; its square is the width α of the GGX lobe";
+                Scale::new("roughness", hint, Property::Alpha, 0.032..=1.0).show(ui, id, alpha, asked);
+            }
+            row(ui, "Fresnel", |ui| {
+                let mut schlick = *fresnel == Fresnel::Schlick;
+                let hint = "brighter at grazing angles, by Schlick's approximation";
+                if ui.checkbox(&mut schlick, "Schlick").on_hover_text(hint).changed() {
+                    let value = DVec3::splat(f64::from(u8::from(schlick)));
+                    asked.edit(Edit::Set { id, property: Property::Schlick, value });
+                }
+            });
+        }
+        Material::Glass { ior, absorption } => {
+            IOR.show(ui, id, f64::from(*ior), asked);
+            row_with_hint(ui, "absorption", "red, green and blue, per metre (Beer–Lambert)", |ui| {
+                if let Some(value) = vector(ui, absorption.as_dvec3(), 0.02) {
+                    asked.edit(Edit::Set { id, property: Property::Absorption, value });
+                }
+            });
+        }
+        Material::Phong { ambient, specular, shininess, transparency, ior, .. } => {
+            let share = |name, hint, property| Scale::new(name, hint, property, 0.0..=1.0);
+            share("ambient", "share of the ambient light", Property::Ambient).show(ui, id, f64::from(*ambient), asked);
+            if let Some(specular) = number(specular) {
+                share("specular", "share of mirrored light", Property::Specular).show(ui, id, specular, asked);
+            }
+            Scale::new("shininess", "exponent of the highlight", Property::Shininess, 1.0..=10_000.0).show(
+                ui,
+                id,
+                f64::from(*shininess),
+                asked,
+            );
+            let hint = "share of light that passes through";
+            share("transparency", hint, Property::Transparency).show(ui, id, f64::from(*transparency), asked);
+            IOR.show(ui, id, f64::from(*ior), asked);
+        }
+        Material::Blend { weight, a, b } => {
+            let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
+            row(ui, "of", |ui| {
+                let text = format!("{} and {}", name(a), name(b));
+                ui.add(egui::Label::new(text).truncate()).on_hover_text("each has an editor in the list of materials");
+            });
+            if let Some(weight) = number(weight) {
+                let hint = "0: the first of the two alone, 1: the second alone";
+                Scale::new("weight", hint, Property::Weight, 0.0..=1.0).show(ui, id, weight, asked);
+            }
+        }
+        Material::Diffuse { .. } | Material::Mirror { .. } | Material::Emissive { .. } => {}
+    }
+}

@@ -1,0 +1,98 @@
+//! The list of materials, and below it the editor of the one that was clicked.
+
+use super::list::{Listed, Which, list};
+use super::material::{editor, shared_by};
+use super::swatch::swatch;
+use super::widgets::{choice, name_field};
+use super::{Asked, PanelState};
+use crate::frame::{Edit, MaterialKind, Selection, Session};
+use crate::scene::{Inventory, Material, MaterialEntry};
+use crate::viewer::status::thousands;
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::Entity;
+use egui::{RichText, Ui};
+
+impl Listed for MaterialEntry {
+    fn entity(&self) -> Entity {
+        self.entity
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn kind(&self) -> &str {
+        "material"
+    }
+}
+
+pub fn materials(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
+    let inventory = state.inventory(session);
+    let chosen = state.material;
+    let which = Which { id: "materials", revision: session.revision(), chosen };
+    let mut clicked = None;
+    list(ui, &mut state.material_list, &which, &inventory.materials, |ui, entry| {
+        swatch(ui, session.world(), entry.entity);
+        let kind = kind_of(session, entry.entity);
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let text = format!("{kind}, {}", uses(entry.users.len()));
+            ui.label(RichText::new(text).size(11.0).weak());
+            let row = choice(ui, chosen == Some(entry.entity), &entry.label);
+            if row.on_hover_text(shared_by(entry)).clicked() {
+                clicked = Some(entry.entity);
+            }
+        });
+    });
+    if let Some(clicked) = clicked {
+        // A second click closes the editor.
+        state.material = Some(clicked).filter(|_| chosen != Some(clicked));
+    }
+    match state.material.and_then(|entity| inventory.material(entity)) {
+        Some(entry) => open(ui, session, &inventory, entry, asked),
+        None => state.material = None,
+    }
+}
+
+/// The editor of one, and what can be done with all that use it.
+fn open(ui: &mut Ui, session: &Session, inventory: &Inventory, entry: &MaterialEntry, asked: &mut Asked) {
+    let id = entry.entity.to_bits();
+    egui::Frame::group(ui.style()).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.horizontal(|ui| {
+            swatch(ui, session.world(), entry.entity);
+            name_field(ui, id, session.world().get::<Name>(entry.entity).map(|name| name.as_str()), asked);
+        });
+        ui.weak(shared_by(entry));
+        if !entry.blends.is_empty() {
+            let names = entry.blends.iter().filter_map(|blend| Some(inventory.material(*blend)?.label.as_str()));
+            ui.weak(format!("a part of {}", names.collect::<Vec<_>>().join(", ")));
+        }
+        ui.horizontal_wrapped(|ui| {
+            let users = ui.add_enabled(!entry.users.is_empty(), egui::Button::new("Select users"));
+            if users.on_hover_text("select all objects that use it").clicked() {
+                asked.edit(Edit::SelectUsers { material: id });
+            }
+            let selected = &session.world().resource::<Selection>().0;
+            let give = ui.add_enabled(!selected.is_empty(), egui::Button::new("Assign to selected"));
+            if give.on_hover_text("what is selected gets this material").clicked() {
+                for object in selected {
+                    asked.edit(Edit::Assign { id: object.to_bits(), material: id });
+                }
+            }
+        });
+        editor(ui, session, inventory, entry.entity, asked);
+    });
+}
+
+fn kind_of(session: &Session, entity: Entity) -> &'static str {
+    let material = session.world().get::<Material>(entity);
+    material.and_then(MaterialKind::of).map_or("blend", MaterialKind::label)
+}
+
+fn uses(n: usize) -> String {
+    match n {
+        0 => "unused".to_owned(),
+        1 => "1 object".to_owned(),
+        n => format!("{} objects", thousands(n)),
+    }
+}

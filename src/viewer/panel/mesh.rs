@@ -1,0 +1,74 @@
+//! The mesh of what is selected: its faces, its normals, and how far it is simplified.
+
+use super::widgets::{row, rows};
+use super::{Asked, PanelState};
+use crate::frame::{Edit, MeshMeasure, Selection, Session};
+use crate::scene::file::MeshShadingPart;
+use crate::scene::{MeshOrigin, Shape};
+use crate::viewer::change::Difference;
+use crate::viewer::status::{metres, percent, thousands};
+use egui::Ui;
+
+pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
+    let active = session.world().resource::<Selection>().active();
+    let shape = active.and_then(|active| Some((active, session.world().get::<Shape>(active)?)));
+    let Some((entity, Shape::Mesh(mesh))) = shape else {
+        ui.weak("no mesh is selected");
+        return;
+    };
+    let id = entity.to_bits();
+    rows(ui, "mesh", |ui| {
+        row(ui, "faces", |ui| drop(ui.label(thousands(mesh.triangles.len()))));
+        let Some(origin) = session.world().get::<MeshOrigin>(entity) else { return };
+        let ratio = origin.simplify.unwrap_or(1.0);
+        row(ui, "normals", |ui| {
+            ui.horizontal(|ui| {
+                let kinds = [
+                    (MeshShadingPart::Auto, "auto"),
+                    (MeshShadingPart::Smooth, "smooth"),
+                    (MeshShadingPart::Flat, "flat"),
+                ];
+                for (shading, label) in kinds {
+                    if ui.selectable_label(origin.shading == shading, label).clicked() && origin.shading != shading {
+                        asked.edit(Edit::Remesh { id, shading, ratio });
+                    }
+                }
+            })
+        });
+        row(ui, "simplify", |ui| {
+            let shown = state.ratio.filter(|(of, _)| *of == entity).map_or(ratio, |(_, ratio)| ratio);
+            let mut percent = 100.0 * shown;
+            let scale = egui::Slider::new(&mut percent, 1.0..=100.0).logarithmic(true).suffix(" %").max_decimals(1);
+            let response = ui.add(scale.update_while_editing(false));
+            if response.changed() {
+                let ratio = (percent / 100.0).clamp(0.01, 1.0);
+                state.ratio = Some((entity, ratio));
+                state.change.begin(entity, origin.simplify.is_none(), session);
+                asked.edit(Edit::Remesh { id, shading: origin.shading, ratio });
+            } else if !response.dragged() && session.status().loading.is_none() {
+                state.ratio = None;
+            }
+        });
+        if let Some(measure) = session.world().get::<MeshMeasure>(entity).filter(|m| m.faces == mesh.triangles.len()) {
+            row(ui, "before", |ui| drop(ui.label(format!("{} faces", thousands(measure.whole_faces)))));
+            if let Some(deviation) = measure.deviation {
+                row(ui, "deviation", |ui| {
+                    let hint = "between the two surfaces, measured at 20,000 points of each, before scaling";
+                    let text = format!("mean {}, largest {}", metres(deviation.mean()), metres(deviation.max()));
+                    ui.label(text).on_hover_text(hint);
+                });
+                row(ui, "difference", |ui| match state.change.of(entity) {
+                    Some(Difference { mean, plain, spp: [before, now] }) => {
+                        let hint = format!(
+                            "of the picture to the one with the whole mesh ({before} samples, now {now}), noise \
+                             included: mean, and pixels that differ by more than a twentieth of white"
+                        );
+                        let text = format!("{} mean, {} of pixels", percent(mean), percent(plain));
+                        ui.label(text).on_hover_text(hint);
+                    }
+                    None => drop(ui.weak("–").on_hover_text("the whole mesh was not seen from here")),
+                });
+            }
+        }
+    });
+}

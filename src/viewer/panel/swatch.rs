@@ -1,0 +1,51 @@
+//! The colour that a material is known by, in a list.
+
+use crate::frame::paint_of;
+use crate::scene::file::TexturePart;
+use crate::scene::{Material, Paint};
+use bevy_ecs::prelude::{Entity, World};
+use egui::{Color32, Sense, Stroke, Ui, vec2};
+use glam::Vec3;
+
+/// As wide and as high as a letter is, points.
+const SIDE: f32 = 13.0;
+/// Blends of blends are shown by the parts of the first ones.
+const MAX_NESTING: usize = 4;
+
+/// Draws it: one colour, or two where a blend or a checker has two.
+pub fn swatch(ui: &mut Ui, world: &World, material: Entity) {
+    let [a, b] = colors(world, material, 0);
+    let (rect, _) = ui.allocate_exact_size(vec2(SIDE, SIDE), Sense::hover());
+    let painter = ui.painter();
+    painter.rect_filled(rect, 2.0, srgb(a));
+    if a != b {
+        let half = vec![rect.right_top(), rect.right_bottom(), rect.left_bottom()];
+        painter.add(egui::Shape::convex_polygon(half, srgb(b), Stroke::NONE));
+    }
+    painter.rect_stroke(rect, 2.0, (1.0, Color32::from_gray(90)), egui::StrokeKind::Inside);
+}
+
+fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
+    let Some(material) = world.get::<Material>(entity) else { return [Vec3::splat(0.5); 2] };
+    match material {
+        Material::Blend { a, b, .. } if nesting < MAX_NESTING => {
+            [colors(world, *a, nesting + 1)[0], colors(world, *b, nesting + 1)[0]]
+        }
+        // What a metre of it lets through.
+        Material::Glass { absorption, .. } => [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2],
+        material => match paint_of(material) {
+            // Of a light, the hue.
+            Some(Paint::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
+            Some(Paint::Texture(texture)) => match &texture.part {
+                TexturePart::Checker { a, b, .. } => [a.0, b.0],
+                TexturePart::Image { .. } => [Vec3::splat(0.75), Vec3::splat(0.1)],
+            },
+            None => [Vec3::splat(0.5); 2],
+        },
+    }
+}
+
+fn srgb(linear: Vec3) -> Color32 {
+    let [r, g, b] = linear.clamp(Vec3::ZERO, Vec3::ONE).to_array();
+    egui::Rgba::from_rgb(r, g, b).into()
+}

@@ -1,0 +1,131 @@
+//! The widgets of the panel: rows of a name and a value, numbers, vectors, colours.
+//!
+//! Each answers with the new value when a person has changed it, and with nothing otherwise. Typing takes effect at the
+//! end, dragging at once.
+
+use super::Asked;
+use crate::frame::Edit;
+use egui::{RichText, Ui};
+use glam::{DVec3, Vec3};
+
+/// Rows of a name and what it names, aligned through the panel.
+pub fn rows<R>(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
+    egui::Grid::new(id).num_columns(2).min_col_width(74.0).spacing([8.0, 4.0]).show(ui, contents).inner
+}
+
+pub fn row<R>(ui: &mut Ui, name: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
+    row_with_hint(ui, name, "", contents)
+}
+
+/// The hint comes when the mouse rests on the name.
+pub fn row_with_hint<R>(ui: &mut Ui, name: &str, hint: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
+    let label = ui.label(RichText::new(name).color(egui::Color32::from_gray(170)));
+    if !hint.is_empty() {
+        label.on_hover_text(hint);
+    }
+    let result = contents(ui);
+    ui.end_row();
+    result
+}
+
+/// What an entity is called, to be typed anew; takes effect when the field is left.
+pub fn name_field(ui: &mut Ui, id: u64, name: Option<&str>, asked: &mut Asked) {
+    let old = name.unwrap_or_default();
+    // What is being typed is kept by the field.
+    let key = ui.id().with(("name", id));
+    let mut text = ui.data(|data| data.get_temp::<String>(key)).unwrap_or_else(|| old.to_owned());
+    let field = ui.add(egui::TextEdit::singleline(&mut text).hint_text("no name").desired_width(130.0));
+    if field.has_focus() {
+        ui.data_mut(|data| data.insert_temp(key, text));
+        return;
+    }
+    ui.data_mut(|data| data.remove::<String>(key));
+    if field.lost_focus() && text != old {
+        asked.edit(Edit::Rename { id, name: text });
+    }
+}
+
+/// A row of a list that can be chosen, cut off where there is no more room.
+pub fn choice(ui: &mut Ui, is_chosen: bool, text: &str) -> egui::Response {
+    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+        ui.add(egui::Button::selectable(is_chosen, text).truncate())
+    })
+    .inner
+}
+
+/// A number that is dragged or typed. Typing takes effect at the end, dragging at once.
+pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f64>, suffix: &str) -> Option<f64> {
+    let mut new = value;
+    let drag = egui::DragValue::new(&mut new)
+        .speed(speed)
+        .range(range)
+        .suffix(suffix)
+        .max_decimals(4)
+        .update_while_editing(false);
+    ui.add(drag).changed().then_some(new)
+}
+
+/// A whole number, in the same way.
+pub fn whole(ui: &mut Ui, value: u32, range: std::ops::RangeInclusive<u32>) -> Option<u32> {
+    let mut new = value;
+    let drag = egui::DragValue::new(&mut new).speed(0.05).range(range).update_while_editing(false);
+    ui.add(drag).changed().then_some(new)
+}
+
+/// Three numbers; the speed of dragging suits `scale`.
+pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
+    let mut new = value;
+    let mut changed = false;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.spacing_mut().interact_size.x = 52.0;
+        for axis in 0..3 {
+            let drag = egui::DragValue::new(&mut new[axis]).speed(speed).max_decimals(3).update_while_editing(false);
+            changed |= ui.add(drag).changed();
+        }
+    });
+    changed.then_some(new)
+}
+
+/// A number on a sliding scale.
+pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, logarithmic: bool) -> Option<f64> {
+    let mut new = value;
+    let slider = egui::Slider::new(&mut new, range)
+        .logarithmic(logarithmic)
+        .update_while_editing(false)
+        .max_decimals(4)
+        .smart_aim(true);
+    ui.add(slider).changed().then_some(new)
+}
+
+/// A linear colour. What may be brighter than white is a hue and a strength beside it.
+pub fn color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
+    let strength = if bright { value.max_element() } else { 1.0 };
+    // Black has no hue: it will be white once it has a strength.
+    let hue = if strength > 0.0 { value / strength } else { Vec3::ONE };
+    let mut rgb = hue.to_array();
+    let new_hue = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
+    let new_strength = if bright { strength_drag(ui, f64::from(strength), "× ", "") } else { None };
+    if new_hue.is_none() && new_strength.is_none() {
+        return None;
+    }
+    let strength = match new_strength {
+        Some(strength) => strength,
+        // A colour that is chosen for what was black is meant to be seen.
+        None if strength == 0.0 => 1.0,
+        None => f64::from(strength),
+    };
+    Some(new_hue.unwrap_or_else(|| hue.as_dvec3()) * strength)
+}
+
+/// A number that may be of any size: each step of a drag changes it by the same part of itself.
+pub fn strength_drag(ui: &mut Ui, value: f64, prefix: &str, suffix: &str) -> Option<f64> {
+    let mut new = value;
+    let drag = egui::DragValue::new(&mut new).speed(proportional(value)).range(0.0..=1e9).prefix(prefix).suffix(suffix);
+    ui.add(drag.max_decimals(4).update_while_editing(false)).changed().then_some(new)
+}
+
+/// Of a drag, a pixel: twice as much takes about 140 pixels at any size. From nothing it gets away slowly.
+pub fn proportional(value: f64) -> f64 {
+    0.005 * value.abs().max(1e-3)
+}
