@@ -22,7 +22,7 @@ pub struct Spot {
 
 /// A tenth of the distance is large enough to see and to grab, and leaves most of the picture as it is.
 const SHARE: f64 = 0.1;
-/// Steps towards the eye, in half sizes, before something smaller is tried.
+/// Steps towards the eye, of half a size, before something smaller is tried.
 const STEPS: u32 = 24;
 /// What has no room is made smaller so many times.
 const SHRINKS: u32 = 5;
@@ -43,17 +43,19 @@ pub fn find(world: &World) -> Spot {
     // What lies far behind the pivot is a wall or the floor at the horizon.
     let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
     let (place, distance) = hit.map_or((view.pivot(), view.pivot_distance), |hit| (hit.point, hit.depth));
-    let mut size = SHARE * distance;
+    let mut share = SHARE;
     for _ in 0..SHRINKS {
-        let steps = (0..STEPS).map(|step| place - view.forward * (0.5 * size * f64::from(step)));
+        let step = 0.5 * share * distance;
         // Not in the face of who looks.
-        let steps = steps.take_while(|place| (*place - view.eye).dot(view.forward) > 3.0 * size);
-        for place in steps {
-            if let Some(foot) = stand(scene, &view, place, size) {
+        let depths = (0..STEPS).map(|i| distance - step * f64::from(i)).take_while(|depth| *depth > 0.3 * distance);
+        for depth in depths {
+            // What is nearer looks larger, and is made smaller for it.
+            let size = share * depth;
+            if let Some(foot) = stand(scene, &view, place - view.forward * (distance - depth), size) {
                 return Spot { foot, size };
             }
         }
-        size *= 0.6;
+        share *= 0.6;
     }
     Spot { foot: place, size: SHARE * distance }
 }
