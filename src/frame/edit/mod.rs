@@ -81,7 +81,8 @@ pub enum Edit {
         axis: DVec3,
         angle_deg: f64,
     },
-    /// What is selected, about the last one's place: along its own axes if it is one, evenly if they are several.
+    /// What is selected, about the last one's place: along its own axes if it is one, evenly if they are several or
+    /// a ball.
     Scale {
         factors: DVec3,
     },

@@ -5,8 +5,8 @@
 
 use crate::frame::history::History;
 use crate::frame::selection::{OwnBox, Selection, box_of};
-use crate::scene::{Linear, Placement};
-use bevy_ecs::prelude::World;
+use crate::scene::{Linear, Placement, Shape};
+use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DQuat, DVec3, EulerRot};
 
 /// What is to be done to a placement.
@@ -27,7 +27,9 @@ pub enum Change {
 /// Changes the placements of all that is selected; `change` is told the middle of the last one.
 pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let selected = world.resource::<Selection>().0.clone();
-    let several = selected.len() > 1;
+    // Several would be sheared along the axes of one, and balls stay balls.
+    let round = |entity: &Entity| matches!(world.get(*entity), Some(Shape::Sphere { .. } | Shape::Spheres(_)));
+    let evenly = selected.len() > 1 || selected.iter().any(round);
     let before: Vec<_> = selected
         .into_iter()
         .filter_map(|entity| {
@@ -39,7 +41,7 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let own_box = box_of(world, active).map(|own| OwnBox { world_from_box: last.affine(), ..own });
     let change = change(own_box.map_or(last.translation, |own| own.middle()));
     for (entity, placement) in before {
-        let changed = changed(&placement, &change, several);
+        let changed = changed(&placement, &change, evenly);
         // Reading first: a mutable borrow alone would mark it.
         if changed.affine().is_finite() && world.get::<Placement>(entity) != Some(&changed) {
             world.entity_mut(entity).insert(changed);
@@ -47,8 +49,8 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     }
 }
 
-/// Of `several`, each is scaled evenly: along the axes of one, the others would shear.
-fn changed(placement: &Placement, change: &Change, several: bool) -> Placement {
+/// What is scaled `evenly` takes the factor that changes most.
+fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
     let Placement { translation, linear } = *placement;
     match *change {
         Change::Move(by) => Placement { translation: translation + by, linear },
@@ -57,7 +59,9 @@ fn changed(placement: &Placement, change: &Change, several: bool) -> Placement {
             Placement { translation: center + turn * (translation - center), linear: turned(&linear, turn) }
         }
         Change::Scale { center, factors } => {
-            let factors = if several { DVec3::splat(factors.max_element()) } else { factors };
+            let most = |a: f64, b: f64| if b.ln().abs() > a.ln().abs() { b } else { a };
+            let even = most(most(factors.x, factors.y), factors.z);
+            let factors = if evenly { DVec3::splat(even) } else { factors };
             let linear = match linear {
                 Linear::Turned { rotation_deg, scale } => Linear::Turned { rotation_deg, scale: scale * factors },
                 Linear::Matrix(matrix) => Linear::Matrix(matrix * DMat3::from_diagonal(factors)),
@@ -109,5 +113,7 @@ mod tests {
         assert_eq!(changed(&placement, &change, false).linear(), DMat3::from_diagonal(DVec3::new(1.0, 3.0, 1.0)));
         let evenly = changed(&placement, &change, true);
         assert_eq!((evenly.translation, evenly.even_scale()), (3.0 * DVec3::X, Some(3.0)));
+        let smaller = Change::Scale { center: DVec3::ZERO, factors: DVec3::new(0.5, 1.0, 1.0) };
+        assert_eq!(changed(&placement, &smaller, true).even_scale(), Some(0.5), "smaller along one axis is smaller");
     }
 }
