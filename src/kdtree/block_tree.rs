@@ -1,42 +1,142 @@
 //! Kd-tree over primitives of one kind: the binary nodes, the wide ones, and the leaf blocks below both.
 
-use super::blocks::{BLOCK, LeafBlock};
+use super::blocks::{BLOCK, LeafBlock, Prims};
 use super::build::{BuildConfig, Primitives, build};
-use super::nodes::KdNodes;
-use super::wide::{WideNode, widen};
+use super::nodes::{KdNode, KdNodes};
+use super::ray::Nearest;
+use super::simd::Simd;
+use super::wide::{LEAF, WideNode, widen};
 
 #[derive(Debug, PartialEq)]
-pub(super) struct BlockTree<B> {
+pub(super) struct BlockTree<B: LeafBlock> {
     /// The tree for packets, picking and as the reference.
     pub nodes: KdNodes,
     /// The same tree for streams.
     pub wide: Vec<WideNode>,
-    pub blocks: Vec<B>,
+    blocks: Vec<B>,
+    /// The blocks of leaves whose first block has the bit [`COMPACT`] set.
+    compact: Vec<B::Compact>,
     /// The largest side of the bounds.
     pub extent: f32,
 }
 
+/// The blocks of one leaf, all of one form.
+pub(super) struct Leaf<'a, B: LeafBlock> {
+    pub blocks: &'a [B],
+    pub compact: &'a [B::Compact],
+}
+
+/// In the number of a leaf's first block: it is one of the compact ones. The highest bit that a node has room for.
+const COMPACT: u32 = 1 << 29;
+
 impl<B: LeafBlock> BlockTree<B> {
     /// - `make_block`: up to sixteen primitives as a block.
-    pub fn build(primitives: &impl Primitives, config: &BuildConfig, make_block: impl Fn(&[u32]) -> B) -> Self {
-        let mut blocks: Vec<B> = Vec::new();
+    /// - `make_compact`: any number of primitives as compact blocks, or none where that does not pay.
+    pub fn build(
+        primitives: &impl Primitives,
+        config: &BuildConfig,
+        make_block: impl Fn(&[u32]) -> B,
+        make_compact: impl Fn(&[u32]) -> Vec<B::Compact>,
+    ) -> Self {
+        let (mut blocks, mut compact) = (Vec::new(), Vec::new());
         let nodes = build(primitives, config, |prims| {
-            let first = blocks.len();
-            blocks.extend(prims.chunks(BLOCK).map(&make_block));
-            let count = blocks.len() - first;
-            blocks[first..].iter_mut().take(count.saturating_sub(1)).for_each(|block| block.prims_mut().set_followed());
-            (first as u32, count as u32)
+            if prims.is_empty() {
+                return (0, 0);
+            }
+            let small = make_compact(prims);
+            if small.is_empty() {
+                append(&mut blocks, prims.chunks(BLOCK).map(&make_block))
+            } else {
+                let (first, count) = append(&mut compact, small);
+                (first | COMPACT, count)
+            }
         });
         let (extent, wide) = (nodes.extent(), widen(&nodes));
-        Self { nodes, wide, blocks, extent }
+        Self { nodes, wide, blocks, compact, extent }
     }
 
     /// Whether the tree outgrows the caches, so that asking for memory in advance pays.
     pub fn is_large(&self) -> bool {
-        self.blocks.len() * size_of::<B>() > 1 << 20
+        self.block_bytes() > 1 << 20
     }
 
-    pub fn leaf(&self, first: u32, count: u32) -> &[B] {
-        &self.blocks[first as usize..][..count as usize]
+    pub fn bytes(&self) -> usize {
+        self.nodes.nodes.len() * size_of::<KdNode>() + self.wide.len() * size_of::<WideNode>() + self.block_bytes()
+    }
+
+    fn block_bytes(&self) -> usize {
+        self.blocks.len() * size_of::<B>() + self.compact.len() * size_of::<B::Compact>()
+    }
+
+    pub fn n_blocks(&self) -> usize {
+        self.blocks.len() + self.compact.len()
+    }
+
+    /// The leaf of a binary node.
+    pub fn leaf(&self, first: u32, count: u32) -> Leaf<'_, B> {
+        let range = (first & !COMPACT) as usize..(first & !COMPACT) as usize + count as usize;
+        if first & COMPACT == 0 {
+            Leaf { blocks: &self.blocks[range], compact: &[] }
+        } else {
+            Leaf { blocks: &[], compact: &self.compact[range] }
+        }
+    }
+
+    /// Offers the hits of a leaf, which is a child of a wide node.
+    #[inline(always)]
+    pub fn test_leaf<S: Simd>(&self, s: S, child: u32, ray: &B::Ray, nearest: &mut Nearest) {
+        let first = (child & !(LEAF | COMPACT)) as usize;
+        if child & COMPACT == 0 {
+            test_blocks(s, &self.blocks, first, ray, nearest);
+        } else {
+            test_blocks(s, &self.compact, first, ray, nearest);
+        }
+    }
+
+    /// Asks for the first `LINES` cache lines of a child of a wide node, whatever it is; 0 for all of a block.
+    #[inline(always)]
+    pub fn prefetch<S: Simd, const LINES: usize>(&self, s: S, child: u32) {
+        let first = (child & !(LEAF | COMPACT)) as usize;
+        let node = self.wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
+        let block = self.blocks.as_ptr().wrapping_add(first).cast::<u8>();
+        let compact = self.compact.as_ptr().wrapping_add(first).cast::<u8>();
+        let is_compact = child & COMPACT != 0;
+        let leaf = if is_compact { compact } else { block };
+        let at = if child & LEAF != 0 { leaf } else { node };
+        let all = if is_compact { size_of::<B::Compact>() / 64 } else { size_of::<B>() / 64 };
+        for line in 0..if LINES == 0 { all } else { LINES } {
+            s.prefetch(at.wrapping_add(64 * line));
+        }
+    }
+}
+
+/// Appends the blocks of a leaf; returns the number of the first one, and how many there are.
+fn append<B: LeafBlock>(to: &mut Vec<B>, blocks: impl IntoIterator<Item = B>) -> (u32, u32) {
+    let first = to.len();
+    to.extend(blocks);
+    let count = to.len() - first;
+    to[first..].iter_mut().take(count.saturating_sub(1)).for_each(|block| block.prims_mut().set_followed());
+    assert!(to.len() < COMPACT as usize, "a tree of more than 2^29 leaf blocks");
+    (first as u32, count as u32)
+}
+
+#[inline(always)]
+fn test_blocks<S: Simd, B: LeafBlock>(s: S, blocks: &[B], mut block: usize, ray: &B::Ray, nearest: &mut Nearest) {
+    loop {
+        B::test(s, &blocks[block], ray, nearest);
+        if !blocks[block].prims().is_followed() {
+            return;
+        }
+        block += 1;
+    }
+}
+
+impl<'a, B: LeafBlock> Leaf<'a, B> {
+    pub fn prims(&self) -> impl Iterator<Item = u32> + use<'a, B> {
+        self.blocks.iter().map(B::prims).chain(self.compact.iter().map(B::Compact::prims)).flat_map(Prims::iter)
+    }
+
+    pub fn n_blocks(&self) -> usize {
+        self.blocks.len() + self.compact.len()
     }
 }

@@ -2,23 +2,29 @@
 
 use super::lanes::{LaneHits, may_hit, quad_hits, resolve, shear, sphere_hits};
 use super::ray::Nearest;
+use super::shared_block::SharedBlock;
 use super::simd::{LANES, Mask, Simd};
 use crate::geometry::{Ray, Shear};
 use glam::Vec3;
+use std::convert::Infallible;
+use std::marker::PhantomData;
 
 /// Primitives in a leaf block: what one AVX-512 instruction tests.
 pub(super) const BLOCK: usize = LANES;
 
-/// Sixteen primitives of one kind.
-///
-/// Lanes without a primitive hold NaN, which no comparison lets through.
+/// What the test of a leaf wants to know of a ray, made once for all leaves.
+pub(super) trait LeafRay: Copy {
+    const IDLE: Self;
+
+    fn new(ray: &Ray, shear: &Shear) -> Self;
+}
+
+/// Up to sixteen primitives of one kind.
 pub(super) trait LeafBlock: Sized {
-    /// What the test wants to know of a ray, made once for all blocks.
-    type Ray: Copy;
+    type Ray: LeafRay;
 
-    const IDLE: Self::Ray;
-
-    fn ray(ray: &Ray, shear: &Shear) -> Self::Ray;
+    /// A smaller form for leaves whose primitives have much in common.
+    type Compact: LeafBlock<Ray = Self::Ray>;
 
     fn prims(&self) -> &Prims;
 
@@ -57,7 +63,7 @@ const FOLLOWED: u32 = 1 << 31;
 pub(super) const MAX_PRIMS: usize = FOLLOWED as usize;
 
 impl Prims {
-    fn new(prims: &[u32]) -> Self {
+    pub fn new(prims: &[u32]) -> Self {
         let mut all = [u32::MAX; BLOCK];
         all[..prims.len()].copy_from_slice(prims);
         Self(all)
@@ -94,7 +100,29 @@ impl Prims {
     }
 }
 
-/// `points[k][axis][lane]`.
+/// For primitives that have nothing in common: there is none.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct NoBlock<R>(Infallible, PhantomData<R>);
+
+impl<R: LeafRay> LeafBlock for NoBlock<R> {
+    type Ray = R;
+    type Compact = Self;
+
+    fn prims(&self) -> &Prims {
+        match self.0 {}
+    }
+
+    fn prims_mut(&mut self) -> &mut Prims {
+        match self.0 {}
+    }
+
+    #[inline(always)]
+    fn hits<S: Simd>(_: S, block: &Self, _: &R) -> LaneHits<S> {
+        match block.0 {}
+    }
+}
+
+/// `points[k][axis][lane]`; lanes without a primitive hold NaN, which no comparison lets through.
 type Points<const N: usize> = [[[f32; BLOCK]; 3]; N];
 
 fn gather<const N: usize>(prims: &[u32], points: impl Fn(u32) -> [Vec3; N]) -> Points<N> {
@@ -128,14 +156,10 @@ impl TriangleBlock {
     pub fn new(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Self {
         Self { vertices: gather(prims, triangle), prims: Prims::new(prims) }
     }
-
-    pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
-        self.vertices.map(|vertex| Vec3::from_array(vertex.map(|axis| axis[lane])))
-    }
 }
 
 /// A ray in the sheared frame of the watertight test.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ShearedRay {
     /// Axes across, across and along.
     pub axes: [usize; 3],
@@ -146,7 +170,7 @@ pub(super) struct ShearedRay {
     pub sz: f32,
 }
 
-impl ShearedRay {
+impl LeafRay for ShearedRay {
     const IDLE: Self = Self { axes: [0, 1, 2], origin: [0.0; 3], sx: 0.0, sy: 0.0, sz: 0.0 };
 
     #[inline(always)]
@@ -154,10 +178,12 @@ impl ShearedRay {
         let axes = [shear.kx, shear.ky, shear.kz];
         Self { axes, origin: axes.map(|k| ray.origin[k]), sx: shear.sx, sy: shear.sy, sz: shear.sz }
     }
+}
 
+impl ShearedRay {
     /// Brings sixteen points into the frame.
     #[inline(always)]
-    fn shear<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
+    pub fn shear<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
         let [kx, ky, kz] = self.axes;
         let origin = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
         let point = [s.load(&points[kx]), s.load(&points[ky]), s.load(&points[kz])];
@@ -167,12 +193,7 @@ impl ShearedRay {
 
 impl LeafBlock for TriangleBlock {
     type Ray = ShearedRay;
-    const IDLE: ShearedRay = ShearedRay::IDLE;
-
-    #[inline(always)]
-    fn ray(ray: &Ray, shear: &Shear) -> ShearedRay {
-        ShearedRay::new(ray, shear)
-    }
+    type Compact = SharedBlock;
 
     #[inline(always)]
     fn prims(&self) -> &Prims {
@@ -211,12 +232,7 @@ impl QuadBlock {
 
 impl LeafBlock for QuadBlock {
     type Ray = ShearedRay;
-    const IDLE: ShearedRay = ShearedRay::IDLE;
-
-    #[inline(always)]
-    fn ray(ray: &Ray, shear: &Shear) -> ShearedRay {
-        ShearedRay::new(ray, shear)
-    }
+    type Compact = NoBlock<ShearedRay>;
 
     #[inline(always)]
     fn prims(&self) -> &Prims {
@@ -267,16 +283,25 @@ impl SphereBlock {
 }
 
 /// A ray in `f64`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PreciseRay {
     origin: [f64; 3],
     dir: [f64; 3],
     inv_dir_squared: f64,
 }
 
+impl LeafRay for PreciseRay {
+    const IDLE: Self = Self { origin: [0.0; 3], dir: [0.0; 3], inv_dir_squared: 0.0 };
+
+    #[inline(always)]
+    fn new(ray: &Ray, _shear: &Shear) -> Self {
+        Self::of(ray.origin.as_dvec3().to_array(), ray.dir.as_dvec3().to_array())
+    }
+}
+
 impl PreciseRay {
     #[inline(always)]
-    pub fn new(origin: [f64; 3], dir: [f64; 3]) -> Self {
+    pub fn of(origin: [f64; 3], dir: [f64; 3]) -> Self {
         let inv_dir_squared = 1.0 / (dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
         Self { origin, dir, inv_dir_squared }
     }
@@ -284,12 +309,7 @@ impl PreciseRay {
 
 impl LeafBlock for SphereBlock {
     type Ray = PreciseRay;
-    const IDLE: PreciseRay = PreciseRay { origin: [0.0; 3], dir: [0.0; 3], inv_dir_squared: 0.0 };
-
-    #[inline(always)]
-    fn ray(ray: &Ray, _shear: &Shear) -> PreciseRay {
-        PreciseRay::new(ray.origin.as_dvec3().to_array(), ray.dir.as_dvec3().to_array())
-    }
+    type Compact = NoBlock<PreciseRay>;
 
     #[inline(always)]
     fn prims(&self) -> &Prims {

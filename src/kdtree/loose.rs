@@ -5,6 +5,7 @@ use super::blocks::{BLOCK, LeafBlock, QuadBlock, SphereBlock, TriangleBlock};
 use super::build::{Primitives, clip_triangle};
 use super::mesh_tree::BuildPreset;
 use super::scene_tree::{Shape, object_bounds};
+use super::shared_block::SharedBlock;
 use super::sphere_tree::clip_ball;
 use crate::geometry::{Aabb, quad_corners};
 use glam::Vec3;
@@ -54,34 +55,41 @@ impl LooseTrees {
                     Shape::Sphere { center, radius } => (*center, *radius),
                     _ => (Vec3::NAN, f32::NAN),
                 };
-                self.spheres = Some(tree(shapes, objects, |objects| SphereBlock::new(objects, sphere)));
+                let make_block = |objects: &[u32]| SphereBlock::new(objects, sphere);
+                self.spheres = Some(tree(shapes, objects, make_block, |_| Vec::new()));
             }
             Shape::Quad { .. } => {
                 let corners = |object: u32| match &shapes[object as usize] {
                     Shape::Quad { corner, edge_u, edge_v } => quad_corners(*corner, *edge_u, *edge_v),
                     _ => [Vec3::NAN; 4],
                 };
-                self.quads = Some(tree(shapes, objects, |objects| QuadBlock::new(objects, corners)));
+                let make_block = |objects: &[u32]| QuadBlock::new(objects, corners);
+                self.quads = Some(tree(shapes, objects, make_block, |_| Vec::new()));
             }
             Shape::Triangle { .. } => {
                 let vertices = |object: u32| match &shapes[object as usize] {
                     Shape::Triangle { vertices } => *vertices,
                     _ => [Vec3::NAN; 3],
                 };
-                self.triangles = Some(tree(shapes, objects, |objects| TriangleBlock::new(objects, vertices)));
+                let make_block = |objects: &[u32]| TriangleBlock::new(objects, vertices);
+                let make_compact = |objects: &[u32]| SharedBlock::pack_if_small(objects, vertices);
+                self.triangles = Some(tree(shapes, objects, make_block, make_compact));
             }
             Shape::Plane { .. } | Shape::Mesh { .. } | Shape::Spheres { .. } => {}
         }
     }
 }
 
-fn tree<B: LeafBlock>(shapes: &[Shape], objects: &[u32], make_block: impl Fn(&[u32]) -> B) -> BlockTree<B> {
-    let of_objects = |prims: &[u32]| {
-        let mut block = [0; BLOCK];
-        block.iter_mut().zip(prims).for_each(|(object, &prim)| *object = objects[prim as usize]);
-        make_block(&block[..prims.len()])
-    };
-    BlockTree::build(&Loose { shapes, objects }, &BuildPreset::Best.config(BLOCK), of_objects)
+fn tree<B: LeafBlock>(
+    shapes: &[Shape],
+    objects: &[u32],
+    make_block: impl Fn(&[u32]) -> B,
+    make_compact: impl Fn(&[u32]) -> Vec<B::Compact>,
+) -> BlockTree<B> {
+    let of_prims = |prims: &[u32]| -> Vec<u32> { prims.iter().map(|&prim| objects[prim as usize]).collect() };
+    let config = BuildPreset::Best.config(BLOCK);
+    let make_block = |prims: &[u32]| make_block(&of_prims(prims));
+    BlockTree::build(&Loose { shapes, objects }, &config, make_block, |prims| make_compact(&of_prims(prims)))
 }
 
 /// What the builder sees of them.

@@ -4,12 +4,13 @@
 //! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
 //! traced in groups.
 
-use super::block_tree::BlockTree;
+use super::block_tree::{BlockTree, Leaf};
 use super::blocks::{BLOCK, LeafBlock, PreciseRay, ShearedRay, SphereBlock, TriangleBlock};
 use super::lanes::{LaneHits, may_hit, resolve, shear, sphere_hits};
 use super::nodes::{MAX_DEPTH, Node};
 use super::objects::WideFrame;
 use super::ray::{Nearest, WIDEN};
+use super::shared_block::SharedBlock;
 use super::simd::{LANES, Mask, Simd};
 
 /// Sixteen rays in the mesh's own space, and what they have hit so far.
@@ -43,14 +44,56 @@ pub(super) trait PacketBlock: LeafBlock {
 
     fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> Self::Frame<S>;
 
-    /// The rays of `mask` against all of the block.
+    /// The rays of `mask` against all of the leaf.
     fn test_rays<S: Simd>(
         s: S,
         packet: &mut MeshPacket<S>,
-        shared: (&Group<S>, &Self::Frame<S>),
-        block: &Self,
+        common: (&Group<S>, &Self::Frame<S>),
+        leaf: &Leaf<Self>,
         mask: Mask,
     );
+}
+
+/// Sixteen triangles, however their vertices are kept.
+trait Triangles: LeafBlock<Ray = ShearedRay> {
+    fn corner(&self, lane: usize, corner: usize) -> [f32; 3];
+
+    /// Where the three corners come to lie across, across and along the rays, at the least and at the most.
+    fn reach<S: Simd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3];
+}
+
+impl Triangles for TriangleBlock {
+    #[inline(always)]
+    fn corner(&self, lane: usize, corner: usize) -> [f32; 3] {
+        let [x, y, z] = &self.vertices[corner];
+        [x[lane], y[lane], z[lane]]
+    }
+
+    #[inline(always)]
+    fn reach<S: Simd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
+        let [a, b, c] = &self.vertices;
+        [footprint.reach(s, a, axes), footprint.reach(s, b, axes), footprint.reach(s, c, axes)]
+    }
+}
+
+impl Triangles for SharedBlock {
+    #[inline(always)]
+    fn corner(&self, lane: usize, corner: usize) -> [f32; 3] {
+        self.corner(lane, corner)
+    }
+
+    #[inline(always)]
+    fn reach<S: Simd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
+        let mut corners = [[[s.splat(0.0); 2]; 3]; 3];
+        let vertices = footprint.reach(s, self.vertices(), axes);
+        for axis in 0..3 {
+            for side in 0..2 {
+                let [a, b, c] = self.by_corner(s, vertices[axis][side]);
+                (corners[0][axis][side], corners[1][axis][side], corners[2][axis][side]) = (a, b, c);
+            }
+        }
+        corners
+    }
 }
 
 impl PacketBlock for TriangleBlock {
@@ -62,8 +105,19 @@ impl PacketBlock for TriangleBlock {
     fn frame<S: Simd>(_: S, _: &MeshPacket<S>) {}
 
     #[inline(always)]
-    fn test_rays<S: Simd>(s: S, packet: &mut MeshPacket<S>, (group, ()): (&Group<S>, &()), block: &Self, mask: Mask) {
-        packet.test_leaf(s, group, block, mask);
+    fn test_rays<S: Simd>(
+        s: S,
+        packet: &mut MeshPacket<S>,
+        (group, ()): (&Group<S>, &()),
+        leaf: &Leaf<Self>,
+        mask: Mask,
+    ) {
+        for block in leaf.compact {
+            packet.test_triangles(s, group, block, mask);
+        }
+        for block in leaf.blocks {
+            packet.test_triangles(s, group, block, mask);
+        }
     }
 }
 
@@ -82,23 +136,11 @@ impl PacketBlock for SphereBlock {
         s: S,
         packet: &mut MeshPacket<S>,
         (_, frame): (&Group<S>, &WideFrame<S>),
-        block: &Self,
-        mut mask: Mask,
+        leaf: &Leaf<Self>,
+        mask: Mask,
     ) {
-        let n_balls = block.prims().len();
-        if n_balls <= mask.count_ones() as usize {
-            for lane in 0..n_balls {
-                packet.test_ball(s, frame, block, lane, mask);
-            }
-            return;
-        }
-        let origin = [stored(s, packet.origin[0]), stored(s, packet.origin[1]), stored(s, packet.origin[2])];
-        let dir = [stored(s, packet.dir[0]), stored(s, packet.dir[1]), stored(s, packet.dir[2])];
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize % LANES;
-            mask &= mask - 1;
-            let at = |v: &[[f32; LANES]; 3]| [f64::from(v[0][lane]), f64::from(v[1][lane]), f64::from(v[2][lane])];
-            packet.nearest.offer_one(s, block, &PreciseRay::new(at(&origin), at(&dir)), lane);
+        for block in leaf.blocks {
+            packet.test_balls(s, frame, block, mask);
         }
     }
 }
@@ -148,12 +190,9 @@ impl Footprint {
     /// Rounding is monotone: the steps of the test done on intervals, in the order of the test, bound what it gets for every ray,
     /// and a triangle whose sheared vertices all lie on one side of the rays, or behind them, is missed by all of them.
     #[inline(always)]
-    fn may_hit<S: Simd>(&self, s: S, axes: [usize; 3], block: &TriangleBlock) -> Mask {
+    fn may_hit<S: Simd>(&self, s: S, axes: [usize; 3], block: &impl Triangles) -> Mask {
         let zero = s.splat(0.0);
-        let [x, y, z] = axes;
-        let first = self.reach(s, &block.vertices[0], x, y, z);
-        let second = self.reach(s, &block.vertices[1], x, y, z);
-        let third = self.reach(s, &block.vertices[2], x, y, z);
+        let [first, second, third] = block.reach(s, self, axes);
         let mut missed = 0;
         for axis in 0..3 {
             let low = s.min(first[axis][0], s.min(second[axis][0], third[axis][0]));
@@ -169,7 +208,7 @@ impl Footprint {
 
     /// Where sixteen vertices come to lie, at the least and at the most.
     #[inline(always)]
-    fn reach<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3], x: usize, y: usize, z: usize) -> [[S::F; 2]; 3] {
+    fn reach<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3], [x, y, z]: [usize; 3]) -> [[S::F; 2]; 3] {
         let depth = less(s, s.load(&points[z]), self.origin[2]);
         [
             self.across(s, s.load(&points[x]), self.origin[0], self.sx, depth),
@@ -295,9 +334,7 @@ impl<S: Simd> MeshPacket<S> {
                     }
                 }
                 Node::Leaf { first, count } => {
-                    for block in tree.leaf(first, count) {
-                        B::test_rays(s, self, (&group, frame), block, mask);
-                    }
+                    B::test_rays(s, self, (&group, frame), &tree.leaf(first, count), mask);
                 }
             }
             mask = 0;
@@ -322,12 +359,12 @@ impl<S: Simd> MeshPacket<S> {
     }
 
     #[inline(always)]
-    fn test_leaf(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mask: Mask) {
+    fn test_triangles(&mut self, s: S, group: &Group<S>, block: &impl Triangles, mask: Mask) {
         let n_rays = mask.count_ones();
         if n_rays <= FEW_RAYS {
             return self.test_by_ray(s, group, block, mask);
         }
-        let mut triangles = group.footprint.may_hit(s, group.axes, block) & block.prims.lanes(s);
+        let mut triangles = group.footprint.may_hit(s, group.axes, block) & block.prims().lanes(s);
         if n_rays < triangles.count_ones() {
             return self.test_by_ray(s, group, block, mask);
         }
@@ -339,7 +376,7 @@ impl<S: Simd> MeshPacket<S> {
 
     /// One ray after the other against all triangles.
     #[inline(always)]
-    fn test_by_ray(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, mut mask: Mask) {
+    fn test_by_ray(&mut self, s: S, group: &Group<S>, block: &impl Triangles, mut mask: Mask) {
         let [kx, ky, kz] = group.axes;
         let origin = [stored(s, self.origin[kx]), stored(s, self.origin[ky]), stored(s, self.origin[kz])];
         let (sx, sy, sz) = (stored(s, group.sx), stored(s, group.sy), stored(s, group.sz));
@@ -357,6 +394,26 @@ impl<S: Simd> MeshPacket<S> {
         }
     }
 
+    /// Whichever are fewer, balls or rays, one after the other.
+    #[inline(always)]
+    fn test_balls(&mut self, s: S, frame: &WideFrame<S>, block: &SphereBlock, mut mask: Mask) {
+        let n_balls = block.prims().len();
+        if n_balls <= mask.count_ones() as usize {
+            for lane in 0..n_balls {
+                self.test_ball(s, frame, block, lane, mask);
+            }
+            return;
+        }
+        let origin = [stored(s, self.origin[0]), stored(s, self.origin[1]), stored(s, self.origin[2])];
+        let dir = [stored(s, self.dir[0]), stored(s, self.dir[1]), stored(s, self.dir[2])];
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize % LANES;
+            mask &= mask - 1;
+            let at = |v: &[[f32; LANES]; 3]| [f64::from(v[0][lane]), f64::from(v[1][lane]), f64::from(v[2][lane])];
+            self.nearest.offer_one(s, block, &PreciseRay::of(at(&origin), at(&dir)), lane);
+        }
+    }
+
     /// One ball against all rays.
     #[inline(always)]
     fn test_ball(&mut self, s: S, frame: &WideFrame<S>, block: &SphereBlock, lane: usize, mask: Mask) {
@@ -371,14 +428,14 @@ impl<S: Simd> MeshPacket<S> {
 
     /// One triangle against all rays.
     #[inline(always)]
-    fn test_triangle(&mut self, s: S, group: &Group<S>, block: &TriangleBlock, lane: usize, mask: Mask) {
+    fn test_triangle(&mut self, s: S, group: &Group<S>, block: &impl Triangles, lane: usize, mask: Mask) {
         let lane = lane % BLOCK;
         let [kx, ky, kz] = group.axes;
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
-        let [a, b, c] = &block.vertices;
-        let a = [s.splat(a[kx][lane]), s.splat(a[ky][lane]), s.splat(a[kz][lane])];
-        let b = [s.splat(b[kx][lane]), s.splat(b[ky][lane]), s.splat(b[kz][lane])];
-        let c = [s.splat(c[kx][lane]), s.splat(c[ky][lane]), s.splat(c[kz][lane])];
+        let (a, b, c) = (block.corner(lane, 0), block.corner(lane, 1), block.corner(lane, 2));
+        let a = [s.splat(a[kx]), s.splat(a[ky]), s.splat(a[kz])];
+        let b = [s.splat(b[kx]), s.splat(b[ky]), s.splat(b[kz])];
+        let c = [s.splat(c[kx]), s.splat(c[ky]), s.splat(c[kz])];
         let a = shear(s, a, origin, group.sx, group.sy);
         let b = shear(s, b, origin, group.sx, group.sy);
         let c = shear(s, c, origin, group.sx, group.sy);
@@ -387,7 +444,7 @@ impl<S: Simd> MeshPacket<S> {
             return;
         }
         let hits = resolve(s, mask, &a, &b, &c, group.sz);
-        self.offer(s, hits, block.prims.get(lane));
+        self.offer(s, hits, block.prims().get(lane));
     }
 
     /// Keeps the lanes that are nearer; at equal `t` the lower primitive.

@@ -4,6 +4,7 @@ use super::block_tree::BlockTree;
 use super::blocks::{BLOCK, MAX_PRIMS, TriangleBlock};
 use super::build::{BuildConfig, Primitives, clip_triangle};
 use super::ray::{Nearest, TreeRay};
+use super::shared_block::SharedBlock;
 use super::stats::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
 use glam::Vec3;
@@ -97,7 +98,9 @@ impl MeshTree {
         assert!(triangles.len() < MAX_PRIMS, "a mesh of more than 2^31 triangles");
         let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
         let view = Triangles { positions: &positions, triangles: &triangles };
-        let tree = BlockTree::build(&view, config, |prims| TriangleBlock::new(prims, |prim| view.vertices(prim)));
+        let vertices = |prim| view.vertices(prim);
+        let make_block = |prims: &[u32]| TriangleBlock::new(prims, vertices);
+        let tree = BlockTree::build(&view, config, make_block, |prims| SharedBlock::pack_if_small(prims, vertices));
         Self { positions, triangles, tree }
     }
 
@@ -157,11 +160,9 @@ impl MeshTree {
 
     #[inline]
     fn offer_leaf(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, first: u32, count: u32) {
-        for block in self.tree.leaf(first, count) {
-            for lane in 0..BLOCK {
-                if let Some(hit) = intersect_triangle(ray.origin, shear, &block.triangle(lane)) {
-                    nearest.offer(hit.t, hit.u, hit.v, block.prims.get(lane));
-                }
+        for prim in self.tree.leaf(first, count).prims() {
+            if let Some(hit) = intersect_triangle(ray.origin, shear, &self.vertices(prim)) {
+                nearest.offer(hit.t, hit.u, hit.v, prim);
             }
         }
     }

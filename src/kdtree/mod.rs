@@ -17,6 +17,7 @@ mod nodes;
 mod objects;
 mod ray;
 mod scene_tree;
+mod shared_block;
 mod sieve;
 mod simd;
 mod sphere_tree;

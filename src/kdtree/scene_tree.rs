@@ -278,7 +278,7 @@ impl SceneTree {
         let Some(tree) = tree else { return };
         let tree_ray = TreeRay::new(ray.ray.origin, ray.ray.dir, &ray.shear, tree.extent);
         tree.nodes.walk(&tree_ray, best.map_or(ray.ray.t_max, |hit| hit.t), |first, count| {
-            for object in tree.leaf(first, count).iter().flat_map(|block| block.prims().iter()) {
+            for object in tree.leaf(first, count).prims() {
                 self.offer_object(object, ray, best, effort);
             }
             limit(best, &ray.ray, effort)

@@ -73,9 +73,8 @@ impl SphereTree {
         let (centers, radii) = (centers.to_vec(), radii.to_vec());
         assert!(centers.len() < MAX_PRIMS, "a cloud of more than 2^31 balls");
         let balls = Balls { centers: &centers, radii: &radii };
-        let tree = BlockTree::build(&balls, &BuildPreset::Best.config(BLOCK), |prims| {
-            SphereBlock::new(prims, |prim| balls.ball(prim))
-        });
+        let make_block = |prims: &[u32]| SphereBlock::new(prims, |prim| balls.ball(prim));
+        let tree = BlockTree::build(&balls, &BuildPreset::Best.config(BLOCK), make_block, |_| Vec::new());
         Self { centers, radii, tree }
     }
 
@@ -103,7 +102,7 @@ impl SphereTree {
         let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.tree.extent);
         let wide = WideRay::new(ray);
         self.tree.nodes.walk(&tree_ray, nearest.t, |first, count| {
-            for block in self.tree.leaf(first, count) {
+            for block in self.tree.leaf(first, count).blocks {
                 for (lane, prim) in block.prims().iter().enumerate() {
                     let (center, radius) = block.sphere(lane);
                     wide.offer_sphere(center, radius, prim, nearest);

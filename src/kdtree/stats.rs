@@ -1,13 +1,11 @@
 //! What a tree looks like: counts for reports, and the invariants that tests rely on.
 
 use super::MeshTree;
-use super::blocks::{BLOCK, TriangleBlock};
+use super::blocks::BLOCK;
 use super::mesh_tree::BLOCK_COST;
-use super::nodes::{KdNode, KdNodes, Node};
-use super::wide::WideNode;
+use super::nodes::{KdNodes, Node};
 use crate::geometry::Aabb;
 use glam::Vec3;
-use std::mem::size_of;
 
 /// Counts over one tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,11 +52,8 @@ impl MeshTree {
     pub fn stats(&self) -> KdTreeStats {
         let mut stats = KdTreeStats {
             primitives: self.n_triangles(),
-            blocks: self.tree.blocks.len(),
-            references: self.tree.blocks.iter().map(|block| block.prims.len()).sum(),
-            bytes: self.tree.nodes.nodes.len() * size_of::<KdNode>()
-                + self.tree.wide.len() * size_of::<WideNode>()
-                + self.tree.blocks.len() * size_of::<TriangleBlock>(),
+            blocks: self.tree.n_blocks(),
+            bytes: self.tree.bytes(),
             ..KdTreeStats::default()
         };
         let root_area = f64::from(self.tree.nodes.bounds.area());
@@ -71,8 +66,9 @@ impl MeshTree {
                     stats.expected_inner_visits += share;
                 }
                 Node::Leaf { count: 0, .. } => stats.empty_leaves += 1,
-                Node::Leaf { count, .. } => {
+                Node::Leaf { first, count } => {
                     stats.leaves += 1;
+                    stats.references += self.tree.leaf(first, count).prims().count();
                     stats.expected_leaf_visits += share;
                     stats.expected_block_tests += share * f64::from(count);
                 }
@@ -87,10 +83,10 @@ impl MeshTree {
         self.tree.nodes.visit_cells(&mut |node, cell, _| {
             assert!(!cell.is_empty(), "a cell inside out: {cell:?}");
             if let Node::Leaf { first, count } = node {
-                let blocks = &self.tree.blocks[first as usize..][..count as usize];
-                let prims: Vec<u32> = blocks.iter().flat_map(|block| block.prims.iter()).collect();
+                let leaf = self.tree.leaf(first, count);
+                let prims: Vec<u32> = leaf.prims().collect();
                 assert!(prims.is_sorted_by(|a, b| a < b), "not ascending: {prims:?}");
-                assert_eq!(prims.len().div_ceil(BLOCK), blocks.len(), "blocks that could be saved");
+                assert_eq!(prims.len().div_ceil(BLOCK), leaf.n_blocks(), "blocks that could be saved");
                 for &prim in &prims {
                     seen[prim as usize] = true;
                     let around = Aabb::from_points(self.vertices(prim));
@@ -109,10 +105,7 @@ impl MeshTree {
             for point in points {
                 assert!(
                     self.tree.nodes.some_leaf_at(point.to_array(), |first, count| {
-                        self.tree.blocks[first as usize..][..count as usize]
-                            .iter()
-                            .flat_map(|block| block.prims.iter())
-                            .any(|other| other == prim)
+                        self.tree.leaf(first, count).prims().any(|other| other == prim)
                     }),
                     "triangle {prim} is missing at {point}"
                 );

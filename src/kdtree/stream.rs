@@ -7,10 +7,10 @@
 //! Start reading at [`run`].
 
 use super::block_tree::BlockTree;
-use super::blocks::LeafBlock;
+use super::blocks::{LeafBlock, LeafRay};
 use super::ray::{Nearest, TreeRay};
 use super::simd::Simd;
-use super::wide::{DescentRay, LEAF, Stack, WideNode};
+use super::wide::{DescentRay, LEAF, Stack};
 use crate::geometry::{Ray, Shear};
 
 /// Rays in flight.
@@ -87,10 +87,10 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
     source: &mut impl Source,
     stacks: &mut Stacks,
 ) {
-    let (wide, blocks) = (&tree.wide[..], &tree.blocks[..]);
+    let wide = &tree.wide[..];
     let prefetch = tree.is_large();
     let stacks = &mut stacks.0;
-    let mut slots: [Slot<B::Ray>; SLOTS] = [Slot::idle(B::IDLE); SLOTS];
+    let mut slots: [Slot<B::Ray>; SLOTS] = [Slot::idle(B::Ray::IDLE); SLOTS];
     let (mut inner, mut leaf, mut idle) = (List::NEW, List::NEW, List::NEW);
     (0..SLOTS as u8).for_each(|i| idle.push_if(true, i));
     loop {
@@ -116,7 +116,9 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
             slot.pop(&stacks[i as usize % SLOTS]);
-            fetch::<S, B, 2>(s, prefetch, wide, blocks, slot.child);
+            if prefetch {
+                tree.prefetch::<S, 2>(s, slot.child);
+            }
             inner.push_if(slot.child < DONE, i);
             leaf.push_if(slot.child > DONE, i);
             idle.push_if(slot.child == DONE, i);
@@ -124,18 +126,13 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
         let (list, len) = leaf.take();
         for &i in &list[..len] {
             let child = slots[i as usize % SLOTS].child;
-            fetch::<S, B, 0>(s, prefetch, wide, blocks, child);
+            if prefetch {
+                tree.prefetch::<S, 0>(s, child);
+            }
         }
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
-            let mut block = (slot.child & !LEAF) as usize;
-            loop {
-                B::test(s, &blocks[block], &slot.leaf, &mut slot.nearest);
-                if !blocks[block].prims().is_followed() {
-                    break;
-                }
-                block += 1;
-            }
+            tree.test_leaf(s, slot.child, &slot.leaf, &mut slot.nearest);
         }
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
@@ -143,24 +140,12 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
             if ANY && slot.nearest.found {
                 slot.child = DONE;
             }
-            fetch::<S, B, 2>(s, prefetch, wide, blocks, slot.child);
+            if prefetch {
+                tree.prefetch::<S, 2>(s, slot.child);
+            }
             inner.push_if(slot.child < DONE, i);
             leaf.push_if(slot.child > DONE, i);
             idle.push_if(slot.child == DONE, i);
-        }
-    }
-}
-
-/// Asks for the first `LINES` cache lines of what will be visited next, whatever it is; 0 for all of a block.
-#[inline(always)]
-fn fetch<S: Simd, B, const LINES: usize>(s: S, wanted: bool, wide: &[WideNode], blocks: &[B], child: u32) {
-    if wanted {
-        let node = wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
-        let block = blocks.as_ptr().wrapping_add((child & !LEAF) as usize).cast::<u8>();
-        let at = if child & LEAF != 0 { block } else { node };
-        let lines = if LINES == 0 { size_of::<B>() / 64 } else { LINES };
-        for line in 0..lines {
-            s.prefetch(at.wrapping_add(64 * line));
         }
     }
 }
@@ -175,7 +160,7 @@ fn refill<B: LeafBlock>(tree: &BlockTree<B>, slot: &mut Slot<B::Ray>, source: &m
         if t0 <= t1 && !tree.wide.is_empty() {
             *slot = Slot {
                 descent: DescentRay::new(tree_ray.origin, tree_ray.inv_lo, tree_ray.inv_hi, tree_ray.slack),
-                leaf: B::ray(&ray, &shear),
+                leaf: B::Ray::new(&ray, &shear),
                 nearest,
                 id,
                 is_busy: true,

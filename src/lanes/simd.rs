@@ -59,6 +59,8 @@ pub(crate) trait Simd: Copy {
     fn least(self, mask: Mask, a: Self::F) -> f32;
     /// The axis of a point that each lane asks for.
     fn pick(self, point: &[f32; 4], axes: Self::U) -> Self::F;
+    /// Entries of the table by the low four bits of the indices.
+    fn lookup(self, table: Self::F, indices: Self::U) -> Self::F;
 
     fn splat_u(self, x: u32) -> Self::U;
     fn load_u(self, from: &[u32; LANES]) -> Self::U;
@@ -304,6 +306,10 @@ impl Simd for Portable {
         axes.map(|axis| point[axis as usize & 3])
     }
     #[inline(always)]
+    fn lookup(self, table: Self::F, indices: Self::U) -> Self::F {
+        indices.map(|index| table[index as usize % LANES])
+    }
+    #[inline(always)]
     fn splat_u(self, x: u32) -> Self::U {
         [x; LANES]
     }
@@ -495,6 +501,7 @@ mod tests {
                 s.neg_mul_add(a, b, c),
                 s.select(0x5A3C, a, b),
                 s.pick(&[1.0, 2.0, 3.0, 4.0], s.load_u(&std::array::from_fn(|i| i as u32 % 3))),
+                s.lookup(a, s.load_u(&std::array::from_fn(|i| (i * 11 + shift) as u32 % 16 | (i as u32) << 4))),
                 s.splat(numbers[shift]),
                 s.sqrt(a),
                 s.to_f(s.to_bits(a)),

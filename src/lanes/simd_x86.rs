@@ -87,6 +87,7 @@ impl Simd for Avx512 {
         fn pick(point: &[f32; 4], axes: __m512i) -> __m512 {
             _mm512_permutevar_ps(_mm512_broadcast_f32x4(_mm_loadu_ps(point.as_ptr())), axes)
         }
+        fn lookup(table: __m512, indices: __m512i) -> __m512 { _mm512_permutexvar_ps(indices, table) }
         fn splat_u(x: u32) -> __m512i { _mm512_set1_epi32(x as i32) }
         fn load_u(from: &[u32; LANES]) -> __m512i { _mm512_loadu_si512(from.as_ptr().cast()) }
         fn store_u(a: __m512i, to: &mut [u32; LANES]) { _mm512_storeu_si512(to.as_mut_ptr().cast(), a) }
@@ -208,6 +209,21 @@ unsafe fn compress_half(mask: u8, a: __m256i) -> __m256i {
     }
 }
 
+/// Entries of the table by the low four bits of the indices.
+///
+/// # Safety
+/// As [`lanes_of`].
+#[inline(always)]
+unsafe fn lookup_half(table: [__m256; 2], indices: __m256i) -> __m256 {
+    // SAFETY: the caller's promise; no memory is touched.
+    unsafe {
+        let low = _mm256_permutevar8x32_ps(table[0], indices);
+        let high = _mm256_permutevar8x32_ps(table[1], indices);
+        // The fourth bit becomes the sign, by which blends choose.
+        _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(indices)))
+    }
+}
+
 /// The same operation on both halves.
 macro_rules! halves {
     ($operation:ident($($arg:ident),+)) => { [$operation($($arg[0]),+), $operation($($arg[1]),+)] };
@@ -281,6 +297,9 @@ impl Simd for Avx2 {
             let point = _mm_loadu_ps(point.as_ptr());
             let point = _mm256_set_m128(point, point);
             [_mm256_permutevar_ps(point, axes[0]), _mm256_permutevar_ps(point, axes[1])]
+        }
+        fn lookup(table: Self::F, indices: Self::U) -> Self::F {
+            [lookup_half(table, indices[0]), lookup_half(table, indices[1])]
         }
         fn splat_u(x: u32) -> Self::U { [_mm256_set1_epi32(x as i32); 2] }
         fn load_u(from: &[u32; LANES]) -> Self::U {
