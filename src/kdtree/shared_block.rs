@@ -143,3 +143,112 @@ impl LeafBlock for SharedBlock {
         resolve(s, mask, &[ax, ay, az], &[bx, by, bz], &[cx, cy, cz], s.splat(ray.sz))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Ray, Shear};
+    use crate::kdtree::blocks::{LeafRay, TriangleBlock};
+    use crate::kdtree::ray::Nearest;
+    use crate::kdtree::simd::{InstructionSet, dispatch};
+    use glam::vec3;
+    use proptest::prelude::*;
+
+    /// Triangles over few places, some of which differ in the sign of a zero only.
+    fn triangles() -> impl Strategy<Value = Vec<[Vec3; 3]>> {
+        (2usize..60, any::<u64>(), 1usize..70).prop_map(|(n_places, seed, n_triangles)| {
+            let mut state = seed;
+            let mut next = move || {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 33) as u32
+            };
+            let mut number = || [0.0, -0.0, 1.0, next() as f32 / 1e9 - 1.0][next() as usize % 4];
+            let places: Vec<Vec3> = (0..n_places).map(|_| vec3(number(), number(), number())).collect();
+            (0..n_triangles).map(|_| [0; 3].map(|_| places[next() as usize % n_places])).collect()
+        })
+    }
+
+    fn bits(triangle: [Vec3; 3]) -> [[u32; 3]; 3] {
+        triangle.map(|vertex| vertex.to_array().map(f32::to_bits))
+    }
+
+    type Answer = Vec<Option<(u32, [u32; 3])>>;
+
+    #[inline(always)]
+    fn nearest_of<S: Simd, B: LeafBlock<Ray = ShearedRay>>(s: S, blocks: &[B], ray: &Ray) -> Option<(u32, [u32; 3])> {
+        let sheared = ShearedRay::new(ray, &Shear::new(ray.dir));
+        let mut nearest = Nearest::before(f32::INFINITY);
+        for block in blocks {
+            B::test(s, block, &sheared, &mut nearest);
+        }
+        nearest.found.then(|| (nearest.prim, [nearest.t, nearest.u, nearest.v].map(f32::to_bits)))
+    }
+
+    #[inline(always)]
+    fn test_both<S: Simd>(s: S, shared: &[SharedBlock], plain: &[TriangleBlock], rays: &[Ray], out: &mut [Answer; 2]) {
+        for ray in rays {
+            out[0].push(nearest_of(s, shared, ray));
+            out[1].push(nearest_of(s, plain, ray));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(crate::geometry::robust::fixed_cases(400))]
+
+        #[test]
+        fn every_corner_keeps_its_bits_and_its_place(triangles in triangles()) {
+            let prims: Vec<u32> = (0..triangles.len() as u32).map(|prim| 3 * prim + 1).collect();
+            let blocks = SharedBlock::pack(&prims, |prim| triangles[prim as usize / 3]);
+            let mut unpacked = Vec::new();
+            for block in &blocks {
+                for lane in 0..block.prims.len() {
+                    let corner = |corner| Vec3::from_array(block.corner(lane, corner));
+                    unpacked.push((block.prims.get(lane), bits([corner(0), corner(1), corner(2)])));
+                }
+            }
+            let expected: Vec<_> = prims.iter().map(|&prim| (prim, bits(triangles[prim as usize / 3]))).collect();
+            prop_assert_eq!(unpacked, expected);
+            // With all vertices in one block, nothing but the number of triangles ends it.
+            let mut places: Vec<_> = triangles.iter().flat_map(|triangle| bits(*triangle)).collect();
+            places.sort_unstable();
+            places.dedup();
+            if places.len() <= BLOCK {
+                prop_assert_eq!(blocks.len(), prims.len().div_ceil(BLOCK));
+            }
+        }
+
+        #[test]
+        fn hits_are_those_of_plain_blocks(triangles in triangles(), aims in proptest::array::uniform8(-1.0f32..1.0)) {
+            let prims: Vec<u32> = (0..triangles.len() as u32).collect();
+            let triangle = |prim: u32| triangles[prim as usize];
+            let shared = &SharedBlock::pack(&prims, triangle)[..];
+            let plain: Vec<_> = prims.chunks(BLOCK).map(|prims| TriangleBlock::new(prims, triangle)).collect();
+            let plain = &plain[..];
+            // Into the middle of a triangle, or past all of them; some down an axis.
+            let rays: Vec<Ray> = (0..32)
+                .map(|i| {
+                    let origin = vec3(2.0, -1.5, 3.0) * aims[i % 8];
+                    let to = triangles[i % triangles.len()].iter().sum::<Vec3>() / 3.0 - origin;
+                    let dir = if i % 5 == 0 { vec3(0.0, 0.0, to.z) } else { to };
+                    Ray::new(origin, if dir == Vec3::ZERO { Vec3::X } else { dir })
+                })
+                .collect();
+            let rays = &rays[..];
+            for set in InstructionSet::available() {
+                let mut answers: [Answer; 2] = Default::default();
+                let out = &mut answers;
+                dispatch!(set, test_both(shared: &[SharedBlock], plain: &[TriangleBlock], rays: &[Ray], out: &mut [Answer; 2]));
+                prop_assert_eq!(&answers[0], &answers[1], "{:?}", set);
+            }
+        }
+    }
+
+    #[test]
+    fn a_leaf_without_shared_vertices_is_not_packed() {
+        let apart = |prim: u32| [0.0, 1.0, 2.0].map(|x| Vec3::splat(3.0 * prim as f32 + x));
+        let fan = |prim: u32| [Vec3::ZERO, Vec3::splat(prim as f32 + 1.0), Vec3::splat(prim as f32 + 2.0)];
+        let prims: Vec<u32> = (0..14).collect();
+        assert!(SharedBlock::pack_if_small(&prims, apart).is_empty());
+        assert_eq!(SharedBlock::pack_if_small(&prims, fan).len(), 1);
+    }
+}
