@@ -81,7 +81,9 @@ fn picture_of(scene: &Path) -> (image::Rgb32FImage, String) {
     let output = program.arg("render").arg(scene).args(["--spp", "4", "-o"]).arg(&picture).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
-    (image::open(picture).unwrap().into_rgb32f(), said)
+    // The last line is the result.
+    let warnings = said.lines().filter(|line| !line.starts_with(&*picture.to_string_lossy())).collect();
+    (image::open(picture).unwrap().into_rgb32f(), warnings)
 }
 
 fn has_python() -> bool {
