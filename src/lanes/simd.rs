@@ -501,7 +501,7 @@ mod tests {
                 s.neg_mul_add(a, b, c),
                 s.select(0x5A3C, a, b),
                 s.pick(&[1.0, 2.0, 3.0, 4.0], s.load_u(&std::array::from_fn(|i| i as u32 % 3))),
-                s.lookup(a, s.load_u(&std::array::from_fn(|i| (i * 11 + shift) as u32 % 16 | (i as u32) << 4))),
+                s.lookup(a, s.load_u(&std::array::from_fn(|i| (i * 11 + shift) as u32 % 16 + 16 * i as u32))),
                 s.splat(numbers[shift]),
                 s.sqrt(a),
                 s.to_f(s.to_bits(a)),

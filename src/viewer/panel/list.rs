@@ -38,6 +38,8 @@ const ROWS: f32 = 10.0;
 /// From so many on, a field for words is worth its place.
 const MANY: usize = 9;
 const GRIP: f32 = 7.0;
+/// What the bar that floats over a long list covers.
+const SCROLL_BAR: f32 = 9.0;
 
 /// Shows `items`; `row` fills a row.
 pub fn list<T: Listed>(
@@ -97,6 +99,9 @@ pub fn list<T: Listed>(
                 ui.push_id(i, |ui| {
                     ui.horizontal(|ui| {
                         ui.set_height(text);
+                        if all > height {
+                            ui.set_max_width(ui.available_width() - SCROLL_BAR);
+                        }
                         row(ui, &items[i]);
                     });
                 });
