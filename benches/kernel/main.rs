@@ -1,7 +1,7 @@
 //! How fast the ray kernel is, and how fast others are on the same rays.
 //!
 //! ```text
-//! cargo bench --bench kernel -- [FILTER] [--class NAME] [--rounds N] [--quick] [--small] [--crowd]
+//! cargo bench --bench kernel -- [FILTER] [--class NAME] [--size N] [--rounds N] [--quick] [--small] [--crowd]
 //! ```
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
@@ -34,12 +34,15 @@ struct Options {
     filter: String,
     /// Of rays; empty for all of them.
     class: String,
+    /// Width and height of the picture that the rays belong to.
+    size: u32,
     rounds: usize,
     preset: BuildPreset,
 }
 
 fn main() {
-    let mut options = Options { filter: String::new(), class: String::new(), rounds: 7, preset: BuildPreset::Best };
+    let mut options =
+        Options { filter: String::new(), class: String::new(), size: 384, rounds: 7, preset: BuildPreset::Best };
     let (mut only_small, mut only_crowd) = (false, false);
     // Builds too run on this thread alone, whose clock is read.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().unwrap();
@@ -52,6 +55,10 @@ fn main() {
             "--small" => only_small = true,
             "--crowd" => only_crowd = true,
             "--class" => options.class = args.next().expect("--class wants a name"),
+            "--size" => {
+                let size: u32 = args.next().and_then(|n| n.parse().ok()).expect("--size wants a number of pixels");
+                options.size = u32::max(size / 8 * 8, 8);
+            }
             "--rounds" => options.rounds = args.next().and_then(|n| n.parse().ok()).expect("--rounds wants a number"),
             filter => options.filter = filter.to_string(),
         }
@@ -101,7 +108,7 @@ fn main() {
         });
         println!();
         let scene = SceneTree::build(vec![Shape::Mesh { tree: tree.clone(), world_from_object: Affine3A::IDENTITY }]);
-        for set in rays::classes(&scene, &mesh) {
+        for set in rays::classes(&scene, &mesh, options.size) {
             if !options.class.is_empty() && options.class != set.name {
                 continue;
             }

@@ -22,10 +22,8 @@ impl RaySet {
     }
 }
 
-/// Width and height of the picture.
-const SIZE: u32 = 384;
-
-pub fn classes(scene: &SceneTree, mesh: &Mesh) -> Vec<RaySet> {
+/// - `size`: width and height of the picture, a multiple of 8.
+pub fn classes(scene: &SceneTree, mesh: &Mesh, size: u32) -> Vec<RaySet> {
     let bounds = scene.bounds();
     let (center, half) = (bounds.center(), 0.5 * bounds.size());
     let eye = center + half * mesh.eye;
@@ -36,10 +34,10 @@ pub fn classes(scene: &SceneTree, mesh: &Mesh) -> Vec<RaySet> {
     let frame = Frame::around(forward);
     let spread = if inside { 0.6 } else { half.length() / (target - eye).length() };
     let mut random = Random(1);
-    let primary: Vec<Ray> = tiles()
+    let primary: Vec<Ray> = tiles(size)
         .map(|(x, y)| {
-            let sx = (x as f32 + random.unit()) / SIZE as f32 * 2.0 - 1.0;
-            let sy = (y as f32 + random.unit()) / SIZE as f32 * 2.0 - 1.0;
+            let sx = (x as f32 + random.unit()) / size as f32 * 2.0 - 1.0;
+            let sy = (y as f32 + random.unit()) / size as f32 * 2.0 - 1.0;
             Ray::new(eye, (forward + spread * (sx * frame.x + sy * frame.y)).normalize())
         })
         .collect();
@@ -75,10 +73,10 @@ pub fn classes(scene: &SceneTree, mesh: &Mesh) -> Vec<RaySet> {
 }
 
 /// Pixels in tiles of 8 by 8, each as sixteens of 4 by 4.
-pub fn tiles() -> impl Iterator<Item = (u32, u32)> {
-    let tile = |n: u32| (n % (SIZE / 8) * 8, n / (SIZE / 8) * 8);
+pub fn tiles(size: u32) -> impl Iterator<Item = (u32, u32)> {
+    let tile = move |n: u32| (n % (size / 8) * 8, n / (size / 8) * 8);
     let quarter = |n: u32| (n % 2 * 4, n / 2 * 4);
-    (0..SIZE * SIZE).map(move |i| {
+    (0..size * size).map(move |i| {
         let ((tx, ty), (qx, qy)) = (tile(i / 64), quarter(i / 16 % 4));
         (tx + qx + i % 4, ty + qy + i / 4 % 4)
     })

@@ -28,7 +28,7 @@ pub fn run(rounds: usize) {
     let scene = cornell();
     let mut random = Random(3);
     let eye = vec3(0.0, 1.0, 3.4);
-    let primary: Vec<Ray> = tiles()
+    let primary: Vec<Ray> = tiles(384)
         .map(|(x, y)| {
             let at = vec3((x as f32 + random.unit()) / 192.0 - 1.0, (y as f32 + random.unit()) / 192.0, 1.0);
             Ray::new(eye, (at - eye).normalize())
