@@ -79,7 +79,7 @@ fn main() {
     if embree.is_some() {
         println!("figures in ns a ray (x: how many times faster than Embree, one ray at a time)");
     }
-    let mut totals: Vec<(&str, f64, usize)> = Vec::new();
+    let mut totals: Vec<Total> = Vec::new();
     for mesh in meshes::all(&options.filter) {
         let mut build = Vec::new();
         let mut tree = None;
@@ -117,7 +117,7 @@ fn main() {
             let mut occluded = Vec::new();
             #[cfg(unix)]
             let prepared = rival.as_ref().map(|rival| rival.prepare(&set));
-            let (mut own, mut any, mut theirs, mut packets) = (vec![], vec![], vec![], vec![]);
+            let (mut own, mut any, mut theirs, mut their_any, mut packets) = (vec![], vec![], vec![], vec![], vec![]);
             for _ in 0..options.rounds {
                 let per_ray = |seconds: f64| 1e9 * seconds / set.len() as f64;
                 let start = cpu_seconds();
@@ -135,12 +135,15 @@ fn main() {
                 #[cfg(unix)]
                 if let (Some(rival), Some(prepared)) = (&rival, &prepared) {
                     theirs.push(per_ray(rival.trace(prepared)));
+                    their_any.push(per_ray(rival.trace_any(prepared)));
                     packets.push(per_ray(rival.trace_packets(prepared)));
                 }
             }
-            let ratio = median(&mut theirs.iter().zip(&own).map(|(theirs, own)| theirs / own).collect::<Vec<_>>());
-            let packet_ratio =
-                median(&mut theirs.iter().zip(&packets).map(|(theirs, own)| theirs / own).collect::<Vec<_>>());
+            let ratio_of = |theirs: &[f64], own: &[f64]| {
+                median(&mut theirs.iter().zip(own).map(|(theirs, own)| theirs / own).collect::<Vec<_>>())
+            };
+            let (ratio, any_ratio) = (ratio_of(&theirs, &own), ratio_of(&their_any, &any));
+            let packet_ratio = ratio_of(&theirs, &packets);
             let visits = mean_visits(&tree, &set);
             print!(
                 "    {:9} [{:4.1} {:4.2} {:4.2}] closest {:6.1}  any {:6.1}",
@@ -153,24 +156,62 @@ fn main() {
             );
             if !theirs.is_empty() {
                 print!(
-                    "   x{ratio:.2}   embree {:6.1}, packet 16 {:6.1} (x{packet_ratio:.2})",
+                    "   x{ratio:.2}, any x{any_ratio:.2}   embree {:6.1}, any {:6.1}, packet 16 {:6.1} (x{packet_ratio:.2})",
                     median(&mut theirs),
+                    median(&mut their_any),
                     median(&mut packets)
                 );
                 #[cfg(unix)]
                 if let (Some(rival), Some(prepared)) = (&rival, &prepared) {
                     print!("   differ: {}", rival.differences(prepared, &scene, &set));
                 }
-                match totals.iter_mut().find(|total| total.0 == set.name) {
-                    Some(total) => (total.1, total.2) = (total.1 + ratio.ln(), total.2 + 1),
-                    None => totals.push((set.name, ratio.ln(), 1)),
+                let logs = [ratio, any_ratio, packet_ratio].map(f64::ln);
+                match totals.iter_mut().find(|total| total.name == set.name) {
+                    Some(total) => total.add(logs, mesh.name == "slivers"),
+                    None => {
+                        let mut total =
+                            Total { name: set.name, logs: [0.0; 3], n: 0, without_slivers: [0.0; 3], n_without: 0 };
+                        total.add(logs, mesh.name == "slivers");
+                        totals.push(total);
+                    }
                 }
             }
             println!();
         }
     }
-    for (name, sum, count) in totals {
-        println!("geometric mean over {count} meshes, {name}: x{:.2}", (sum / count as f64).exp());
+    for total in totals {
+        total.print();
+    }
+}
+
+/// Logarithms of a ray class's ratios to Embree's single rays, summed over meshes: closest hit, any hit, and Embree's packets.
+struct Total {
+    name: &'static str,
+    logs: [f64; 3],
+    n: usize,
+    without_slivers: [f64; 3],
+    n_without: usize,
+}
+
+impl Total {
+    fn add(&mut self, logs: [f64; 3], are_slivers: bool) {
+        (0..3).for_each(|i| self.logs[i] += logs[i]);
+        self.n += 1;
+        if !are_slivers {
+            (0..3).for_each(|i| self.without_slivers[i] += logs[i]);
+            self.n_without += 1;
+        }
+    }
+
+    fn print(&self) {
+        let mean = |logs: [f64; 3], n: usize| logs.map(|log| format!("x{:.2}", (log / n as f64).exp())).join(" ");
+        println!(
+            "geometric means, {:9} closest, any, Embree's packets: {} over {} meshes, {} without slivers",
+            self.name,
+            mean(self.logs, self.n),
+            self.n,
+            mean(self.without_slivers, self.n_without)
+        );
     }
 }
 

@@ -4,6 +4,7 @@
 
 use super::simd::{LANES, Mask, Simd};
 use crate::geometry::{TINY_EDGE, tiny_edges};
+use glam::Affine3A;
 
 /// Vertices in the ray's sheared frame: across, across, along.
 pub(super) type Sheared<S> = [<S as crate::lanes::Simd>::F; 3];
@@ -177,4 +178,30 @@ fn resolve_tiny<S: Simd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&She
         edges[k] = s.load(&stored[k]);
     }
     hit
+}
+
+/// Origins and directions in the space of an object.
+#[inline(always)]
+pub(super) fn to_own_space<S: Simd>(s: S, map: &Affine3A, origin: &[S::F; 3], dir: &[S::F; 3]) -> [[S::F; 3]; 2] {
+    let turned = transform(s, map, origin);
+    let origin = [
+        s.add(turned[0], s.splat(map.translation[0])),
+        s.add(turned[1], s.splat(map.translation[1])),
+        s.add(turned[2], s.splat(map.translation[2])),
+    ];
+    [origin, transform(s, map, dir)]
+}
+
+/// As `scene_tree::transform_vector`, rounding for rounding.
+#[inline(always)]
+fn transform<S: Simd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
+    [transform_row(s, map, 0, v), transform_row(s, map, 1, v), transform_row(s, map, 2, v)]
+}
+
+#[inline(always)]
+fn transform_row<S: Simd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S::F {
+    let x = s.mul(s.splat(map.matrix3.x_axis[row]), v[0]);
+    let y = s.mul(s.splat(map.matrix3.y_axis[row]), v[1]);
+    let z = s.mul(s.splat(map.matrix3.z_axis[row]), v[2]);
+    s.add(s.add(x, y), z)
 }

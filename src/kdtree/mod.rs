@@ -8,6 +8,7 @@ mod batch;
 mod block_tree;
 mod blocks;
 mod build;
+mod gate;
 mod instance_tree;
 mod lanes;
 mod loose;

@@ -7,25 +7,31 @@
 //! Start reading at [`run`].
 
 use super::block_tree::BlockTree;
-use super::blocks::{LeafBlock, LeafRay};
-use super::ray::{Nearest, TreeRay};
+use super::blocks::{LeafBlock, LeafRay, PreciseRay, ShearedRay};
+use super::gate::Gate;
+use super::ray::Nearest;
 use super::simd::Simd;
 use super::wide::{DescentRay, LEAF, Stack};
-use crate::geometry::{Ray, Shear};
+use crate::geometry::Ray;
+use glam::Affine3A;
 
-/// Rays in flight.
-const SLOTS: usize = 32;
+/// Rays in flight. With half as many some of the waiting shows, with twice as many they no longer fit the nearest cache.
+const SLOTS: usize = 64;
 
-/// Where the stream gets its rays, in the tree's own space, and leaves what they hit.
+/// Where the stream gets its rays, and leaves what they hit.
 pub(super) trait Source {
+    /// No fewer than the rays that are left.
+    fn left(&self) -> usize;
     /// The next ray, what it hit before, and a number that `finish` gets back.
     fn next(&mut self) -> Option<(Ray, Nearest, u32)>;
-    /// `nearest.found` says whether this tree has something nearer.
+    /// From the space of the rays to the tree's own; `None` if they are the same.
+    fn own_from_world(&self) -> Option<&Affine3A>;
+    /// For rays that met the tree's bounds; `nearest.found` says whether it has something nearer.
     fn finish(&mut self, ray: u32, nearest: &Nearest);
 }
 
 #[derive(Clone, Copy)]
-struct Slot<R> {
+pub(super) struct Slot<R> {
     descent: DescentRay,
     leaf: R,
     nearest: Nearest,
@@ -64,18 +70,41 @@ impl List {
     }
 }
 
-/// What waits to be visited by each ray in flight. Made once for many streams, for clearing it takes longer than tracing
-/// a few rays.
-pub(super) struct Stacks([Stack; SLOTS]);
+/// Room for the rays in flight and for what waits to be visited by each of them. Made once for many streams, for clearing it takes
+/// longer than tracing a few rays.
+pub(super) struct Flight {
+    stacks: Box<[Stack]>,
+    sheared: Box<[Slot<ShearedRay>]>,
+    precise: Box<[Slot<PreciseRay>]>,
+}
 
-impl Stacks {
-    #[inline(always)]
+impl Flight {
     pub fn new() -> Self {
-        let mut stacks = [Stack::NEW; SLOTS];
+        let mut stacks: Box<[Stack]> = (0..SLOTS).map(|_| Stack::NEW).collect();
         for stack in &mut stacks {
             (stack.child[0], stack.t0[0]) = (DONE, f32::NEG_INFINITY);
         }
-        Self(stacks)
+        Self { stacks, sheared: vec![Slot::IDLE; SLOTS].into(), precise: vec![Slot::IDLE; SLOTS].into() }
+    }
+}
+
+/// A ray that may be in flight.
+pub(super) trait FlyingRay: LeafRay {
+    /// All of them idle, as a stream leaves them.
+    fn slots<'a>(sheared: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>];
+}
+
+impl FlyingRay for ShearedRay {
+    #[inline(always)]
+    fn slots<'a>(sheared: &'a mut [Slot<Self>], _: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>] {
+        sheared
+    }
+}
+
+impl FlyingRay for PreciseRay {
+    #[inline(always)]
+    fn slots<'a>(_: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<Self>]) -> &'a mut [Slot<Self>] {
+        precise
     }
 }
 
@@ -85,14 +114,21 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     source: &mut impl Source,
-    stacks: &mut Stacks,
-) {
+    flight: &mut Flight,
+) where
+    B::Ray: FlyingRay,
+{
     let wide = &tree.wide[..];
+    if wide.is_empty() {
+        return;
+    }
     let prefetch = tree.is_large();
-    let stacks = &mut stacks.0;
-    let mut slots: [Slot<B::Ray>; SLOTS] = [Slot::idle(B::Ray::IDLE); SLOTS];
+    let stacks: &mut [Stack; SLOTS] = (&mut *flight.stacks).try_into().expect("one for each slot");
+    let slots = B::Ray::slots(&mut flight.sheared, &mut flight.precise);
+    let slots: &mut [Slot<B::Ray>; SLOTS] = slots.try_into().expect("as many as there are");
     let (mut inner, mut leaf, mut idle) = (List::NEW, List::NEW, List::NEW);
-    (0..SLOTS as u8).for_each(|i| idle.push_if(true, i));
+    (0..usize::min(source.left(), SLOTS)).for_each(|i| idle.push_if(true, i as u8));
+    let mut gate = Gate::new();
     loop {
         let (list, len) = idle.take();
         for &i in &list[..len] {
@@ -100,7 +136,7 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
             if slot.is_busy {
                 source.finish(slot.id, &slot.nearest);
             }
-            slot.is_busy = refill(tree, slot, source);
+            slot.is_busy = refill(s, tree, slot, &mut gate, source);
             inner.push_if(slot.is_busy, i);
         }
         if inner.len + leaf.len == 0 {
@@ -152,44 +188,41 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
 
 /// Starts the next ray that meets the bounds; false if there are no more.
 #[inline(always)]
-fn refill<B: LeafBlock>(tree: &BlockTree<B>, slot: &mut Slot<B::Ray>, source: &mut impl Source) -> bool {
-    while let Some((ray, nearest, id)) = source.next() {
-        let shear = Shear::new(ray.dir);
-        let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, tree.extent);
-        let (t0, t1) = tree_ray.clip(&tree.nodes.bounds, nearest.t);
-        if t0 <= t1 && !tree.wide.is_empty() {
-            *slot = Slot {
-                descent: DescentRay::new(tree_ray.origin, tree_ray.inv_lo, tree_ray.inv_hi, tree_ray.slack),
-                leaf: B::Ray::new(&ray, &shear),
-                nearest,
-                id,
-                is_busy: true,
-                height: 1,
-                child: 0,
-                t0,
-                t1,
-            };
-            return true;
-        }
-        source.finish(id, &nearest);
-    }
-    false
+fn refill<S: Simd, B: LeafBlock>(
+    s: S,
+    tree: &BlockTree<B>,
+    slot: &mut Slot<B::Ray>,
+    gate: &mut Gate,
+    source: &mut impl Source,
+) -> bool {
+    let Some(lane) = gate.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
+    let (t0, t1) = gate.within(lane);
+    *slot = Slot {
+        descent: gate.descent(lane),
+        leaf: gate.leaf(lane),
+        nearest: gate.nearest(lane),
+        id: gate.id(lane),
+        is_busy: true,
+        height: 1,
+        child: 0,
+        t0,
+        t1,
+    };
+    true
 }
 
-impl<R> Slot<R> {
-    const fn idle(leaf: R) -> Self {
-        Self {
-            descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0 },
-            leaf,
-            nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
-            id: 0,
-            is_busy: false,
-            height: 1,
-            child: 0,
-            t0: 0.0,
-            t1: 0.0,
-        }
-    }
+impl<R: LeafRay> Slot<R> {
+    const IDLE: Self = Self {
+        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0 },
+        leaf: R::IDLE,
+        nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
+        id: 0,
+        is_busy: false,
+        height: 1,
+        child: 0,
+        t0: 0.0,
+        t1: 0.0,
+    };
 
     /// Takes the nearest entry that can still matter; the last of all is [`DONE`].
     #[inline(always)]

@@ -9,16 +9,18 @@ use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
 use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
 use super::instance_tree::{Entry, InstanceTree, Recent};
+use super::lanes::to_own_space;
 use super::loose::LooseTrees;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
 use super::objects::{Packet, SimpleObjects};
 use super::ray::Nearest;
 use super::scene_tree::{RayClass, SceneTree, Shape};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
-use super::stream::{self, Source, Stacks};
+use super::stream::{self, Flight, Source};
 use super::surface::Instance;
 use crate::geometry::Ray;
 use glam::Affine3A;
+use std::cell::RefCell;
 
 /// Rays that are taken through all objects before the next ones start.
 const CHUNK: usize = 2048;
@@ -116,7 +118,7 @@ trait Answers {
     fn packets(&mut self, set: InstructionSet, packets: &Packets);
 
     /// [`stream`] by the instructions of `set`.
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks);
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut Flight);
 }
 
 impl Answers for HitBatch {
@@ -142,9 +144,9 @@ impl Answers for HitBatch {
         dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut Flight) {
         let answers = self;
-        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, stacks: &mut Stacks));
+        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut Flight));
     }
 }
 
@@ -172,9 +174,9 @@ impl Answers for [bool] {
         dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, stacks: &mut Stacks) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut Flight) {
         let answers = self;
-        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], stacks: &mut Stacks));
+        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut Flight));
     }
 }
 
@@ -186,8 +188,28 @@ fn trace<A: Answers + ?Sized>(
     class: RayClass,
     answers: &mut A,
 ) {
-    let mut stacks = Stacks::new();
-    let mut rounds = Rounds::default();
+    ROOM.with_borrow_mut(|room| trace_in(room, set, (top, scene), (rays, class), answers));
+}
+
+/// What tracing a batch takes besides it, kept from one to the next.
+struct Room {
+    flight: Flight,
+    rounds: Rounds,
+    all: Vec<u32>,
+}
+
+thread_local! {
+    static ROOM: RefCell<Room> =
+        RefCell::new(Room { flight: Flight::new(), rounds: Rounds::default(), all: Vec::new() });
+}
+
+fn trace_in<A: Answers + ?Sized>(
+    Room { flight, rounds, all }: &mut Room,
+    set: InstructionSet,
+    (top, scene): (&TopLevel, &SceneTree),
+    (rays, class): (&RayBatch, RayClass),
+    answers: &mut A,
+) {
     let (few, chunk) = match &top.instances {
         Instances::Few(few) => (&few[..], CHUNK),
         Instances::Many(_) => (&[][..], LARGE_CHUNK),
@@ -198,27 +220,28 @@ fn trace<A: Answers + ?Sized>(
         _ => false,
     };
     let (in_packets, streamed): (Vec<u32>, Vec<u32>) = few.iter().partition(|object| goes_in_packets(object));
-    let all: Vec<u32> = (0..rays.len() as u32).collect();
+    all.clear();
+    all.extend(0..rays.len() as u32);
     for queue in all.chunks(chunk) {
         answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, queue });
         let own =
             |instance: Option<u32>| Rays { rays, queue, instance: instance.map(|i| (i, &scene.instances[i as usize])) };
         if let Some(tree) = &top.loose.spheres {
-            answers.stream(set, StreamTree::Spheres(tree), own(None), &mut stacks);
+            answers.stream(set, StreamTree::Spheres(tree), own(None), flight);
         }
         if let Some(tree) = &top.loose.quads {
-            answers.stream(set, StreamTree::Quads(tree), own(None), &mut stacks);
+            answers.stream(set, StreamTree::Quads(tree), own(None), flight);
         }
         if let Some(tree) = &top.loose.triangles {
-            answers.stream(set, StreamTree::Triangles(tree), own(None), &mut stacks);
+            answers.stream(set, StreamTree::Triangles(tree), own(None), flight);
         }
         for &object in &streamed {
             if let Some(tree) = tree_of(scene, object) {
-                answers.stream(set, tree, own(Some(object)), &mut stacks);
+                answers.stream(set, tree, own(Some(object)), flight);
             }
         }
         if let Instances::Many(tree) = &top.instances {
-            rounds.trace(set, tree, scene, rays, answers, queue, &mut stacks);
+            rounds.trace(set, tree, scene, rays, answers, queue, flight);
         }
     }
 }
@@ -270,7 +293,7 @@ fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &
                     trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
                 }
                 Shape::Spheres { tree, .. } => {
-                    let [origin, dir] = own_rays(s, instance, &packet);
+                    let [origin, dir] = to_own_space(s, &instance.object_from_world, &packet.origin, &packet.dir);
                     packet.test_cloud::<ANY>(s, tree, object, &origin, &dir);
                 }
                 _ => {}
@@ -278,33 +301,6 @@ fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &
         }
         answers.store(s, &packet, first);
     }
-}
-
-/// As `scene_tree::transform_vector`, rounding for rounding.
-#[inline(always)]
-fn transform<S: Simd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
-    [transform_row(s, map, 0, v), transform_row(s, map, 1, v), transform_row(s, map, 2, v)]
-}
-
-#[inline(always)]
-fn transform_row<S: Simd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S::F {
-    let x = s.mul(s.splat(map.matrix3.x_axis[row]), v[0]);
-    let y = s.mul(s.splat(map.matrix3.y_axis[row]), v[1]);
-    let z = s.mul(s.splat(map.matrix3.z_axis[row]), v[2]);
-    s.add(s.add(x, y), z)
-}
-
-/// Origins and directions in the space of an instance.
-#[inline(always)]
-fn own_rays<S: Simd>(s: S, instance: &Instance, packet: &Packet<S>) -> [[S::F; 3]; 2] {
-    let map = &instance.object_from_world;
-    let turned = transform(s, map, &packet.origin);
-    let origin = [
-        s.add(turned[0], s.splat(map.translation[0])),
-        s.add(turned[1], s.splat(map.translation[1])),
-        s.add(turned[2], s.splat(map.translation[2])),
-    ];
-    [origin, transform(s, map, &packet.dir)]
 }
 
 /// Takes a packet through one mesh or cloud of balls.
@@ -321,7 +317,7 @@ fn trace_packet<S: Simd, B: PacketBlock, const ANY: bool>(
     if lanes == 0 {
         return;
     }
-    let [origin, dir] = own_rays(s, instance, packet);
+    let [origin, dir] = to_own_space(s, &instance.object_from_world, &packet.origin, &packet.dir);
     let mut nearest = NearestLanes { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], prim: [0; LANES], found: 0 };
     s.store(packet.t, &mut nearest.t);
     // At equal distance the lower object wins, whatever its primitive.
@@ -340,13 +336,13 @@ fn trace_packet<S: Simd, B: PacketBlock, const ANY: bool>(
 }
 
 #[inline(always)]
-fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, stacks: &mut Stacks) {
-    run_stream::<S, HitBatch, false>(s, tree, rays, answers, stacks);
+fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut Flight) {
+    run_stream::<S, HitBatch, false>(s, tree, rays, answers, flight);
 }
 
 #[inline(always)]
-fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], stacks: &mut Stacks) {
-    run_stream::<S, [bool], true>(s, tree, rays, answers, stacks);
+fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut Flight) {
+    run_stream::<S, [bool], true>(s, tree, rays, answers, flight);
 }
 
 #[inline(always)]
@@ -355,13 +351,13 @@ fn run_stream<S: Simd, A: Answers + ?Sized, const ANY: bool>(
     tree: StreamTree,
     rays: Rays,
     answers: &mut A,
-    stacks: &mut Stacks,
+    flight: &mut Flight,
 ) {
     let mut source = Queue { rays, answers };
     match tree {
-        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
-        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
-        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, stacks),
+        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, flight),
+        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, flight),
+        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, flight),
     }
 }
 
@@ -381,6 +377,11 @@ struct Queue<'a, A: ?Sized> {
 
 impl<A: Answers + ?Sized> Source for Queue<'_, A> {
     #[inline(always)]
+    fn left(&self) -> usize {
+        self.rays.queue.len()
+    }
+
+    #[inline(always)]
     fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
         loop {
             let (&i, queue) = self.rays.queue.split_first()?;
@@ -389,13 +390,18 @@ impl<A: Answers + ?Sized> Source for Queue<'_, A> {
             let Some((t, so_far)) = self.answers.so_far(i as usize, ray.t_max) else { continue };
             let mut nearest = Nearest::before(t);
             // At equal distance the lower object wins, whatever its primitive.
-            let Some((object, instance)) = self.rays.instance else {
+            let Some((object, _)) = self.rays.instance else {
                 nearest.prim = so_far.unwrap_or(0);
                 return Some((ray, nearest, i));
             };
             nearest.prim = if so_far.is_some_and(|other| object < other) { u32::MAX } else { 0 };
-            return Some((instance.ray(&ray), nearest, i));
+            return Some((ray, nearest, i));
         }
+    }
+
+    #[inline(always)]
+    fn own_from_world(&self) -> Option<&Affine3A> {
+        self.rays.instance.map(|(_, instance)| &instance.object_from_world)
     }
 
     #[inline(always)]
@@ -459,7 +465,7 @@ impl Rounds {
         rays: &RayBatch,
         answers: &mut A,
         queue: &[u32],
-        stacks: &mut Stacks,
+        flight: &mut Flight,
     ) {
         self.entries.clear();
         self.pending.clear();
@@ -485,7 +491,7 @@ impl Rounds {
                 let object = wish[0].0;
                 let instance = Some((object, &scene.instances[object as usize]));
                 if let Some(tree) = tree_of(scene, object) {
-                    answers.stream(set, tree, Rays { rays, queue: &self.together, instance }, stacks);
+                    answers.stream(set, tree, Rays { rays, queue: &self.together, instance }, flight);
                 }
             }
         }
