@@ -240,7 +240,7 @@ fn interval<S: Simd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
 }
 
 impl<S: Simd> MeshPacket<S> {
-    /// Finds the nearest hits; with `ANY` a ray ends at its first hit.
+    /// Finds the nearest hits; with `ANY` a ray ends at its first hit, and looks for it from its far end as in streams.
     #[inline(always)]
     pub fn trace<B: PacketBlock, const ANY: bool>(&mut self, s: S, tree: &BlockTree<B>, stack: &mut PacketStack<S>) {
         let frame = B::frame(s, self);
@@ -320,14 +320,17 @@ impl<S: Simd> MeshPacket<S> {
                     let down = (octant >> axis & 1) as u32;
                     let (near, far) = (first_child + down, first_child + 1 - down);
                     let (near_mask, far_mask) = (mask & !s.lt(hi, t0), mask & !s.lt(t1, lo));
-                    if near_mask == 0 {
-                        (index, mask, t0) = (far, far_mask, s.max(lo, t0));
+                    let near = (near, near_mask, t0, s.min(hi, t1));
+                    let far = (far, far_mask, s.max(lo, t0), t1);
+                    let (first, second) = if ANY { (far, near) } else { (near, far) };
+                    if first.1 == 0 {
+                        (index, mask, t0, t1) = second;
                     } else {
-                        if far_mask != 0 {
-                            stack.0[height % MAX_DEPTH] = (far, far_mask, s.max(lo, t0), t1);
+                        if second.1 != 0 {
+                            stack.0[height % MAX_DEPTH] = second;
                             height += 1;
                         }
-                        (index, mask, t1) = (near, near_mask, s.min(hi, t1));
+                        (index, mask, t0, t1) = first;
                     }
                     if mask != 0 {
                         continue;

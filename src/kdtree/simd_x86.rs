@@ -40,7 +40,8 @@ impl Simd for Avx512 {
             let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(middle, times), bounds);
             let mask = both_halves(octant >> 40);
             let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(bottom, times), bounds);
-            let order = _mm512_srlv_epi32(_mm512_set1_epi32(octant as i32), shifts);
+            let order = node.octants[ray.order & 7];
+            let order = _mm512_srlv_epi32(_mm512_set1_epi32(order as i32), shifts);
             let order_twice = _mm512_ternarylogic_epi32::<0xF8>(upper_half, order, _mm512_set1_epi32(7));
             let bounds = _mm512_permutexvar_ps(order_twice, bounds);
             let first = _mm512_castps512_ps256(bounds);
@@ -111,7 +112,7 @@ impl Simd for Avx2 {
             last = _mm256_min_ps(sides::<0b1111_0000>(lower_t1, root, upper_t1), last);
             last = _mm256_min_ps(sides::<0b1100_1100>(lower_t1, middle, upper_t1), last);
             last = _mm256_min_ps(sides::<0b1010_1010>(lower_t1, bottom, upper_t1), last);
-            let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.octants[ray.octant & 7] as i32), shifts);
+            let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.octants[ray.order & 7] as i32), shifts);
             let first = _mm256_permutevar8x32_ps(first, order);
             let last = _mm256_permutevar8x32_ps(last, order);
             let children = _mm256_permutevar8x32_epi32(_mm256_load_si256(node.children.as_ptr().cast()), order);

@@ -108,7 +108,10 @@ impl FlyingRay for PreciseRay {
     }
 }
 
-/// Traces all rays of the source; with `ANY` a ray ends at its first hit.
+/// Traces all rays of the source; with `ANY` a ray ends at its first hit, and looks for it from its far end.
+///
+/// A ray that leaves a surface first comes past everything around it, and most of that is not in its way. What is, in a room a wall, is as
+/// likely to be found from the other end.
 #[inline(always)]
 pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
     s: S,
@@ -136,7 +139,7 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
             if slot.is_busy {
                 source.finish(slot.id, &slot.nearest);
             }
-            slot.is_busy = refill(s, tree, slot, &mut gate, source);
+            slot.is_busy = refill::<S, B, ANY>(s, tree, slot, &mut gate, source);
             inner.push_if(slot.is_busy, i);
         }
         if inner.len + leaf.len == 0 {
@@ -188,7 +191,7 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
 
 /// Starts the next ray that meets the bounds; false if there are no more.
 #[inline(always)]
-fn refill<S: Simd, B: LeafBlock>(
+fn refill<S: Simd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     slot: &mut Slot<B::Ray>,
@@ -198,7 +201,7 @@ fn refill<S: Simd, B: LeafBlock>(
     let Some(lane) = gate.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
     let (t0, t1) = gate.within(lane);
     *slot = Slot {
-        descent: gate.descent(lane),
+        descent: if ANY { gate.descent(lane).far_first() } else { gate.descent(lane) },
         leaf: gate.leaf(lane),
         nearest: gate.nearest(lane),
         id: gate.id(lane),
@@ -213,7 +216,7 @@ fn refill<S: Simd, B: LeafBlock>(
 
 impl<R: LeafRay> Slot<R> {
     const IDLE: Self = Self {
-        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0 },
+        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0, order: 0 },
         leaf: R::IDLE,
         nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
         id: 0,

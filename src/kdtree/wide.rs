@@ -54,6 +54,8 @@ pub(super) struct DescentRay {
     pub inv: [[f32; 8]; 2],
     pub slack: f32,
     pub octant: usize,
+    /// The octant in whose order children are visited.
+    pub order: usize,
 }
 
 impl DescentRay {
@@ -66,7 +68,14 @@ impl DescentRay {
             [inv_lo[0], inv_lo[1], inv_lo[2], 0.0, 0.0, 0.0, 0.0, 0.0],
             [-inv_hi[0], -inv_hi[1], -inv_hi[2], 0.0, 0.0, 0.0, 0.0, 0.0],
         ];
-        Self { origin, inv, slack, octant: down(0) | down(1) | down(2) }
+        let octant = down(0) | down(1) | down(2);
+        Self { origin, inv, slack, octant, order: octant }
+    }
+
+    /// The same ray, which visits what is farthest first.
+    #[inline(always)]
+    pub fn far_first(self) -> Self {
+        Self { order: self.octant ^ 7, ..self }
     }
 }
 
@@ -150,7 +159,8 @@ fn octant_word(axes: u32, octant: usize) -> u64 {
 
 /// The plain version of [`super::simd::Simd::descend`].
 ///
-/// Pushes the children that the ray meets within `t0..=t1`, farthest first, and returns the new height.
+/// Pushes the children that the ray meets within `t0..=t1`, farthest first (of a ray that goes far first: nearest), and returns the new
+/// height.
 #[inline(always)]
 pub(super) fn descend_plain(
     node: &WideNode,
@@ -160,7 +170,7 @@ pub(super) fn descend_plain(
     stack: &mut Stack,
     mut height: usize,
 ) -> usize {
-    let mut order = node.octants[ray.octant];
+    let mut order = node.octants[ray.order];
     for _ in 0..8 {
         let lane = (order & 7) as usize;
         order >>= 3;
@@ -224,6 +234,7 @@ mod tests {
                 node.children = std::array::from_fn(|c| if next() % 5 == 0 { EMPTY } else { c as u32 * 7 });
                 node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
                 let ray = DescentRay::new(origin, dir.map(|d| 0.999 / d), dir.map(|d| 1.001 / d), 1e-6);
+                let ray = if next() % 2 == 0 { ray } else { ray.far_first() };
                 (node, ray, 0.0, if next() % 2 == 0 { f32::INFINITY } else { 1.5 })
             })
             .collect();
