@@ -36,7 +36,8 @@ pub struct ShowArgs {
     /// Samples per pixel of that picture; as many as when it was recorded when not given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)), requires = "replay")]
     spp: Option<u32>,
-    /// Print at the end how promptly the window reacted and how many paths it traced, as one JSON object.
+    /// Print at the end how promptly the window reacted and how many paths it traced, as one JSON object; until then no
+    /// picture is good enough to rest.
     #[cfg(feature = "viewer")]
     #[arg(long)]
     figures: bool,

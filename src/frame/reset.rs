@@ -207,10 +207,12 @@ fn compare_materials(old: &MaterialInput, new: &MaterialInput, label: &str, chan
 trait Named {
     fn entity(&self) -> Entity;
     fn name(&self) -> Option<&str>;
+    /// What it is called without a name.
+    fn kind(&self) -> &'static str;
 }
 
 macro_rules! named {
-    ($($input:ty),*) => {$(
+    ($($input:ty: $kind:expr),*) => {$(
         impl Named for $input {
             fn entity(&self) -> Entity {
                 self.entity
@@ -219,10 +221,15 @@ macro_rules! named {
             fn name(&self) -> Option<&str> {
                 self.name.as_deref()
             }
+
+            fn kind(&self) -> &'static str {
+                let kind: fn(&Self) -> &'static str = $kind;
+                kind(self)
+            }
         }
     )*};
 }
-named!(ObjectInput, LightInput, MaterialInput);
+named!(ObjectInput: |object| object.shape.kind(), LightInput: |_| "point light", MaterialInput: |_| "material");
 
 /// Finds what came, what went, and what changed; `structure` is the level of coming and going.
 fn compare_lists<T: Named + PartialEq>(
@@ -233,30 +240,30 @@ fn compare_lists<T: Named + PartialEq>(
     differ: impl Fn(&T, &T, &str, &mut Changes),
     changes: &mut Changes,
 ) {
-    let label = |item: &T| match item.name() {
+    // As the lists of the panel call it.
+    let label = |(i, item): (usize, &T)| match item.name() {
         Some(name) => format!("{kind} `{name}`"),
-        None => format!("{kind} {}", item.entity()),
+        None => format!("{} {i}", item.kind()),
     };
     // The usual case, in which everything stands where it stood.
     let same_entities = old.len() == new.len() && old.iter().zip(new).all(|(a, b)| a.entity() == b.entity());
     if same_entities {
-        for (old, new) in old.iter().zip(new).filter(|(old, new)| old != new) {
-            differ(old, new, &label(new), changes);
+        for (i, (old, new)) in old.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new) {
+            differ(old, new, &label((i, new)), changes);
         }
         return;
     }
-    let before: HashMap<Entity, &T> = old.iter().map(|item| (item.entity(), item)).collect();
-    let mut gone: HashMap<Entity, &T> = before.clone();
-    for item in new {
+    let mut gone: HashMap<Entity, (usize, &T)> = old.iter().enumerate().map(|it| (it.1.entity(), it)).collect();
+    for (i, item) in new.iter().enumerate() {
         match gone.remove(&item.entity()) {
-            Some(old) if old != item => differ(old, item, &label(item), changes),
+            Some((_, old)) if old != item => differ(old, item, &label((i, item)), changes),
             Some(_) => {}
-            None => changes.add(structure, format!("{} added", label(item))),
+            None => changes.add(structure, format!("{} added", label((i, item)))),
         }
     }
-    let mut gone: Vec<&T> = gone.into_values().collect();
-    gone.sort_by_key(|item| item.entity());
-    for item in &gone {
+    let mut gone: Vec<(usize, &T)> = gone.into_values().collect();
+    gone.sort_by_key(|(_, item)| item.entity());
+    for &item in &gone {
         changes.add(structure, format!("{} removed", label(item)));
     }
     if gone.is_empty() && old.len() == new.len() {

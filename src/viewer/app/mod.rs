@@ -62,7 +62,7 @@ pub struct ViewerOptions {
     pub folder: PathBuf,
     /// Where to write down what is done.
     pub record: Option<PathBuf>,
-    /// Print at the end how prompt and how fast it was, one JSON object.
+    /// Print at the end how prompt and how fast it was, one JSON object; until then no picture is good enough.
     pub print_figures: bool,
 }
 
@@ -212,7 +212,8 @@ impl App {
             height: options.height,
             threads: options.threads,
             seed: options.seed,
-            target: GOOD_ENOUGH,
+            // What rests after a second cannot be measured.
+            target: if options.print_figures { Target::default() } else { GOOD_ENOUGH },
             yielding: true,
             up: options.up,
             waker: Some(waker.clone()),
