@@ -107,7 +107,10 @@ fn each_component_has_its_level() {
     assert_eq!(stage.cause(), "environment");
 
     assert_eq!(stage.set(ball, |placement: &mut Placement| placement.translation.y = 2.0), [TopTree]);
+    // As the panel calls what has no name, numbered as in its list.
+    assert!(stage.cause().starts_with("sphere ") && stage.cause().ends_with(" moved"), "{}", stage.cause());
     assert_eq!(stage.set(light, |placement: &mut Placement| placement.translation.y = 2.0), [TopTree]);
+    assert_eq!(stage.cause(), "point light 0 moved");
     assert_eq!(stage.set(light, |light: &mut PointLight| light.radius = 0.2), [TopTree]);
     assert_eq!(stage.set(ball, |shape: &mut Shape| *shape = Shape::Sphere { radius: 0.5 }), [TopTree]);
     assert_eq!(stage.set(ball, |slots: &mut MaterialSlots| slots.0 = vec![blue]), [TopTree]);
