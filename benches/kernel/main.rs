@@ -205,13 +205,12 @@ impl Total {
 
     fn print(&self) {
         let mean = |logs: [f64; 3], n: usize| logs.map(|log| format!("x{:.2}", (log / n as f64).exp())).join(" ");
-        println!(
-            "geometric means, {:9} closest, any, Embree's packets: {} over {} meshes, {} without slivers",
-            self.name,
-            mean(self.logs, self.n),
-            self.n,
-            mean(self.without_slivers, self.n_without)
-        );
+        print!("geometric means, {:9} closest, any, Embree's packets: ", self.name);
+        print!("{} over {} meshes", mean(self.logs, self.n), self.n);
+        if self.n_without > 0 && self.n_without < self.n {
+            print!(", {} without slivers", mean(self.without_slivers, self.n_without));
+        }
+        println!();
     }
 }
 

@@ -90,7 +90,7 @@ impl Flight {
 
 /// A ray that may be in flight.
 pub(super) trait FlyingRay: LeafRay {
-    /// All of them idle, as a stream leaves them.
+    /// The slots for rays of this kind.
     fn slots<'a>(sheared: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>];
 }
 
@@ -130,7 +130,11 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
     let slots = B::Ray::slots(&mut flight.sheared, &mut flight.precise);
     let slots: &mut [Slot<B::Ray>; SLOTS] = slots.try_into().expect("as many as there are");
     let (mut inner, mut leaf, mut idle) = (List::NEW, List::NEW, List::NEW);
-    (0..usize::min(source.left(), SLOTS)).for_each(|i| idle.push_if(true, i as u8));
+    for (i, slot) in (0..).zip(slots.iter_mut().take(source.left())) {
+        // A stream that ended by a panic leaves rays of its own behind.
+        slot.is_busy = false;
+        idle.push_if(true, i);
+    }
     let mut gate = Gate::new();
     loop {
         let (list, len) = idle.take();
