@@ -272,6 +272,11 @@ fn advance_tile(
     wave: &mut Wave,
 ) -> PassReport {
     let mut report = PassReport { completed: true, ..PassReport::default() };
+    // Rather than begin what would be dropped: with some hundred tiles left, their first rays alone take milliseconds.
+    if tile.spp < target_spp && stop() {
+        report.completed = false;
+        return report;
+    }
     let n_pixels = tile.n_pixels();
     wave.take_tile(tile.origin, tile.size);
     let mut radiance = std::mem::take(&mut wave.radiance);

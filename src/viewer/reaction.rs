@@ -30,7 +30,9 @@ impl Reaction {
     /// A picture of `generation` is on the window.
     pub fn shown(&mut self, generation: u64, now: Instant) {
         while let Some((_, input)) = self.waiting.pop_front_if(|(wanted, _)| *wanted <= generation) {
-            self.waits.add(now.saturating_duration_since(input));
+            let wait = now.saturating_duration_since(input);
+            tracing::trace!("answered after {:.1} ms", wait.as_secs_f64() * 1e3);
+            self.waits.add(wait);
         }
     }
 
