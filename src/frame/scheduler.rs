@@ -13,13 +13,16 @@ use std::time::Duration;
 /// A film side is divided by one of these.
 const DIVIDERS: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 
-/// A coarse picture must take no longer than this, seconds: with what it takes to notice an input, to end the frame that
-/// is being drawn and to draw the next, new pixels come within two frames of a 60 Hz screen.
+/// New pixels come within two frames of a 60 Hz screen, seconds.
+const REACTION: f64 = 1.0 / 30.0;
+/// A coarse picture must take no longer than this, seconds, where it takes next to nothing to put it on the window.
 const SLOWEST: f64 = 1.0 / 80.0;
-/// A finer one is tried when it would take less than this, seconds.
-const FASTEST: f64 = 1.0 / 160.0;
+/// Nor need it take less than this, however long that takes.
+const QUICKEST: f64 = 1.0 / 200.0;
+/// A finer one is tried when it would take less than this part of what it may.
+const FASTEST: f64 = 0.5;
 /// What a fresh choice aims at: between the two, so that it does not change at once.
-const AIM: f64 = 1.0 / 115.0;
+const AIM: f64 = 0.7;
 
 /// So long after the last restart things are taken to have come to rest, and the picture sharpens. Shorter, and the
 /// resolution would jump between two events of a slow mouse.
@@ -31,7 +34,7 @@ const FIRST_SLICE: f64 = 0.05;
 /// processor that stands in for a graphics card ten milliseconds or more.
 const LAST_SLICE: f64 = 0.5;
 /// Between coarse pictures of one view, the first excepted: more would only keep the next input waiting.
-const COARSE_SLICE: f64 = 0.03;
+const COARSE_SLICE: f64 = 0.05;
 
 /// A picture at full resolution that takes no longer needs no coarser ones on the way, seconds.
 const QUICK: f64 = 0.1;
@@ -40,6 +43,9 @@ const QUICK: f64 = 0.1;
 /// batches of rays, and a picture of which some tiles are a little ahead looks the same.
 const EVEN_UNTIL: u32 = 16;
 const AT_ONCE: u32 = 4;
+
+/// A speed that falls to less than one part in this many is believed at once.
+const ANOTHER_SCENE: f64 = 4.0;
 
 /// Camera paths per second, before anything has been measured.
 const GUESSED_RATE: f64 = 1e6;
@@ -82,6 +88,8 @@ pub struct Scheduler {
     paused: bool,
     /// Camera paths per second.
     rate: Option<f64>,
+    /// Seconds from a finished picture to the moment at which it is on the window, lately.
+    showing: f64,
     /// What coarse pictures use; stays from one restart to the next.
     coarse: u32,
     phase: Phase,
@@ -114,6 +122,7 @@ impl Scheduler {
             target,
             paused: false,
             rate: None,
+            showing: 0.0,
             coarse: 1,
             phase: Phase::Full,
             restarted_at: Duration::ZERO,
@@ -162,6 +171,11 @@ impl Scheduler {
     /// Another number of threads renders at another speed.
     pub fn forget_speed(&mut self) {
         self.rate = None;
+    }
+
+    /// A picture was on the window so long after it was finished.
+    pub fn shown_after(&mut self, wait: Duration) {
+        self.showing += 0.05 * (wait.as_secs_f64() - self.showing);
     }
 
     /// Seconds spent at full resolution since the last restart.
@@ -215,7 +229,9 @@ impl Scheduler {
         // Very short steps measure the start of the threads more than the speed of the rays.
         if report.paths >= 256 && report.seconds > 0.0 {
             let measured = report.paths as f64 / report.seconds;
-            self.rate = Some(self.rate.map_or(measured, |rate| 0.5 * rate + 0.5 * measured));
+            // What is so much slower is another scene, and not a worker that had to wait.
+            let known = self.rate.filter(|rate| measured > rate / ANOTHER_SCENE);
+            self.rate = Some(known.map_or(measured, |rate| 0.5 * rate + 0.5 * measured));
         }
         (self.spp, self.error) = (report.spp, report.error);
         if divider == 1 {
@@ -244,13 +260,20 @@ impl Scheduler {
 
     /// Leaves the coarse divider as it is while its time lies in the band, else takes the finest that fits.
     fn choose_coarse(&mut self) {
+        let slowest = self.slowest();
         let finer = DIVIDERS.iter().rev().find(|&&divider| divider < self.coarse).copied();
-        let too_slow = self.seconds_for(self.coarse) > SLOWEST;
-        let finer_fits = finer.is_some_and(|divider| self.seconds_for(divider) < FASTEST);
+        let too_slow = self.seconds_for(self.coarse) > slowest;
+        let finer_fits = finer.is_some_and(|divider| self.seconds_for(divider) < FASTEST * slowest);
         if too_slow || finer_fits {
-            let coarsest = DIVIDERS[DIVIDERS.len() - 1];
-            self.coarse = DIVIDERS.into_iter().find(|&divider| self.seconds_for(divider) <= AIM).unwrap_or(coarsest);
+            let fits = |divider: &u32| self.seconds_for(*divider) <= AIM * slowest;
+            self.coarse = DIVIDERS.into_iter().find(fits).unwrap_or(DIVIDERS[DIVIDERS.len() - 1]);
         }
+    }
+
+    /// What a coarse picture may take, seconds: an input may come while the picture before is put on the window, and its own
+    /// has to be put there too.
+    fn slowest(&self) -> f64 {
+        (REACTION - 2.0 * self.showing).clamp(QUICKEST, SLOWEST)
     }
 
     fn speed(&self) -> f64 {
@@ -344,6 +367,27 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_window_leaves_less_time_for_the_picture() {
+        for (showing, slowest) in [(0.001, SLOWEST), (0.012, REACTION - 0.024), (0.05, QUICKEST)] {
+            let mut machine = Machine::new(1280, 720, 4e6, Target::default());
+            (0..100).for_each(|_| machine.scheduler.shown_after(Duration::from_secs_f64(showing)));
+            while machine.now < 2.0 {
+                machine.step();
+            }
+            machine.restart();
+            machine.shown.clear();
+            let at = machine.now;
+            machine.step();
+            let (divider, shown) = machine.shown[0];
+            let took = shown - at;
+            assert!(took <= slowest * 1.001, "{showing}: {took} s at 1/{divider}");
+            // As fine as it may be.
+            let finer = DIVIDERS.iter().rev().find(|&&finer| finer < divider).expect("a coarse one");
+            assert!(machine.scheduler.seconds_for(*finer) > AIM * slowest, "{showing}: {took} s at 1/{divider}");
+        }
+    }
+
+    #[test]
     fn a_little_more_or_less_speed_does_not_change_the_resolution() {
         let mut machine = Machine::new(1280, 720, 2e6, Target::default());
         while machine.now < 2.0 {
@@ -353,21 +397,26 @@ mod tests {
         for i in 0..200 {
             // The time a divider takes may wander by a third either way without leaving the band.
             machine.rate = 2e6 * (1.0 + 0.3 * (f64::from(i) * 0.7).sin());
+            // And so may the time that the window takes.
+            let showing = 0.01 * (1.0 + 0.3 * (f64::from(i) * 1.9).sin());
+            machine.scheduler.shown_after(Duration::from_secs_f64(showing));
             machine.restart();
             machine.step();
-            // The first choice was made at a guessed speed.
-            if i >= 10 {
+            // The first choices were made at a guessed speed.
+            if i >= 60 {
                 let first = *first.get_or_insert(machine.scheduler.coarse);
                 assert_eq!(machine.scheduler.coarse, first, "event {i}");
             }
         }
         let first = first.expect("a resolution");
         machine.rate = 2e5;
-        for _ in 0..8 {
-            machine.step();
-            machine.restart();
-        }
+        machine.step();
+        machine.restart();
+        machine.shown.clear();
+        let at = machine.now;
+        machine.step();
         assert!(machine.scheduler.coarse > first, "ten times slower is not a little");
+        assert!(machine.shown[0].1 - at <= SLOWEST, "and believed at once");
     }
 
     #[test]

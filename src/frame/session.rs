@@ -190,10 +190,10 @@ impl Session {
         self.world.resource()
     }
 
-    /// The picture of this generation is on the window. A session that is told holds its workers back until the first
-    /// picture after a change can be seen; one that is never told does not.
-    pub fn note_seen(&self, generation: u64) {
-        self.world.resource::<Renderer>().0.note_seen(generation);
+    /// The picture of this number is on the window. A session that is told holds its workers back until a coarse picture can
+    /// be seen; one that is never told does not.
+    pub fn note_seen(&self, number: u64) {
+        self.world.resource::<Renderer>().0.note_seen(number);
     }
 
     pub fn status(&self) -> &Status {

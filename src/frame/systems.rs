@@ -124,7 +124,6 @@ pub struct Shown {
     /// A scene has taken its place, for this reason.
     pub(super) adopted: Option<String>,
     generation: u64,
-    pictures: u64,
     /// Grows when anything but the camera has been touched.
     revision: u64,
 }
@@ -475,12 +474,11 @@ pub fn present(
     clock: Res<Clock>,
     paused: Res<Paused>,
     mut picture: ResMut<Picture>,
-    mut shown: ResMut<Shown>,
+    shown: ResMut<Shown>,
     mut status: ResMut<Status>,
 ) {
-    if renderer.0.has_picture() && renderer.0.take(&mut picture) {
-        shown.pictures += 1;
-        picture.number = shown.pictures;
+    if renderer.0.has_picture() {
+        renderer.0.take(&mut picture);
     }
     let stats = renderer.0.stats();
     let per_second =

@@ -108,7 +108,7 @@ impl Film {
 
     /// The same without samples, to begin with sample number `first`.
     pub fn starting_at(mut self, first: u32) -> Self {
-        self.clear();
+        self.clear(&|| false);
         for tile in &mut self.tiles {
             tile.ranges = std::iter::once(first..first).collect();
         }
@@ -150,11 +150,19 @@ impl Film {
     }
 
     /// A film like a new one, in the memory of this one: for a large film, memory is what takes time.
-    pub fn clear(&mut self) {
-        self.tiles.par_iter_mut().for_each(FilmTile::clear);
+    ///
+    /// False when `stop` said so: then the film is good for nothing but being cleared again.
+    pub fn clear(&mut self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
         if let Some(layer) = self.light.take() {
             self.idle_light = layer.sums;
         }
+        self.tiles.par_iter_mut().all(|tile| {
+            let goes_on = !stop();
+            if goes_on {
+                tile.clear();
+            }
+            goes_on
+        })
     }
 
     /// Makes room for light from the lamps, if there is none.

@@ -128,7 +128,7 @@ pub fn advance_region(
     let Some(caustics) = &pass.caustics else {
         return advance_tiles(&pass, film, region, target_spp, stop);
     };
-    if !caustics.prepare(stop) {
+    if !caustics.prepare(stop) || stop() {
         return PassReport::default();
     }
     film.want_light();

@@ -5,8 +5,9 @@
 //! A new job raises a flag that the workers look at all the time, so that they drop what they are at within
 //! milliseconds. Every job has a generation; a picture carries the one of its job.
 //!
-//! Here is the near end; `thread` is the far one, and `show` what it hands over.
+//! Here is the near end; `thread` is the far one, `show` what it hands over, and `idle` the memory it keeps.
 
+mod idle;
 mod show;
 mod thread;
 
@@ -164,7 +165,7 @@ struct Shared {
     interrupt: AtomicBool,
     /// The thread waits for a message.
     sleeping: AtomicBool,
-    /// Generation of the newest picture that is on a window; 0 when nobody tells.
+    /// Number of the newest picture that is on a window; 0 when nobody tells.
     seen: AtomicU64,
     outbox: Mutex<Outbox>,
     pool: Mutex<Arc<rayon::ThreadPool>>,
@@ -284,11 +285,11 @@ impl Worker {
         lock(&self.shared.outbox).fresh
     }
 
-    /// The picture of this generation is on the window.
-    pub fn note_seen(&self, generation: u64) {
+    /// The picture of this number is on the window.
+    pub fn note_seen(&self, number: u64) {
         // Under the lock, as with any message; but it is no reason to drop anything.
         let inbox = lock(&self.shared.inbox);
-        self.shared.seen.store(generation, Ordering::Release);
+        self.shared.seen.store(number, Ordering::Release);
         drop(inbox);
         self.shared.arrived.notify_all();
     }

@@ -77,7 +77,8 @@ impl Loop<'_> {
             pool.install(|| tint_sharp_zone(&mut picture.rgba, size, &depths, key.size, zone, camera.focus_distance));
             self.views.depths = Some((key, depths));
         }
-        (picture.width, picture.height) = (width, height);
+        self.n_pictures += 1;
+        (picture.width, picture.height, picture.number) = (width, height, self.n_pictures);
         (picture.inspection, picture.legend) = (self.look.inspection, legend);
         (picture.generation, picture.divider, picture.spp) = (job.generation, *divider, film.spp());
         {

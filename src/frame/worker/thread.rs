@@ -1,5 +1,6 @@
 //! The far end: takes over what has arrived, does the scheduler's next step, hands over, and sleeps.
 
+use super::idle::IdleFilms;
 use super::show::Views;
 use super::{Answer, BESIDE, Job, Look, Question, Shared, Stats, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{Scheduler, Step, StepReport};
@@ -32,15 +33,14 @@ pub struct Loop<'a> {
     pub(super) film: Option<(u32, Film)>,
     /// The film before it, as long as the new one has pixels without a sample.
     pub(super) previous: Option<(u32, Film)>,
-    /// A film at full resolution that is not in use, for its memory.
-    idle_film: Option<Film>,
+    idle: IdleFilms,
     pub(super) stats: Stats,
     /// Developed pictures that are not shared, for their memory.
     pub(super) spare: Picture,
     /// The picture that was shown last is not of these settings.
     pub(super) redraw: bool,
-    /// Generation of which a first picture was let to be seen.
-    let_seen: u64,
+    /// Handed over so far.
+    pub(super) n_pictures: u64,
     /// Who waits for a film worth keeping.
     to_keep: Vec<Sender<Film>>,
 }
@@ -60,11 +60,11 @@ impl<'a> Loop<'a> {
             job: None,
             film: None,
             previous: None,
-            idle_film: None,
+            idle: IdleFilms::default(),
             stats: Stats { asleep: true, ..Stats::default() },
             spare: Picture::default(),
             redraw: false,
-            let_seen: 0,
+            n_pictures: 0,
             to_keep: Vec::new(),
         }
     }
@@ -136,10 +136,13 @@ impl<'a> Loop<'a> {
             self.scheduler.resize(size.0, size.1, self.clock.elapsed());
             let threads = lock(&self.shared.pool).current_num_threads();
             self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
+            let is_as_large = self.job.as_ref().is_some_and(|old| (old.width, old.height) == size);
             self.job = Some(job);
-            let films = [self.film.take(), self.previous.take()];
-            if let Some((_, film)) = films.into_iter().flatten().find(|(divider, _)| *divider == 1) {
-                self.idle_film = Some(film);
+            let films = [self.previous.take(), self.film.take()];
+            if is_as_large {
+                films.into_iter().flatten().for_each(|(_, film)| self.idle.keep(film));
+            } else {
+                self.idle.forget();
             }
             self.redraw = false;
             self.scheduler.set_region(None, 0, None);
@@ -229,10 +232,13 @@ impl<'a> Loop<'a> {
         let Some(job) = &self.job else { return };
         if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
             let size = (job.width.div_ceil(divider), job.height.div_ceil(divider));
-            let idle = if divider == 1 { self.idle_film.take() } else { None };
-            let film = match idle.filter(|film| (film.width(), film.height()) == size) {
+            let film = match self.idle.take(size) {
                 Some(mut film) => {
-                    lock(&self.shared.pool).install(|| film.clear());
+                    let pool = lock(&self.shared.pool).clone();
+                    let stop = || self.shared.interrupt.load(Ordering::Relaxed);
+                    if !pool.install(|| film.clear(&stop)) {
+                        return self.idle.keep(film);
+                    }
                     film
                 }
                 None => match Film::try_new(size.0, size.1) {
@@ -240,8 +246,9 @@ impl<'a> Loop<'a> {
                     Err(error) => return self.give_up(error.to_string()),
                 },
             };
-            if let Some(old) = self.film.replace((divider, film)).filter(|(_, old)| old.spp() > 0) {
-                self.previous = Some(old);
+            match self.film.replace((divider, film)) {
+                Some(old) if old.1.spp() > 0 => self.previous = Some(old),
+                old => old.into_iter().for_each(|(_, film)| self.idle.keep(film)),
             }
             self.stats.n_bad = 0;
             self.stats.bad.clear();
@@ -289,8 +296,8 @@ impl<'a> Loop<'a> {
         let can_be_seen = film.spp() > 0;
         self.is_uneven &= region.is_some() || film.max_spp() > film.spp();
         self.scheduler.finished(step, report, self.clock.elapsed());
-        if can_be_seen {
-            self.previous = None;
+        if can_be_seen && let Some((_, film)) = self.previous.take() {
+            self.idle.keep(film);
         }
         if region.is_none() && self.region.is_some() {
             // From now on there may be one.
@@ -299,26 +306,31 @@ impl<'a> Loop<'a> {
         self.hand_out(false);
         self.answer(false);
         if !replaced && (self.redraw || self.previous.is_none()) {
+            let finished = Instant::now();
             self.show(false);
             if divider > 1 {
-                self.let_it_be_seen();
+                self.let_it_be_seen(finished);
             }
         }
     }
 
-    /// The first picture after a change has the processors to itself until it is on the window: where they have to
-    /// draw that too, more samples for a coarse film would only keep it waiting.
-    fn let_it_be_seen(&mut self) {
-        let generation = self.stats.generation;
+    /// A coarse picture has the processors to itself until it is on the window: where they have to draw that too, more samples
+    /// for a coarse film would only keep it waiting, or the next input.
+    ///
+    /// - `finished`: when its samples were there.
+    fn let_it_be_seen(&mut self, finished: Instant) {
+        let number = self.n_pictures;
         let seen = || self.shared.seen.load(Ordering::Acquire);
-        if self.let_seen == generation || seen() == 0 {
+        if seen() == 0 || seen() >= number {
             return;
         }
-        self.let_seen = generation;
         let inbox = lock(&self.shared.inbox);
-        let waits = |_: &mut _| seen() < generation && !self.shared.interrupt.load(Ordering::Acquire);
+        let waits = |_: &mut _| seen() < number && !self.shared.interrupt.load(Ordering::Acquire);
         // Whether the window drew it in time or not, the next step follows.
         drop(self.shared.arrived.wait_timeout_while(inbox, LONGEST_DRAW, waits));
+        if seen() >= number {
+            self.scheduler.shown_after(finished.elapsed());
+        }
     }
 
     /// Gives the film to who wants to keep it: at full resolution, or as it is if there will be `no_better` one.
@@ -376,6 +388,7 @@ impl<'a> Loop<'a> {
     fn give_up(&mut self, reason: String) {
         self.stats.failure = Some(reason);
         (self.job, self.film, self.previous) = (None, None, None);
+        self.idle.forget();
         lock(&self.shared.outbox).stats = Stats { asleep: true, ..self.stats.clone() };
         self.wake();
     }

@@ -1,6 +1,6 @@
 //! Picture and overlays onto the window.
 
-use super::App;
+use super::{App, LIVELY, SETTLED};
 use crate::frame::{Around, Explaining, Looking, Projector};
 use crate::render::Inspection;
 use crate::viewer::presenter::{PresentError, Presenter};
@@ -81,8 +81,9 @@ impl App {
             }
         })?;
         if !presented.again {
-            let generation = self.session.picture().generation;
-            self.session.note_seen(generation);
+            let picture = self.session.picture();
+            let generation = picture.generation;
+            self.session.note_seen(picture.number);
             self.reaction.shown(generation, Instant::now());
             // A movement may have waited for it.
             self.stirred |= generation > self.seen;
@@ -92,7 +93,9 @@ impl App {
         if presented.again {
             window.request_redraw();
         }
-        let repaint_at = now.checked_add(presented.repaint_after).filter(|_| presented.repaint_after < Duration::MAX);
+        let soonest = if self.has_widgets() { LIVELY } else { SETTLED };
+        let repaint_after = Some(presented.repaint_after.max(soonest)).filter(|wait| *wait < Duration::MAX);
+        let repaint_at = repaint_after.and_then(|wait| now.checked_add(wait));
         let late_at = self.inspected_since.filter(|_| is_late.is_none()).map(|(_, since)| since + SLOW);
         self.repaint_at = repaint_at.into_iter().chain(late_at).min();
         (self.last_draw, self.unseen_since) = (Some(now), None);

@@ -1,7 +1,7 @@
 //! What winit tells: most of it is only noted, and carried out by the next tick.
 
 use super::{App, FRAME, Wake};
-use crate::frame::{Command, Edit, Explaining};
+use crate::frame::{Command, Edit};
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -41,9 +41,7 @@ impl ApplicationHandler<Wake> for App {
         let response = presenter.on_window_event(&event);
         // Overlays take the keyboard only while somebody types into them; they always want Tab, which is ours.
         let typing = presenter.egui_context().wants_keyboard_input();
-        let explains = self.session.world().resource::<Explaining>().story.is_some();
-        let has_widgets = self.help.open || self.overlays && (self.panel.shown || explains);
-        if response.repaint && has_widgets && !self.input.is_dragging() {
+        if response.repaint && self.has_widgets() && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
         self.stirred = true;

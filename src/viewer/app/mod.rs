@@ -30,7 +30,9 @@ use super::reaction::Reaction;
 use super::saver::Saver;
 use super::story::WaysShown;
 use super::toasts::{Toasts, Tone};
-use crate::frame::{Command, Focus, FocusTarget, MessageKind, Session, SessionOptions, Target, Waits, Waker};
+use crate::frame::{
+    Command, Explaining, Focus, FocusTarget, MessageKind, Session, SessionOptions, Target, Waits, Waker,
+};
 use crate::render::Inspection;
 use crate::scene::{SceneSource, UpAxis};
 use memory::Memory;
@@ -92,9 +94,14 @@ pub enum ViewerError {
 struct Wake;
 
 /// Ticks and frames come no faster: more would only cost the workers their processors.
-const FRAME: Duration = Duration::from_micros(8_000);
+const FRAME: Duration = Duration::from_micros(4_000);
 /// So long a movement waits for the picture of the one before it, and overlays for the picture that is to come.
 const LATEST: Duration = Duration::from_millis(250);
+/// Overlays that want to be drawn again wait so long, for after every input they do, and a window that is being drawn answers to
+/// no other. With a new picture they are drawn in any case.
+const SETTLED: Duration = Duration::from_millis(100);
+/// The same while there is something to be moved or pressed.
+const LIVELY: Duration = Duration::from_millis(33);
 /// Figures that change by themselves are shown again so often.
 const FIGURES: Duration = Duration::from_millis(250);
 /// So long after the last change of its size a window has come to rest.
@@ -402,6 +409,12 @@ impl App {
             .into_iter()
             .flatten()
             .min();
+    }
+
+    /// Something on the window answers to the mouse.
+    fn has_widgets(&self) -> bool {
+        let explains = self.session.world().resource::<Explaining>().story.is_some();
+        self.help.open || self.overlays && (self.panel.shown || explains)
     }
 
     /// What is under the mouse is to be sharp, and the mouse is not in the panel.
