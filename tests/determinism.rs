@@ -7,7 +7,7 @@ use firstlight::render::{
     ColorInput, Environment, Film, Fresnel, Integrator, Material, RenderSettings, ScalarInput, Snapshot, advance,
 };
 use glam::Vec3;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 fn busy_scene() -> Snapshot {
     let mut camera = camera(Vec3::new(0.0, 1.5, 5.0), Vec3::new(0.0, 0.5, 0.0), 40.0);
@@ -112,6 +112,10 @@ fn a_cleared_film_is_like_a_new_one() {
     let (mut expected, mut used) = (new(), Film::new(75, 50));
     advance(&scene, &settings, &mut expected, 4, &|| false);
     advance(&scene, &RenderSettings { seed: 9, ..settings }, &mut used, 5, &|| false);
+    // Interrupted first.
+    let asked = AtomicUsize::new(0);
+    let stop = || asked.fetch_add(1, Ordering::Relaxed) >= 1;
+    assert!(!used.clear_unless(&stop) && asked.load(Ordering::Relaxed) > 1);
     used.clear();
     assert_eq!((used.spp(), used.max_spp(), used.mean(40, 30)), (0, 0, Vec3::ZERO));
     assert!(used.error_estimate().is_none());

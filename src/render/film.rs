@@ -108,7 +108,7 @@ impl Film {
 
     /// The same without samples, to begin with sample number `first`.
     pub fn starting_at(mut self, first: u32) -> Self {
-        self.clear(&|| false);
+        self.clear();
         for tile in &mut self.tiles {
             tile.ranges = std::iter::once(first..first).collect();
         }
@@ -150,9 +150,12 @@ impl Film {
     }
 
     /// A film like a new one, in the memory of this one: for a large film, memory is what takes time.
-    ///
-    /// False when `stop` said so: then the film is good for nothing but being cleared again.
-    pub fn clear(&mut self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
+    pub fn clear(&mut self) {
+        self.clear_unless(&|| false);
+    }
+
+    /// The same until `stop` says so. Then it is false, and the film is good for nothing but being cleared again.
+    pub fn clear_unless(&mut self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
         if let Some(layer) = self.light.take() {
             self.idle_light = layer.sums;
         }

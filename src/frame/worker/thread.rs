@@ -236,7 +236,7 @@ impl<'a> Loop<'a> {
                 Some(mut film) => {
                     let pool = lock(&self.shared.pool).clone();
                     let stop = || self.shared.interrupt.load(Ordering::Relaxed);
-                    if !pool.install(|| film.clear(&stop)) {
+                    if !pool.install(|| film.clear_unless(&stop)) {
                         return self.idle.keep(film);
                     }
                     film
