@@ -1,8 +1,9 @@
 //! What to render next, decided without threads and without a clock: it is told the times.
 //!
 //! After a restart comes a coarse picture that is there within a frame, then sharper ones, then samples at full
-//! resolution in slices, so that the picture is shown ten to twenty times a second at first and twice when it has
-//! been converging for some seconds, until the target is reached.
+//! resolution in slices, so that the picture is shown up to twenty times a second at first and twice when it has
+//! been converging for some seconds, until the target is reached. Where it takes long to show a picture, it is shown less
+//! often.
 //! The resolution while things move follows from the measured speed, with a band in which it stays as it is.
 //!
 //! The one who renders asks [`Scheduler::next`], does it, tells [`Scheduler::finished`], and asks again.
@@ -33,6 +34,12 @@ const FIRST_SLICE: f64 = 0.05;
 /// After four and a half seconds, in which half a second changes the error by a twentieth: to draw a picture takes a
 /// processor that stands in for a graphics card ten milliseconds or more.
 const LAST_SLICE: f64 = 0.5;
+/// At least so many times what it takes to show a picture: to develop and draw it takes the processors some one and a half
+/// times as long, where they draw the window too, and that should be less than a tenth of their time.
+const SLICE_OVER_SHOWING: f64 = 20.0;
+/// A picture at full resolution that comes within this part of a slice after another is not shown: what a slice has left
+/// over, when it was cut short by time.
+const TOO_SOON: f64 = 0.5;
 /// Between coarse pictures of one view, the first excepted: more would only keep the next input waiting.
 const COARSE_SLICE: f64 = 0.05;
 
@@ -96,6 +103,8 @@ pub struct Scheduler {
     restarted_at: Duration,
     /// Seconds spent at full resolution since the restart.
     spent: f64,
+    /// When the last picture at full resolution was worth showing, since the restart.
+    pictured_at: Option<Duration>,
     /// Samples that every pixel of the current film has, or of its region.
     spp: u32,
     /// Relative error of the current film, or of its region.
@@ -127,6 +136,7 @@ impl Scheduler {
             phase: Phase::Full,
             restarted_at: Duration::ZERO,
             spent: 0.0,
+            pictured_at: None,
             spp: 0,
             error: None,
             region: None,
@@ -140,7 +150,7 @@ impl Scheduler {
         self.choose_coarse();
         self.phase = if self.coarse == 1 { Phase::Full } else { Phase::Coarse(self.coarse) };
         self.restarted_at = now;
-        (self.spent, self.spp, self.error) = (0.0, 0, None);
+        (self.spent, self.pictured_at, self.spp, self.error) = (0.0, None, 0, None);
     }
 
     /// A restart with another size.
@@ -208,7 +218,7 @@ impl Scheduler {
             Phase::Full => {
                 let n_pixels = self.region.map_or(self.pixels(1), |n| n.max(1) as f64);
                 let left = self.target.seconds.map_or(f64::INFINITY, |seconds| seconds - self.spent);
-                let slice = (FIRST_SLICE + 0.1 * self.spent).min(LAST_SLICE).min(left);
+                let slice = self.slice().min(left);
                 let least = if self.spp < EVEN_UNTIL { 1 } else { AT_ONCE };
                 let passes = (slice * self.speed() / n_pixels).clamp(f64::from(least), 65_536.0) as u32;
                 let goal = self.target.spp.unwrap_or(u32::MAX);
@@ -223,9 +233,10 @@ impl Scheduler {
         }
     }
 
-    /// Takes note of a step that was not cut short by a restart.
-    pub fn finished(&mut self, step: Step, report: StepReport, now: Duration) {
-        let Step::Render { divider, .. } = step else { return };
+    /// Takes note of a step that was not cut short by a restart, and tells whether its picture is worth showing: at full
+    /// resolution not soon after another one.
+    pub fn finished(&mut self, step: Step, report: StepReport, now: Duration) -> bool {
+        let Step::Render { divider, .. } = step else { return false };
         // Very short steps measure the start of the threads more than the speed of the rays.
         if report.paths >= 256 && report.seconds > 0.0 {
             let measured = report.paths as f64 / report.seconds;
@@ -244,6 +255,17 @@ impl Scheduler {
             Phase::Sharpening(divider) if report.spp > 0 => self.sharpen(divider),
             _ => {}
         }
+        let too_soon = Duration::from_secs_f64(TOO_SOON * self.slice());
+        if divider == 1 && self.pictured_at.is_some_and(|before| now.saturating_sub(before) < too_soon) {
+            return false;
+        }
+        self.pictured_at = (divider == 1 && report.spp > 0).then_some(now);
+        true
+    }
+
+    /// Seconds between pictures at full resolution.
+    fn slice(&self) -> f64 {
+        (FIRST_SLICE + 0.1 * self.spent).max(SLICE_OVER_SHOWING * self.showing).min(LAST_SLICE)
     }
 
     /// Whether the target is reached, at full resolution.
@@ -335,8 +357,9 @@ mod tests {
             // Independent samples of standard deviation 1.
             let error = (self.spp > 0).then(|| 1.0 / f64::from(self.spp).sqrt());
             let report = StepReport { paths, seconds, spp: self.spp, error };
-            self.scheduler.finished(step, report, Duration::from_secs_f64(self.now));
-            self.shown.push((divider, self.now));
+            if self.scheduler.finished(step, report, Duration::from_secs_f64(self.now)) {
+                self.shown.push((divider, self.now));
+            }
             true
         }
     }
@@ -436,8 +459,9 @@ mod tests {
 
     #[test]
     fn converging_pictures_are_shown_often_at_first_and_twice_a_second_later() {
-        for (rate, width) in [(3e6, 1280), (2e7, 320)] {
+        for (rate, width, showing) in [(3e6, 1280, 0.002), (2e7, 320, 0.002), (2e7, 320, 0.012), (4e6, 1280, 0.012)] {
             let mut machine = Machine::new(width, 720, rate, Target::default());
+            (0..100).for_each(|_| machine.scheduler.shown_after(Duration::from_secs_f64(showing)));
             while machine.now < 10.0 {
                 machine.step();
             }
@@ -446,7 +470,9 @@ mod tests {
                 shown as f64 / (until - from)
             };
             let (first, later) = (per_second(0.5, 1.0), per_second(5.0, 10.0));
-            assert!((4.0..=20.0).contains(&first), "{rate:e}: {first} pictures a second");
+            // Drawing takes 1.6 times as long as it takes to show: less than a tenth.
+            let most = 20.0_f64.min(0.1 / (1.6 * showing) + 1.0);
+            assert!((2.0..=most).contains(&first), "{rate:e}, {showing}: {first} pictures a second");
             assert!((1.2..=2.3).contains(&later), "{rate:e}: {later} pictures a second");
         }
     }

@@ -44,6 +44,8 @@ pub struct Status {
     pub seconds: f64,
     /// Rays since the restart.
     pub rays: RayCounts,
+    /// Seconds from the restart to the last of these rays, whatever they were spent on.
+    pub elapsed: f64,
     /// Millions of rays a second lately, by class.
     pub camera_mrays: f64,
     pub bounce_mrays: f64,

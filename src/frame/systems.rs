@@ -491,7 +491,7 @@ pub fn present(
     status.spp = stats.spp;
     status.region = stats.region;
     status.seconds = stats.seconds;
-    status.rays = stats.rays;
+    (status.rays, status.elapsed) = (stats.rays, stats.elapsed);
     status.estimated_error = stats.error;
     status.camera_mrays = per_second(stats.recent_rays.camera);
     status.bounce_mrays = per_second(stats.recent_rays.bounce);

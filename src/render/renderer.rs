@@ -159,14 +159,18 @@ fn advance_tiles(
     target_spp: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
-    let reports: Vec<PassReport> = film
+    // One after the other, for whoever is free: divided beforehand, the half with the model in it would be waited for.
+    let mut reports: Vec<(usize, PassReport)> = film
         .tiles
-        .par_iter_mut()
-        .filter(|tile| region.is_none_or(|region| region.has(tile)))
-        .map_init(Wave::default, |wave, tile| advance_tile(pass, tile, target_spp, stop, wave))
+        .iter_mut()
+        .enumerate()
+        .filter(|(_, tile)| region.is_none_or(|region| region.has(tile)))
+        .par_bridge()
+        .map_init(Wave::default, |wave, (i, tile)| (i, advance_tile(pass, tile, target_spp, stop, wave)))
         .collect();
+    reports.sort_unstable_by_key(|(i, _)| *i);
     let mut total = PassReport { completed: true, ..PassReport::default() };
-    for report in reports {
+    for (_, report) in reports {
         total.completed &= report.completed;
         total.add(report);
     }

@@ -91,6 +91,8 @@ pub struct Stats {
     pub recent_seconds: f64,
     /// Since the restart.
     pub rays: RayCounts,
+    /// Seconds from the restart to the last of these rays, whatever they were spent on.
+    pub elapsed: f64,
     pub n_bad: u64,
     pub bad: Vec<BadSample>,
     pub threads: usize,

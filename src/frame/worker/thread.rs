@@ -20,6 +20,8 @@ const LONGEST_DRAW: Duration = Duration::from_millis(33);
 pub struct Loop<'a> {
     pub(super) shared: &'a Shared,
     clock: Instant,
+    /// When the job came.
+    restarted_at: Instant,
     pub(super) scheduler: Scheduler,
     pub(super) display: Display,
     pub(super) look: Look,
@@ -50,6 +52,7 @@ impl<'a> Loop<'a> {
         Self {
             shared,
             clock: Instant::now(),
+            restarted_at: Instant::now(),
             scheduler: Scheduler::new(1, 1, target),
             display: Display::default(),
             look: Look::default(),
@@ -136,6 +139,7 @@ impl<'a> Loop<'a> {
             self.scheduler.resize(size.0, size.1, self.clock.elapsed());
             let threads = lock(&self.shared.pool).current_num_threads();
             self.stats = Stats { generation: job.generation, threads, ..Stats::default() };
+            self.restarted_at = Instant::now();
             let is_as_large = self.job.as_ref().is_some_and(|old| (old.width, old.height) == size);
             self.job = Some(job);
             let films = [self.previous.take(), self.film.take()];
@@ -286,6 +290,7 @@ impl<'a> Loop<'a> {
         stats.recent_seconds += seconds;
         stats.rays += pass.rays;
         stats.seconds += seconds;
+        stats.elapsed = self.restarted_at.elapsed().as_secs_f64();
         stats.n_bad += pass.n_bad;
         stats.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(stats.bad.len())));
         let interrupted = !pass.completed && interrupt.load(Ordering::Relaxed);
@@ -295,7 +300,7 @@ impl<'a> Loop<'a> {
         let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp_in(region.as_ref()), error };
         let can_be_seen = film.spp() > 0;
         self.is_uneven &= region.is_some() || film.max_spp() > film.spp();
-        self.scheduler.finished(step, report, self.clock.elapsed());
+        let is_due = self.scheduler.finished(step, report, self.clock.elapsed());
         if can_be_seen && let Some((_, film)) = self.previous.take() {
             self.idle.keep(film);
         }
@@ -305,7 +310,7 @@ impl<'a> Loop<'a> {
         }
         self.hand_out(false);
         self.answer(false);
-        if !replaced && (self.redraw || self.previous.is_none()) {
+        if !replaced && (self.redraw || (is_due && self.previous.is_none())) {
             let finished = Instant::now();
             self.show(false);
             if divider > 1 {

@@ -200,10 +200,6 @@ struct App {
     last_tick: Option<Instant>,
     /// When a movement was last handed over.
     steered_at: Instant,
-    /// When the last restart was.
-    restarted_at: Instant,
-    /// When the target was reached after that.
-    done_at: Option<Instant>,
     last_draw: Option<Instant>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
@@ -234,8 +230,6 @@ impl App {
         Ok(Self {
             start,
             steered_at: start,
-            restarted_at: start,
-            done_at: None,
             pending,
             session,
             saver: Saver::new(&options.folder, waker.clone()),
@@ -300,8 +294,8 @@ impl App {
         window.request_redraw();
     }
 
-    /// How long people waited (milliseconds), and the paths since the last restart with the seconds since then, or until
-    /// the target was reached, in which the window did all that it does.
+    /// How long people waited (milliseconds), and the paths of the last picture with the seconds from the restart to the last
+    /// of them, in which the window did all that it does.
     fn print_figures(&self) {
         let milliseconds = |waits: &Waits| {
             let of = |share| waits.quantile(share).map(|wait| wait.as_secs_f64() * 1e3);
@@ -315,7 +309,7 @@ impl App {
             "reaction_ms": milliseconds(self.reaction.waits()),
             "cancel_ms": milliseconds(&self.session.cancels()),
             "camera_rays": status.rays.camera,
-            "seconds": self.done_at.unwrap_or_else(Instant::now).duration_since(self.restarted_at).as_secs_f64(),
+            "seconds": status.elapsed,
         });
         // Standard output may be closed, and then nobody reads it.
         let _ = writeln!(std::io::stdout(), "{figures}");
@@ -345,13 +339,9 @@ impl App {
             let generation = self.session.status().restarts;
             self.reaction.carried_out((generation != restarts).then_some(generation));
         }
-        if self.session.status().restarts != restarts {
-            (self.restarted_at, self.done_at) = (now, None);
-        }
         if self.session.status().restarts > self.seen {
             self.unseen_since.get_or_insert(now);
         }
-        self.done_at = if self.session.status().done { self.done_at.or(Some(now)) } else { None };
         for trouble in self.memory.follow(&mut self.session) {
             self.toasts.add(Tone::Problem, trouble, now);
         }
