@@ -8,6 +8,7 @@ use firstlight::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, Sc
 use firstlight::mesh::procedural;
 use glam::{Affine3A, Vec3};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Rays of every class here: `N_RAYS` through the unit box.
 const N_RAYS: usize = 1 << 16;
@@ -49,16 +50,23 @@ fn crowds() -> Vec<(String, Vec<Shape>)> {
 
 pub fn run(rounds: usize) {
     println!(
-        "crowds in a unit box, ns a ray (closest, any; closest one ray at a time), ms to rebuild when all have moved"
+        "crowds in a unit box, ns a ray (closest, any; closest one ray at a time), ms to rebuild when all have moved on one thread, on all"
     );
+    let all = rayon::ThreadPoolBuilder::new().build().expect("threads");
     for (name, shapes) in crowds() {
-        let mut build = Vec::new();
-        for _ in 0..3 {
-            let shapes = shapes.clone();
+        let (mut alone, mut together) = (Vec::new(), Vec::new());
+        for _ in 0..5 {
+            let (first, second) = (shapes.clone(), shapes.clone());
             let start = cpu_seconds();
-            std::hint::black_box(SceneTree::build(shapes));
-            build.push(1e3 * (cpu_seconds() - start));
+            std::hint::black_box(SceneTree::build(first));
+            alone.push(1e3 * (cpu_seconds() - start));
+            together.push(all.install(|| {
+                let start = Instant::now();
+                std::hint::black_box(SceneTree::build(second));
+                1e3 * start.elapsed().as_secs_f64()
+            }));
         }
+        let rebuild = [median(&mut alone), median(&mut together)];
         let scene = SceneTree::build(shapes);
         let mut random = Random(4);
         let camera = (0..N_RAYS).map(|i| {
@@ -93,9 +101,10 @@ pub fn run(rounds: usize) {
             }
             let (closest, any, alone) = (median(&mut closest), median(&mut any), median(&mut alone));
             println!(
-                "    {name:15} {kind:7} {closest:7.1} {any:7.1} {alone:8.1} (x{:.1})   {:6.2} ms",
+                "    {name:15} {kind:7} {closest:7.1} {any:7.1} {alone:8.1} (x{:.1})   {:6.2} {:6.2} ms",
                 alone / closest,
-                median(&mut build)
+                rebuild[0],
+                rebuild[1]
             );
         }
     }

@@ -3,7 +3,7 @@
 //! One by one it takes five divisions and branches on directions, which nothing foretells.
 
 use super::blocks::LeafRay;
-use super::lanes::to_own_space;
+use super::lanes::{longest_axis, to_own_space};
 use super::ray::{Nearest, WIDEN};
 use super::simd::{LANES, Mask, Simd};
 use super::stream::Source;
@@ -107,9 +107,7 @@ impl Gate {
                 s.store(dir[axis], &mut self.dir[axis]);
             }
         }
-        let [x, y, z] = three!(|axis| s.abs(dir[axis]));
-        let along_x = s.le(y, x) & s.le(z, x);
-        let along_y = !along_x & s.le(z, y);
+        let (along_x, along_y) = longest_axis(s, &dir);
         let kz = s.select_u(along_x, s.splat_u(0), s.select_u(along_y, s.splat_u(1), s.splat_u(2)));
         let [dx, dy, dz] = dir;
         let longest = s.select(along_x, dx, s.select(along_y, dy, dz));

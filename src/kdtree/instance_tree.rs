@@ -4,7 +4,6 @@ use super::build::{BuildConfig, Primitives, build};
 use super::mesh_tree::BuildPreset;
 use super::nodes::KdNodes;
 use super::ray::TreeRay;
-use super::scene_tree::{Shape, object_bounds};
 use crate::geometry::{Aabb, Ray, Shear};
 use glam::Vec3;
 
@@ -45,8 +44,9 @@ impl Recent {
 const ENTRIES: usize = 4;
 
 impl InstanceTree {
-    pub fn build(shapes: &[Shape], objects: Vec<u32>) -> Self {
-        let boxes: Vec<Aabb> = objects.iter().map(|&object| object_bounds(&shapes[object as usize])).collect();
+    /// - `boxes`: of all objects of the scene.
+    pub fn build(boxes: &[Aabb], objects: Vec<u32>) -> Self {
+        let boxes: Vec<Aabb> = objects.iter().map(|&object| boxes[object as usize]).collect();
         let config = BuildConfig { exact_below: 8, block_cost: 4.0, max_growth: 2.0, ..BuildPreset::Best.config(1) };
         let mut leaf_places = Vec::new();
         let nodes = build(&Boxes(&boxes), &config, |leaf| {

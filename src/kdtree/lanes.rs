@@ -25,6 +25,14 @@ impl<S: Simd> LaneHits<S> {
     }
 }
 
+/// Lanes whose direction is longest along x, and those along y; all others along z. On ties the first axis, as in `geometry::Shear`.
+#[inline(always)]
+pub(super) fn longest_axis<S: Simd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask) {
+    let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
+    let along_x = s.le(y, x) & s.le(z, x);
+    (along_x, !along_x & s.le(z, y))
+}
+
 /// Shears a vertex that is given along the ray's own axes.
 ///
 /// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.

@@ -4,7 +4,7 @@ use super::block_tree::BlockTree;
 use super::blocks::{BLOCK, LeafBlock, QuadBlock, SphereBlock, TriangleBlock};
 use super::build::{Primitives, clip_triangle};
 use super::mesh_tree::BuildPreset;
-use super::scene_tree::{Shape, object_bounds};
+use super::scene_tree::Shape;
 use super::shared_block::SharedBlock;
 use super::sphere_tree::clip_ball;
 use crate::geometry::{Aabb, quad_corners};
@@ -23,7 +23,9 @@ pub(super) struct LooseTrees {
 
 impl LooseTrees {
     /// Builds trees for the kinds that need one, the most frequent first, and returns the objects that are left.
-    pub fn build(shapes: &[Shape]) -> (Self, Vec<u32>) {
+    ///
+    /// - `boxes`: of all the shapes.
+    pub fn build(shapes: &[Shape], boxes: &[Aabb]) -> (Self, Vec<u32>) {
         let of_kind = |is_kind: fn(&Shape) -> bool| -> Vec<u32> {
             (0u32..).zip(shapes).filter(|(_, shape)| is_kind(shape)).map(|(object, _)| object).collect()
         };
@@ -41,14 +43,15 @@ impl LooseTrees {
             if n_simple <= MAX_SIMPLE {
                 simple.extend(objects);
             } else {
-                trees.add(shapes, &objects);
+                trees.add(shapes, boxes, &objects);
             }
         }
         simple.sort_unstable();
         (trees, simple)
     }
 
-    fn add(&mut self, shapes: &[Shape], objects: &[u32]) {
+    fn add(&mut self, shapes: &[Shape], boxes: &[Aabb], objects: &[u32]) {
+        let loose = Loose { shapes, boxes, objects };
         match &shapes[objects[0] as usize] {
             Shape::Sphere { .. } => {
                 let sphere = |object: u32| match &shapes[object as usize] {
@@ -56,7 +59,7 @@ impl LooseTrees {
                     _ => (Vec3::NAN, f32::NAN),
                 };
                 let make_block = |objects: &[u32]| SphereBlock::new(objects, sphere);
-                self.spheres = Some(tree(shapes, objects, make_block, |_| Vec::new()));
+                self.spheres = Some(tree(&loose, make_block, |_| Vec::new()));
             }
             Shape::Quad { .. } => {
                 let corners = |object: u32| match &shapes[object as usize] {
@@ -64,7 +67,7 @@ impl LooseTrees {
                     _ => [Vec3::NAN; 4],
                 };
                 let make_block = |objects: &[u32]| QuadBlock::new(objects, corners);
-                self.quads = Some(tree(shapes, objects, make_block, |_| Vec::new()));
+                self.quads = Some(tree(&loose, make_block, |_| Vec::new()));
             }
             Shape::Triangle { .. } => {
                 let vertices = |object: u32| match &shapes[object as usize] {
@@ -73,7 +76,7 @@ impl LooseTrees {
                 };
                 let make_block = |objects: &[u32]| TriangleBlock::new(objects, vertices);
                 let make_compact = |objects: &[u32]| SharedBlock::pack_if_small(objects, vertices);
-                self.triangles = Some(tree(shapes, objects, make_block, make_compact));
+                self.triangles = Some(tree(&loose, make_block, make_compact));
             }
             Shape::Plane { .. } | Shape::Mesh { .. } | Shape::Spheres { .. } => {}
         }
@@ -81,20 +84,20 @@ impl LooseTrees {
 }
 
 fn tree<B: LeafBlock>(
-    shapes: &[Shape],
-    objects: &[u32],
+    loose: &Loose,
     make_block: impl Fn(&[u32]) -> B,
     make_compact: impl Fn(&[u32]) -> Vec<B::Compact>,
 ) -> BlockTree<B> {
-    let of_prims = |prims: &[u32]| -> Vec<u32> { prims.iter().map(|&prim| objects[prim as usize]).collect() };
+    let of_prims = |prims: &[u32]| -> Vec<u32> { prims.iter().map(|&prim| loose.objects[prim as usize]).collect() };
     let config = BuildPreset::Best.config(BLOCK);
     let make_block = |prims: &[u32]| make_block(&of_prims(prims));
-    BlockTree::build(&Loose { shapes, objects }, &config, make_block, |prims| make_compact(&of_prims(prims)))
+    BlockTree::build(loose, &config, make_block, |prims| make_compact(&of_prims(prims)))
 }
 
 /// What the builder sees of them.
 struct Loose<'a> {
     shapes: &'a [Shape],
+    boxes: &'a [Aabb],
     objects: &'a [u32],
 }
 
@@ -110,7 +113,7 @@ impl Primitives for Loose<'_> {
     }
 
     fn bounds(&self, prim: u32) -> Aabb {
-        object_bounds(self.shape(prim))
+        self.boxes[self.objects[prim as usize] as usize]
     }
 
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {

@@ -6,7 +6,7 @@
 
 use super::block_tree::{BlockTree, Leaf};
 use super::blocks::{BLOCK, LeafBlock, PreciseRay, ShearedRay, SphereBlock, TriangleBlock};
-use super::lanes::{LaneHits, may_hit, resolve, shear, sphere_hits};
+use super::lanes::{LaneHits, longest_axis, may_hit, resolve, shear, sphere_hits};
 use super::nodes::{MAX_DEPTH, Node};
 use super::objects::WideFrame;
 use super::ray::{Nearest, WIDEN};
@@ -244,9 +244,7 @@ impl<S: Simd> MeshPacket<S> {
     #[inline(always)]
     pub fn trace<B: PacketBlock, const ANY: bool>(&mut self, s: S, tree: &BlockTree<B>, stack: &mut PacketStack<S>) {
         let frame = B::frame(s, self);
-        let [x, y, z] = [s.abs(self.dir[0]), s.abs(self.dir[1]), s.abs(self.dir[2])];
-        let along_x = s.le(y, x) & s.le(z, x);
-        let along_y = !along_x & s.le(z, y);
+        let (along_x, along_y) = longest_axis(s, &self.dir);
         let down = [s.negative(self.dir[0]), s.negative(self.dir[1]), s.negative(self.dir[2])];
         let mut left = self.lanes;
         while left != 0 {

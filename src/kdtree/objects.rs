@@ -4,7 +4,7 @@
 //! branch costs less than finding out which ones to leave away, however little the rays have in common.
 
 use super::batch::{HitBatch, RayBatch};
-use super::lanes::{LaneHits, Sheared, dot, may_hit, quad_hits, resolve, shear, sphere_hits};
+use super::lanes::{LaneHits, Sheared, dot, longest_axis, may_hit, quad_hits, resolve, shear, sphere_hits};
 use super::loose::MAX_SIMPLE;
 use super::scene_tree::Shape;
 use super::sieve::{SieveRays, SievedQuad};
@@ -379,9 +379,7 @@ pub(super) struct ShearFrame<S: Simd> {
 impl<S: Simd> ShearFrame<S> {
     #[inline(always)]
     fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
-        let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
-        let along_x = s.le(y, x) & s.le(z, x);
-        let along_y = !along_x & s.le(z, y);
+        let (along_x, along_y) = longest_axis(s, dir);
         // Across, across, along are x y z, z x y or y z x.
         let [x, y, z] = *dir;
         let d = [

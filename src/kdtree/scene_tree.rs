@@ -11,6 +11,7 @@ use super::trace::{Instances, TopLevel};
 use super::{HitBatch, MeshTree, RayBatch, SphereTree, Visits};
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The geometry of one object, in the space of the snapshot unless said otherwise.
@@ -123,6 +124,15 @@ pub(super) fn object_bounds(shape: &Shape) -> Aabb {
     }
 }
 
+/// In parallel where there are many: to ask other threads takes longer than to work out a few.
+fn of_each<T: Send>(shapes: &[Shape], work_out: impl Fn(&Shape) -> T + Send + Sync) -> Vec<T> {
+    const SIDE_BY_SIDE: usize = 512;
+    if shapes.len() <= SIDE_BY_SIDE {
+        return shapes.iter().map(work_out).collect();
+    }
+    shapes.par_iter().with_min_len(SIDE_BY_SIDE).map(work_out).collect()
+}
+
 fn max_row_sum(map: &Affine3A) -> f32 {
     let m = map.matrix3;
     (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element()
@@ -131,9 +141,10 @@ fn max_row_sum(map: &Affine3A) -> f32 {
 impl SceneTree {
     /// Object `i` of all later hits is `shapes[i]`.
     pub fn build(shapes: Vec<Shape>) -> Self {
-        let instances = shapes.iter().map(Instance::new).collect();
-        let bounds = shapes.iter().map(object_bounds).fold(Aabb::EMPTY, Aabb::union);
-        let top = TopLevel::new(&shapes);
+        let instances = of_each(&shapes, Instance::new);
+        let boxes = of_each(&shapes, object_bounds);
+        let bounds = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
+        let top = TopLevel::new(&shapes, &boxes);
         Self { shapes, instances, bounds, top }
     }
 

@@ -242,3 +242,77 @@ impl<R: LeafRay> Slot<R> {
         (self.child, self.t0, self.t1) = (stack.child[top], stack.t0[top], stack.t1[top]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kdtree::{BuildPreset, MeshTree};
+    use crate::lanes::Portable;
+    use glam::Vec3;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    /// Rays of a list, and what became of each; a bug in what takes the answers ends it at the ray `poisoned`.
+    struct Listed<'a> {
+        rays: &'a [Ray],
+        next: usize,
+        poisoned: Option<u32>,
+        finished: Vec<(u32, bool, u32)>,
+    }
+
+    impl Source for Listed<'_> {
+        fn left(&self) -> usize {
+            self.rays.len() - self.next
+        }
+
+        fn next(&mut self) -> Option<(Ray, Nearest, u32)> {
+            let ray = *self.rays.get(self.next)?;
+            self.next += 1;
+            Some((ray, Nearest::before(f32::INFINITY), self.next as u32 - 1))
+        }
+
+        fn own_from_world(&self) -> Option<&Affine3A> {
+            None
+        }
+
+        fn finish(&mut self, ray: u32, nearest: &Nearest) {
+            assert!(self.poisoned != Some(ray), "poisoned");
+            self.finished.push((ray, nearest.found, nearest.t.to_bits()));
+        }
+    }
+
+    fn trace(tree: &MeshTree, rays: &[Ray], poisoned: Option<u32>, flight: &mut Flight) -> Vec<(u32, bool, u32)> {
+        let mut source = Listed { rays, next: 0, poisoned, finished: Vec::new() };
+        run::<Portable, _, false>(Portable, &tree.tree, &mut source, flight);
+        source.finished.sort_unstable();
+        source.finished
+    }
+
+    #[test]
+    fn a_stream_cut_short_by_a_panic_leaves_nothing_to_the_next() {
+        // A staircase, so that rays take different numbers of steps.
+        let corners: Vec<Vec3> = (0..600)
+            .map(|i| Vec3::new((i % 20) as f32 + (i % 3) as f32 * 0.9, (i / 20) as f32, ((i * 7) % 11) as f32 * 0.1))
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..560).map(|i| [i, i + 1, i + 20]).collect();
+        let tree = MeshTree::build(&corners, &triangles, BuildPreset::Best);
+        let rays: Vec<Ray> = (0..300)
+            .map(|i| {
+                let to = Vec3::new((i * 13 % 20) as f32, (i * 29 % 28) as f32, 0.3);
+                Ray::new(Vec3::new(3.0, 2.0, 40.0), (to - Vec3::new(3.0, 2.0, 40.0)).normalize())
+            })
+            .collect();
+        let whole = trace(&tree, &rays, None, &mut Flight::new());
+        assert!(whole.iter().filter(|(_, found, _)| *found).count() > 50);
+        let mut flight = Flight::new();
+        for poisoned in [0, 70, 150] {
+            let poisoned = whole.iter().map(|(ray, ..)| *ray).find(|ray| *ray >= poisoned);
+            let cut = catch_unwind(AssertUnwindSafe(|| trace(&tree, &rays, poisoned, &mut flight)));
+            assert!(cut.is_err(), "the ray {poisoned:?} was to be finished");
+            // Fewer than were in flight, and then all.
+            for n in [3, rays.len()] {
+                let fresh = trace(&tree, &rays[..n], None, &mut Flight::new());
+                assert_eq!(trace(&tree, &rays[..n], None, &mut flight), fresh);
+            }
+        }
+    }
+}

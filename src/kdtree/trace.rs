@@ -18,7 +18,7 @@ use super::scene_tree::{RayClass, SceneTree, Shape};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
 use super::stream::{self, Flight, Source};
 use super::surface::Instance;
-use crate::geometry::Ray;
+use crate::geometry::{Aabb, Ray};
 use glam::Affine3A;
 use std::cell::RefCell;
 
@@ -60,12 +60,13 @@ const MAX_BALLS: usize = 16;
 const MAX_INSTANCES: usize = 12;
 
 impl TopLevel {
-    pub fn new(shapes: &[Shape]) -> Self {
-        let (loose, simple_objects) = LooseTrees::build(shapes);
+    /// - `boxes`: of all the shapes.
+    pub fn new(shapes: &[Shape], boxes: &[Aabb]) -> Self {
+        let (loose, simple_objects) = LooseTrees::build(shapes, boxes);
         let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
         let instances: Vec<u32> = (0..shapes.len() as u32).filter(is_instance).collect();
         let instances = if instances.len() > MAX_INSTANCES {
-            Instances::Many(InstanceTree::build(shapes, instances))
+            Instances::Many(InstanceTree::build(boxes, instances))
         } else {
             Instances::Few(instances)
         };
