@@ -4,7 +4,7 @@ use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
     Bookmarks, Command, Edit, Focus, FocusTarget, MaterialKind, MeshMeasure, NewThing, Projector, Property, Selection,
-    Session, SessionOptions, Target,
+    Session, SessionOptions, Target, wanted_mesh,
 };
 use firstlight::render::Inspection;
 use firstlight::scene::file::{MeshShadingPart, MeshSourcePart, Rgb, TexturePart, WrapPart};
@@ -262,6 +262,39 @@ fn a_mesh_is_simplified_beside_the_picture() {
     driver.until(|session| session.inputs().objects.iter().any(|object| object.name.as_deref() == Some("torus")));
     driver.edit([Edit::Add(NewThing::Mesh(MeshSourcePart::Obj("/no/such.obj".to_owned())))]);
     driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("no such file")));
+}
+
+#[test]
+fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
+    let mut driver = Driver::open("gallery");
+    let entity = driver.named("serpent");
+    let id = entity.to_bits();
+    let wanted = |driver: &Driver| wanted_mesh(driver.session.world(), entity);
+    let count = |driver: &Driver| driver.session.inputs().objects.len();
+    let (whole, before): (Shape, _) = (driver.get("serpent"), wanted(&driver));
+    driver.edit([Edit::Add(NewThing::Sphere)]);
+    let n_objects = count(&driver);
+    // A slider that is dragged, and another control.
+    for ratio in [0.9, 0.5, 0.2, 0.05] {
+        driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Auto, ratio }]);
+        assert_eq!(wanted(&driver), Some((MeshShadingPart::Auto, ratio)));
+    }
+    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Flat, ratio: 0.05 }]);
+    assert_eq!(wanted(&driver), Some((MeshShadingPart::Flat, 0.05)));
+    driver.edit([Edit::Undo]);
+    driver.until(Session::is_idle);
+    assert_eq!((wanted(&driver), count(&driver)), (before, n_objects), "the mesh was what came last, not the sphere");
+    assert_eq!(driver.get::<Shape>("serpent"), whole);
+    // What was done after it was asked for goes first.
+    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Flat, ratio: 0.05 }]);
+    driver.edit([Edit::Add(NewThing::Sphere), Edit::Undo]);
+    assert_eq!(count(&driver), n_objects);
+    driver.until(Session::is_idle);
+    assert_eq!(wanted(&driver), Some((MeshShadingPart::Flat, 0.05)));
+    assert!(driver.get::<MeshMeasure>("serpent").faces <= driver.get::<MeshMeasure>("serpent").whole_faces / 20);
+    driver.edit([Edit::Undo]);
+    driver.until(Session::is_idle);
+    assert_eq!((driver.get::<Shape>("serpent"), count(&driver)), (whole, n_objects));
 }
 
 #[test]

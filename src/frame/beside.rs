@@ -35,13 +35,24 @@ struct Board {
     /// The number of the newest load; an older one is dropped when it comes in.
     newest_load: u64,
     building: usize,
-    /// Meshes that are being made: what for, and their numbers. A newer one for the same takes the place of an older.
-    remaking: Vec<(ForWhom, u64, String)>,
+    /// Meshes that are wanted, with their numbers; the oldest first. A newer one for the same takes the place of an older.
+    remaking: Vec<(u64, Remake)>,
     newest_remake: u64,
+    /// There is a thread that makes them, one after the other: side by side, those that a slider left behind would keep the wanted one waiting.
+    makes_meshes: bool,
     /// Pictures that are being read for materials.
     reading: usize,
     /// What the last mesh was made from.
     base: Option<MeshBase>,
+}
+
+impl Board {
+    /// The oldest mesh that is wanted; `None` ends the thread that makes them.
+    fn next_remake(&mut self) -> Option<(u64, Remake)> {
+        let next = self.remaking.first().cloned();
+        self.makes_meshes = next.is_some();
+        next
+    }
 }
 
 /// Starts such work and collects what comes of it.
@@ -117,34 +128,53 @@ impl Beside {
 
     /// Makes a mesh anew; an earlier one for the same object is forgotten.
     pub fn remake(&self, job: Remake, pool: Arc<rayon::ThreadPool>) {
-        let for_whom = job.for_whom;
-        let number = self.with(|board| {
+        let makes_meshes = self.with(|board| {
             board.newest_remake += 1;
-            board.remaking.retain(|(other, ..)| *other != for_whom);
-            board.remaking.push((for_whom, board.newest_remake, job.title()));
-            board.newest_remake
+            board.remaking.retain(|(_, other)| other.for_whom != job.for_whom);
+            board.remaking.push((board.newest_remake, job));
+            std::mem::replace(&mut board.makes_meshes, true)
         });
+        if makes_meshes {
+            return;
+        }
         let this = self.clone();
         let work = move || {
-            let is_wanted = |board: &mut Board| board.remaking.iter().any(|(_, other, _)| *other == number);
             // A slider asks faster than meshes are made: what is outdated before it began is not begun.
             std::thread::sleep(std::time::Duration::from_millis(30));
-            if !this.with(|board| is_wanted(board)) {
-                return;
-            }
             let mut base = this.with(|board| board.base.take());
-            let result =
-                guarded(|| pool.install(|| job.run(&mut base))).unwrap_or_else(|panic| Err(SceneError::new(panic)));
-            this.with(|board| {
-                board.base = base;
-                if is_wanted(board) {
-                    board.remaking.retain(|(_, other, _)| *other != number);
-                    board.finished.push(Finished::Mesh(Box::new(Remade { job, result })));
-                }
-            });
-            this.wake();
+            while let Some((number, job)) = this.with(Board::next_remake) {
+                let result =
+                    guarded(|| pool.install(|| job.run(&mut base))).unwrap_or_else(|panic| Err(SceneError::new(panic)));
+                this.with(|board| {
+                    if board.remaking.iter().any(|(other, _)| *other == number) {
+                        board.remaking.retain(|(other, _)| *other != number);
+                        board.finished.push(Finished::Mesh(Box::new(Remade { job, result })));
+                    }
+                });
+                this.wake();
+            }
+            this.with(|board| board.base = base);
         };
-        self.spawn("firstlight mesh", work, move |board, _| board.remaking.retain(|(_, other, _)| *other != number));
+        self.spawn("firstlight mesh", work, |board, _| {
+            board.remaking.clear();
+            board.makes_meshes = false;
+        });
+    }
+
+    /// What the mesh of an object is about to become.
+    pub fn wanted(&self, entity: Entity) -> Option<Remake> {
+        let is_it = |job: &Remake| job.for_whom == ForWhom::Object(entity);
+        self.with(|board| board.remaking.iter().map(|(_, job)| job).find(|job| is_it(job)).cloned())
+    }
+
+    /// Forgets the newest mesh that is wanted, if it was asked for at this revision of the history or later; tells which.
+    pub fn forget_mesh(&self, since: u64) -> Option<Remake> {
+        self.with(|board| board.remaking.pop_if(|(_, job)| job.revision >= since)).map(|(_, job)| job)
+    }
+
+    /// What the mesh that comes next is, for people.
+    pub fn mesh_in_the_making(&self) -> Option<String> {
+        self.with(|board| board.remaking.first().map(|(_, job)| job.title()))
     }
 
     /// Reads a picture for a material.
@@ -180,7 +210,7 @@ impl Beside {
     pub fn progress(&self) -> Option<String> {
         self.with(|board| {
             let building = (board.building > 0).then(|| "building a tree".to_owned());
-            let remaking = board.remaking.last().map(|(.., title)| title.clone());
+            let remaking = board.remaking.first().map(|(_, job)| job.title());
             board.progress.clone().or(remaking).or(building)
         })
     }

@@ -63,6 +63,8 @@ pub struct History {
     selected: Vec<Entity>,
     undo: Vec<Step>,
     redo: Vec<Step>,
+    /// Grows with every change.
+    revision: u64,
     /// A change is under way; what the entities were when it began, and whether it has a step yet.
     begun: Option<(Arc<BTreeMap<Entity, Arc<EntityState>>>, bool)>,
     /// Nothing is read while nothing has been touched.
@@ -102,6 +104,12 @@ impl History {
         remember(world);
     }
 
+    /// How many changes there have been.
+    pub fn revision(world: &mut World) -> u64 {
+        Self::remember_now(world);
+        world.resource::<Self>().revision
+    }
+
     /// Where the entity was when the change that is under way began.
     pub fn placement_at_begin(&self, entity: Entity) -> Option<Placement> {
         self.begun.as_ref().and_then(|(entities, _)| entities.get(&entity)?.placement)
@@ -117,6 +125,7 @@ impl History {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
         let step = history.undo.pop()?;
+        history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
         history.redo.push(Step { before: now.clone(), ..step.clone() });
         history.begun = None;
@@ -130,6 +139,7 @@ impl History {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
         let step = history.redo.pop()?;
+        history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
         history.undo.push(Step { before: now.clone(), ..step.clone() });
         history.begun = None;
@@ -147,6 +157,7 @@ impl History {
             self.now = Some(old);
             return;
         }
+        self.revision += 1;
         let (label, merge) = what_changed(&old, &new);
         // Merging over a redo would lose where it came from.
         let goes_on = match &mut self.begun {

@@ -51,7 +51,7 @@ pub use history::History;
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
 pub use picture_file::{PictureFormat, Print, write_errors, write_film};
 pub use recording::{ReplayOptions, Replayed, replay};
-pub use remesh::MeshMeasure;
+pub use remesh::{MeshMeasure, wanted_mesh};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use saving::SavedAs;
 pub use scheduler::{Scheduler, Step, StepReport};

@@ -4,6 +4,7 @@
 //! opens with the very same triangles.
 
 use super::beside::Beside;
+use super::history::History;
 use super::selection::Selection;
 use super::status::{MessageKind, Status};
 use super::systems::{Clock, CurrentScene, Renderer};
@@ -34,6 +35,8 @@ pub struct Remake {
     pub source: MeshSourcePart,
     pub shading: MeshShadingPart,
     pub ratio: f64,
+    /// The state of the history that it was asked for in.
+    pub revision: u64,
     folder: PathBuf,
 }
 
@@ -60,7 +63,10 @@ pub fn start(world: &mut World, entity: Entity, shading: MeshShadingPart, ratio:
     }
     let origin = world.get::<MeshOrigin>(entity).ok_or("it is not known where this mesh came from")?;
     let source = origin.source.clone();
-    run(world, ForWhom::Object(entity), source, shading, ratio);
+    let pending = world.resource::<Beside>().wanted(entity);
+    if pending.is_none_or(|job| (job.shading, job.ratio) != (shading, ratio)) {
+        run(world, ForWhom::Object(entity), source, shading, ratio);
+    }
     Ok(())
 }
 
@@ -71,7 +77,8 @@ pub fn start_new(world: &mut World, source: MeshSourcePart, place: DVec3, size: 
 
 fn run(world: &mut World, for_whom: ForWhom, source: MeshSourcePart, shading: MeshShadingPart, ratio: f64) {
     let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
-    let job = Remake { for_whom, source, shading, ratio, folder };
+    let revision = History::revision(world);
+    let job = Remake { for_whom, source, shading, ratio, revision, folder };
     let pool = world.resource::<Renderer>().0.pool();
     world.resource::<Beside>().remake(job, pool);
 }
@@ -103,6 +110,23 @@ impl Remake {
             ForWhom::NewObject { .. } => format!("reading {name}"),
         }
     }
+}
+
+/// How the mesh of an object is to be shaded and what share of its faces is to be kept, also while that is still being made; `None`
+/// where it is not known where it came from.
+pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShadingPart, f64)> {
+    let origin = world.get::<MeshOrigin>(entity)?;
+    let pending = world.resource::<Beside>().wanted(entity);
+    Some(pending.map_or((origin.shading, origin.simplify.unwrap_or(1.0)), |job| (job.shading, job.ratio)))
+}
+
+/// Forgets a mesh that is still being made, if nothing was changed after it was asked for: an undo takes back the newest.
+pub fn take_back(world: &mut World) -> Option<()> {
+    let revision = History::revision(world);
+    let job = world.resource::<Beside>().forget_mesh(revision)?;
+    let now = world.resource::<Clock>().0;
+    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{}: stopped", job.title()));
+    Some(())
 }
 
 /// Puts a mesh that was made into the world.

@@ -1,6 +1,7 @@
 //! Saves the open scene beside the picture: the world is described in the frame, and written on a thread of its own.
 
 use super::Waker;
+use super::beside::Beside;
 use super::status::{MessageKind, Status};
 use super::systems::{Clock, CurrentScene};
 use crate::scene::{Description, Fingerprint, SavedScene, SceneContent};
@@ -83,6 +84,10 @@ pub fn save(world: &mut World) {
         let current = world.get_resource::<CurrentScene>().map(|current| current.0.clone());
         let description = Description::of(world, current.as_deref());
         let content = SceneContent::of(world, &description);
+        if let Some(title) = world.resource::<Beside>().mesh_in_the_making() {
+            let text = format!("{title} is not done, so it is not in the file: save again when it is");
+            world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
+        }
         let mut saving = world.resource_mut::<Saving>();
         let (finished, waker) = (saving.finished.clone(), saving.waker.clone());
         let target = path.clone();

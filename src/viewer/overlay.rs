@@ -178,7 +178,8 @@ fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[(&str, Vec<&Binding>)], w
 
 /// What the colours of an inspection mean, in the lower left corner; it takes no mouse.
 pub fn legend(context: &Context, title: &str, legend: Option<Legend>) {
-    egui::Area::new("legend".into())
+    // Where it stands follows from how high it was when it was drawn last.
+    egui::Area::new(egui::Id::new(("legend", legend.is_some())))
         .order(Order::Foreground)
         .interactable(false)
         .fixed_pos(context.content_rect().left_bottom() + Vec2::new(10.0, -34.0))

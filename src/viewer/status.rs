@@ -4,11 +4,17 @@ use crate::frame::Status;
 use crate::render::{Integrator, ToneCurve};
 use std::fmt::Write as _;
 
-/// The figures: samples, seconds, speed, resolution, error, and why it last began again.
+/// The figures: whether it goes on, samples, seconds, speed, resolution, error, and why it last began again.
 pub fn figures(status: &Status) -> String {
     let mut line = String::new();
     if let Some(loading) = &status.loading {
         write!(line, "{loading}…   ").expect("a string takes all");
+    }
+    // Who sees the samples stand still wants to know why.
+    if status.paused {
+        line += "paused   ";
+    } else if status.done {
+        line += "finished   ";
     }
     write!(
         line,
@@ -34,12 +40,9 @@ pub fn figures(status: &Status) -> String {
     line
 }
 
-/// What is not as usual: lens, exposure, tone curve, model, pause; and the key that helps.
+/// What is not as usual: lens, exposure, tone curve, model; and the key that helps.
 pub fn settings(status: &Status) -> String {
     let mut parts = Vec::new();
-    if status.paused {
-        parts.push("paused".to_owned());
-    }
     if status.integrator == Integrator::Phong {
         parts.push("Phong".to_owned());
     }
@@ -137,6 +140,10 @@ mod tests {
         );
         (status.estimated_error, status.divider) = (None, 1);
         assert!(figures(&status).contains("320×180   error –"));
+        status.done = true;
+        assert!(figures(&status).starts_with("finished   37 spp"));
+        status.paused = true;
+        assert!(figures(&status).starts_with("paused   37 spp"));
     }
 
     #[test]
@@ -144,9 +151,8 @@ mod tests {
         let mut status = Status::default();
         assert_eq!(settings(&status), "N: panel, H: keys");
         status.rig.lens = Lens::thin(0.01, 2.5);
-        status.paused = true;
         status.display.exposure_stops = -1.0 / 3.0;
-        assert_eq!(settings(&status), "paused   focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   N: panel, H: keys");
+        assert_eq!(settings(&status), "focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   N: panel, H: keys");
     }
 
     #[test]

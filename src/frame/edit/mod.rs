@@ -184,7 +184,9 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::SelectNone => world.resource_mut::<Selection>().0.clear(),
         Edit::Begin => History::begin(world),
         Edit::End => History::end(world),
-        Edit::Undo => History::step_back(world).ok_or("there is nothing to undo")?,
+        Edit::Undo => {
+            super::remesh::take_back(world).or_else(|| History::step_back(world)).ok_or("there is nothing to undo")?;
+        }
         Edit::Redo => History::step_on(world).ok_or("there is nothing to redo")?,
         Edit::Delete => add::delete(world),
         Edit::Duplicate => add::duplicate(world),

@@ -25,10 +25,9 @@ use std::time::{Duration, Instant};
 const BESIDE: &str = "beside";
 const WORKERS: &str = "firstlight";
 
-/// How far yielding threads give way: a third of the weight of others for workers, a third of that beside them.
-fn niceness(name: &str) -> i32 {
-    if name == BESIDE { 10 } else { 5 }
-}
+/// How far yielding threads give way, workers and those beside them alike: they have a third of the weight of others. Who has asked for a mesh or a
+/// tree waits for that, and not for more samples of the picture before it.
+const NICENESS: i32 = 5;
 
 /// Called whenever there is something new to be looked at.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -327,7 +326,7 @@ fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<r
         .thread_name(move |i| format!("{name} {i}"))
         .start_handler(move |_| {
             if yielding {
-                yield_to_others(niceness(name));
+                yield_to_others();
             }
         })
         .build()
@@ -336,15 +335,13 @@ fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<r
 }
 
 /// From now on this thread takes what others leave of the processor, most of it while there are others.
-fn yield_to_others(niceness: i32) {
+fn yield_to_others() {
     // Elsewhere than on Linux a thread's own niceness cannot be set.
     #[cfg(target_os = "linux")]
     {
         // It may always be raised, and without it all is as it was.
-        let _ = rustix::process::setpriority_process(None, niceness);
+        let _ = rustix::process::setpriority_process(None, NICENESS);
     }
-    #[cfg(not(target_os = "linux"))]
-    let _ = niceness;
 }
 
 /// The data behind a lock is whole at every moment at which a thread could panic.

@@ -348,6 +348,10 @@ pub static BINDINGS: &[Group] = &[
                 effect: "exposure, tone curve, what is shown in place of the picture",
             },
             Binding {
+                triggers: &[Trigger::Mouse("Panel: Add")],
+                effect: "a sphere, a plane, a cube, a light, a built-in mesh or an OBJ file",
+            },
+            Binding {
                 triggers: &[Trigger::Mouse("Panel: Selected")],
                 effect: "name, position, rotation, scale, material, texture and light of what is selected, by numbers",
             },
@@ -370,10 +374,6 @@ pub static BINDINGS: &[Group] = &[
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Sky")],
                 effect: "colours of the surroundings, or strength and rotation of their picture",
-            },
-            Binding {
-                triggers: &[Trigger::Mouse("Panel: Add")],
-                effect: "a sphere, a plane, a cube, a light, a built-in mesh or an OBJ file",
             },
             Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "a file by dialog, or what was open before" },
             Binding {

@@ -2,7 +2,7 @@
 
 use super::widgets::{row, rows};
 use super::{Asked, PanelState};
-use crate::frame::{Edit, MeshMeasure, Selection, Session};
+use crate::frame::{Edit, MeshMeasure, Selection, Session, wanted_mesh};
 use crate::scene::file::MeshShadingPart;
 use crate::scene::{MeshOrigin, Shape};
 use crate::viewer::change::Difference;
@@ -19,8 +19,7 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
     let id = entity.to_bits();
     rows(ui, "mesh", |ui| {
         row(ui, "faces", |ui| drop(ui.label(thousands(mesh.triangles.len()))));
-        let Some(origin) = session.world().get::<MeshOrigin>(entity) else { return };
-        let ratio = origin.simplify.unwrap_or(1.0);
+        let Some((wanted, ratio)) = wanted_mesh(session.world(), entity) else { return };
         row(ui, "normals", |ui| {
             ui.horizontal(|ui| {
                 let kinds = [
@@ -29,24 +28,22 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
                     (MeshShadingPart::Flat, "flat"),
                 ];
                 for (shading, label) in kinds {
-                    if ui.selectable_label(origin.shading == shading, label).clicked() && origin.shading != shading {
+                    if ui.selectable_label(wanted == shading, label).clicked() && wanted != shading {
                         asked.edit(Edit::Remesh { id, shading, ratio });
                     }
                 }
             })
         });
         row(ui, "simplify", |ui| {
-            let shown = state.ratio.filter(|(of, _)| *of == entity).map_or(ratio, |(_, ratio)| ratio);
-            let mut percent = 100.0 * shown;
+            let mut percent = 100.0 * ratio;
             let scale = egui::Slider::new(&mut percent, 1.0..=100.0).logarithmic(true).suffix(" %").max_decimals(1);
             let response = ui.add(scale.update_while_editing(false));
             if response.changed() {
                 let ratio = (percent / 100.0).clamp(0.01, 1.0);
-                state.ratio = Some((entity, ratio));
-                state.change.begin(entity, origin.simplify.is_none(), session);
-                asked.edit(Edit::Remesh { id, shading: origin.shading, ratio });
-            } else if !response.dragged() && session.status().loading.is_none() {
-                state.ratio = None;
+                let is_whole =
+                    session.world().get::<MeshOrigin>(entity).is_some_and(|origin| origin.simplify.is_none());
+                state.change.begin(entity, is_whole, session);
+                asked.edit(Edit::Remesh { id, shading: wanted, ratio });
             }
         });
         if let Some(measure) = session.world().get::<MeshMeasure>(entity).filter(|m| m.faces == mesh.triangles.len()) {

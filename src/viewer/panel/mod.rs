@@ -44,8 +44,6 @@ pub struct PanelState {
     pub shown: bool,
     /// The handles over what is selected.
     pub gizmo: Option<gizmo::Mode>,
-    /// The ratio that the slider asks for while it is dragged.
-    ratio: Option<(Entity, f64)>,
     change: PictureChange,
     /// A file to be added.
     mesh_path: String,
@@ -77,7 +75,6 @@ impl Default for PanelState {
         Self {
             shown: false,
             gizmo: None,
-            ratio: None,
             change: PictureChange::default(),
             mesh_path: String::new(),
             scale: 1,
@@ -138,13 +135,13 @@ pub const SECTIONS: [&str; 14] = [
     "Views",
     "Lens",
     "Display",
+    "Add",
     "Selected",
     "Mesh",
     "Objects",
     "Materials",
     "Lights",
     "Sky",
-    "Add",
     "Open",
     "Statistics",
 ];
@@ -170,20 +167,21 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Beside the scroll bar.
             ui.set_width((ui.available_width() - 8.0).max(0.0));
-            let [render, camera, views, lens, display, selected, mesh, ..] = SECTIONS;
+            let [render, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
             section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
             section(ui, camera, false, |ui| camera::camera(ui, session, around, asked));
             section(ui, views, false, |ui| camera::views(ui, session, around, asked));
             section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));
             section(ui, display, false, |ui| picture::display(ui, session, asked));
+            // Above what changes with the selection, so that its buttons stay where they are.
+            section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
             section(ui, selected, true, |ui| selected::selected(ui, state, session, asked));
             section(ui, mesh, true, |ui| mesh::mesh(ui, state, session, asked));
-            let [.., objects, materials, lights, sky, add, open, statistics] = SECTIONS;
+            let [.., objects, materials, lights, sky, open, statistics] = SECTIONS;
             section(ui, objects, true, |ui| scene::objects(ui, state, session, asked));
             section(ui, materials, false, |ui| materials::materials(ui, state, session, asked));
             section(ui, lights, false, |ui| lights::lights(ui, state, session, asked));
             section(ui, sky, false, |ui| lights::sky(ui, session, asked));
-            section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
             section(ui, open, false, |ui| scene::open(ui, session, around.recent, asked));
             section(ui, statistics, true, |ui| statistics::statistics(ui, session, around));
         });
