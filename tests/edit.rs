@@ -292,6 +292,9 @@ fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
     driver.until(Session::is_idle);
     assert_eq!(wanted(&driver), Some((MeshShadingPart::Flat, 0.05)));
     assert!(driver.get::<MeshMeasure>("serpent").faces <= driver.get::<MeshMeasure>("serpent").whole_faces / 20);
+    // Nor does it begin again for what is so already.
+    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Flat, ratio: 0.05 }]);
+    assert!(driver.session.status().loading.is_none());
     driver.edit([Edit::Undo]);
     driver.until(Session::is_idle);
     assert_eq!((driver.get::<Shape>("serpent"), count(&driver)), (whole, n_objects));

@@ -63,8 +63,8 @@ pub fn start(world: &mut World, entity: Entity, shading: MeshShadingPart, ratio:
     }
     let origin = world.get::<MeshOrigin>(entity).ok_or("it is not known where this mesh came from")?;
     let source = origin.source.clone();
-    let pending = world.resource::<Beside>().wanted(entity);
-    if pending.is_none_or(|job| (job.shading, job.ratio) != (shading, ratio)) {
+    // A control that says again what is so, or is about to be, asks for nothing.
+    if wanted_mesh(world, entity) != Some((shading, ratio)) {
         run(world, ForWhom::Object(entity), source, shading, ratio);
     }
     Ok(())

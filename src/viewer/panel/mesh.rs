@@ -38,7 +38,9 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
             let mut percent = 100.0 * ratio;
             let scale = egui::Slider::new(&mut percent, 1.0..=100.0).logarithmic(true).suffix(" %").max_decimals(1);
             let response = ui.add(scale.update_while_editing(false));
-            if response.changed() {
+            // The slider rounds to what it shows, which is no wish to change anything.
+            let is_another = (10.0 * percent).round() != (1000.0 * ratio).round();
+            if response.changed() && is_another {
                 let ratio = (percent / 100.0).clamp(0.01, 1.0);
                 let is_whole =
                     session.world().get::<MeshOrigin>(entity).is_some_and(|origin| origin.simplify.is_none());
