@@ -54,19 +54,19 @@ pub fn run(rounds: usize) {
     );
     let all = rayon::ThreadPoolBuilder::new().build().expect("threads");
     for (name, shapes) in crowds() {
-        let (mut alone, mut together) = (Vec::new(), Vec::new());
+        let (mut on_one, mut on_all) = (Vec::new(), Vec::new());
         for _ in 0..5 {
             let (first, second) = (shapes.clone(), shapes.clone());
             let start = cpu_seconds();
             std::hint::black_box(SceneTree::build(first));
-            alone.push(1e3 * (cpu_seconds() - start));
-            together.push(all.install(|| {
+            on_one.push(1e3 * (cpu_seconds() - start));
+            on_all.push(all.install(|| {
                 let start = Instant::now();
                 std::hint::black_box(SceneTree::build(second));
                 1e3 * start.elapsed().as_secs_f64()
             }));
         }
-        let rebuild = [median(&mut alone), median(&mut together)];
+        let rebuild = [median(&mut on_one), median(&mut on_all)];
         let scene = SceneTree::build(shapes);
         let mut random = Random(4);
         let camera = (0..N_RAYS).map(|i| {

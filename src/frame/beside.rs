@@ -47,6 +47,11 @@ struct Board {
 }
 
 impl Board {
+    /// What the mesh that comes next is, for people.
+    fn mesh_in_the_making(&self) -> Option<String> {
+        self.remaking.first().map(|(_, job)| job.title())
+    }
+
     /// The oldest mesh that is wanted; `None` ends the thread that makes them.
     fn next_remake(&mut self) -> Option<(u64, Remake)> {
         let next = self.remaking.first().cloned();
@@ -174,7 +179,7 @@ impl Beside {
 
     /// What the mesh that comes next is, for people.
     pub fn mesh_in_the_making(&self) -> Option<String> {
-        self.with(|board| board.remaking.first().map(|(_, job)| job.title()))
+        self.with(|board| board.mesh_in_the_making())
     }
 
     /// Reads a picture for a material.
@@ -210,8 +215,7 @@ impl Beside {
     pub fn progress(&self) -> Option<String> {
         self.with(|board| {
             let building = (board.building > 0).then(|| "building a tree".to_owned());
-            let remaking = board.remaking.first().map(|(_, job)| job.title());
-            board.progress.clone().or(remaking).or(building)
+            board.progress.clone().or_else(|| board.mesh_in_the_making()).or(building)
         })
     }
 

@@ -464,7 +464,14 @@ mod tests {
             let mut machine = Machine::new(width, 720, rate, Target::default());
             (0..100).for_each(|_| machine.scheduler.shown_after(Duration::from_secs_f64(showing)));
             while machine.now < 10.0 {
+                let before = machine.shown.len();
                 machine.step();
+                // Never what a slice had left over.
+                if let [.., (1, last), (1, now)] = machine.shown[..]
+                    && machine.shown.len() > before
+                {
+                    assert!(now - last >= 0.5 * machine.scheduler.slice() - 1e-9, "{rate:e}, {showing}: {last}, {now}");
+                }
             }
             let per_second = |from: f64, until: f64| {
                 let shown = machine.shown.iter().filter(|(_, at)| (from..until).contains(at)).count();
