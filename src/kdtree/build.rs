@@ -9,7 +9,9 @@
 //! Start reading at [`build`].
 
 use super::nodes::{KdNode, KdNodes};
-use super::split::{Split, find_split, median_split};
+use super::simd::{InstructionSet, LANES};
+use super::split::{Split, median_split};
+use super::split_lanes::find_split;
 use crate::geometry::Aabb;
 use glam::Vec3;
 
@@ -59,12 +61,23 @@ pub(super) struct Reference {
 const _: () = assert!(size_of::<Reference>() == 32);
 
 impl Reference {
-    fn new(bounds: &Aabb, prim: u32) -> Self {
+    pub fn new(bounds: &Aabb, prim: u32) -> Self {
         Self { min: bounds.min.into(), prim, max: bounds.max.into(), unused: 0 }
     }
 
     fn bounds(&self) -> Aabb {
         Aabb { min: self.min.into(), max: self.max.into() }
+    }
+
+    /// Two of them, as they lie in memory.
+    #[inline(always)]
+    pub fn pair([a, b]: &[Self; 2]) -> [f32; LANES] {
+        let (a_prim, b_prim) = (f32::from_bits(a.prim), f32::from_bits(b.prim));
+        let (a_unused, b_unused) = (f32::from_bits(a.unused), f32::from_bits(b.unused));
+        [
+            a.min[0], a.min[1], a.min[2], a_prim, a.max[0], a.max[1], a.max[2], a_unused, b.min[0], b.min[1], b.min[2],
+            b_prim, b.max[0], b.max[1], b.max[2], b_unused,
+        ]
     }
 
     /// A flat reference inside the plane goes below.
@@ -105,7 +118,7 @@ pub(super) fn build(
         }
     }
     let growth = (references.len() as f32 * config.max_growth) as usize + 64;
-    let builder = Builder { primitives, config, padding: clip_padding(&bounds) };
+    let builder = Builder { primitives, config, padding: clip_padding(&bounds), set: InstructionSet::detect() };
     let root = builder.subtree(references, bounds, growth, 0);
     let mut nodes = vec![KdNode::leaf(0, 0)];
     root.flatten(0, &mut nodes, &mut make_leaf);
@@ -181,10 +194,11 @@ struct Builder<'a, P> {
     primitives: &'a P,
     config: &'a BuildConfig,
     padding: f32,
+    set: InstructionSet,
 }
 
 /// Subtrees with more references than this are built side by side.
-const FORK_ABOVE: usize = 4096;
+const FORK_ABOVE: usize = 1024;
 
 impl<P: Primitives> Builder<'_, P> {
     /// - `growth`: references that this subtree may add to those given.
@@ -274,7 +288,11 @@ impl<P: Primitives> Builder<'_, P> {
         if depth >= self.config.max_depth || references.len() <= self.config.leaf_limit {
             return None;
         }
-        if self.config.median { median_split(references, cell) } else { find_split(references, cell, self.config) }
+        if self.config.median {
+            median_split(references, cell)
+        } else {
+            find_split(self.set, references, cell, self.config)
+        }
     }
 
     /// The parts of a reference on either side; none where its primitive does not reach.

@@ -23,6 +23,7 @@ mod sieve;
 mod simd;
 mod sphere_tree;
 mod split;
+mod split_lanes;
 mod stats;
 mod stream;
 mod surface;

@@ -1,7 +1,10 @@
 //! Where to split a cell: the surface area heuristic, by bins or face by face, and the median for comparison.
+//!
+//! Plain, for processors without wide registers, and the reference for `split_lanes`, which must find the same splits.
 
 use super::build::{BuildConfig, Reference};
 use crate::geometry::Aabb;
+use glam::Vec3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Split {
@@ -10,7 +13,11 @@ pub(super) struct Split {
 }
 
 /// Cuts of less than this share of a cell earn no bonus for the empty space they remove.
-const EMPTY_CUT: f32 = 0.05;
+pub(super) const EMPTY_CUT: f32 = 0.05;
+
+/// The most bins, and the most references of a node whose faces are tried.
+pub(super) const MAX_BINS: usize = 16;
+pub(super) const MAX_FACES: usize = 64;
 
 /// The split with the lowest expected cost, or `None` if a leaf costs no more.
 pub(super) fn find_split(references: &[Reference], cell: &Aabb, config: &BuildConfig) -> Option<Split> {
@@ -22,6 +29,28 @@ pub(super) fn find_split(references: &[Reference], cell: &Aabb, config: &BuildCo
     }
     search.try_walls(references);
     search.best
+}
+
+/// Whether parts of a block count in the cost: large nodes are split further, so that the steps of a block even out.
+pub(super) fn is_smooth(count: usize, config: &BuildConfig) -> bool {
+    count > 4 * config.block
+}
+
+/// References that lie flat in a face of the cell: all that a ray through the cell would test of a wall behind it.
+///
+/// The plane next to the face leaves them a cell of their own without any thickness, which only rays that cross the wall visit.
+///
+/// - `offer`: gets the plane and how many references lie on either side.
+pub(super) fn walls(references: &[Reference], cell: &Aabb, axis: usize, mut offer: impl FnMut(f32, usize, usize)) {
+    let (lo, hi) = (cell.min[axis], cell.max[axis]);
+    let is_flat = |face: f32| references.iter().any(|r| r.min[axis] == face && r.max[axis] == face);
+    for (face, at) in [(lo, lo.next_up()), (hi, hi.next_down())] {
+        if is_flat(face) {
+            let below = references.iter().filter(|r| r.is_below(axis, at)).count();
+            let above = references.iter().filter(|r| r.is_above(axis, at)).count();
+            offer(at, below, above);
+        }
+    }
 }
 
 struct Search<'a> {
@@ -46,9 +75,8 @@ impl<'a> Search<'a> {
         self.config.block_cost * count.div_ceil(self.config.block) as f32
     }
 
-    /// Large nodes are split further, so that the steps of a block even out.
     fn side_cost(&self, count: usize) -> f32 {
-        if self.count > 4 * self.config.block {
+        if is_smooth(self.count, self.config) {
             self.config.block_cost * count as f32 / self.config.block as f32
         } else {
             self.leaf_cost(count)
@@ -79,25 +107,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// References that lie flat in a face of the cell: all that a ray through the cell would test of a wall behind it.
-    ///
-    /// The plane next to the face leaves them a cell of their own without any thickness, which only rays that cross the wall visit.
     fn try_walls(&mut self, references: &[Reference]) {
         for axis in 0..3 {
-            let (lo, hi) = (self.cell.min[axis], self.cell.max[axis]);
-            let is_flat = |face: f32| references.iter().any(|r| r.min[axis] == face && r.max[axis] == face);
-            for (face, at) in [(lo, lo.next_up()), (hi, hi.next_down())] {
-                if is_flat(face) {
-                    let below = references.iter().filter(|r| r.is_below(axis, at)).count();
-                    let above = references.iter().filter(|r| r.is_above(axis, at)).count();
-                    self.offer(axis, at, below, above);
-                }
-            }
+            walls(references, self.cell, axis, |at, below, above| self.offer(axis, at, below, above));
         }
     }
 
     fn try_bins(&mut self, references: &[Reference]) {
-        const MAX_BINS: usize = 64;
         let bins = self.config.bins.min(MAX_BINS);
         let tight = tight_bounds(references);
         let (min, size) = (tight.min.to_array(), tight.size().to_array());
@@ -126,12 +142,11 @@ impl<'a> Search<'a> {
     }
 
     fn try_faces(&mut self, references: &[Reference]) {
-        const MAX: usize = 64;
         let count = references.len();
-        assert!(count <= MAX, "only small nodes try every face");
+        assert!(count <= MAX_FACES, "only small nodes try every face");
         for axis in 0..3 {
             // Missing references lie outside of every candidate, on neither side.
-            let (mut min, mut max) = ([f32::INFINITY; MAX], [f32::NEG_INFINITY; MAX]);
+            let (mut min, mut max) = ([f32::INFINITY; MAX_FACES], [f32::NEG_INFINITY; MAX_FACES]);
             for (i, reference) in references.iter().enumerate() {
                 (min[i], max[i]) = (reference.min[axis], reference.max[axis]);
             }
@@ -159,7 +174,8 @@ fn tight_bounds(references: &[Reference]) -> Aabb {
             max[axis] = max[axis].max(reference.max[axis]);
         }
     }
-    Aabb { min: min.into(), max: max.into() }
+    // 0 is positive, whatever the order.
+    Aabb { min: (Vec3::from(min) + 0.0), max: (Vec3::from(max) + 0.0) }
 }
 
 /// The middle reference along the longest side of the cell.
