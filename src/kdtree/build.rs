@@ -190,6 +190,13 @@ impl Arena {
     }
 }
 
+/// Where one thread keeps the references of the subtree that it builds.
+struct Room {
+    stack: Vec<Reference>,
+    /// Lower parts of one node's references: no node has more than the first.
+    below: Vec<Reference>,
+}
+
 struct Builder<'a, P> {
     primitives: &'a P,
     config: &'a BuildConfig,
@@ -206,7 +213,7 @@ impl<P: Primitives> Builder<'_, P> {
         if references.len() > FORK_ABOVE
             && let Some(split) = self.choose(&references, &cell, depth)
         {
-            let (mut below, mut above) = (Vec::new(), Vec::new());
+            let (mut below, mut above) = (Vec::with_capacity(references.len()), Vec::with_capacity(references.len()));
             for reference in &references {
                 let (lower, upper) = self.divide(reference, &split);
                 below.extend(lower);
@@ -223,54 +230,52 @@ impl<P: Primitives> Builder<'_, P> {
             }
         }
         let mut arena = Arena::default();
-        let mut stack = references;
-        self.sequential(&mut stack, 0, cell, growth, depth, &mut arena);
+        let mut room = Room { below: references.clone(), stack: references };
+        self.sequential(&mut room, 0, cell, growth, depth, &mut arena);
         Part::Done(arena)
     }
 
-    /// Builds the subtree over `stack[start..]`, which it consumes.
-    fn sequential(
-        &self,
-        stack: &mut Vec<Reference>,
-        start: usize,
-        cell: Aabb,
-        growth: usize,
-        depth: u32,
-        arena: &mut Arena,
-    ) {
-        let end = stack.len();
+    /// Builds the subtree over `room.stack[start..]`, which it consumes.
+    fn sequential(&self, room: &mut Room, start: usize, cell: Aabb, growth: usize, depth: u32, arena: &mut Arena) {
+        let end = room.stack.len();
         let count = end - start;
-        if let Some(split) = self.choose(&stack[start..], &cell, depth) {
-            // Upper parts are packed where the references lie, lower parts pile up behind them.
-            let mut kept = start;
+        if let Some(split) = self.choose(&room.stack[start..], &cell, depth) {
+            // Upper parts are packed where the references lie, lower parts apart. Most references lie on one side, and nobody can
+            // foretell on which: they are written to both and counted on one.
+            let (mut kept, mut n_below) = (start, 0);
             for i in start..end {
-                let (lower, upper) = self.divide(&stack[i], &split);
-                if let Some(upper) = upper {
-                    stack[kept] = upper;
-                    kept += 1;
+                let reference = room.stack[i];
+                let (mut upper, mut lower) = (reference, reference);
+                let mut is_below = reference.is_below(split.axis, split.at);
+                let mut is_above = !is_below | reference.is_above(split.axis, split.at);
+                if is_below & is_above {
+                    let parts = (self.part(&reference, &split, true), self.part(&reference, &split, false));
+                    (is_below, is_above) = (parts.0.is_some(), parts.1.is_some());
+                    (lower, upper) = (parts.0.unwrap_or(reference), parts.1.unwrap_or(reference));
                 }
-                stack.extend(lower);
+                room.stack[kept] = upper;
+                kept += usize::from(is_above);
+                room.below[n_below] = lower;
+                n_below += usize::from(is_below);
             }
-            let (n_above, n_below) = (kept - start, stack.len() - end);
+            room.stack.truncate(kept);
+            room.stack.extend_from_slice(&room.below[..n_below]);
+            let n_above = kept - start;
             if let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) {
-                stack.copy_within(end.., kept);
-                stack.truncate(kept + n_below);
                 let (cell_below, cell_above) = split_cell(&cell, &split);
                 let index = arena.nodes.len();
                 arena.nodes.push(ArenaNode::Inner { axis: split.axis, split: split.at, above: 0 });
-                self.sequential(stack, kept, cell_below, growth_below, depth + 1, arena);
+                self.sequential(room, kept, cell_below, growth_below, depth + 1, arena);
                 let above = arena.nodes.len() as u32;
                 arena.nodes[index] = ArenaNode::Inner { axis: split.axis, split: split.at, above };
-                self.sequential(stack, start, cell_above, growth_above, depth + 1, arena);
+                self.sequential(room, start, cell_above, growth_above, depth + 1, arena);
                 return;
             }
             // Too many copies. Every primitive is in one of the two lists: they make up the leaf together.
-            stack.copy_within(end.., kept);
-            stack.truncate(kept + n_below);
         }
         let first = arena.prims.len();
-        arena.prims.extend(stack[start..].iter().map(|reference| reference.prim));
-        stack.truncate(start);
+        arena.prims.extend(room.stack[start..].iter().map(|reference| reference.prim));
+        room.stack.truncate(start);
         arena.prims[first..].sort_unstable();
         // Both halves of a rejected split may name the same primitive.
         let mut length = first;
