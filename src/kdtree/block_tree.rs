@@ -1,7 +1,7 @@
 //! Kd-tree over primitives of one kind: the binary nodes, the wide ones, and the leaf blocks below both.
 
 use super::blocks::{BLOCK, LeafBlock, Prims};
-use super::build::{BuildConfig, Primitives, build};
+use super::build::{BuildConfig, LeafMaker, Primitives, build};
 use super::nodes::{KdNode, KdNodes};
 use super::ray::Nearest;
 use super::simd::Simd;
@@ -35,22 +35,10 @@ impl<B: LeafBlock> BlockTree<B> {
     pub fn build(
         primitives: &impl Primitives,
         config: &BuildConfig,
-        make_block: impl Fn(&[u32]) -> B,
-        make_compact: impl Fn(&[u32]) -> Vec<B::Compact>,
+        make_block: impl Fn(&[u32]) -> B + Sync,
+        make_compact: impl Fn(&[u32]) -> Vec<B::Compact> + Sync,
     ) -> Self {
-        let (mut blocks, mut compact) = (Vec::new(), Vec::new());
-        let nodes = build(primitives, config, |prims| {
-            if prims.is_empty() {
-                return (0, 0);
-            }
-            let small = make_compact(prims);
-            if small.is_empty() {
-                append(&mut blocks, prims.chunks(BLOCK).map(&make_block))
-            } else {
-                let (first, count) = append(&mut compact, small);
-                (first | COMPACT, count)
-            }
-        });
+        let (nodes, Blocks { blocks, compact }) = build(primitives, config, &BlockMaker { make_block, make_compact });
         let (extent, wide) = (nodes.extent(), widen(&nodes));
         Self { nodes, wide, blocks, compact, extent }
     }
@@ -110,14 +98,60 @@ impl<B: LeafBlock> BlockTree<B> {
     }
 }
 
+/// The blocks of some leaves.
+struct Blocks<B: LeafBlock> {
+    blocks: Vec<B>,
+    compact: Vec<B::Compact>,
+}
+
+impl<B: LeafBlock> Default for Blocks<B> {
+    fn default() -> Self {
+        Self { blocks: Vec::new(), compact: Vec::new() }
+    }
+}
+
+struct BlockMaker<M, C> {
+    make_block: M,
+    make_compact: C,
+}
+
+impl<B: LeafBlock, M: Fn(&[u32]) -> B + Sync, C: Fn(&[u32]) -> Vec<B::Compact> + Sync> LeafMaker for BlockMaker<M, C> {
+    type Leaves = Blocks<B>;
+
+    fn make(&self, leaves: &mut Blocks<B>, prims: &[u32]) -> (u32, u32) {
+        if prims.is_empty() {
+            return (0, 0);
+        }
+        let small = (self.make_compact)(prims);
+        if small.is_empty() {
+            append(&mut leaves.blocks, prims.chunks(BLOCK).map(&self.make_block))
+        } else {
+            let (first, count) = append(&mut leaves.compact, small);
+            (first | COMPACT, count)
+        }
+    }
+
+    fn append(&self, leaves: &mut Blocks<B>, mut part: Blocks<B>) -> impl Fn(u32) -> u32 {
+        let (n_blocks, n_compact) = (leaves.blocks.len(), leaves.compact.len());
+        leaves.blocks.append(&mut part.blocks);
+        leaves.compact.append(&mut part.compact);
+        check_count(leaves.blocks.len().max(leaves.compact.len()));
+        move |first| first + if first & COMPACT == 0 { n_blocks } else { n_compact } as u32
+    }
+}
+
 /// Appends the blocks of a leaf; returns the number of the first one, and how many there are.
 fn append<B: LeafBlock>(to: &mut Vec<B>, blocks: impl IntoIterator<Item = B>) -> (u32, u32) {
     let first = to.len();
     to.extend(blocks);
     let count = to.len() - first;
     to[first..].iter_mut().take(count.saturating_sub(1)).for_each(|block| block.prims_mut().set_followed());
-    assert!(to.len() < COMPACT as usize, "a tree of more than 2^29 leaf blocks");
+    check_count(to.len());
     (first as u32, count as u32)
+}
+
+fn check_count(n_blocks: usize) {
+    assert!(n_blocks < COMPACT as usize, "a tree of more than 2^29 leaf blocks");
 }
 
 #[inline(always)]

@@ -13,14 +13,14 @@ use std::marker::PhantomData;
 pub(super) const BLOCK: usize = LANES;
 
 /// What the test of a leaf wants to know of a ray, made once for all leaves.
-pub(super) trait LeafRay: Copy {
+pub(super) trait LeafRay: Copy + Send {
     const IDLE: Self;
 
     fn new(ray: &Ray, shear: &Shear) -> Self;
 }
 
 /// Up to sixteen primitives of one kind.
-pub(super) trait LeafBlock: Sized {
+pub(super) trait LeafBlock: Sized + Send {
     type Ray: LeafRay;
 
     /// A smaller form for leaves whose primitives have much in common.

@@ -100,14 +100,24 @@ fn clip_padding(bounds: &Aabb) -> f32 {
     super::ray::WIDEN * (bounds.size().max_element() + 0.25 * largest)
 }
 
-/// Builds the nodes and hands every leaf's primitives, ascending, to `make_leaf`, in the order of the leaves.
-///
-/// `make_leaf` returns the two numbers that its leaf node stores.
-pub(super) fn build(
+/// What becomes of the leaves.
+pub(super) trait LeafMaker: Sync {
+    /// Those of a part of the tree, in order.
+    type Leaves: Default + Send;
+
+    /// Adds the leaf with these primitives, ascending; returns the two numbers that its node stores.
+    fn make(&self, leaves: &mut Self::Leaves, prims: &[u32]) -> (u32, u32);
+
+    /// Puts the leaves of a part behind the others; returns what turns the first of the two numbers into that of the whole.
+    fn append(&self, leaves: &mut Self::Leaves, part: Self::Leaves) -> impl Fn(u32) -> u32;
+}
+
+/// Builds the nodes and, in their order, the leaves.
+pub(super) fn build<M: LeafMaker>(
     primitives: &impl Primitives,
     config: &BuildConfig,
-    mut make_leaf: impl FnMut(&[u32]) -> (u32, u32),
-) -> KdNodes {
+    maker: &M,
+) -> (KdNodes, M::Leaves) {
     let mut references = Vec::with_capacity(primitives.len());
     let mut bounds = Aabb::EMPTY;
     for prim in 0..primitives.len() as u32 {
@@ -118,39 +128,44 @@ pub(super) fn build(
         }
     }
     let growth = (references.len() as f32 * config.max_growth) as usize + 64;
-    let builder = Builder { primitives, config, padding: clip_padding(&bounds), set: InstructionSet::detect() };
+    let set = InstructionSet::detect();
+    let builder = Builder { primitives, config, maker, padding: clip_padding(&bounds), set };
     let root = builder.subtree(references, bounds, growth, 0);
-    let mut nodes = vec![KdNode::leaf(0, 0)];
-    root.flatten(0, &mut nodes, &mut make_leaf);
-    KdNodes { nodes, bounds }
+    let (mut nodes, mut leaves) = (vec![KdNode::leaf(0, 0)], M::Leaves::default());
+    root.flatten(0, &mut nodes, maker, &mut leaves);
+    (KdNodes { nodes, bounds }, leaves)
 }
 
 /// A finished part of the tree, before it gets its place in the arrays.
-enum Part {
-    Fork { axis: usize, split: f32, children: Box<[Part; 2]> },
-    Done(Arena),
+enum Part<L> {
+    Fork { axis: usize, split: f32, children: Box<[Part<L>; 2]> },
+    Done(Arena<L>),
 }
 
-impl Part {
-    fn flatten(&self, slot: usize, nodes: &mut Vec<KdNode>, make_leaf: &mut impl FnMut(&[u32]) -> (u32, u32)) {
+impl<L: Default> Part<L> {
+    fn flatten<M: LeafMaker<Leaves = L>>(self, slot: usize, nodes: &mut Vec<KdNode>, maker: &M, leaves: &mut L) {
         match self {
             Self::Fork { axis, split, children } => {
                 let first = nodes.len();
                 nodes.extend([KdNode::leaf(0, 0); 2]);
-                nodes[slot] = KdNode::inner(*axis, *split, first as u32);
-                children[0].flatten(first, nodes, make_leaf);
-                children[1].flatten(first + 1, nodes, make_leaf);
+                nodes[slot] = KdNode::inner(axis, split, first as u32);
+                let [lower, upper] = *children;
+                lower.flatten(first, nodes, maker, leaves);
+                upper.flatten(first + 1, nodes, maker, leaves);
             }
-            Self::Done(arena) => arena.flatten(0, slot, nodes, make_leaf),
+            Self::Done(Arena { nodes: part, leaves: part_leaves }) => {
+                let in_whole = maker.append(leaves, part_leaves);
+                flatten(&part, 0, slot, nodes, &in_whole);
+            }
         }
     }
 }
 
 /// A subtree built by one thread.
 #[derive(Default)]
-struct Arena {
+struct Arena<L> {
     nodes: Vec<ArenaNode>,
-    prims: Vec<u32>,
+    leaves: L,
 }
 
 enum ArenaNode {
@@ -166,40 +181,35 @@ enum ArenaNode {
     },
 }
 
-impl Arena {
-    fn flatten(
-        &self,
-        index: usize,
-        slot: usize,
-        nodes: &mut Vec<KdNode>,
-        make_leaf: &mut impl FnMut(&[u32]) -> (u32, u32),
-    ) {
-        match self.nodes[index] {
-            ArenaNode::Inner { axis, split, above } => {
-                let first = nodes.len();
-                nodes.extend([KdNode::leaf(0, 0); 2]);
-                nodes[slot] = KdNode::inner(axis, split, first as u32);
-                self.flatten(index + 1, first, nodes, make_leaf);
-                self.flatten(above as usize, first + 1, nodes, make_leaf);
-            }
-            ArenaNode::Leaf { first, count } => {
-                let (first, count) = make_leaf(&self.prims[first as usize..][..count as usize]);
-                nodes[slot] = KdNode::leaf(first, count);
-            }
+/// Copies the subtree at `index` of a part to `nodes[slot]` and the end of `nodes`.
+fn flatten(part: &[ArenaNode], index: usize, slot: usize, nodes: &mut Vec<KdNode>, in_whole: &impl Fn(u32) -> u32) {
+    match part[index] {
+        ArenaNode::Inner { axis, split, above } => {
+            let first = nodes.len();
+            nodes.extend([KdNode::leaf(0, 0); 2]);
+            nodes[slot] = KdNode::inner(axis, split, first as u32);
+            flatten(part, index + 1, first, nodes, in_whole);
+            flatten(part, above as usize, first + 1, nodes, in_whole);
         }
+        ArenaNode::Leaf { count: 0, .. } => nodes[slot] = KdNode::leaf(0, 0),
+        ArenaNode::Leaf { first, count } => nodes[slot] = KdNode::leaf(in_whole(first), count),
     }
 }
 
-/// Where one thread keeps the references of the subtree that it builds.
+/// Where one thread keeps what it works on.
 struct Room {
+    /// The references of nodes that wait, those of the next one on top.
     stack: Vec<Reference>,
     /// Lower parts of one node's references: no node has more than the first.
     below: Vec<Reference>,
+    /// Primitives of one leaf.
+    prims: Vec<u32>,
 }
 
-struct Builder<'a, P> {
+struct Builder<'a, P, M> {
     primitives: &'a P,
     config: &'a BuildConfig,
+    maker: &'a M,
     padding: f32,
     set: InstructionSet,
 }
@@ -207,86 +217,76 @@ struct Builder<'a, P> {
 /// Subtrees with more references than this are built side by side.
 const FORK_ABOVE: usize = 1024;
 
-impl<P: Primitives> Builder<'_, P> {
+impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
     /// - `growth`: references that this subtree may add to those given.
-    fn subtree(&self, references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Part {
-        if references.len() > FORK_ABOVE
+    fn subtree(&self, mut references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Part<M::Leaves> {
+        let count = references.len();
+        let mut arena = Arena::default();
+        let mut below = references.clone();
+        if count > FORK_ABOVE
             && let Some(split) = self.choose(&references, &cell, depth)
         {
-            let (mut below, mut above) = (Vec::with_capacity(references.len()), Vec::with_capacity(references.len()));
-            for reference in &references {
-                let (lower, upper) = self.divide(reference, &split);
-                below.extend(lower);
-                above.extend(upper);
-            }
-            if let Some((growth_below, growth_above)) = share(growth, references.len(), below.len(), above.len()) {
-                drop(references);
-                let (cell_below, cell_above) = split_cell(&cell, &split);
-                let (lower, upper) = rayon::join(
-                    || self.subtree(below, cell_below, growth_below, depth + 1),
-                    || self.subtree(above, cell_above, growth_above, depth + 1),
-                );
-                return Part::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
-            }
+            let (n_above, n_below) = self.divide(&mut references, &mut below, &split);
+            references.truncate(n_above);
+            below.truncate(n_below);
+            let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) else {
+                references.append(&mut below);
+                self.make_leaf(&references, &mut Vec::new(), &mut arena);
+                return Part::Done(arena);
+            };
+            references.shrink_to_fit();
+            below.shrink_to_fit();
+            let (cell_below, cell_above) = split_cell(&cell, &split);
+            let (lower, upper) = rayon::join(
+                || self.subtree(below, cell_below, growth_below, depth + 1),
+                || self.subtree(references, cell_above, growth_above, depth + 1),
+            );
+            return Part::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
         }
-        let mut arena = Arena::default();
-        let mut room = Room { below: references.clone(), stack: references };
+        let mut room = Room { stack: references, below, prims: Vec::new() };
         self.sequential(&mut room, 0, cell, growth, depth, &mut arena);
         Part::Done(arena)
     }
 
     /// Builds the subtree over `room.stack[start..]`, which it consumes.
-    fn sequential(&self, room: &mut Room, start: usize, cell: Aabb, growth: usize, depth: u32, arena: &mut Arena) {
-        let end = room.stack.len();
-        let count = end - start;
+    fn sequential(
+        &self,
+        room: &mut Room,
+        start: usize,
+        cell: Aabb,
+        growth: usize,
+        depth: u32,
+        arena: &mut Arena<M::Leaves>,
+    ) {
+        let count = room.stack.len() - start;
         if let Some(split) = self.choose(&room.stack[start..], &cell, depth) {
-            // Upper parts are packed where the references lie, lower parts apart. Most references lie on one side, and nobody can
-            // foretell on which: they are written to both and counted on one.
-            let (mut kept, mut n_below) = (start, 0);
-            for i in start..end {
-                let reference = room.stack[i];
-                let (mut upper, mut lower) = (reference, reference);
-                let mut is_below = reference.is_below(split.axis, split.at);
-                let mut is_above = !is_below | reference.is_above(split.axis, split.at);
-                if is_below & is_above {
-                    let parts = (self.part(&reference, &split, true), self.part(&reference, &split, false));
-                    (is_below, is_above) = (parts.0.is_some(), parts.1.is_some());
-                    (lower, upper) = (parts.0.unwrap_or(reference), parts.1.unwrap_or(reference));
-                }
-                room.stack[kept] = upper;
-                kept += usize::from(is_above);
-                room.below[n_below] = lower;
-                n_below += usize::from(is_below);
-            }
-            room.stack.truncate(kept);
+            let (n_above, n_below) = self.divide(&mut room.stack[start..], &mut room.below, &split);
+            room.stack.truncate(start + n_above);
             room.stack.extend_from_slice(&room.below[..n_below]);
-            let n_above = kept - start;
             if let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) {
                 let (cell_below, cell_above) = split_cell(&cell, &split);
                 let index = arena.nodes.len();
                 arena.nodes.push(ArenaNode::Inner { axis: split.axis, split: split.at, above: 0 });
-                self.sequential(room, kept, cell_below, growth_below, depth + 1, arena);
+                self.sequential(room, start + n_above, cell_below, growth_below, depth + 1, arena);
                 let above = arena.nodes.len() as u32;
                 arena.nodes[index] = ArenaNode::Inner { axis: split.axis, split: split.at, above };
                 self.sequential(room, start, cell_above, growth_above, depth + 1, arena);
                 return;
             }
-            // Too many copies. Every primitive is in one of the two lists: they make up the leaf together.
         }
-        let first = arena.prims.len();
-        arena.prims.extend(room.stack[start..].iter().map(|reference| reference.prim));
+        self.make_leaf(&room.stack[start..], &mut room.prims, arena);
         room.stack.truncate(start);
-        arena.prims[first..].sort_unstable();
-        // Both halves of a rejected split may name the same primitive.
-        let mut length = first;
-        for i in first..arena.prims.len() {
-            if length == first || arena.prims[length - 1] != arena.prims[i] {
-                arena.prims[length] = arena.prims[i];
-                length += 1;
-            }
-        }
-        arena.prims.truncate(length);
-        arena.nodes.push(ArenaNode::Leaf { first: first as u32, count: (length - first) as u32 });
+    }
+
+    /// The leaf of these references. After a split that would have made too many copies both of its sides are among them, and may
+    /// name the same primitive.
+    fn make_leaf(&self, references: &[Reference], prims: &mut Vec<u32>, arena: &mut Arena<M::Leaves>) {
+        prims.clear();
+        prims.extend(references.iter().map(|reference| reference.prim));
+        prims.sort_unstable();
+        prims.dedup();
+        let (first, count) = self.maker.make(&mut arena.leaves, prims);
+        arena.nodes.push(ArenaNode::Leaf { first, count });
     }
 
     fn choose(&self, references: &[Reference], cell: &Aabb, depth: u32) -> Option<Split> {
@@ -300,14 +300,28 @@ impl<P: Primitives> Builder<'_, P> {
         }
     }
 
-    /// The parts of a reference on either side; none where its primitive does not reach.
-    #[inline]
-    fn divide(&self, reference: &Reference, split: &Split) -> (Option<Reference>, Option<Reference>) {
-        match (reference.is_below(split.axis, split.at), reference.is_above(split.axis, split.at)) {
-            (true, false) => (Some(*reference), None),
-            (false, _) => (None, Some(*reference)),
-            (true, true) => (self.part(reference, split, true), self.part(reference, split, false)),
+    /// Packs the parts above the plane at the front of `references`, those below at the front of `below`, and returns how
+    /// many there are; none where a primitive does not reach.
+    ///
+    /// Most references lie on one side, and nobody can foretell on which: they are written to both and counted on one.
+    fn divide(&self, references: &mut [Reference], below: &mut [Reference], split: &Split) -> (usize, usize) {
+        let (mut n_above, mut n_below) = (0, 0);
+        for i in 0..references.len() {
+            let reference = references[i];
+            let (mut upper, mut lower) = (reference, reference);
+            let mut is_below = reference.is_below(split.axis, split.at);
+            let mut is_above = !is_below | reference.is_above(split.axis, split.at);
+            if is_below & is_above {
+                let parts = (self.part(&reference, split, true), self.part(&reference, split, false));
+                (is_below, is_above) = (parts.0.is_some(), parts.1.is_some());
+                (lower, upper) = (parts.0.unwrap_or(reference), parts.1.unwrap_or(reference));
+            }
+            references[n_above] = upper;
+            n_above += usize::from(is_above);
+            below[n_below] = lower;
+            n_below += usize::from(is_below);
         }
+        (n_above, n_below)
     }
 
     fn part(&self, reference: &Reference, split: &Split, below: bool) -> Option<Reference> {

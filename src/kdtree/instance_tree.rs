@@ -1,6 +1,6 @@
 //! The objects with a tree of their own, when they are many: a tree over their boxes.
 
-use super::build::{BuildConfig, Primitives, build};
+use super::build::{BuildConfig, LeafMaker, Primitives, build};
 use super::mesh_tree::BuildPreset;
 use super::nodes::KdNodes;
 use super::ray::TreeRay;
@@ -48,11 +48,7 @@ impl InstanceTree {
     pub fn build(boxes: &[Aabb], objects: Vec<u32>) -> Self {
         let boxes: Vec<Aabb> = objects.iter().map(|&object| boxes[object as usize]).collect();
         let config = BuildConfig { exact_below: 8, block_cost: 4.0, max_growth: 2.0, ..BuildPreset::Best.config(1) };
-        let mut leaf_places = Vec::new();
-        let nodes = build(&Boxes(&boxes), &config, |leaf| {
-            leaf_places.extend_from_slice(leaf);
-            ((leaf_places.len() - leaf.len()) as u32, leaf.len() as u32)
-        });
+        let (nodes, leaf_places) = build(&Boxes(&boxes), &config, &Places);
         Self { extent: nodes.extent(), nodes, leaf_places, objects, boxes }
     }
 
@@ -89,6 +85,25 @@ impl InstanceTree {
         self.nodes.walk_cells(&tree_ray, from, t_max, visit, || ());
         entries[first..].sort_unstable_by(|a, b| a.t.total_cmp(&b.t));
         go_on
+    }
+}
+
+/// Leaves are ranges of `leaf_places`.
+struct Places;
+
+impl LeafMaker for Places {
+    type Leaves = Vec<u32>;
+
+    fn make(&self, places: &mut Vec<u32>, leaf: &[u32]) -> (u32, u32) {
+        let first = places.len() as u32;
+        places.extend_from_slice(leaf);
+        (first, leaf.len() as u32)
+    }
+
+    fn append(&self, places: &mut Vec<u32>, mut part: Vec<u32>) -> impl Fn(u32) -> u32 {
+        let n_before = places.len() as u32;
+        places.append(&mut part);
+        move |first| first + n_before
     }
 }
 

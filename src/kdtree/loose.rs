@@ -85,8 +85,8 @@ impl LooseTrees {
 
 fn tree<B: LeafBlock>(
     loose: &Loose,
-    make_block: impl Fn(&[u32]) -> B,
-    make_compact: impl Fn(&[u32]) -> Vec<B::Compact>,
+    make_block: impl Fn(&[u32]) -> B + Sync,
+    make_compact: impl Fn(&[u32]) -> Vec<B::Compact> + Sync,
 ) -> BlockTree<B> {
     let of_prims = |prims: &[u32]| -> Vec<u32> { prims.iter().map(|&prim| loose.objects[prim as usize]).collect() };
     let config = BuildPreset::Best.config(BLOCK);

@@ -17,7 +17,7 @@ pub(super) const EMPTY_CUT: f32 = 0.05;
 
 /// The most bins, and the most references of a node whose faces are tried.
 pub(super) const MAX_BINS: usize = 16;
-pub(super) const MAX_FACES: usize = 64;
+pub(super) const MAX_FACES: usize = 32;
 
 /// The split with the lowest expected cost, or `None` if a leaf costs no more.
 pub(super) fn find_split(references: &[Reference], cell: &Aabb, config: &BuildConfig) -> Option<Split> {

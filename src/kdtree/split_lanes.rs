@@ -39,7 +39,7 @@ fn search<S: Simd>(s: S, references: &[Reference], cell: &Aabb, config: &BuildCo
     *into = search.best;
 }
 
-/// As many as the faces of the largest node whose faces are tried, and room for one full store beyond.
+/// As many as the faces of the largest node whose faces are tried.
 const MAX_CANDIDATES: usize = 2 * MAX_FACES;
 
 /// Planes across one axis, and how many references would lie on either side.
@@ -147,9 +147,9 @@ impl<'a, S: Simd> Search<'a, S> {
             candidates.at[count..2 * count].copy_from_slice(&max[..count]);
             let n_chunks = count.div_ceil(LANES);
             let chunks = || min.as_chunks::<LANES>().0.iter().zip(max.as_chunks::<LANES>().0).take(n_chunks);
-            let mut flat: u64 = 0;
+            let mut flat: u32 = 0;
             for (i, (min, max)) in chunks().enumerate() {
-                flat |= u64::from(s.eq(s.load(min), s.load(max))) << (i * LANES);
+                flat |= u32::from(s.eq(s.load(min), s.load(max))) << (i * LANES);
             }
             *is_any_flat = flat != 0;
             for i in 0..2 * count {
