@@ -131,7 +131,13 @@ impl<B: LeafBlock, M: Fn(&[u32]) -> B + Sync, C: Fn(&[u32]) -> Vec<B::Compact> +
         }
     }
 
-    fn append(&self, leaves: &mut Blocks<B>, mut part: Blocks<B>) -> impl Fn(u32) -> u32 {
+    fn with_room_for(&self, parts: &[&Blocks<B>]) -> Blocks<B> {
+        let n_blocks = parts.iter().map(|part| part.blocks.len()).sum();
+        let n_compact = parts.iter().map(|part| part.compact.len()).sum();
+        Blocks { blocks: Vec::with_capacity(n_blocks), compact: Vec::with_capacity(n_compact) }
+    }
+
+    fn add_part(&self, leaves: &mut Blocks<B>, mut part: Blocks<B>) -> impl Fn(u32) -> u32 {
         let (n_blocks, n_compact) = (leaves.blocks.len(), leaves.compact.len());
         leaves.blocks.append(&mut part.blocks);
         leaves.compact.append(&mut part.compact);

@@ -108,8 +108,11 @@ pub(super) trait LeafMaker: Sync {
     /// Adds the leaf with these primitives, ascending; returns the two numbers that its node stores.
     fn make(&self, leaves: &mut Self::Leaves, prims: &[u32]) -> (u32, u32);
 
+    /// None yet, with room for those of all parts.
+    fn with_room_for(&self, parts: &[&Self::Leaves]) -> Self::Leaves;
+
     /// Puts the leaves of a part behind the others; returns what turns the first of the two numbers into that of the whole.
-    fn append(&self, leaves: &mut Self::Leaves, part: Self::Leaves) -> impl Fn(u32) -> u32;
+    fn add_part(&self, leaves: &mut Self::Leaves, part: Self::Leaves) -> impl Fn(u32) -> u32;
 }
 
 /// Builds the nodes and, in their order, the leaves.
@@ -131,7 +134,9 @@ pub(super) fn build<M: LeafMaker>(
     let set = InstructionSet::detect();
     let builder = Builder { primitives, config, maker, padding: clip_padding(&bounds), set };
     let root = builder.subtree(references, bounds, growth, 0);
-    let (mut nodes, mut leaves) = (vec![KdNode::leaf(0, 0)], M::Leaves::default());
+    let mut parts = Vec::new();
+    root.collect_leaves(&mut parts);
+    let (mut nodes, mut leaves) = (vec![KdNode::leaf(0, 0)], maker.with_room_for(&parts));
     root.flatten(0, &mut nodes, maker, &mut leaves);
     (KdNodes { nodes, bounds }, leaves)
 }
@@ -142,7 +147,14 @@ enum Part<L> {
     Done(Arena<L>),
 }
 
-impl<L: Default> Part<L> {
+impl<L> Part<L> {
+    fn collect_leaves<'a>(&'a self, parts: &mut Vec<&'a L>) {
+        match self {
+            Self::Fork { children, .. } => children.iter().for_each(|child| child.collect_leaves(parts)),
+            Self::Done(arena) => parts.push(&arena.leaves),
+        }
+    }
+
     fn flatten<M: LeafMaker<Leaves = L>>(self, slot: usize, nodes: &mut Vec<KdNode>, maker: &M, leaves: &mut L) {
         match self {
             Self::Fork { axis, split, children } => {
@@ -154,7 +166,7 @@ impl<L: Default> Part<L> {
                 upper.flatten(first + 1, nodes, maker, leaves);
             }
             Self::Done(Arena { nodes: part, leaves: part_leaves }) => {
-                let in_whole = maker.append(leaves, part_leaves);
+                let in_whole = maker.add_part(leaves, part_leaves);
                 flatten(&part, 0, slot, nodes, &in_whole);
             }
         }
@@ -226,7 +238,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
         if count > FORK_ABOVE
             && let Some(split) = self.choose(&references, &cell, depth)
         {
-            let (n_above, n_below) = self.divide(&mut references, &mut below, &split);
+            let (n_below, n_above) = self.divide(&mut references, &mut below, &split);
             references.truncate(n_above);
             below.truncate(n_below);
             let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) else {
@@ -260,7 +272,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
     ) {
         let count = room.stack.len() - start;
         if let Some(split) = self.choose(&room.stack[start..], &cell, depth) {
-            let (n_above, n_below) = self.divide(&mut room.stack[start..], &mut room.below, &split);
+            let (n_below, n_above) = self.divide(&mut room.stack[start..], &mut room.below, &split);
             room.stack.truncate(start + n_above);
             room.stack.extend_from_slice(&room.below[..n_below]);
             if let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) {
@@ -300,8 +312,8 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
         }
     }
 
-    /// Packs the parts above the plane at the front of `references`, those below at the front of `below`, and returns how
-    /// many there are; none where a primitive does not reach.
+    /// Packs the parts below the plane at the front of `below`, those above at the front of `references`, and returns how
+    /// many there are of each; none where a primitive does not reach.
     ///
     /// Most references lie on one side, and nobody can foretell on which: they are written to both and counted on one.
     fn divide(&self, references: &mut [Reference], below: &mut [Reference], split: &Split) -> (usize, usize) {
@@ -321,7 +333,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
             below[n_below] = lower;
             n_below += usize::from(is_below);
         }
-        (n_above, n_below)
+        (n_below, n_above)
     }
 
     fn part(&self, reference: &Reference, split: &Split, below: bool) -> Option<Reference> {

@@ -100,7 +100,11 @@ impl LeafMaker for Places {
         (first, leaf.len() as u32)
     }
 
-    fn append(&self, places: &mut Vec<u32>, mut part: Vec<u32>) -> impl Fn(u32) -> u32 {
+    fn with_room_for(&self, parts: &[&Vec<u32>]) -> Vec<u32> {
+        Vec::with_capacity(parts.iter().map(|part| part.len()).sum())
+    }
+
+    fn add_part(&self, places: &mut Vec<u32>, mut part: Vec<u32>) -> impl Fn(u32) -> u32 {
         let n_before = places.len() as u32;
         places.append(&mut part);
         move |first| first + n_before

@@ -57,7 +57,7 @@ struct Search<'a> {
     config: &'a BuildConfig,
     cell: &'a Aabb,
     count: usize,
-    /// Half the area of the cell's surface, and 1 over it.
+    /// 1 over half the area of the cell's surface.
     inv_area: f32,
     best_cost: f32,
     best: Option<Split>,

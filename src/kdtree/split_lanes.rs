@@ -205,14 +205,14 @@ impl<'a, S: Simd> Search<'a, S> {
             let place = s.mul(s.sub(lanes, origin), scale);
             // NaN becomes the first bin.
             let bin = s.truncate(s.min(s.max(place, first_bin), last_bin));
-            let mut bins = [0; LANES];
-            s.store_u(bin, &mut bins);
+            let mut bin_of = [0; LANES];
+            s.store_u(bin, &mut bin_of);
             for lane in [0, 1, 2, 4, 5, 6] {
-                counts[lane][bins[lane] as usize % MAX_BINS] += 1;
+                counts[lane][bin_of[lane] as usize % MAX_BINS] += 1;
             }
             if i < pairs.len() {
                 for lane in [8, 9, 10, 12, 13, 14] {
-                    counts[lane][bins[lane] as usize % MAX_BINS] += 1;
+                    counts[lane][bin_of[lane] as usize % MAX_BINS] += 1;
                 }
             }
         }
@@ -247,32 +247,44 @@ mod tests {
             (state >> 40) as f32 / (1 << 24) as f32
         };
         let (mut found, mut walls) = (0, 0);
-        for case in 0..4000 {
-            let count = [1, 2, 7, 15, 16, 17, 31, 32, 33, 40, 64, 65, 130, 517][case % 14];
+        let counts = [1, 2, 7, 15, 16, 17, 31, 32, 33, 40, 64, 65, 130, 517];
+        for case in 0..4032 {
+            let count = counts[case % counts.len()];
+            // Each of these with each of the others, and with each count.
+            let (kind, block) = (case / counts.len() % 8, [1, 16][case / counts.len() / 8 % 2]);
+            let scale = [1.0, 1.0, 1.0, 1.0, 1e-40, 1e38][case / counts.len() / 16 % 6];
             // Few different numbers in half of the cases, so that many planes cost the same; zeros of both signs.
-            let coarse = case % 2 == 0;
+            let coarse = kind % 2 == 0;
             let mut number = || {
                 let x = random() * 2.0 - 1.0;
-                if coarse { (x * 3.0).round() / 3.0 } else { x }
+                scale * if coarse { (x * 3.0).round() / 3.0 } else { x }
             };
             let references: Vec<Reference> = (0..count)
                 .map(|prim| {
                     let mut point = || Vec3::new(number(), number(), number());
-                    let (a, b) = (point(), point());
-                    let b = if prim % 5 == 0 { Vec3::new(b.x, a.y, b.z) } else { a + 0.3 * (b - a) };
+                    let (mut a, b) = (point(), point());
+                    let mut b = a + 0.3 * (b - a);
+                    if prim % 5 == 0 {
+                        // Flat, in some nodes as a wall.
+                        a.y = if kind % 4 == 1 { -scale } else { a.y };
+                        b.y = a.y;
+                    }
                     Reference::new(&Aabb::from_points([a, b]), prim as u32 * 1_000_003)
                 })
                 .collect();
-            let mut cell = Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
-            if case % 7 == 0 {
+            let mut cell = Aabb { min: Vec3::splat(-scale), max: Vec3::splat(scale) };
+            // A cell without thickness, and one without an area.
+            if kind >= 6 {
                 cell.max.x = cell.min.x;
             }
-            let block = [1, 16][case / 14 % 2];
+            if kind == 7 {
+                cell.max.z = cell.min.z;
+            }
             for preset in [BuildPreset::Best, BuildPreset::Quick] {
                 let config = preset.config(block);
                 let plain = split::find_split(&references, &cell, &config);
                 found += usize::from(plain.is_some());
-                walls += usize::from(plain.is_some_and(|split| split.at == (-1.0f32).next_up()));
+                walls += usize::from(plain.is_some_and(|split| split.at == (-scale).next_up()));
                 for set in InstructionSet::available() {
                     let split = find_split(set, &references, &cell, &config);
                     let bits = |split: Option<Split>| split.map(|split| (split.axis, split.at.to_bits()));
@@ -280,6 +292,6 @@ mod tests {
                 }
             }
         }
-        assert!(found > 3000 && walls > 20, "{found} splits, {walls} at walls");
+        assert!(found > 3000 && walls > 100, "{found} splits, {walls} at walls");
     }
 }
