@@ -41,6 +41,8 @@ fn search<S: Simd>(s: S, references: &[Reference], cell: &Aabb, config: &BuildCo
 
 /// As many as the faces of the largest node whose faces are tried.
 const MAX_CANDIDATES: usize = 2 * MAX_FACES;
+// Between bins, and at either end of the references.
+const _: () = assert!(MAX_BINS < MAX_CANDIDATES);
 
 /// Planes across one axis, and how many references would lie on either side.
 struct Candidates {
