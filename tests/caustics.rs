@@ -98,6 +98,26 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
 
 /// Every filter gives light that falls onto the film to the same pixels, with the same weight, as light that is looked
 /// for.
+/// Paths from the light are joined to a camera inside of glass from within that glass alone.
+#[test]
+fn a_camera_under_water_sees_the_same_with_and_without_them() {
+    let water = Material::Glass { ior: 1.33, absorption: Vec3::new(0.3, 0.1, 0.02) };
+    let shapes = vec![
+        (sphere(Vec3::ZERO, 2.0), 0),
+        (sphere(Vec3::new(0.0, -0.9, -0.3), 0.7), 1),
+        (sphere(Vec3::new(0.3, 0.1, -0.6), 0.25), 2),
+        (sphere(Vec3::new(0.0, 4.0, 0.0), 0.8), 3),
+    ];
+    let eye = camera(Vec3::new(0.2, 0.3, 1.2), Vec3::new(0.0, -0.5, -0.3), 40.0);
+    let scene = scene(shapes, vec![water, diffuse(0.7), GLASS, emissive(10.0)], Environment::Black, eye);
+    let found = mean_of_renders(&scene, settings(1, true), (24, 24), 256, 8);
+    let expected = mean_of_renders(&scene, settings(100, false), (24, 24), 1024, 8);
+    let error = (found.1.powi(2) + expected.1.powi(2)).sqrt();
+    println!("{found:?} {expected:?}");
+    assert!((found.0 - expected.0).abs() < 4.0 * error, "{found:?} for {expected:?}");
+    assert!(error < 0.02 * expected.0, "too noisy to tell: {error}");
+}
+
 #[test]
 fn every_filter_sees_the_same_light() {
     let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), eye());

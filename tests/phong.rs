@@ -174,6 +174,22 @@ fn a_white_furnace_stays_white() {
 }
 
 /// A highlight narrower than the lamp in it was found by chance alone: most samples were black, and a few very bright.
+/// Each surface splits a ray in two; the rays of a sample stay a number that does not grow with the surfaces.
+#[test]
+fn fifty_shells_of_glass_do_not_multiply_the_rays() {
+    let shells = (0..50).map(|i| (sphere(Vec3::ZERO, 1.0 - 0.019 * i as f32), i % 2)).collect();
+    let materials = [1.5, 1.0].map(|ior| Material::Glass { ior, absorption: Vec3::ZERO }).into();
+    let view = camera(Vec3::new(0.0, 0.4, 4.0), Vec3::ZERO, 30.0);
+    let scene = scene(shells, materials, Environment::Constant(Vec3::ONE), view);
+    let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
+    let (film, report) = render(&scene, &settings, 24, 24, 16);
+    let per_sample = report.rays.total() / report.rays.camera;
+    let (mean, error) = picture_mean(&film);
+    println!("{per_sample} rays a sample, mean {mean} ± {error}");
+    assert!(per_sample < 4000, "{per_sample} rays a sample");
+    assert!((mean - 1.0).abs() < 5.0 * error && error < 0.05, "{mean} ± {error}");
+}
+
 #[test]
 fn polished_metal_shows_a_large_lamp_without_speckles() {
     let metal = |alpha: f32| Material::Metal {

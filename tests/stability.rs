@@ -48,6 +48,14 @@ fn no_light_is_lost_and_no_sample_is_bad() {
     }
 }
 
+/// However glass is nested, shared, open or blended, from whatever side and by whichever integrator.
+#[test]
+fn nothing_lossless_shows_in_a_white_furnace() {
+    for name in ["nested-media", "random-furnaces"] {
+        assert_sound(name, 100_000);
+    }
+}
+
 #[test]
 fn a_million_samples_sum_up() {
     assert_sound("long-sums", 1_000_000);

@@ -13,7 +13,7 @@ use firstlight::frame::{
     FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, render_region_until,
     write_errors, write_film_file,
 };
-use firstlight::render::{Display, Film, NoRoom, Purpose, Region, RenderSettings, Room};
+use firstlight::render::{BadSample, Display, Film, NoRoom, Purpose, Region, RenderSettings, Room};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::check_writable;
 use firstlight::scene::{
@@ -352,7 +352,18 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     if film.n_bad() > bad_before {
         let total = report.rays.camera;
         let n_bad = film.n_bad() - bad_before;
-        remark(format_args!("warning: {n_bad} of {total} samples were not finite and were left out"));
+        remark(format_args!(
+            "warning: {n_bad} of {total} samples were not finite and were left out{}",
+            first_of(&report.bad)
+        ));
+    }
+    if report.n_above > 0 {
+        let (n_above, total) = (report.n_above, report.rays.camera);
+        remark(format_args!(
+            "warning: {n_above} of {total} samples are brighter than anything in the scene can be{}: \
+             this is a fault of the program, please report it with the scene",
+            first_of(&report.above)
+        ));
     }
     if let (false, Some(wanted), Some(error)) = (stopped, target.error, error)
         && error > wanted
@@ -445,10 +456,18 @@ fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Fai
     })
 }
 
+/// Where the first sample of a list is, for people who want to look into it.
+fn first_of(samples: &[BadSample]) -> String {
+    let place = |&BadSample { x, y, sample }: &BadSample| format!(" (pixel {x},{y}, sample {sample})");
+    samples.first().map(place).unwrap_or_default()
+}
+
 /// One line for machines.
 fn json(job: &Job, report: &OfflineReport, cpu_seconds: Option<f64>, film: &Film, stopped: bool) -> serde_json::Value {
     let error = film.error_estimate();
-    let bad: Vec<_> = report.bad.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect();
+    let places = |samples: &[BadSample]| -> Vec<_> {
+        samples.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect()
+    };
     serde_json::json!({
         "scene": job.scene.source.title(),
         "width": film.width(),
@@ -471,6 +490,8 @@ fn json(job: &Job, report: &OfflineReport, cpu_seconds: Option<f64>, film: &Film
         "estimated_error": error.map(|error| error.relative),
         "estimated_error_95": error.map(|error| [error.low, error.high]),
         "bad_samples": report.n_bad,
-        "bad_samples_at": bad,
+        "bad_samples_at": places(&report.bad),
+        "samples_above_bound": report.n_above,
+        "samples_above_bound_at": places(&report.above),
     })
 }

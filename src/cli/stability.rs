@@ -141,16 +141,16 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
 }
 
 const HEAD: &str = "\
-| case           |          rays | leaks | acne | missed | wrong t | non-finite | light error (allowed) | worst of bound |
-|----------------|--------------:|------:|-----:|-------:|--------:|-----------:|----------------------:|---------------:|
+| case            |          rays | leaks | acne | missed | wrong t | non-finite | above | light error (allowed) | worst of bound |
+|-----------------|--------------:|------:|-----:|-------:|--------:|-----------:|------:|----------------------:|---------------:|
 ";
 
 fn row(case: &Case, tally: &Tally) -> String {
-    let Tally { rays, leaks, acne, missed, wrong_t, non_finite, energy, worst } = tally;
+    let Tally { rays, leaks, acne, missed, wrong_t, non_finite, above, energy, worst } = tally;
     let light = energy.map_or(String::new(), |energy| format!("{:.1e} ({:.0e})", energy.error, energy.allowed));
     let worst = worst.as_ref().map_or(String::new(), |worst| format!("{:.2}", worst.severity));
     format!(
-        "| {:14} | {rays:13} | {leaks:5} | {acne:4} | {missed:6} | {wrong_t:7} | {non_finite:10} | {light:>21} | {worst:>14} |\n",
+        "| {:15} | {rays:13} | {leaks:5} | {acne:4} | {missed:6} | {wrong_t:7} | {non_finite:10} | {above:5} | {light:>21} | {worst:>14} |\n",
         case.name
     )
 }
@@ -169,6 +169,7 @@ fn json(args: &StabilityArgs, case: &Case, tally: &Tally, seconds: f64) -> serde
         "missed": tally.missed,
         "wrong_t": tally.wrong_t,
         "non_finite": tally.non_finite,
+        "above_bound": tally.above,
         "energy": energy,
         "worst": worst,
         "findings": tally.findings(),

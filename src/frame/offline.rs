@@ -43,6 +43,10 @@ pub struct OfflineReport {
     pub n_bad: u64,
     /// The first few of them.
     pub bad: Vec<BadSample>,
+    /// Samples brighter than anything in the scene can be, see [`PassReport::n_above`](crate::render::PassReport::n_above).
+    pub n_above: u64,
+    /// The first few of them.
+    pub above: Vec<BadSample>,
 }
 
 /// Adds samples to `film` until `target`; `progress` returns false to stop early.
@@ -99,6 +103,8 @@ pub fn render_region_until(
         report.rays += pass.rays;
         report.n_bad += pass.n_bad;
         report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));
+        report.n_above += pass.n_above;
+        report.above.extend(pass.above.into_iter().take(16_usize.saturating_sub(report.above.len())));
         report.seconds = start.elapsed().as_secs_f64();
         let (spp, seconds, error) = (film.spp_in(region), report.seconds, film.error_estimate_in(region));
         let go_on = progress(Progress { spp, seconds, rays: report.rays, error });

@@ -69,6 +69,8 @@ pub struct Status {
     pub n_bad: u64,
     /// The first few of them.
     pub bad: Vec<BadSample>,
+    /// Samples brighter than anything in the scene can be: a fault of the program.
+    pub n_above: u64,
     pub threads: usize,
     pub paused: bool,
     /// The target is reached.

@@ -499,6 +499,7 @@ pub fn present(
     (status.film_width, status.film_height, status.divider) = (stats.film_width, stats.film_height, stats.divider);
     status.n_bad = stats.n_bad;
     status.bad = stats.bad;
+    status.n_above = stats.n_above;
     status.threads = stats.threads;
     if let Some(CameraInput { view, projection, lens, .. }) = shown.inputs.camera {
         status.rig = navigation::Rig { view, projection, lens };

@@ -85,6 +85,11 @@ pub(super) struct FilterSampler {
 const STEPS: usize = 512;
 
 impl FilterSampler {
+    /// Weight of every sample but for its sign.
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
     pub fn new(filter: PixelFilter) -> Self {
         if matches!(filter, PixelFilter::Box | PixelFilter::Tent) {
             return Self { filter, quantiles: Vec::new(), scale: 1.0 };

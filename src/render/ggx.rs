@@ -71,14 +71,18 @@ pub fn sample_visible_normal(wo: Vec3, alpha: f32, u: Vec2) -> Vec3 {
 }
 
 /// The share of light that one bounce returns from a surface with reflectance 1, seen under `cos_theta`.
+///
+/// From a table, within 5 · 10⁻⁴ of the integral for every angle and every `alpha` from 10⁻⁴ on.
 #[inline]
 pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    let table =
-        TABLE.get_or_init(|| (0..N * N).map(|i| integrate_albedo(table_cos(i % N), table_alpha(i / N))).collect());
-    // Equal steps in √: the albedo bends most at grazing angles and for smooth surfaces.
-    let x = cos_theta.clamp(0.0, 1.0).sqrt() * (N - 1) as f32;
-    let y = alpha.clamp(0.0, 1.0).sqrt() * (N - 1) as f32;
+    let table = TABLE.get_or_init(|| {
+        (0..N * N).map(|i| integrate_albedo(table_cos(i % N, i / N), table_alpha(i / N), 64, 32)).collect()
+    });
+    let alpha = alpha.clamp(0.0, 1.0);
+    let cos_theta = cos_theta.clamp(1e-6, 1.0);
+    let x = (cos_theta * (1.0 + BEND * alpha) / (cos_theta + BEND * alpha)).sqrt() * (N - 1) as f32;
+    let y = alpha.sqrt() * (N - 1) as f32;
     let (ix, iy) = ((x as usize).min(N - 2), (y as usize).min(N - 2));
     let (fx, fy) = (x - ix as f32, y - iy as f32);
     let at = |dx, dy| table[(iy + dy) * N + ix + dx];
@@ -87,30 +91,49 @@ pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
 }
 
 /// Entries along each side of the albedo table.
-const N: usize = 32;
+const N: usize = 48;
 
-fn table_cos(i: usize) -> f32 {
+/// The albedo bends most where the cosine is about as large as alpha: columns are even in the root of
+/// `cos (1 + BEND α) / (cos + BEND α)`.
+const BEND: f32 = 2.0;
+
+fn table_cos(column: usize, row: usize) -> f32 {
+    let (x, alpha) = (column as f32 / (N - 1) as f32, table_alpha(row));
     // Grazing light itself has no frame; the limit is close enough.
-    (i as f32 / (N - 1) as f32).powi(2).max(1e-4)
+    (BEND * alpha * x * x / (1.0 + BEND * alpha - x * x)).max(1e-6)
 }
 
-fn table_alpha(i: usize) -> f32 {
-    (i as f32 / (N - 1) as f32).powi(2).max(1e-3)
+fn table_alpha(row: usize) -> f32 {
+    (row as f32 / (N - 1) as f32).powi(2).max(1e-4)
 }
 
-fn integrate_albedo(cos_theta: f32, alpha: f32) -> f32 {
+/// Over all visible normals, by the midpoint rule. Most of what a smooth surface loses is in the long tail of its normals,
+/// at the rim of the disc that [`sample_visible_normal`] maps from, so radii are dense there.
+fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> f32 {
     let wo = Vec3::new((1.0 - cos_theta * cos_theta).max(0.0).sqrt(), 0.0, cos_theta);
-    let n = 32;
+    let stretch = Vec3::new(alpha, alpha, 1.0);
+    let wo_std = (wo * stretch).normalize();
     let mut sum = 0.0;
-    for i in 0..n * n {
-        let u = Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32;
-        let h = sample_visible_normal(wo, alpha, u);
-        let wi = 2.0 * wo.dot(h) * h - wo;
-        if wi.z > 0.0 {
-            sum += reflection_weight(wo, wi, alpha);
+    for i in 0..n_radii {
+        // 1 − r², by its cube root.
+        let rest = 1.0 - (i as f32 + 0.5) / n_radii as f32;
+        let (gap, weight) = (rest.powi(3), 3.0 * rest * rest);
+        let z = gap * (1.0 + wo_std.z) - wo_std.z;
+        let sin_theta = (1.0 - z * z).max(0.0).sqrt();
+        for k in 0..n_angles {
+            // The other half is its mirror image.
+            let (sin_phi, cos_phi) = (PI * (k as f32 + 0.5) / n_angles as f32).sin_cos();
+            // `z + wo_std.z` without its cancellation.
+            let up = gap * (1.0 + wo_std.z);
+            let h =
+                (Vec3::new(sin_theta * cos_phi + wo_std.x, sin_theta * sin_phi, up) * stretch).normalize_or(Vec3::Z);
+            let wi = 2.0 * wo.dot(h) * h - wo;
+            if wi.z > 0.0 {
+                sum += f64::from(weight * reflection_weight(wo, wi, alpha));
+            }
         }
     }
-    sum / (n * n) as f32
+    (sum / f64::from(n_radii * n_angles)) as f32
 }
 
 #[cfg(test)]
@@ -209,9 +232,11 @@ mod tests {
 
     #[test]
     fn albedo_table_interpolates_the_integral() {
-        for (cos_theta, alpha) in [(1.0, 0.05), (0.6, 0.3), (0.3, 0.77), (0.9, 1.0), (0.15, 0.5)] {
-            let (table, integral) = (single_scattering_albedo(cos_theta, alpha), integrate_albedo(cos_theta, alpha));
-            assert!((table - integral).abs() < 0.01, "cos {cos_theta}, α {alpha}: {table} for {integral}");
+        let steps = [1e-3, 3e-3, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.73, 0.85, 0.93, 1.0];
+        for (cos_theta, alpha) in steps.into_iter().flat_map(|cos| steps.map(|alpha| (cos, alpha))) {
+            let table = single_scattering_albedo(cos_theta, alpha);
+            let integral = integrate_albedo(cos_theta, alpha, 200, 100);
+            assert!((table / integral - 1.0).abs() < 5e-4, "cos {cos_theta}, α {alpha}: {table} for {integral}");
             assert!(integral <= 1.0 + 1e-6, "a surface must not make light");
         }
     }

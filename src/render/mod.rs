@@ -3,6 +3,7 @@
 //! Start reading at [`Snapshot`] (what is rendered), [`advance`] (how) and [`Film`] (where it goes).
 
 mod ambient;
+mod bound;
 mod bsdf;
 mod camera;
 mod caustics;

@@ -11,10 +11,10 @@ use super::bsdf::Scatter;
 use super::caustics::{Bounce, CausticPass, Guided, Track};
 use super::explain::Record;
 use super::light::LightSample;
-use super::medium::MediumStack;
+use super::medium::{MediumId, MediumSets};
 use super::paths::{Path, PathBatch, ShadowBatch};
 use super::renderer::{RayCounts, RenderSettings};
-use super::surface::{Vertex, blend_at, lobe_at};
+use super::surface::{Sides, Vertex, blend_at, lobe_at};
 use super::wide::{self, Group, KINDS, SortedHits};
 use super::{Material, MaterialId, Snapshot, Techniques};
 use crate::geometry::Ray;
@@ -29,8 +29,10 @@ const ROULETTE_DEPTH: u32 = 4;
 pub(super) const ROULETTE_GRACE: f32 = 4.0;
 
 /// From here on even paths that lose nothing are ended now and then: between perfect mirrors they would go on for
-/// ever.
-const ENDLESS_DEPTH: u32 = 64;
+/// ever. The way through nested glass is as much longer as it is nested.
+pub(super) fn endless_depth(scene: &Snapshot) -> u32 {
+    64 * scene.shading.bodies.deepest().clamp(1, 128)
+}
 
 /// Sample dimensions of the camera, and then of each vertex.
 pub(super) const CAMERA_DIMENSIONS: u32 = 2;
@@ -50,7 +52,7 @@ impl From<CameraPath> for Path {
             normal: ray.dir,
             sampler,
             slot,
-            media: MediumStack::default(),
+            media: MediumId::OUTSIDE,
             track: Track::default(),
         }
     }
@@ -73,9 +75,9 @@ pub(super) struct Survival {
 }
 
 impl Survival {
-    fn at(depth: u32, techniques: &Techniques) -> Self {
+    fn at(depth: u32, scene: &Snapshot, techniques: &Techniques) -> Self {
         let share = match depth {
-            ENDLESS_DEPTH.. => Some(0.95),
+            _ if depth >= endless_depth(scene) => Some(0.95),
             ROULETTE_DEPTH.. if techniques.roulette => Some(1.0),
             _ => None,
         };
@@ -91,6 +93,10 @@ pub(super) struct PathWave {
     hits: HitBatch,
     sorted: SortedHits,
     shadows: ShadowBatch,
+    sets: MediumSets,
+    camera: MediumId,
+    /// Segments of the longest path of the last wave.
+    pub depth: u32,
     /// Looks on, when somebody wants to know.
     pub record: Option<Box<Record>>,
 }
@@ -100,6 +106,11 @@ const MISSES: usize = 0;
 const EMITTERS: usize = 1;
 
 impl PathWave {
+    /// Before the paths of a picture: they begin in these media, see [`super::medium::Bodies::around`].
+    pub fn begin_in(&mut self, scene: &Snapshot, camera_media: &[u32]) {
+        self.camera = self.sets.start(scene, camera_media);
+    }
+
     /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
     /// slot.
     ///
@@ -115,6 +126,7 @@ impl PathWave {
     ) -> Option<RayCounts> {
         self.paths.start(radiance.len(), scene.shading.features.glass, caustics.is_some());
         start(&mut self.paths);
+        self.paths.begin_in(self.camera);
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
         let tree = &scene.geometry.tree;
         for depth in 1..=settings.max_depth {
@@ -124,6 +136,7 @@ impl PathWave {
             if stop() {
                 return None;
             }
+            self.depth = depth;
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             tree.closest_hits(&self.paths.rays, class, &mut self.hits);
@@ -173,17 +186,18 @@ impl PathWave {
                 caustics,
                 depth,
                 dimension: first_dimension(depth),
-                survival: Survival::at(depth, &settings.techniques),
+                survival: Survival::at(depth, scene, &settings.techniques),
                 paths: &self.paths,
                 hits: &self.hits,
                 materials: &self.sorted.materials,
                 order,
                 next: &mut self.next,
                 shadows: &mut self.shadows,
+                sets: &mut self.sets,
             };
             match (settings.lanes, kind) {
                 (Some(set), MISSES) if scene.shading.environment_sampler.is_none() => {
-                    wide::shade_misses(set, scene, &self.paths, order, radiance);
+                    wide::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
                 }
                 (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
                 (Some(set), EMITTERS) if emitters_have_lanes => wide::shade_emitters(set, group, radiance),
@@ -208,14 +222,17 @@ impl PathWave {
         for &i in self.sorted.of_kind(MISSES) {
             let i = i as usize;
             let dir = self.paths.rays.get(i).dir;
+            let mut throughput = self.paths.throughput_of(i);
+            if scene.shading.features.glass {
+                throughput *= self.sets.environment_scale(self.paths.media_of(i));
+            }
             if always {
                 // Bounces alone find it.
-                radiance[self.paths.slot[i] as usize] +=
-                    self.paths.throughput_of(i) * scene.shading.environment.radiance(dir);
+                radiance[self.paths.slot[i] as usize] += throughput * scene.shading.environment.radiance(dir);
                 continue;
             }
             let path = self.paths.get(i);
-            radiance[path.slot as usize] += path.throughput * environment_light(scene, techniques, &path, dir);
+            radiance[path.slot as usize] += throughput * environment_light(scene, techniques, &path, dir);
         }
     }
 
@@ -234,14 +251,14 @@ impl PathWave {
         let ray = self.paths.rays.get(i);
         let Some(hit) = self.hits.get(i) else { return };
         if scene.shading.features.media {
-            path.throughput *= path.media.transmittance(scene, hit.t);
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
         }
         let material = self.sorted.materials[i];
         let vertex = Vertex::new(scene, &ray, &hit, material);
         if let Some(emission) = scene.shading.emission[material as usize]
             && vertex.front
         {
-            let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, &path.media, &hit, &vertex));
+            let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, path.media, &hit, &vertex));
             let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
             let weight = emission.scale * weight;
             radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
@@ -260,11 +277,13 @@ impl PathWave {
             caustics,
             is_told: false,
         };
+        let mut sides = (scene.shading.features.glass)
+            .then(|| Sides::new(scene, &mut self.sets, path.media, &hit, material, vertex.front));
         if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
-            if let Some(blend) = blend_at(scene, material, &vertex, &path.media) {
+            if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
                 self.scatter_told(step, &blend);
             }
-        } else if let Some(lobe) = lobe_at(scene, material, &vertex, &path.media) {
+        } else if let Some(lobe) = lobe_at(scene, material, &vertex, sides.as_mut()) {
             self.scatter_told(step, &lobe);
         }
     }
@@ -305,10 +324,13 @@ impl PathWave {
         if light == Vec3::ZERO {
             return;
         }
+        if shading.features.glass && target.is_none() {
+            light *= self.sets.environment_scale(path.media);
+        }
         if shading.features.media
             && let Some(target) = target
         {
-            light *= path.media.transmittance(scene, vertex.position.distance(target));
+            light *= self.sets.transmittance(path.media, vertex.position.distance(target));
         }
         let origin = vertex.leaving(sample.wi);
         let shadow_ray = match target {
@@ -330,12 +352,12 @@ impl PathWave {
         let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
         // The true surface decides which side a direction leads to.
         let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
-        if if sample.transmitted { !beyond } else { !vertex.is_reached_from(sample.wi) } {
+        if if sample.through.is_some() { !beyond } else { !vertex.is_reached_from(sample.wi) } {
             return;
         }
         path.throughput *= sample.weight;
-        if sample.transmitted {
-            path.media = path.media.crossed(material, vertex.front);
+        if let Some(through) = sample.through {
+            path.media = through.beyond;
         }
         if let Some(pass) = step.caustics {
             let bounce = Bounce {
@@ -344,7 +366,7 @@ impl PathWave {
                 eye: (depth == 1).then_some(path.position),
                 wi: sample.wi,
                 pdf: sample.pdf,
-                transmitted: sample.transmitted,
+                transmitted: sample.through.is_some(),
                 blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
                 before: step.path.media,
                 after: path.media,
@@ -352,9 +374,9 @@ impl PathWave {
             let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
             path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
         }
-        if let Some(most_kept) = Survival::at(depth, techniques).share {
+        if let Some(most_kept) = Survival::at(depth, scene, techniques).share {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
-            let ior = if scene.shading.features.glass { path.media.ior(scene) } else { 1.0 };
+            let ior = if scene.shading.features.glass { self.sets.ior(path.media) } else { 1.0 };
             let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior * path.track.gain;
             let survival = most.min(most_kept);
             if survival < 1.0 {
@@ -370,7 +392,7 @@ impl PathWave {
         path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
         path.position = vertex.position;
         path.normal = vertex.normal;
-        let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         self.next.push(&Ray::new(origin, sample.wi), &path);
     }
 }

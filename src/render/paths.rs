@@ -1,7 +1,7 @@
 //! Paths and shadow rays in flight, as structures of arrays.
 
 use super::caustics::Track;
-use super::medium::MediumStack;
+use super::medium::MediumId;
 use crate::geometry::Ray;
 use crate::kdtree::{RayBatch, append, append_bits};
 use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector};
@@ -20,7 +20,7 @@ pub(super) struct Path {
     pub normal: Vec3,
     pub sampler: Sampler,
     pub slot: u32,
-    pub media: MediumStack,
+    pub media: MediumId,
     /// Against paths from the lamps.
     pub track: Track,
 }
@@ -38,7 +38,7 @@ pub(super) struct PathBatch {
     pub screen: Vec<u32>,
     pub slot: Vec<u32>,
     /// Kept only where some surface lets light through.
-    pub media: Option<Vec<MediumStack>>,
+    pub media: Option<Vec<MediumId>>,
     /// Kept only where paths are traced from the lamps as well.
     pub tracks: Option<Vec<Track>>,
 }
@@ -81,6 +81,13 @@ impl PathBatch {
             for array in [&mut self.stream, &mut self.reversed_index, &mut self.screen, &mut self.slot] {
                 array.resize(least, 0);
             }
+        }
+    }
+
+    /// Puts all paths into the same media.
+    pub fn begin_in(&mut self, id: MediumId) {
+        if let Some(media) = &mut self.media {
+            media.fill(id);
         }
     }
 
@@ -127,8 +134,8 @@ impl PathBatch {
     }
 
     #[inline]
-    pub fn media_of(&self, i: usize) -> MediumStack {
-        self.media.as_ref().map_or(MediumStack::default(), |media| media[i])
+    pub fn media_of(&self, i: usize) -> MediumId {
+        self.media.as_ref().map_or(MediumId::OUTSIDE, |media| media[i])
     }
 
     #[inline]

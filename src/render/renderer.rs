@@ -1,10 +1,11 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
+use super::bound::at_depth;
 use super::caustics::CausticPass;
 use super::explain::{Record, TracedPath};
 use super::film::{Film, FilmTile};
 use super::filter::{FilterSampler, PixelFilter};
-use super::path::{CameraPath, PathWave};
+use super::path::{CameraPath, PathWave, endless_depth};
 use super::paths::PathBatch;
 use super::phong::PhongWave;
 use super::region::Region;
@@ -79,7 +80,7 @@ impl AddAssign for RayCounts {
     }
 }
 
-/// A sample that was not finite and was left out; replay it with the same scene, seed and settings.
+/// A sample that cannot be right; replay it with the same scene, seed and settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BadSample {
     pub x: u32,
@@ -97,6 +98,10 @@ pub struct PassReport {
     pub n_bad: u64,
     /// The first few of them.
     pub bad: Vec<BadSample>,
+    /// How many samples are brighter than anything in the scene can be: a fault of the program.
+    pub n_above: u64,
+    /// The first few of them.
+    pub above: Vec<BadSample>,
 }
 
 /// Takes samples until every pixel has `target_spp` of them, or until `stop` says so.
@@ -123,8 +128,7 @@ pub fn advance_region(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
     let size = UVec2::new(film.width(), film.height());
-    let caustics = CausticPass::of(snapshot, settings, size);
-    let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size };
+    let pass = Pass::new(snapshot, settings, size);
     let Some(caustics) = &pass.caustics else {
         return advance_tiles(&pass, film, region, target_spp, stop);
     };
@@ -178,11 +182,13 @@ fn advance_tiles(
 }
 
 impl PassReport {
-    /// Rays and bad samples of another.
+    /// Rays and samples that cannot be right of another.
     fn add(&mut self, other: Self) {
         self.rays += other.rays;
         self.n_bad += other.n_bad;
         self.bad.extend(other.bad.into_iter().take(MAX_LISTED_BAD - self.bad.len()));
+        self.n_above += other.n_above;
+        self.above.extend(other.above.into_iter().take(MAX_LISTED_BAD - self.above.len()));
     }
 }
 
@@ -253,8 +259,12 @@ impl Wave {
             }
         };
         match pass.settings.integrator {
-            Integrator::Phong => phong.trace(pass.snapshot, pass.settings, start, radiance, stop),
-            Integrator::Path => path.trace(pass.snapshot, pass.settings, pass.caustics.as_ref(), start, radiance, stop),
+            Integrator::Phong => phong.trace(pass.snapshot, pass.settings, &pass.camera_media, start, radiance, stop),
+            Integrator::Path => {
+                let caustics = pass.caustics.as_ref();
+                path.begin_in(pass.snapshot, &pass.camera_media);
+                path.trace(pass.snapshot, pass.settings, caustics, start, radiance, stop)
+            }
         }
     }
 }
@@ -264,8 +274,20 @@ struct Pass<'a> {
     snapshot: &'a Snapshot,
     settings: &'a RenderSettings,
     caustics: Option<CausticPass<'a>>,
+    camera_media: Vec<u32>,
     filter: FilterSampler,
     size: UVec2,
+    /// Of samples, see [`super::bound`].
+    bound: Option<f32>,
+    /// Depth from which on all paths are ended by chance.
+    endless: u32,
+}
+
+impl FilmTile {
+    fn sample_at(&self, local: u32, sample: u32) -> BadSample {
+        let pixel = self.origin + UVec2::new(local % self.size.x, local / self.size.x);
+        BadSample { x: pixel.x, y: pixel.y, sample }
+    }
 }
 
 fn advance_tile(
@@ -295,6 +317,16 @@ fn advance_tile(
             break;
         };
         report.rays += rays;
+        if let Some(bound) = pass.bound {
+            let bound = at_depth(bound, wave.path.depth, pass.endless);
+            let above = |light: &Vec3| light.is_finite() && light.abs().max_element() > bound;
+            for slot in (0..radiance.len()).filter(|&slot| above(&radiance[slot])) {
+                report.n_above += 1;
+                if report.above.len() < MAX_LISTED_BAD {
+                    report.above.push(tile.sample_at((slot % n_pixels) as u32, first + (slot / n_pixels) as u32));
+                }
+            }
+        }
         let n_bad_before = tile.bad.len();
         for (s, sample) in radiance.chunks_exact(n_pixels).enumerate() {
             tile.add_sample(first + s as u32, sample.iter().copied());
@@ -305,10 +337,7 @@ fn advance_tile(
         let new_bad = &tile.bad[n_bad_before..];
         report.n_bad += new_bad.len() as u64;
         let room = MAX_LISTED_BAD - report.bad.len();
-        report.bad.extend(new_bad.iter().take(room).map(|&(local, sample)| {
-            let pixel = tile.origin + UVec2::new(local % tile.size.x, local / tile.size.x);
-            BadSample { x: pixel.x, y: pixel.y, sample }
-        }));
+        report.bad.extend(new_bad.iter().take(room).map(|&(local, sample)| tile.sample_at(local, sample)));
     }
     wave.radiance = radiance;
     report
@@ -317,8 +346,7 @@ fn advance_tile(
 /// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film, but for that of paths from
 /// the lamps, which belong to no pixel.
 pub fn replay_sample(snapshot: &Snapshot, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
-    let caustics = CausticPass::of(snapshot, settings, film_size);
-    let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size: film_size };
+    let pass = Pass::new(snapshot, settings, film_size);
     if let Some(caustics) = &pass.caustics {
         caustics.prepare(&|| false);
     }
@@ -336,8 +364,7 @@ pub(super) fn trace_recorded(
     pixel: UVec2,
     samples: Range<u32>,
 ) -> Vec<TracedPath> {
-    let caustics = CausticPass::of(snapshot, settings, film_size);
-    let pass = Pass { snapshot, settings, caustics, filter: FilterSampler::new(settings.filter), size: film_size };
+    let pass = Pass::new(snapshot, settings, film_size);
     if let Some(caustics) = &pass.caustics {
         caustics.prepare(&|| false);
     }
@@ -363,8 +390,7 @@ pub(super) fn mean_bounces(
 ) -> Option<Vec<f32>> {
     const SIDE: u32 = 4;
     // Paths from the eye alone; light from the lamps has no pixel to begin with.
-    let (caustics, filter) = (None, FilterSampler::new(settings.filter));
-    let pass = Pass { snapshot, settings, caustics, filter, size };
+    let pass = Pass { caustics: None, ..Pass::new(snapshot, settings, size) };
     let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
     let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
         .into_par_iter()
@@ -386,7 +412,18 @@ pub(super) fn mean_bounces(
     Some((0..size.x * size.y).map(|i| means[block_of(i) as usize]).collect())
 }
 
-impl Pass<'_> {
+impl<'a> Pass<'a> {
+    fn new(snapshot: &'a Snapshot, settings: &'a RenderSettings, size: UVec2) -> Self {
+        let camera_media = snapshot.camera_media();
+        let caustics = CausticPass::of(snapshot, settings, size, &camera_media);
+        let filter = FilterSampler::new(settings.filter);
+        let bound = (snapshot.shading.radiance_bound)
+            .filter(|_| settings.integrator == Integrator::Path)
+            .map(|bound| bound * filter.scale() * snapshot.shading.bodies.environment_scale(&camera_media));
+        let endless = endless_depth(snapshot);
+        Self { snapshot, settings, caustics, camera_media, filter, size, bound, endless }
+    }
+
     fn lens(&self) -> Lens<'_> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
         Lens { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }

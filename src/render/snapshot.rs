@@ -4,9 +4,11 @@
 //! keeps [`Geometry`] and [`Shading`], a new material keeps [`Geometry`].
 
 use super::ambient::AmbientLight;
+use super::bound::radiance_bound;
 use super::caustics::CasterTable;
 use super::environment::EnvironmentSampler;
 use super::light::LightTable;
+use super::medium::Bodies;
 use super::wide::{ClassicTable, MaterialTable, SurfaceTable};
 use super::{Camera, Emission, Environment, Material, MaterialId, Texture};
 use crate::kdtree::{SceneTree, Shape};
@@ -19,6 +21,16 @@ pub struct Snapshot {
     pub geometry: Arc<Geometry>,
     pub shading: Arc<Shading>,
     pub camera: Camera,
+}
+
+impl Snapshot {
+    /// The bodies that the camera is inside of; see [`Bodies::around`].
+    pub(super) fn camera_media(&self) -> Vec<u32> {
+        if !self.shading.features.glass {
+            return Vec::new();
+        }
+        self.shading.bodies.around(&self.geometry, self.camera.eye)
+    }
 }
 
 /// Where everything is. Object `i` here is object `i` of the tree.
@@ -47,6 +59,19 @@ impl Object {
     pub fn plain(material: MaterialId) -> Self {
         Self { materials: vec![material], ..Self::default() }
     }
+
+    /// The material of a primitive.
+    #[inline]
+    pub(super) fn material_of(&self, prim: u32) -> MaterialId {
+        match &self.materials[..] {
+            [only] => *only,
+            many => {
+                let mesh = self.mesh.as_ref().expect("only meshes have several slots");
+                let slot = mesh.slots.get(prim as usize).map_or(0, |&slot| usize::from(slot));
+                many[slot.min(many.len() - 1)]
+            }
+        }
+    }
 }
 
 /// How everything looks and shines; built for one [`Geometry`], because lights are objects.
@@ -63,11 +88,14 @@ pub struct Shading {
     /// What each material adds itself.
     pub(super) emission: Vec<Option<Emission>>,
     pub lights: LightTable,
+    pub(super) bodies: Bodies,
     pub(super) environment_sampler: Option<EnvironmentSampler>,
     pub(super) material_table: MaterialTable,
     pub(super) classic_table: ClassicTable,
     /// What gathers light, where something does.
     pub(super) casters: Option<CasterTable>,
+    /// See [`super::bound`].
+    pub(super) radiance_bound: Option<f32>,
     pub features: Features,
 }
 
@@ -111,6 +139,7 @@ impl Shading {
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(&materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, &textures);
         let environment_sampler = EnvironmentSampler::build(&environment);
+        let bodies = Bodies::build(geometry, &materials);
         let casters = CasterTable::build(geometry, &materials, &lights);
         let glass = materials.iter().any(Material::is_clear);
         let features = Features {
@@ -126,7 +155,7 @@ impl Shading {
         let textured = (0..materials.len()).map(|id| materials[id].is_textured(&materials)).collect();
         let ambient = AmbientLight::of(&environment);
         let air = Vec3::ZERO;
-        Self {
+        let mut shading = Self {
             materials,
             textures,
             environment,
@@ -135,12 +164,16 @@ impl Shading {
             textured,
             emission,
             lights,
+            bodies,
             environment_sampler,
             material_table,
             classic_table,
             casters,
+            radiance_bound: None,
             features,
-        }
+        };
+        shading.radiance_bound = radiance_bound(&shading);
+        shading
     }
 
     /// The same under air that absorbs light, per metre.

@@ -2,7 +2,7 @@
 
 use super::bsdf::{Blend, Lobe, MAX_LOBES};
 use super::light::sphere_uv;
-use super::medium::MediumStack;
+use super::medium::{Boundary, Interface, MediumId, MediumSets};
 use super::{ColorInput, Material, MaterialId, ScalarInput, Snapshot};
 use crate::geometry::{Frame, Ray, robust};
 use crate::kdtree::{Hit, Shape};
@@ -154,15 +154,7 @@ fn lift_of(corners: &[(Vec3, Vec3); 3], weights: Vec3) -> Vec3 {
 /// The material of a hit.
 #[inline]
 pub(super) fn material_of(scene: &Snapshot, hit: &Hit) -> MaterialId {
-    let object = &scene.geometry.objects[hit.object as usize];
-    match &object.materials[..] {
-        [only] => *only,
-        many => {
-            let mesh = object.mesh.as_ref().expect("only meshes have several slots");
-            let slot = mesh.slots.get(hit.prim as usize).map_or(0, |&slot| usize::from(slot));
-            many[slot.min(many.len() - 1)]
-        }
-    }
+    scene.geometry.objects[hit.object as usize].material_of(hit.prim)
 }
 
 impl ColorInput {
@@ -185,30 +177,70 @@ impl ScalarInput {
     }
 }
 
+/// The media on the two sides of a surface that a path meets.
+pub(super) struct Sides<'a> {
+    pub sets: &'a mut MediumSets,
+    /// On the side of the path.
+    pub here: MediumId,
+    pub boundary: Boundary,
+}
+
+impl<'a> Sides<'a> {
+    #[inline]
+    pub fn new(
+        scene: &Snapshot,
+        sets: &'a mut MediumSets,
+        here: MediumId,
+        hit: &Hit,
+        id: MaterialId,
+        front: bool,
+    ) -> Self {
+        Self { sets, here, boundary: scene.shading.bodies.boundary(hit.object, hit.prim, id, front) }
+    }
+
+    /// The way through a transparent part of the material; see [`MediumSets::interface`].
+    #[inline]
+    pub fn interface(&mut self, scene: &Snapshot, leaf: u32) -> Interface {
+        self.sets.interface(scene, self.here, self.boundary, leaf)
+    }
+}
+
 /// The lobes of a blend at a vertex; `None` where all of it is black.
-pub(super) fn blend_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Blend> {
-    let mut parts = [(Lobe::Glass { eta: 1.0 }, 0.0); MAX_LOBES];
-    let mut n = 0;
-    collect(scene, id, vertex, media, 1.0, &mut |lobe, weight| {
+///
+/// - `sides`: asked for by transparent parts; without them these may be told apart from others, but not sampled.
+pub(super) fn blend_at(
+    scene: &Snapshot,
+    id: MaterialId,
+    vertex: &Vertex,
+    mut sides: Option<&mut Sides>,
+) -> Option<Blend> {
+    let mut parts = [(Lobe::CLEAR, 0.0); MAX_LOBES];
+    let (mut n, mut n_leaves) = (0, 0);
+    collect(scene, id, vertex, &mut sides, &mut n_leaves, 1.0, &mut |lobe, weight| {
         parts[n] = (lobe, weight);
         n += 1;
     });
     (n > 0).then(|| Blend::new(&parts[..n]))
 }
 
+/// - `n_leaves`: transparent parts so far, of whatever weight: they are counted as [`super::medium::Bodies`] does.
 fn collect(
     scene: &Snapshot,
     id: MaterialId,
     vertex: &Vertex,
-    media: &MediumStack,
+    sides: &mut Option<&mut Sides>,
+    n_leaves: &mut u32,
     weight: f32,
     push: &mut impl FnMut(Lobe, f32),
 ) {
-    match &scene.shading.materials[id as usize] {
+    let material = &scene.shading.materials[id as usize];
+    let leaf = *n_leaves;
+    *n_leaves += u32::from(material.is_clear());
+    match material {
         Material::Blend { weight: share, a, b } => {
             let share = share.eval(scene, vertex.uv).clamp(0.0, 1.0);
-            collect(scene, *a, vertex, media, weight * (1.0 - share), push);
-            collect(scene, *b, vertex, media, weight * share, push);
+            collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), push);
+            collect(scene, *b, vertex, sides, n_leaves, weight * share, push);
         }
         _ if weight == 0.0 => {}
         Material::Phong { diffuse, specular, transparency, .. } => {
@@ -221,14 +253,23 @@ fn collect(
                 push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
             }
             if *transparency > 0.0 {
-                push(Lobe::Glass { eta: media.eta(scene, id, vertex.front) }, weight * transparency);
+                push(clear_lobe(scene, sides, leaf), weight * transparency);
             }
         }
+        Material::Glass { .. } => push(clear_lobe(scene, sides, leaf), weight),
         _ => {
-            if let Some(lobe) = lobe_at(scene, id, vertex, media) {
+            if let Some(lobe) = lobe_at(scene, id, vertex, None) {
                 push(lobe, weight);
             }
         }
+    }
+}
+
+#[inline]
+fn clear_lobe(scene: &Snapshot, sides: &mut Option<&mut Sides>, leaf: u32) -> Lobe {
+    match sides {
+        Some(sides) => Lobe::Glass(sides.interface(scene, leaf)),
+        None => Lobe::CLEAR,
     }
 }
 
@@ -240,9 +281,14 @@ pub(super) fn scalar_at(scene: &Snapshot, id: MaterialId, uv: Vec2) -> f32 {
     }
 }
 
-/// The one lobe of a plain material; `None` where the surface is black.
+/// The one lobe of a plain material; `None` where the surface is black. `sides` as in [`blend_at`].
 #[inline]
-pub(super) fn lobe_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) -> Option<Lobe> {
+pub(super) fn lobe_at(
+    scene: &Snapshot,
+    id: MaterialId,
+    vertex: &Vertex,
+    mut sides: Option<&mut Sides>,
+) -> Option<Lobe> {
     let uv = vertex.uv;
     match &scene.shading.materials[id as usize] {
         Material::Diffuse { albedo } => Some(Lobe::Diffuse { albedo: albedo.eval(scene, uv) }),
@@ -253,7 +299,7 @@ pub(super) fn lobe_at(scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: 
             fresnel: *fresnel,
             compensate: *compensate,
         }),
-        Material::Glass { .. } => Some(Lobe::Glass { eta: media.eta(scene, id, vertex.front) }),
+        Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
         Material::Emissive { .. } | Material::Phong { .. } | Material::Blend { .. } => None,
     }
 }

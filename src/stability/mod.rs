@@ -7,6 +7,7 @@
 
 mod anywhere;
 mod bounces;
+mod furnace;
 mod judge;
 mod light;
 mod random;
@@ -101,6 +102,18 @@ pub const CASES: &[Case] = &[
         about: "microfacets of alpha 0 ... 1 in a white furnace",
         share: 0.02,
         kind: Kind::Pictures(light::metal),
+    },
+    Case {
+        name: "nested-media",
+        about: "up to 100 shells of glass, shared walls, overlaps, blends, a camera at every level, in a white furnace",
+        share: 0.1,
+        kind: Kind::Pictures(furnace::nested),
+    },
+    Case {
+        name: "random-furnaces",
+        about: "random lossless scenes of every material and shape in a white furnace",
+        share: 0.5,
+        kind: Kind::Pictures(furnace::random),
     },
     Case {
         name: "lights",

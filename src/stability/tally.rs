@@ -17,6 +17,8 @@ pub struct Tally {
     pub wrong_t: u64,
     /// Samples that were not finite.
     pub non_finite: u64,
+    /// Samples brighter than anything in the scene can be.
+    pub above: u64,
     /// Largest error of light against the known answer, over what is allowed; above 1 is a finding.
     pub energy: Option<Energy>,
     /// The worst ray.
@@ -52,7 +54,7 @@ pub struct Worst {
 impl Tally {
     pub fn findings(&self) -> u64 {
         let energy = u64::from(self.energy.is_some_and(|energy| energy.is_finding()));
-        self.leaks + self.acne + self.missed + self.wrong_t + self.non_finite + energy
+        self.leaks + self.acne + self.missed + self.wrong_t + self.non_finite + self.above + energy
     }
 
     /// The sum does not depend on the order: of equally bad rays the first one counts.
@@ -63,6 +65,7 @@ impl Tally {
         self.missed += other.missed;
         self.wrong_t += other.wrong_t;
         self.non_finite += other.non_finite;
+        self.above += other.above;
         self.energy = match (self.energy, other.energy) {
             (Some(a), Some(b)) => {
                 Some(if b.error / b.allowed > a.error / a.allowed || b.error.is_nan() { b } else { a })

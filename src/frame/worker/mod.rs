@@ -94,6 +94,7 @@ pub struct Stats {
     pub elapsed: f64,
     pub n_bad: u64,
     pub bad: Vec<BadSample>,
+    pub n_above: u64,
     pub threads: usize,
     /// Nothing is left to do: the target is reached, or it is paused.
     pub asleep: bool,

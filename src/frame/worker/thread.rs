@@ -255,6 +255,7 @@ impl<'a> Loop<'a> {
                 old => old.into_iter().for_each(|(_, film)| self.idle.keep(film)),
             }
             self.stats.n_bad = 0;
+            self.stats.n_above = 0;
             self.stats.bad.clear();
             self.is_uneven = false;
         }
@@ -292,6 +293,7 @@ impl<'a> Loop<'a> {
         stats.seconds += seconds;
         stats.elapsed = self.restarted_at.elapsed().as_secs_f64();
         stats.n_bad += pass.n_bad;
+        stats.n_above += pass.n_above;
         stats.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(stats.bad.len())));
         let interrupted = !pass.completed && interrupt.load(Ordering::Relaxed);
         let replaced = interrupted && lock(&self.shared.inbox).orders.job.is_some();

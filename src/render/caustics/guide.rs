@@ -301,7 +301,7 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
             sample.wi
         };
         let (value, pdf) = self.eval(wo, wi, normal);
-        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample { wi, weight: value / pdf, pdf, transmitted: false })
+        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample { wi, weight: value / pdf, pdf, through: None })
     }
 }
 

@@ -10,7 +10,7 @@ use super::trace::{DIM_LENS, DIM_ROULETTE, most_kept};
 use crate::kdtree::{Hit, HitBatch, InstructionSet};
 use crate::lanes::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
 use crate::render::Camera;
-use crate::render::medium::MediumStack;
+use crate::render::medium::{MediumId, MediumSets};
 use crate::render::paths::{PathBatch, PathLanes};
 use crate::render::wide::warp::uniform_disc;
 use crate::render::wide::{
@@ -35,6 +35,9 @@ pub(super) struct Group<'a> {
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub arrivals: &'a mut Arrivals,
+    pub sets: &'a mut MediumSets,
+    /// What the camera is inside of.
+    pub camera: MediumId,
 }
 
 /// Whether [`scatter`] knows what to do with a hit on a material of a kind.
@@ -80,7 +83,7 @@ fn scatter_coated<S: Simd>(s: S, group: Group) {
 
 #[inline(always)]
 fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
-    let Group { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals } = group;
+    let Group { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals, sets, camera } = group;
     let scene = pass.scene;
     for some in order.chunks(LANES) {
         let chunk = Chunk::of(some);
@@ -92,15 +95,15 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
         let mut throughput = Vector::gather(&paths.throughput, index);
         if scene.shading.features.media {
             let distance = Float::gather(&hits.t, index);
-            throughput = throughput.times(transmittance(s, scene, mask, &media, distance));
+            throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
         }
         let (ratio, sampler) = (Float::gather(&paths.pdf, index), paths.sampler_lanes(index));
         let step = Step { pass, at: &at, place: &place, media: &media, throughput, ratio, sampler, dimension };
         if scatters(KIND) && n_vertices > 1 {
-            step.join::<KIND>(s, arrivals);
+            step.join::<KIND>(s, sets, camera, arrivals);
         }
         if pass.goes_on(n_vertices) {
-            step.go_on::<KIND>(s, n_vertices, next);
+            step.go_on::<KIND>(s, sets, n_vertices, next);
         }
     }
 }
@@ -111,7 +114,7 @@ struct Step<'a, S: Simd> {
     at: &'a At<'a, S>,
     /// As seen from the lamp's side.
     place: &'a Place<S>,
-    media: &'a [MediumStack; LANES],
+    media: &'a [MediumId; LANES],
     throughput: Vector<S>,
     ratio: Float<S>,
     sampler: SamplerLanes<S>,
@@ -121,13 +124,13 @@ struct Step<'a, S: Simd> {
 impl<S: Simd> Step<'_, S> {
     /// Shadow rays to points of the lens, where in the film they end and the light that they bring.
     #[inline(always)]
-    fn join<const KIND: usize>(&self, s: S, arrivals: &mut Arrivals) {
+    fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut Arrivals) {
         let &Self { pass, at, place, media, throughput, ratio, .. } = self;
         let scene = pass.scene;
         let Camera { eye, right, up, forward, tan_half_vfov, focus_distance, .. } = scene.camera;
         let mut open = at.mask;
         if scene.shading.features.glass {
-            lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(!media[lane].is_empty()) << lane));
+            lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane] != camera) << lane));
         }
         let [x, y] = self.lens_offsets(s, &scene.camera);
         let (right, up) = (Vector::splat(s, right), Vector::splat(s, up));
@@ -153,7 +156,7 @@ impl<S: Simd> Step<'_, S> {
         let cos_lens = depth / distance;
         let seen = Place { wo: way * (depth.all(-1.0) / distance), ..*place };
         let (cos_o, cos_i) = (seen.wo.dot(place.geometric_normal), place.wo.dot(place.geometric_normal));
-        let surface = surface_of::<S, KIND>(s, at, &seen);
+        let surface = surface_of::<S, KIND>(s, at, &seen, sets, media);
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
         open &= surface.smooth & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
         let importance = distance2 * (cos_lens * cos_lens * cos_lens);
@@ -165,7 +168,7 @@ impl<S: Simd> Step<'_, S> {
             return;
         }
         let light = if scene.shading.features.media {
-            light.times(transmittance(s, scene, open, media, distance))
+            light.times(transmittance(s, sets, open, media, distance))
         } else {
             light
         };
@@ -194,11 +197,11 @@ impl<S: Simd> Step<'_, S> {
 
     /// Chooses how the paths go on, and whether.
     #[inline(always)]
-    fn go_on<const KIND: usize>(&self, s: S, n_vertices: u32, next: &mut PathBatch) {
+    fn go_on<const KIND: usize>(&self, s: S, sets: &mut MediumSets, n_vertices: u32, next: &mut PathBatch) {
         let &Self { at, place, ref sampler, dimension, .. } = self;
         let normal = place.geometric_normal;
-        let surface = surface_of::<S, KIND>(s, at, place);
-        let bounce = sample::<S, KIND>(at, &surface, place, &HintLanes::NONE, sampler, dimension, self.media);
+        let surface = surface_of::<S, KIND>(s, at, place, sets, self.media);
+        let bounce = sample::<S, KIND>(at, &surface, place, &HintLanes::NONE, sampler, dimension);
         let (along, wi) = (bounce.wi.dot(normal), bounce.wi);
         let smooth = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();
@@ -209,10 +212,11 @@ impl<S: Simd> Step<'_, S> {
             go_on &= smooth;
         }
         let mut media = *self.media;
-        if KIND == GLASS {
+        if let Some(glass) = &surface.glass
+            && KIND == GLASS
+        {
             for lane in lanes_of(go_on & bounce.transmitted) {
-                let material = at.materials[at.indices[lane] as usize];
-                media[lane] = media[lane].crossed(material, place.front >> lane & 1 != 0);
+                media[lane] = glass.beyond[lane];
                 // A path from the other end could not do the same.
                 go_on &= !(Mask::from(media[lane] == self.media[lane]) << lane);
             }
@@ -226,7 +230,7 @@ impl<S: Simd> Step<'_, S> {
         let mut ratio = self.ratio / gain;
         if scatters(KIND) && n_vertices > 1 {
             let seen = Place { wo: wi, ..*place };
-            let surface = surface_of::<S, KIND>(s, at, &seen);
+            let surface = surface_of::<S, KIND>(s, at, &seen, sets, self.media);
             let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
             go_on &= smooth | (pdf.is_positive() & cos_i.is_positive());
             factor = select_vector(smooth, factor, value * (cos_o / (cos_i * bounce.pdf)));
@@ -235,7 +239,9 @@ impl<S: Simd> Step<'_, S> {
         let mut throughput = self.throughput.times(factor);
         let mut at_stake = 0;
         let (one, mut most) = (ratio.all(1.0), ratio.all(1.0));
-        for (kept, lanes) in [(most_kept(n_vertices, true), smooth), (most_kept(n_vertices, false), !smooth)] {
+        for (kept, lanes) in
+            [(most_kept(at.scene, n_vertices, true), smooth), (most_kept(at.scene, n_vertices, false), !smooth)]
+        {
             if let Some(kept) = kept {
                 most = select(lanes, one.all(kept), most);
                 at_stake |= go_on & lanes;

@@ -50,11 +50,13 @@ pub(super) struct CausticPass<'a> {
     paths_per_sample: f64,
     /// Of a pixel, on the plane one metre ahead of the eye; square metres.
     pixel_area: f32,
+    /// See [`super::medium::Bodies::around`].
+    camera_media: Vec<u32>,
 }
 
 impl<'a> CausticPass<'a> {
     /// `None` where there is nothing to gain.
-    pub fn of(scene: &'a Snapshot, settings: &RenderSettings, size: UVec2) -> Option<Self> {
+    pub fn of(scene: &'a Snapshot, settings: &RenderSettings, size: UVec2, camera_media: &[u32]) -> Option<Self> {
         let casters = scene.shading.casters.as_ref()?;
         // Lamp, mirror, matte, eye: three segments.
         let traces_paths = settings.integrator == Integrator::Path;
@@ -75,6 +77,7 @@ impl<'a> CausticPass<'a> {
             filter_norm: settings.filter.integral(),
             paths_per_sample: Batches::of_film((size.x * size.y) as usize).paths_per_sample(),
             pixel_area: pixel * pixel,
+            camera_media: camera_media.to_vec(),
         })
     }
 }
@@ -93,7 +96,8 @@ impl CausticPass<'_> {
         if self.casters.guide.get().is_some() {
             return true;
         }
-        let scouts = Self { seed: 0, techniques: Techniques::ALL, max_depth: u32::MAX, ..*self };
+        let scouts =
+            Self { seed: 0, techniques: Techniques::ALL, max_depth: u32::MAX, camera_media: Vec::new(), ..*self };
         let traces: Vec<Option<Vec<_>>> = (0..SCOUTS / SCOUT_BATCH)
             .into_par_iter()
             .map_init(LightWave::default, |wave, batch| {

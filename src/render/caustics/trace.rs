@@ -15,12 +15,12 @@ use super::{CausticPass, aim};
 use crate::geometry::Ray;
 use crate::kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use crate::render::bsdf::{Blend, BsdfSample, Lobe, Scatter};
-use crate::render::medium::MediumStack;
-use crate::render::path::{DIM_DIRECTION, DIM_LOBE};
+use crate::render::medium::{Interface, MediumId, MediumSets};
+use crate::render::path::{DIM_DIRECTION, DIM_LOBE, endless_depth};
 use crate::render::paths::{Path, PathBatch};
-use crate::render::surface::{Vertex, blend_at, lobe_at, material_of};
+use crate::render::surface::{Sides, Vertex, blend_at, lobe_at, material_of};
 use crate::render::wide::{KINDS, SortedHits};
-use crate::render::{Material, MaterialId, PixelFilter, RayCounts};
+use crate::render::{Material, MaterialId, PixelFilter, RayCounts, Snapshot};
 use crate::sampling::{Sampler, hash_u32};
 use glam::{Vec2, Vec3};
 
@@ -40,9 +40,6 @@ const SCOUTED_REFLECTION: f32 = 0.25;
 /// Vertices before perfectly smooth surfaces end paths that they dim.
 const ROULETTE_DEPTH: u32 = 4;
 
-/// From here on even paths that lose nothing are ended now and then.
-const ENDLESS_DEPTH: u32 = 64;
-
 /// The state of one path between two vertices.
 #[derive(Clone, Copy)]
 struct LightPath {
@@ -53,7 +50,7 @@ struct LightPath {
     sampler: Sampler,
     /// To be hit first; no caster any more after that.
     aimed_at: u32,
-    media: MediumStack,
+    media: MediumId,
 }
 
 /// Paths from the lamps are kept like those from the eye, of which they need less: the density is the ratio, and the
@@ -82,6 +79,9 @@ pub(super) struct LightWave {
     together: Vec<u32>,
     apart: Vec<u32>,
     arrivals: Arrivals,
+    sets: MediumSets,
+    /// What the camera is inside of.
+    camera: MediumId,
 }
 
 /// One of the two kinds of scattering of a surface.
@@ -151,7 +151,8 @@ impl LightWave {
                     continue;
                 }
                 let ray = self.paths.rays.get(i);
-                let Some((vertex, material, surface)) = surface_at(pass, &ray, &hit, &path.media) else { continue };
+                let found = surface_at(pass, &mut self.sets, &ray, &hit, path.media);
+                let Some((vertex, material, surface)) = found else { continue };
                 if n_vertices > 1 && surface.is_smooth() {
                     traces.push(Trace { at: vertex.position, from: ray.origin });
                 }
@@ -167,6 +168,7 @@ impl LightWave {
 
     fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
         self.paths.start(n as usize, pass.scene.shading.features.glass, false);
+        self.camera = self.sets.start(pass.scene, &pass.camera_media);
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
         // One sequence for all paths: its stream is none of any pixel's.
         let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
@@ -178,7 +180,7 @@ impl LightWave {
             if throughput == Vec3::ZERO {
                 continue;
             }
-            let (ratio, media) = (line.density, MediumStack::default());
+            let (ratio, media) = (line.density, MediumId::OUTSIDE);
             let path = LightPath { throughput, ratio, sampler, aimed_at: line.caster, media };
             self.paths.push(&line.ray, &path.into());
         }
@@ -215,6 +217,8 @@ impl LightWave {
                     order: &self.together,
                     next: &mut self.next,
                     arrivals: &mut self.arrivals,
+                    sets: &mut self.sets,
+                    camera: self.camera,
                 };
                 lanes::scatter(set, kind, group);
             }
@@ -229,15 +233,15 @@ impl LightWave {
         let mut path = LightPath::from(self.paths.get(i));
         let Some(hit) = self.hits.get(i) else { return };
         if scene.shading.features.media {
-            path.throughput *= path.media.transmittance(scene, hit.t);
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
         }
-        let found = surface_at(pass, &self.paths.rays.get(i), &hit, &path.media);
+        let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, path.media);
         let Some((vertex, material, surface)) = found else { return };
         let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
         if n_vertices > 1
             && surface.is_smooth()
-            && path.media.is_empty()
-            && let Some((ray, film, light)) = step.join(&surface)
+            && path.media == self.camera
+            && let Some((ray, film, light)) = step.join(&surface, &self.sets)
         {
             self.arrivals.push(&ray, film, light);
         }
@@ -255,9 +259,9 @@ fn first_dimension(n_vertices: u32) -> u32 {
 }
 
 /// The most that roulette keeps of a path behind its vertex number `n_vertices`; `None` while all go on.
-pub(super) fn most_kept(n_vertices: u32, is_smooth: bool) -> Option<f32> {
+pub(super) fn most_kept(scene: &Snapshot, n_vertices: u32, is_smooth: bool) -> Option<f32> {
     match n_vertices {
-        ENDLESS_DEPTH.. => Some(0.95),
+        _ if n_vertices >= endless_depth(scene) => Some(0.95),
         _ if !is_smooth => Some(SURVIVAL),
         ROULETTE_DEPTH.. => Some(1.0),
         _ => None,
@@ -265,16 +269,24 @@ pub(super) fn most_kept(n_vertices: u32, is_smooth: bool) -> Option<f32> {
 }
 
 /// `None` where the surface is black.
-fn surface_at(pass: &CausticPass, ray: &Ray, hit: &Hit, media: &MediumStack) -> Option<(Vertex, MaterialId, Surface)> {
+fn surface_at(
+    pass: &CausticPass,
+    sets: &mut MediumSets,
+    ray: &Ray,
+    hit: &Hit,
+    media: MediumId,
+) -> Option<(Vertex, MaterialId, Surface)> {
     let scene = pass.scene;
     let material = material_of(scene, hit);
     let vertex = Vertex::new(scene, ray, hit, material);
     let is_blend =
         matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
+    let glass = scene.shading.features.glass;
+    let mut sides = glass.then(|| Sides::new(scene, sets, media, hit, material, vertex.front));
     let surface = if is_blend {
-        Surface::Blend(Box::new(blend_at(scene, material, &vertex, media)?))
+        Surface::Blend(Box::new(blend_at(scene, material, &vertex, sides.as_mut())?))
     } else {
-        Surface::Lobe(lobe_at(scene, material, &vertex, media)?)
+        Surface::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?)
     };
     Some((vertex, material, surface))
 }
@@ -298,7 +310,7 @@ impl Step<'_> {
     }
 
     /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
-    fn join(&self, surface: &Surface) -> Option<(Ray, Vec2, Vec3)> {
+    fn join(&self, surface: &Surface, sets: &MediumSets) -> Option<(Ray, Vec2, Vec3)> {
         let &Self { pass, path, .. } = self;
         let (scene, camera) = (pass.scene, &pass.scene.camera);
         let lens = if camera.lens_radius > 0.0 {
@@ -334,7 +346,7 @@ impl Step<'_> {
             return None;
         }
         if scene.shading.features.media {
-            light *= path.media.transmittance(scene, distance2.sqrt());
+            light *= sets.transmittance(path.media, distance2.sqrt());
         }
         let start = vertex.leaving(vertex.wo);
         Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
@@ -361,12 +373,12 @@ impl Step<'_> {
             return None;
         }
         let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
-        if if sample.transmitted { !beyond } else { !vertex.is_reached_from(sample.wi) } {
+        if if sample.through.is_some() { !beyond } else { !vertex.is_reached_from(sample.wi) } {
             return None;
         }
         let before = path.media;
-        if sample.transmitted {
-            path.media = before.crossed(material, vertex.front);
+        if let Some(through) = sample.through {
+            path.media = through.beyond;
         }
         let bounce = Bounce {
             vertex,
@@ -374,7 +386,7 @@ impl Step<'_> {
             eye: None,
             wi: sample.wi,
             pdf: sample.pdf,
-            transmitted: sample.transmitted,
+            transmitted: sample.through.is_some(),
             blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
             before,
             after: path.media,
@@ -386,8 +398,8 @@ impl Step<'_> {
             let gain = etendue_gain(vertex, vertex.wo, sample.wi);
             path.ratio /= gain;
             // Radiance is squeezed on its way into glass, flux is not.
-            let eta = if sample.transmitted { before.eta(scene, material, vertex.front) } else { 1.0 };
-            sample.weight * (gain / (eta * eta))
+            let squeeze = sample.through.map_or(1.0, |Interface { squeeze, .. }| squeeze);
+            sample.weight * (gain / (squeeze * squeeze))
         } else {
             let seen = vertex.seen_along(sample.wi);
             let (value, pdf) = surface.eval(sample.wi, vertex.wo, seen.normal);
@@ -398,7 +410,7 @@ impl Step<'_> {
             path.ratio *= sample.pdf * cos_i / (cos_o * pdf);
             value * (cos_o / (cos_i * sample.pdf))
         };
-        let survival = most_kept(n_vertices, is_smooth).map_or(1.0, |most| factor.abs().max_element().min(most));
+        let survival = most_kept(scene, n_vertices, is_smooth).map_or(1.0, |most| factor.abs().max_element().min(most));
         path.throughput *= factor;
         if survival < 1.0 {
             if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -410,7 +422,7 @@ impl Step<'_> {
             return None;
         }
         path.aimed_at = aim::NO_CASTER;
-        let origin = if sample.transmitted { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         Some((Ray::new(origin, sample.wi), path, is_smooth))
     }
 }

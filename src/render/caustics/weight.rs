@@ -11,13 +11,13 @@
 //!   section 5.3);
 //! - the lamp: the density per étendue with which the line from y was chosen, times paths from the lamps.
 //!
-//! All cosines but those inside of densities are with the true normal. Factors n² for the medium cancel: both ends of a
-//! path that counts lie outside of all glass. Roulette is left out on both sides, which makes the weights no less valid.
+//! All cosines but those inside of densities are with the true normal. The factor n² of the medium that the camera is in
+//! is left out: the light of a path that counts lies outside of all glass. Roulette is left out on both sides, which makes the weights no less valid.
 
 use super::CausticPass;
 use super::aim::NO_CASTER;
 use crate::kdtree::Hit;
-use crate::render::medium::MediumStack;
+use crate::render::medium::MediumId;
 use crate::render::surface::Vertex;
 use glam::Vec3;
 
@@ -82,8 +82,8 @@ pub(in crate::render) struct Bounce<'a> {
     pub transmitted: bool,
     /// The surface is a blend, of which the part is not known.
     pub blended: bool,
-    pub before: MediumStack,
-    pub after: MediumStack,
+    pub before: MediumId,
+    pub after: MediumId,
 }
 
 impl CausticPass<'_> {
@@ -134,8 +134,8 @@ impl CausticPass<'_> {
 
     /// Weight of light that a path from the eye finds on a lamp; `None` if paths from lamps do not matter here.
     #[inline]
-    pub fn eye_weight(&self, track: &Track, media: &MediumStack, hit: &Hit, vertex: &Vertex) -> Option<f32> {
-        if track.caster == NO_CASTER || track.ratio.is_nan() || *media != MediumStack::default() {
+    pub fn eye_weight(&self, track: &Track, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
+        if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
             return None;
         }
         let light = self.scene.shading.lights.light_of(hit.object, hit.prim)?;

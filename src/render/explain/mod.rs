@@ -174,7 +174,9 @@ pub fn light_from_lamps(
     samples: Range<u32>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<DVec3> {
-    let Some(pass) = CausticPass::of(snapshot, settings, film_size) else { return Some(DVec3::ZERO) };
+    let Some(pass) = CausticPass::of(snapshot, settings, film_size, &snapshot.camera_media()) else {
+        return Some(DVec3::ZERO);
+    };
     let mut layer = LightLayer::new(film_size, samples.start);
     let completed = pass.prepare(stop) && layer.advance(&pass, samples.len() as u32, stop).completed;
     completed.then(|| layer.mean((pixel.y * film_size.x + pixel.x) as usize))

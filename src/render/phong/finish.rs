@@ -2,8 +2,8 @@
 
 use super::super::bsdf::{MAX_LOBES, SMALLEST_ALPHA};
 use super::super::dielectric::fresnel;
-use super::super::medium::MediumStack;
-use super::super::surface::Vertex;
+use super::super::medium::Interface;
+use super::super::surface::{Sides, Vertex};
 use super::super::{Material, MaterialId, Snapshot};
 use super::{lobe_pdf, share};
 use glam::Vec3;
@@ -28,8 +28,8 @@ pub(super) enum Shiny {
     /// Lights as highlights, (n + 1) / 2π · cosⁿ about the mirrored direction, which sum up to `tint`; all else
     /// mirrored, within the same lobe if it is `rough`, else sharply (Whitted 1980). Rough ones find lights both ways.
     Gloss { tint: Vec3, exponent: f32, rough: bool },
-    /// A smooth interface; `eta` as in [`fresnel`].
-    Pane { share: f32, eta: f32, id: MaterialId },
+    /// A smooth interface.
+    Pane { share: f32, interface: Interface },
 }
 
 impl Finish {
@@ -40,14 +40,36 @@ impl Finish {
     }
 
     /// Becomes what a material is at a vertex. One finish for many vertices: to make a new one takes longer than this.
-    pub fn look_up(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack) {
+    pub fn look_up(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, mut sides: Option<&mut Sides>) {
         (self.ambient, self.diffuse, self.n_shiny) = (Vec3::ZERO, Vec3::ZERO, 0);
-        self.add(scene, id, vertex, media, 1.0);
+        self.add(scene, id, vertex, &mut sides, &mut 0, 1.0);
     }
 
-    fn add(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, media: &MediumStack, weight: f32) {
+    /// - `n_leaves`: transparent parts so far, of whatever weight: they are counted as [`super::super::medium::Bodies`]
+    ///   does.
+    fn add(
+        &mut self,
+        scene: &Snapshot,
+        id: MaterialId,
+        vertex: &Vertex,
+        sides: &mut Option<&mut Sides>,
+        n_leaves: &mut u32,
+        weight: f32,
+    ) {
         let uv = vertex.uv;
-        match &scene.shading.materials[id as usize] {
+        let material = &scene.shading.materials[id as usize];
+        let leaf = *n_leaves;
+        *n_leaves += u32::from(material.is_clear());
+        let mut pane = |share: f32| {
+            let sides = sides.as_mut().expect("a scene with glass has media");
+            Shiny::Pane { share, interface: sides.interface(scene, leaf) }
+        };
+        match material {
+            Material::Blend { weight: share, a, b } => {
+                let share = share.eval(scene, uv).clamp(0.0, 1.0);
+                self.add(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share));
+                self.add(scene, *b, vertex, sides, n_leaves, weight * share);
+            }
             _ if weight == 0.0 => {}
             Material::Emissive { .. } => {}
             Material::Diffuse { albedo } => {
@@ -70,7 +92,7 @@ impl Finish {
                 });
             }
             Material::Glass { .. } => {
-                self.push(Shiny::Pane { share: weight, eta: media.eta(scene, id, vertex.front), id });
+                self.push(pane(weight));
             }
             Material::Phong { diffuse, ambient, specular, shininess, transparency, .. } => {
                 let specular = specular.eval(scene, uv).clamp(0.0, 1.0);
@@ -83,14 +105,8 @@ impl Finish {
                     self.push(Shiny::Gloss { tint, exponent: *shininess, rough: false });
                 }
                 if *transparency > 0.0 {
-                    let eta = media.eta(scene, id, vertex.front);
-                    self.push(Shiny::Pane { share: weight * transparency, eta, id });
+                    self.push(pane(weight * transparency));
                 }
-            }
-            Material::Blend { weight: share, a, b } => {
-                let share = share.eval(scene, uv).clamp(0.0, 1.0);
-                self.add(scene, *a, vertex, media, weight * (1.0 - share));
-                self.add(scene, *b, vertex, media, weight * share);
             }
         }
     }
@@ -133,19 +149,46 @@ impl Finish {
     }
 }
 
-/// The share of light that goes straight through a surface, for shadows: refraction is left out.
-pub(super) fn straight_through(scene: &Snapshot, id: MaterialId, vertex: &Vertex) -> f32 {
-    match &scene.shading.materials[id as usize] {
+/// The share of light that goes straight through a surface, for shadows: refraction is left out. And the way through
+/// its first transparent part, `None` where it has none.
+pub(super) fn straight_through(
+    scene: &Snapshot,
+    id: MaterialId,
+    vertex: &Vertex,
+    sides: &mut Sides,
+) -> Option<(f32, Interface)> {
+    let mut passage = Passage { share: 0.0, n_leaves: 0, first: None };
+    passage.add(scene, id, vertex, sides, 1.0);
+    passage.first.map(|first| (passage.share, first))
+}
+
+struct Passage {
+    share: f32,
+    n_leaves: u32,
+    first: Option<Interface>,
+}
+
+impl Passage {
+    fn add(&mut self, scene: &Snapshot, id: MaterialId, vertex: &Vertex, sides: &mut Sides, weight: f32) {
+        let material = &scene.shading.materials[id as usize];
+        let leaf = self.n_leaves;
+        self.n_leaves += u32::from(material.is_clear());
+        let share = match material {
+            Material::Blend { weight: share, a, b } => {
+                let share = share.eval(scene, vertex.uv).clamp(0.0, 1.0);
+                self.add(scene, *a, vertex, sides, weight * (1.0 - share));
+                self.add(scene, *b, vertex, sides, weight * share);
+                return;
+            }
+            _ if weight == 0.0 => return,
+            Material::Glass { .. } => weight,
+            Material::Phong { transparency, .. } if *transparency > 0.0 => weight * transparency,
+            _ => return,
+        };
+        let interface = sides.interface(scene, leaf);
         // Unbent light meets both sides at the same angle: that of entering counts.
-        Material::Glass { ior, .. } => 1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), 1.0 / ior).0,
-        Material::Phong { ior, transparency, .. } if *transparency > 0.0 => {
-            transparency * (1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), 1.0 / ior).0)
-        }
-        Material::Blend { weight, a, b } => {
-            let share = weight.eval(scene, vertex.uv).clamp(0.0, 1.0);
-            let part = |id, share: f32| if share > 0.0 { share * straight_through(scene, id, vertex) } else { 0.0 };
-            part(*a, 1.0 - share) + part(*b, share)
-        }
-        _ => 0.0,
+        let eta = if vertex.front { interface.eta } else { 1.0 / interface.eta };
+        self.share += share * (1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), eta).0);
+        self.first.get_or_insert(interface);
     }
 }

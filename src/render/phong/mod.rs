@@ -15,13 +15,14 @@
 mod finish;
 mod shadow;
 
+use super::Snapshot;
 use super::dielectric::{fresnel, refract};
-use super::path::CAMERA_DIMENSIONS;
+use super::medium::{Interface, MediumSets};
+use super::path::{CAMERA_DIMENSIONS, endless_depth};
 use super::paths::{Path, PathBatch};
 use super::renderer::{RayCounts, RenderSettings};
-use super::surface::{Vertex, material_of};
+use super::surface::{Sides, Vertex, material_of};
 use super::wide::{self, ClassicGroup, KINDS, SortedHits};
-use super::{MaterialId, Snapshot};
 use crate::geometry::{Frame, Ray};
 use crate::kdtree::{HitBatch, RayClass};
 use finish::{Finish, Shiny};
@@ -33,12 +34,13 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 /// what the walls of a large, rather dark room send back.
 pub(super) const AMBIENT_SHARE: f32 = 0.05;
 
-/// Rays that count for less than this are followed with a probability, and then for this much: a grey level of a
-/// picture, and few enough rays behind any pixel.
-pub(super) const LEAST_WEIGHT: f32 = 1.0 / 64.0;
-
-/// From here on rays that lose nothing are ended now and then, too.
-pub(super) const ENDLESS_DEPTH: u32 = 64;
+/// Rays at a depth that count for less than this are followed with a probability, and then for this much: a grey level
+/// of a picture, and few enough rays behind any pixel. Deep within glass it is all of a sample, so that as many rays go on
+/// as come in, however many surfaces split them.
+#[inline]
+pub(super) fn least_weight(depth: u32) -> f32 {
+    if depth < 64 { 1.0 / 64.0 } else { 1.0 }
+}
 
 /// Sample dimensions of each vertex: of the lights (see [`super::light::LightTable::sample_each`]), the environment,
 /// and three for each shiny part.
@@ -85,6 +87,7 @@ pub(super) struct PhongWave {
     hits: HitBatch,
     sorted: SortedHits,
     shadows: Shadows,
+    sets: MediumSets,
 }
 
 impl PhongWave {
@@ -97,12 +100,15 @@ impl PhongWave {
         &mut self,
         scene: &Snapshot,
         settings: &RenderSettings,
+        camera_media: &[u32],
         start: impl FnOnce(&mut PathBatch),
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
         self.paths.start(radiance.len(), scene.shading.features.glass, false);
         start(&mut self.paths);
+        let camera = self.sets.start(scene, camera_media);
+        self.paths.begin_in(camera);
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
         for depth in 1..=settings.max_depth {
             if self.paths.is_empty() {
@@ -114,7 +120,7 @@ impl PhongWave {
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.geometry.tree.closest_hits(&self.paths.rays, class, &mut self.hits);
             self.shade(scene, depth, settings, radiance);
-            counts.shadow += self.shadows.cast(scene, class, radiance);
+            counts.shadow += self.shadows.cast(scene, &mut self.sets, class, radiance);
             counts.bounce += self.next.len() as u64;
             std::mem::swap(&mut self.paths, &mut self.next);
         }
@@ -142,7 +148,7 @@ impl PhongWave {
                 continue;
             }
             if kind == MISSES && shading.environment_sampler.is_none() {
-                wide::shade_misses(set, scene, &self.paths, order, radiance);
+                wide::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
                 continue;
             }
             if kind > MISSES && wide::knows_classic(scene, kind as u32 - 1) {
@@ -162,6 +168,7 @@ impl PhongWave {
                     order,
                     next: &mut self.next,
                     shadows: &mut self.shadows,
+                    sets: &self.sets,
                     radiance: &mut *radiance,
                 };
                 wide::shade_classic(set, group);
@@ -192,12 +199,13 @@ impl PhongWave {
             if shading.features.environment {
                 let sampler = &shading.environment_sampler;
                 let share = sampler.as_ref().map_or(1.0, |sampler| share_of_light(&path, |_| sampler.pdf(ray.dir)));
-                radiance[slot] += path.throughput * share * shading.environment.radiance(ray.dir);
+                let throughput = path.throughput * self.sets.environment_scale(path.media);
+                radiance[slot] += throughput * share * shading.environment.radiance(ray.dir);
             }
             return;
         };
         if shading.features.media {
-            path.throughput *= path.media.transmittance(scene, hit.t);
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
         }
         let material = material_of(scene, &hit);
         let vertex = Vertex::new(scene, &ray, &hit, material);
@@ -218,7 +226,9 @@ impl PhongWave {
             return;
         }
         let step = Step { scene, path: &path, vertex: &vertex, depth };
-        finish.look_up(scene, material, &vertex, &path.media);
+        let glass = shading.features.glass;
+        let mut sides = glass.then(|| Sides::new(scene, &mut self.sets, path.media, &hit, material, vertex.front));
+        finish.look_up(scene, material, &vertex, sides.as_mut());
         if finish.is_lit() {
             radiance[slot] += path.throughput * self.light(&step, finish);
         }
@@ -234,6 +244,7 @@ impl PhongWave {
         let Step { scene, path, vertex, .. } = *step;
         let shading = &*scene.shading;
         let mirrored = vertex.mirrored();
+        let sets = &self.sets;
         let mut ambient = Vec3::ZERO;
         let mut direct = |k: usize, radiance: Vec3, wi: Vec3, target: Option<Vec3>, pdf: Option<f32>| {
             if !vertex.is_reached_from(wi) {
@@ -241,7 +252,7 @@ impl PhongWave {
             }
             let light = path.throughput * finish.reflected(wi, vertex.normal, mirrored, pdf) * radiance;
             if light != Vec3::ZERO {
-                self.shadows.push(k, path.slot, light, vertex.leaving(wi), wi, target);
+                self.shadows.push(k, path, light, vertex.leaving(wi), wi, target);
             }
         };
         let dimension = step.dimension();
@@ -253,7 +264,7 @@ impl PhongWave {
             |k, sample, is_point| {
                 let mut arriving = sample.radiance / sample.pdf;
                 if shading.features.media {
-                    arriving *= path.media.transmittance(scene, vertex.position.distance(sample.target));
+                    arriving *= sets.transmittance(path.media, vertex.position.distance(sample.target));
                 }
                 ambient += finish.ambient * arriving * (AMBIENT_SHARE * FRAC_1_PI);
                 direct(k, arriving, sample.wi, Some(sample.target), (!is_point).then_some(sample.pdf));
@@ -261,10 +272,12 @@ impl PhongWave {
         );
         if let Some(environment) = &shading.environment_sampler {
             if let Some((wi, pdf)) = environment.sample(path.sampler.pair(dimension + DIM_ENVIRONMENT)) {
-                direct(shading.lights.n_each(), shading.environment.radiance(wi) / pdf, wi, None, Some(pdf));
+                let arriving = shading.environment.radiance(wi) / pdf;
+                direct(shading.lights.n_each(), arriving, wi, None, Some(pdf));
             }
         } else if shading.features.environment {
-            ambient += finish.ambient * shading.ambient.radiance(vertex.normal);
+            let scale = sets.environment_scale(path.media);
+            ambient += finish.ambient * shading.ambient.radiance(vertex.normal) * scale;
         }
         ambient
     }
@@ -290,27 +303,28 @@ impl PhongWave {
                 }
                 self.follow(step, weight, mirrored, None, LIGHTS_COUNTED, dimension);
             }
-            Shiny::Pane { share, eta, id } => {
+            Shiny::Pane { share, interface } => {
+                let Interface { eta, squeeze, .. } = interface;
                 let (reflectance, cos_t) = fresnel(vertex.normal.dot(vertex.wo).clamp(0.0, 1.0), eta);
                 let weight = path.throughput * share;
                 self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
                 if reflectance < 1.0 {
                     let wi = refract(vertex.wo, vertex.normal, eta, cos_t);
                     // Radiance is squeezed into a narrower cone where light is slower: the factor η².
-                    let weight = weight * ((1.0 - reflectance) * eta * eta);
-                    self.follow(step, weight, wi, Some(id), f32::INFINITY, dimension + 2);
+                    let weight = weight * ((1.0 - reflectance) * squeeze * squeeze);
+                    self.follow(step, weight, wi, Some(interface), f32::INFINITY, dimension + 2);
                 }
             }
         }
     }
 
-    /// - `through`: the glass whose surface is crossed, if one is; `pdf`: see [`LIGHTS_COUNTED`].
+    /// - `through`: what is passed through, if anything is; `pdf`: see [`LIGHTS_COUNTED`].
     fn follow(
         &mut self,
         step: &Step,
         mut weight: Vec3,
         wi: Vec3,
-        through: Option<MaterialId>,
+        through: Option<Interface>,
         pdf: f32,
         dimension: u32,
     ) {
@@ -321,11 +335,11 @@ impl PhongWave {
         if !reached {
             return;
         }
-        let media = through.map_or(path.media, |id| path.media.crossed(id, vertex.front));
+        let media = through.map_or(path.media, |interface| interface.beyond);
         // Inside glass weights carry 1/n², which the way out gives back: it must not count as loss.
-        let ior = if scene.shading.features.glass { media.ior(scene) } else { 1.0 };
-        let most = weight.abs().max_element() * ior * ior / LEAST_WEIGHT;
-        let survival = if depth >= ENDLESS_DEPTH { most.min(0.95) } else { most.min(1.0) };
+        let ior = self.sets.ior(media);
+        let most = weight.abs().max_element() * ior * ior / least_weight(depth);
+        let survival = if depth >= endless_depth(scene) { most.min(0.95) } else { most.min(1.0) };
         if survival < 1.0 {
             if path.sampler.single(dimension) >= survival {
                 return;

@@ -3,8 +3,10 @@
 //! Straight light through glass is an approximation that keeps shadows of glass from being black where nothing
 //! gathers caustics. A scene without glass asks for any hit and is done.
 
-use super::super::paths::ShadowBatch;
-use super::super::surface::{Vertex, material_of};
+use super::super::medium::{MediumId, MediumSets};
+use super::super::paths::{Path, ShadowBatch};
+use super::super::surface::{Sides, Vertex, material_of};
+use super::super::wide::lanes_of;
 use super::super::{Material, MaterialId, Snapshot};
 use super::finish::straight_through;
 use crate::geometry::{Ray, robust};
@@ -19,6 +21,9 @@ struct Arriving {
     light: Vec3,
     /// Where the ray ends; `None` for light from outside the scene.
     target: Option<Vec3>,
+    /// What the ray began inside of, and is now.
+    start: MediumId,
+    media: MediumId,
 }
 
 /// Shadow rays of one wave by what they were sent to, and scratch memory to trace them.
@@ -43,6 +48,8 @@ struct Asked {
     batch: ShadowBatch,
     /// Where rays end, for those that go on behind glass.
     targets: [Vec<f32>; 3],
+    /// What each ray begins inside of; only where it may go on.
+    media: Vec<MediumId>,
 }
 
 /// Glass surfaces in the way of one shadow ray before it counts as blocked.
@@ -58,6 +65,7 @@ impl Shadows {
         }
         for asked in &mut self.asked[..n] {
             asked.batch.start(n_hits);
+            asked.media.clear();
             let least = n_hits + LANES;
             if self.with_targets && asked.targets[0].len() < least {
                 asked.targets.iter_mut().for_each(|array| array.resize(least, 0.0));
@@ -65,15 +73,16 @@ impl Shadows {
         }
     }
 
-    /// Light for `slot` that comes from `target` on light `k`, or from outside along `wi`, to `origin`.
+    /// Light for a path that comes from `target` on light `k`, or from outside along `wi`, to `origin`.
     #[inline]
-    pub fn push(&mut self, k: usize, slot: u32, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
-        let Asked { batch, targets } = &mut self.asked[k];
+    pub fn push(&mut self, k: usize, path: &Path, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
+        let Asked { batch, targets, media } = &mut self.asked[k];
         if self.with_targets {
+            media.push(path.media);
             let target = target.unwrap_or(wi);
             targets.iter_mut().zip(target.to_array()).for_each(|(array, x)| array[batch.rays.len()] = x);
         }
-        batch.push(&shadow_ray(origin, wi, target), slot, light);
+        batch.push(&shadow_ray(origin, wi, target), path.slot, light);
     }
 
     /// The same for the lanes of `mask`; rays that end at `target` have a `t_max` of 1, the others none.
@@ -88,9 +97,11 @@ impl Shadows {
         slot: Bits<S>,
         light: Vector<S>,
         target: Vector<S>,
+        path_media: &[MediumId; LANES],
     ) {
-        let Asked { batch, targets } = &mut self.asked[k];
+        let Asked { batch, targets, media } = &mut self.asked[k];
         if self.with_targets {
+            media.extend(lanes_of(mask).map(|lane| path_media[lane]));
             let at = batch.rays.len();
             append(&mut targets[0], at, mask, target.x);
             append(&mut targets[1], at, mask, target.y);
@@ -100,11 +111,11 @@ impl Shadows {
     }
 
     /// Adds what arrives to `radiance`; returns how many rays it took.
-    pub fn cast(&mut self, scene: &Snapshot, class: RayClass, radiance: &mut [Vec3]) -> u64 {
+    pub fn cast(&mut self, scene: &Snapshot, sets: &mut MediumSets, class: RayClass, radiance: &mut [Vec3]) -> u64 {
         let mut n_rays = 0;
         for k in 0..self.n {
             if self.with_targets {
-                n_rays += self.cast_through(k, scene, class, radiance);
+                n_rays += self.cast_through(k, scene, sets, class, radiance);
                 continue;
             }
             let batch = &mut self.asked[k].batch;
@@ -117,14 +128,23 @@ impl Shadows {
     }
 
     /// The same for one light where rays may go on behind what they meet.
-    fn cast_through(&mut self, k: usize, scene: &Snapshot, class: RayClass, radiance: &mut [Vec3]) -> u64 {
-        let Asked { batch, targets } = &mut self.asked[k];
+    fn cast_through(
+        &mut self,
+        k: usize,
+        scene: &Snapshot,
+        sets: &mut MediumSets,
+        class: RayClass,
+        radiance: &mut [Vec3],
+    ) -> u64 {
+        let Asked { batch, targets, media } = &mut self.asked[k];
         std::mem::swap(&mut self.rays, &mut batch.rays);
         self.lights.clear();
         self.lights.extend((0..self.rays.len()).map(|i| Arriving {
             slot: batch.slot[i],
             light: batch.light_of(i),
             target: (self.rays.t_max[i] == 1.0).then(|| Vec3::new(targets[0][i], targets[1][i], targets[2][i])),
+            start: media[i],
+            media: media[i],
         }));
         let mut n_rays = 0;
         for _ in 0..MAX_CROSSINGS {
@@ -137,7 +157,10 @@ impl Shadows {
             self.next_lights.clear();
             for (i, &arriving) in self.lights.iter().enumerate() {
                 let Some(hit) = self.hits.get(i) else {
-                    radiance[arriving.slot as usize] += arriving.light;
+                    // As an interface changes radiance on the way of a path; see `medium`.
+                    let (here, there) = (sets.ior(arriving.start), sets.ior(arriving.media));
+                    let ratio = if arriving.target.is_some() { here / there } else { here };
+                    radiance[arriving.slot as usize] += arriving.light * (ratio * ratio);
                     continue;
                 };
                 let id = material_of(scene, &hit);
@@ -148,7 +171,9 @@ impl Shadows {
                 let distance = hit.t * ray.dir.length();
                 let unit = Ray { dir: ray.dir.normalize(), ..ray };
                 let vertex = Vertex::new(scene, &unit, &Hit { t: distance, ..hit }, id);
-                let mut light = arriving.light * straight_through(scene, id, &vertex);
+                let mut sides = Sides::new(scene, sets, arriving.media, &hit, id, vertex.front);
+                let Some((share, interface)) = straight_through(scene, id, &vertex, &mut sides) else { continue };
+                let mut light = arriving.light * share;
                 if !vertex.front {
                     light *= inside(scene, id, distance);
                 }
@@ -158,7 +183,7 @@ impl Shadows {
                 let origin =
                     robust::offset_ray_origin(vertex.position, vertex.error, vertex.geometric_normal, unit.dir);
                 self.next_rays.push(&shadow_ray(origin, unit.dir, arriving.target));
-                self.next_lights.push(Arriving { light, ..arriving });
+                self.next_lights.push(Arriving { light, media: interface.beyond, ..arriving });
             }
             std::mem::swap(&mut self.rays, &mut self.next_rays);
             std::mem::swap(&mut self.lights, &mut self.next_lights);

@@ -1,7 +1,7 @@
 //! Hits by the sixteen, and what they share.
 
 use super::super::Snapshot;
-use super::super::medium::MediumStack;
+use super::super::medium::{MediumId, MediumSets};
 use super::super::paths::PathBatch;
 use super::lanes_of;
 use crate::lanes::{Float, LANES, Mask, Simd};
@@ -25,8 +25,8 @@ impl Chunk {
 
     /// What each of them goes through.
     #[inline(always)]
-    pub fn media(&self, scene: &Snapshot, paths: &PathBatch) -> [MediumStack; LANES] {
-        let mut media = [MediumStack::default(); LANES];
+    pub fn media(&self, scene: &Snapshot, paths: &PathBatch) -> [MediumId; LANES] {
+        let mut media = [MediumId::OUTSIDE; LANES];
         if scene.shading.features.glass {
             for (lane, &i) in self.indices.iter().enumerate() {
                 media[lane] = paths.media_of(i as usize);
@@ -39,11 +39,17 @@ impl Chunk {
 /// The index of refraction n of each medium. Weights within carry 1/n², which the way out gives back: roulette must not take
 /// that for a loss.
 #[inline(always)]
-pub(super) fn iors<S: Simd>(s: S, scene: &Snapshot, mask: Mask, media: &[MediumStack; LANES]) -> Float<S> {
+pub(super) fn iors<S: Simd>(
+    s: S,
+    scene: &Snapshot,
+    sets: &MediumSets,
+    mask: Mask,
+    media: &[MediumId; LANES],
+) -> Float<S> {
     let mut ior = [1.0; LANES];
     if scene.shading.features.glass {
-        for lane in lanes_of(mask).filter(|&lane| !media[lane].is_empty()) {
-            ior[lane] = media[lane].ior(scene);
+        for lane in lanes_of(mask).filter(|&lane| media[lane] != MediumId::OUTSIDE) {
+            ior[lane] = sets.ior(media[lane]);
         }
     }
     Float::load(s, &ior)

@@ -6,10 +6,10 @@
 
 use super::super::Snapshot;
 use super::super::light::LightLanes;
+use super::super::medium::MediumSets;
+use super::super::path::endless_depth;
 use super::super::paths::{PathBatch, PathLanes};
-use super::super::phong::{
-    AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, ENDLESS_DEPTH, LEAST_WEIGHT, LIGHTS_COUNTED, Shadows,
-};
+use super::super::phong::{AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, LIGHTS_COUNTED, Shadows, least_weight};
 use super::chunk::{Chunk, iors};
 use super::classic_table::{GLOSS, Inputs, MATTE, ROUGH};
 use super::metal::fresnel;
@@ -42,6 +42,7 @@ pub(in crate::render) struct ClassicGroup<'a> {
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub shadows: &'a mut Shadows,
+    pub sets: &'a MediumSets,
     pub radiance: &'a mut [Vec3],
 }
 
@@ -94,7 +95,8 @@ impl<S: Simd> Kernel<S> for AskLight<'_, S> {
 
 #[inline(always)]
 fn shade<S: Simd>(s: S, group: ClassicGroup) {
-    let ClassicGroup { scene, kind, depth, dimension, paths, hits, materials, order, next, shadows, radiance } = group;
+    let ClassicGroup { scene, kind, depth, dimension, paths, hits, materials, order, next, shadows, sets, radiance } =
+        group;
     let (shading, features) = (&*scene.shading, &scene.shading.features);
     let table = &shading.classic_table;
     let n_lights = shading.lights.n_each();
@@ -110,7 +112,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         let slot = Bits::gather(&paths.slot, index);
         let media = chunk.media(scene, paths);
         if features.media {
-            weight = weight.times(transmittance(s, scene, mask, &media, Float::gather(&hits.t, index)));
+            weight = weight.times(transmittance(s, sets, mask, &media, Float::gather(&hits.t, index)));
         }
         let row = Bits::gather(materials, index);
         let matte = color_of(s, &at, &table.matte, row, &place) * Float::gather(&table.matte.weight, row);
@@ -136,7 +138,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
                 let mut arriving = light.radiance * (zero.all(1.0) / light.pdf);
                 if features.media {
                     let distance = (light.target - place.position).length();
-                    arriving = arriving.times(transmittance(s, scene, light.found, &media, distance));
+                    arriving = arriving.times(transmittance(s, sets, light.found, &media, distance));
                 }
                 let share = arriving.mul_all(AMBIENT_SHARE * FRAC_1_PI);
                 ambient = ambient + select_vector(light.found, share, Vector::splat(s, Vec3::ZERO));
@@ -144,7 +146,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
                 let (found, seen) = reflect(&lit, &place, light.found, light.wi, pdf, arriving);
                 if found != 0 {
                     let rays = [leaving, light.target - leaving];
-                    shadows.append(k, found, rays, zero.all(1.0), slot, seen, light.target);
+                    shadows.append(k, found, rays, zero.all(1.0), slot, seen, light.target, &media);
                 }
             }
             if shading.environment_sampler.is_some() {
@@ -152,10 +154,15 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
                     ask_environment(s, scene, lit.mask, &sampler, dimension + DIM_ENVIRONMENT);
                 let (found, seen) = reflect(&lit, &place, from, wi, pdf, arriving * (zero.all(1.0) / pdf));
                 if found != 0 {
-                    shadows.append(n_lights, found, [leaving, wi], zero.all(f32::INFINITY), slot, seen, wi);
+                    shadows.append(n_lights, found, [leaving, wi], zero.all(f32::INFINITY), slot, seen, wi, &media);
                 }
             } else if features.environment {
-                ambient = ambient + shading.ambient.radiance_lanes(place.normal);
+                let mut around = shading.ambient.radiance_lanes(place.normal);
+                if features.glass {
+                    let ior = iors(s, scene, sets, lit.mask, &media);
+                    around = around * (ior * ior);
+                }
+                ambient = ambient + around;
             }
             let returned = matte * Float::gather(&table.ambient, row);
             let light = weight.times(returned.times(ambient)).to_arrays();
@@ -176,9 +183,9 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         }
         let mut throughput = weight.times(tint);
         let mut go_on = mask & wi.dot(place.reach_normal).is_positive();
-        let ior = iors(s, scene, go_on, &media);
-        let most = throughput.abs().max_element() * (1.0 / LEAST_WEIGHT) * ior * ior;
-        let survival = most.at_most(if depth >= ENDLESS_DEPTH { 0.95 } else { 1.0 });
+        let ior = iors(s, scene, sets, go_on, &media);
+        let most = throughput.abs().max_element() * (1.0 / least_weight(depth)) * ior * ior;
+        let survival = most.at_most(if depth >= endless_depth(scene) { 0.95 } else { 1.0 });
         let at_stake = go_on & survival.lt(survival.all(1.0));
         if at_stake != 0 {
             go_on &= !at_stake | sampler.single(dimension + DIM_SHINY).lt(survival);

@@ -18,7 +18,7 @@ pub(in crate::render) fn shade_emitters(set: InstructionSet, group: Group, radia
 
 #[inline(always)]
 fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
-    let Group { scene, techniques, caustics, paths, hits, materials, order, .. } = group;
+    let Group { scene, techniques, caustics, paths, hits, materials, order, sets, .. } = group;
     let shading = &*scene.shading;
     for chunk in order.chunks(LANES) {
         let Chunk { indices, mask } = Chunk::of(chunk);
@@ -57,7 +57,7 @@ fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
         light = light * weight;
         if scene.shading.features.media {
             let media = indices.map(|i| paths.media_of(i as usize));
-            light = light.times(transmittance(s, scene, mask, &media, distance));
+            light = light.times(transmittance(s, sets, mask, &media, distance));
         }
         let light = light.to_arrays();
         for lane in lanes_of(mask & place.front) {
@@ -82,7 +82,7 @@ fn lamp_weights<S: Simd>(s: S, pass: &CausticPass, at: &At<S>, place: &Place<S>,
     for lane in lanes_of(gathered) {
         let i = at.indices[lane] as usize;
         let hit = at.hits.get(i).expect("a hit is being shaded");
-        let found = pass.eye_weight(&at.paths.track_of(i), &at.paths.media_of(i), &hit, &vertices.vertex(lane));
+        let found = pass.eye_weight(&at.paths.track_of(i), at.paths.media_of(i), &hit, &vertices.vertex(lane));
         weights[lane] = found.unwrap_or(weights[lane]);
     }
     Float::load(s, &weights)

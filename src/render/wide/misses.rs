@@ -1,8 +1,9 @@
 //! Rays that leave the scene, sixteen at a time, under skies that are no pictures.
 
+use super::super::medium::MediumSets;
 use super::super::paths::PathBatch;
 use super::super::{Environment, Snapshot};
-use super::chunk::Chunk;
+use super::chunk::{Chunk, iors};
 use super::lanes_of;
 use crate::lanes::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select_vector};
 use glam::Vec3;
@@ -12,16 +13,21 @@ pub(in crate::render) fn shade_misses(
     set: InstructionSet,
     scene: &Snapshot,
     paths: &PathBatch,
+    sets: &MediumSets,
     order: &[u32],
     radiance: &mut [Vec3],
 ) {
-    dispatch!(set, misses(scene: &Snapshot, paths: &PathBatch, order: &[u32], radiance: &mut [Vec3]));
+    dispatch!(
+        set,
+        misses(scene: &Snapshot, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3])
+    );
 }
 
 #[inline(always)]
-fn misses<S: Simd>(s: S, scene: &Snapshot, paths: &PathBatch, order: &[u32], radiance: &mut [Vec3]) {
+fn misses<S: Simd>(s: S, scene: &Snapshot, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3]) {
     for chunk in order.chunks(LANES) {
-        let Chunk { indices, mask } = Chunk::of(chunk);
+        let chunk = Chunk::of(chunk);
+        let Chunk { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
         let arriving = match &scene.shading.environment {
             Environment::Black => return,
@@ -43,7 +49,13 @@ fn misses<S: Simd>(s: S, scene: &Snapshot, paths: &PathBatch, order: &[u32], rad
                 Vector::from_arrays(s, &found)
             }
         };
-        let light = Vector::gather(&paths.throughput, index).times(arriving).to_arrays();
+        let mut throughput = Vector::gather(&paths.throughput, index);
+        if scene.shading.features.glass {
+            // See [`MediumSets::environment_scale`].
+            let ior = iors(s, scene, sets, mask, &chunk.media(scene, paths));
+            throughput = throughput * (ior * ior);
+        }
+        let light = throughput.times(arriving).to_arrays();
         for lane in lanes_of(mask) {
             let slot = paths.slot[indices[lane] as usize];
             radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);

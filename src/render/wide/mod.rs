@@ -13,6 +13,7 @@ mod classic;
 mod classic_table;
 mod coat;
 mod emitters;
+mod glass;
 mod hints;
 mod instances;
 mod lights;
@@ -27,7 +28,7 @@ mod track;
 pub(super) mod warp;
 
 use super::caustics::CausticPass;
-use super::medium::MediumStack;
+use super::medium::{MediumId, MediumSets};
 use super::path::{DIM_ROULETTE, ROULETTE_GRACE, Survival};
 use super::paths::{PathBatch, PathLanes, ShadowBatch};
 use super::{Material, Snapshot, Techniques};
@@ -68,6 +69,7 @@ pub(super) struct Group<'a> {
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
     pub shadows: &'a mut ShadowBatch,
+    pub sets: &'a mut MediumSets,
 }
 
 pub(super) const DIFFUSE: usize = 1;
@@ -124,8 +126,8 @@ fn shade_coated<S: Simd>(s: S, group: Group) {
 
 #[inline(always)]
 fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
-    let Group { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, next, shadows } =
-        group;
+    let Group { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
+    let Group { next, shadows, sets, .. } = group;
     let features = &scene.shading.features;
     for chunk in order.chunks(LANES) {
         let chunk = Chunk::of(chunk);
@@ -139,9 +141,9 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
         let mut media = chunk.media(scene, paths);
         if features.media {
             let distance = Float::gather(&hits.t, index);
-            throughput = throughput.times(transmittance(s, scene, mask, &media, distance));
+            throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
         }
-        let surface = surface_of::<S, KIND>(s, &at, &place);
+        let surface = surface_of::<S, KIND>(s, &at, &place, sets, &media);
         let hints = match caustics {
             Some(pass) if scatters(KIND) => HintLanes::of(s, pass, depth, &at, &place, mask & surface.smooth),
             _ => HintLanes::NONE,
@@ -162,9 +164,13 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                 if found != 0 {
                     let origin = place.leaving();
                     let infinite = points.infinite;
+                    if features.glass && infinite & found != 0 {
+                        let ior = iors(s, scene, sets, infinite & found, &media);
+                        light = light * (ior * ior);
+                    }
                     if features.media {
                         let distance = (points.target - place.position).length();
-                        let passed = light.times(transmittance(s, scene, found & !infinite, &media, distance));
+                        let passed = light.times(transmittance(s, sets, found & !infinite, &media, distance));
                         light = select_vector(infinite, light, passed);
                     }
                     // The direction spans the way to the light's own bounded point, where the ray ends.
@@ -175,21 +181,20 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
                 }
             }
         }
-        let bounce = sample::<S, KIND>(&at, &surface, &place, &hints, &sampler, dimension, &media);
+        let bounce = sample::<S, KIND>(&at, &surface, &place, &hints, &sampler, dimension);
         let bounce = hints.follow::<S, KIND>(s, &surface, &place, &sampler, dimension, bounce);
         let beyond = bounce.wi.dot(place.geometric_normal).is_negative();
         let reached = bounce.wi.dot(place.reach_normal).is_positive();
         let mut go_on = mask & bounce.go_on;
         go_on &= (bounce.transmitted & beyond) | (!bounce.transmitted & reached);
         throughput = throughput.times(bounce.weight);
-        if KIND == GLASS {
-            for lane in lanes_of(go_on & bounce.transmitted) {
-                let front = place.front >> lane & 1 != 0;
-                media[lane] = media[lane].crossed(materials[indices[lane] as usize], front);
-            }
+        if let Some(glass) = &surface.glass
+            && KIND == GLASS
+        {
+            lanes_of(go_on & bounce.transmitted).for_each(|lane| media[lane] = glass.beyond[lane]);
         }
         if let Some(most_kept) = survival.share {
-            let ior = iors(s, scene, go_on, &media);
+            let ior = iors(s, scene, sets, go_on, &media);
             let mut most = throughput.abs().max_element() * ior * ior;
             if paths.tracks.is_some() {
                 let weight = bounce.weight.to_arrays();
@@ -237,15 +242,15 @@ pub(super) fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {
 #[inline(always)]
 pub(super) fn transmittance<S: Simd>(
     s: S,
-    scene: &Snapshot,
+    sets: &MediumSets,
     mask: Mask,
-    media: &[MediumStack; LANES],
+    media: &[MediumId; LANES],
     distance: Float<S>,
 ) -> Vector<S> {
     let distances = distance.to_array();
     let mut kept = [[1.0; LANES]; 3];
     for lane in lanes_of(mask) {
-        let found = media[lane].transmittance(scene, distances[lane]);
+        let found = sets.transmittance(media[lane], distances[lane]);
         (kept[0][lane], kept[1][lane], kept[2][lane]) = (found.x, found.y, found.z);
     }
     Vector::from_arrays(s, &kept)

@@ -1,10 +1,11 @@
 //! How surfaces scatter, sixteen at a time; see [`super::super::bsdf`].
 
 use super::super::bsdf::SMALLEST_ALPHA;
-use super::super::medium::MediumStack;
+use super::super::medium::{MediumId, MediumSets};
 use super::super::path::{DIM_DIRECTION, DIM_LOBE};
 use super::super::surface::scalar_at;
 use super::coat::Coat;
+use super::glass::GlassLanes;
 use super::hints::HintLanes;
 use super::metal::{self, MetalLanes};
 use super::place::{At, Place};
@@ -23,6 +24,7 @@ pub(in crate::render) struct Surface<S: Simd> {
     pub color: Vector<S>,
     pub metal: Option<MetalLanes<S>>,
     pub coat: Option<Coat<S>>,
+    pub glass: Option<GlassLanes<S>>,
     /// Lanes that light sampling can do something for.
     pub smooth: Mask,
 }
@@ -38,12 +40,26 @@ pub(in crate::render) struct Bounce<S: Simd> {
 
 /// The parameters of the surfaces; black and without lobe only where the scalar code would say so too.
 #[inline(always)]
-pub(in crate::render) fn surface_of<S: Simd, const KIND: usize>(s: S, at: &At<S>, place: &Place<S>) -> Surface<S> {
+///
+/// - `media`: what each path is inside of.
+pub(in crate::render) fn surface_of<S: Simd, const KIND: usize>(
+    s: S,
+    at: &At<S>,
+    place: &Place<S>,
+    sets: &mut MediumSets,
+    media: &[MediumId; LANES],
+) -> Surface<S> {
     let table = &at.scene.shading.material_table;
     if KIND == COATED {
         let coat = Coat::new(s, at, place);
         let (smooth, zero) = (coat.smooth(), Float::splat(s, 0.0));
-        return Surface { color: Vector { x: zero, y: zero, z: zero }, metal: None, coat: Some(coat), smooth };
+        return Surface {
+            color: Vector { x: zero, y: zero, z: zero },
+            metal: None,
+            coat: Some(coat),
+            glass: None,
+            smooth,
+        };
     }
     let material = Bits::gather(at.materials, at.index);
     let color = colors_of(s, at, place, material);
@@ -62,9 +78,10 @@ pub(in crate::render) fn surface_of<S: Simd, const KIND: usize>(s: S, at: &At<S>
         }
         let metal = MetalLanes::new(s, at.mask, place.normal, place.wo, alpha, color, flags);
         let smooth = Float::splat(s, SMALLEST_ALPHA).le(alpha);
-        return Surface { color, metal: Some(metal), coat: None, smooth };
+        return Surface { color, metal: Some(metal), coat: None, glass: None, smooth };
     }
-    Surface { color, metal: None, coat: None, smooth: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
+    let glass = (KIND == GLASS).then(|| GlassLanes::of(s, at, place.front, sets, media));
+    Surface { color, metal: None, coat: None, glass, smooth: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
 }
 
 /// Albedo or reflectance by rows of the table, with their textures.
@@ -115,7 +132,6 @@ pub(in crate::render) fn sample<S: Simd, const KIND: usize>(
     hints: &HintLanes,
     sampler: &SamplerLanes<S>,
     dimension: u32,
-    media: &[MediumStack; LANES],
 ) -> Bounce<S> {
     let s = at.index.s;
     let infinite = Float::splat(s, f32::INFINITY);
@@ -149,12 +165,8 @@ pub(in crate::render) fn sample<S: Simd, const KIND: usize>(
             bounce
         }
         GLASS => {
-            let mut eta = [1.0; LANES];
-            for lane in lanes_of(at.mask) {
-                let material = at.materials[at.indices[lane] as usize];
-                eta[lane] = media[lane].eta(at.scene, material, place.front >> lane & 1 != 0);
-            }
-            let eta = Float::load(s, &eta);
+            let glass = surface.glass.as_ref().expect("glass has its two sides");
+            let eta = glass.eta;
             let one = eta.all(1.0);
             let cos_i = cos_o.at_least(0.0).at_most(1.0);
             let cos2_t = (one - eta) * (eta + 1.0) + (eta * cos_i) * (eta * cos_i);
@@ -169,7 +181,7 @@ pub(in crate::render) fn sample<S: Simd, const KIND: usize>(
             let reflected = sampler.single(dimension + DIM_LOBE).lt(reflectance);
             let refracted = place.wo * -eta + normal * (eta * cos_o - cos_t);
             let wi = select_vector(reflected, mirrored(place.wo, normal), refracted.normalize());
-            let squeeze = select(reflected, one, eta * eta);
+            let squeeze = select(reflected, one, glass.squeeze * glass.squeeze);
             let weight = Vector { x: squeeze, y: squeeze, z: squeeze };
             Bounce { go_on: Mask::MAX, wi, weight, pdf: infinite, transmitted: !reflected }
         }

@@ -2,7 +2,7 @@
 
 use super::super::bsdf::Scatter;
 use super::super::caustics::{CausticPass, NO_CASTER, Track};
-use super::super::medium::MediumStack;
+use super::super::medium::MediumId;
 use super::super::surface::{blend_at, lobe_at};
 use super::super::{Camera, Material};
 use super::hints::HintLanes;
@@ -21,7 +21,7 @@ pub(super) struct BounceTracks<'a, S: Simd> {
     pub hints: &'a HintLanes<'a>,
     pub bounce: &'a Bounce<S>,
     /// Behind the bounce.
-    pub media: &'a [MediumStack; LANES],
+    pub media: &'a [MediumId; LANES],
 }
 
 impl<S: Simd> BounceTracks<'_, S> {
@@ -95,11 +95,11 @@ impl<S: Simd> BounceTracks<'_, S> {
             for lane in lanes_of(mask) {
                 let i = at.indices[lane] as usize;
                 let (vertex, wi) = (vertices.vertex(lane), Vec3::new(wi[0][lane], wi[1][lane], wi[2][lane]));
-                let (material, media) = (at.materials[i], at.paths.media_of(i));
+                let material = at.materials[i];
                 pdfs[lane] = match at.scene.shading.materials[material as usize] {
-                    Material::Blend { .. } | Material::Phong { .. } => blend_at(at.scene, material, &vertex, &media)
+                    Material::Blend { .. } | Material::Phong { .. } => blend_at(at.scene, material, &vertex, None)
                         .map_or(0.0, |blend| blend.eval(wi, vertex.wo, vertex.normal).1),
-                    _ => lobe_at(at.scene, material, &vertex, &media)
+                    _ => lobe_at(at.scene, material, &vertex, None)
                         .map_or(0.0, |lobe| lobe.eval(wi, vertex.wo, vertex.normal).1),
                 };
             }

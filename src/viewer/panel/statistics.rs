@@ -18,6 +18,9 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("", format!("{shadow:.2} shadow"));
         figure("error", status.estimated_error.map_or("–".to_owned(), percent));
         figure("bad samples", format!("{} not finite, left out", status.n_bad));
+        if status.n_above > 0 {
+            figure("", format!("{} brighter than the scene can be", status.n_above));
+        }
         let milliseconds = |waits: &Waits| {
             let of = |share| waits.quantile(share).map(|wait| format!("{:.0} ms", wait.as_secs_f64() * 1e3));
             of(0.5).zip(of(0.99)).map_or("–".to_owned(), |(half, most)| format!("{half}, 1 % over {most}"))

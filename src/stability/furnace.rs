@@ -1,0 +1,346 @@
+//! White furnaces: in an evenly bright world no lossless thing can be seen, whatever it is inside of.
+//!
+//! What a camera inside of glass of index n sees is n² as bright. [`nested`] has the cases on which bookkeeping of media
+//! breaks: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at every
+//! level, both integrators, with and without SIMD. [`random`] has scenes that nobody thought of.
+
+use super::light::{Picture, camera, diffuse, grey, snapshot};
+use super::random::Random;
+use crate::kdtree::{BuildPreset, MeshTree, Shape, SphereTree};
+use crate::mesh::{Mesh, procedural};
+use crate::render::{Camera, Environment, Fresnel, Integrator, Material, Object, RenderSettings, ScalarInput};
+use glam::{Affine3A, Quat, Vec3, vec3};
+use std::sync::Arc;
+
+/// A shape, its material and its mesh, if it is one.
+type Thing = (Shape, u32, Option<Arc<Mesh>>);
+
+/// How a scene is rendered.
+const WAYS: [(Integrator, bool); 3] = [(Integrator::Path, true), (Integrator::Path, false), (Integrator::Phong, true)];
+
+pub fn glass(ior: f32) -> Material {
+    Material::Glass { ior, absorption: Vec3::ZERO }
+}
+
+fn metal(alpha: f32) -> Material {
+    let alpha = ScalarInput::Constant(alpha);
+    Material::Metal { alpha, reflectance: grey(1.0), fresnel: Fresnel::Constant, compensate: true }
+}
+
+fn blend(weight: f32, a: u32, b: u32) -> Material {
+    Material::Blend { weight: ScalarInput::Constant(weight), a, b }
+}
+
+fn classic(specular: f32, transparency: f32, ior: f32) -> Material {
+    Material::Phong {
+        diffuse: grey(1.0),
+        ambient: 1.0,
+        specular: ScalarInput::Constant(specular),
+        shininess: 20.0,
+        transparency,
+        ior,
+        absorption: Vec3::ZERO,
+    }
+}
+
+fn ball(center: Vec3, radius: f32, material: u32) -> Thing {
+    (Shape::Sphere { center, radius }, material, None)
+}
+
+fn mesh(mesh: Mesh, world_from_object: Affine3A, material: u32) -> Thing {
+    let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
+    (Shape::Mesh { tree, world_from_object }, material, Some(Arc::new(mesh)))
+}
+
+/// A box of six quads that face outwards.
+fn quad_box(center: Vec3, half: Vec3, material: u32) -> Vec<Thing> {
+    let (o, x, y, z) = (center - half, 2.0 * half.x * Vec3::X, 2.0 * half.y * Vec3::Y, 2.0 * half.z * Vec3::Z);
+    let faces = [(o, y, x), (o + z, x, y), (o, z, y), (o + x, y, z), (o, x, z), (o + y, z, x)];
+    faces.map(|(corner, edge_u, edge_v)| (Shape::Quad { corner, edge_u, edge_v }, material, None)).into()
+}
+
+/// - `index`: of the medium that the camera is in.
+fn furnace(
+    name: String,
+    things: Vec<Thing>,
+    materials: Vec<Material>,
+    view: Camera,
+    index: f32,
+    (integrator, simd): (Integrator, bool),
+) -> Picture {
+    let (shapes, objects) =
+        things.into_iter().map(|(shape, material, mesh)| (shape, Object { mesh, ..Object::plain(material) })).unzip();
+    let mut settings = RenderSettings { integrator, ..RenderSettings::default() };
+    if !simd {
+        settings.lanes = None;
+    }
+    let way = match (integrator, simd) {
+        (Integrator::Phong, _) => ", phong",
+        (_, true) => "",
+        (_, false) => ", one path at a time",
+    };
+    Picture {
+        name: name + way,
+        scene: snapshot(shapes, objects, materials, Environment::Constant(Vec3::ONE), view),
+        settings,
+        width: 16,
+        height: 16,
+        spp: 16,
+        expected: f64::from(index * index),
+        // Of the mean, besides its noise: paths that are ended by chance make whole samples of it.
+        allowed: 1e-3,
+        allowed_loss: 1e-3,
+        every_pixel: false,
+    }
+}
+
+fn outside() -> Camera {
+    camera(vec3(0.0, 0.4, 4.0), Vec3::ZERO, 40.0)
+}
+
+/// Index of shell `i`, outermost first.
+type Indices = (&'static str, fn(usize) -> f32);
+
+const INDICES: [Indices; 3] = [
+    ("equal", |_| 1.5),
+    ("alternating", |i| if i.is_multiple_of(2) { 1.5 } else { 1.0 }),
+    ("rising", |i| 1.0 + 0.03 * (i % 40 + 1) as f32),
+];
+
+/// Spheres within each other.
+fn shells(n: usize, index: fn(usize) -> f32) -> (Vec<Thing>, Vec<Material>) {
+    let things = (0..n).map(|i| ball(Vec3::ZERO, 1.0 - i as f32 / (n + 1) as f32, i as u32)).collect();
+    (things, (0..n).map(|i| glass(index(i))).collect())
+}
+
+/// See the [module](self).
+pub fn nested() -> Vec<Picture> {
+    let mut pictures = Vec::new();
+    for way in WAYS {
+        for n in [1, 2, 3, 4, 5, 6, 8, 12, 20, 50, 100] {
+            for (which, index) in INDICES {
+                // Rays of the classic model go both ways at each surface.
+                if way.0 == Integrator::Phong && n > 12 && which != "equal" {
+                    continue;
+                }
+                let (things, materials) = shells(n, index);
+                pictures.push(furnace(format!("{n} shells, {which}"), things, materials, outside(), 1.0, way));
+            }
+        }
+        // One material for all: what is the same on both sides cannot be seen.
+        let things = (0..30).map(|i| ball(Vec3::ZERO, 1.0 - 0.03 * i as f32, 0)).collect();
+        pictures.push(furnace("30 shells of one material".into(), things, vec![glass(1.5)], outside(), 1.0, way));
+        let things = (0..30).map(|i| ball(Vec3::ZERO, 1.0 - 0.03 * i as f32, i % 2)).collect();
+        let two = vec![glass(1.5), glass(1.33)];
+        pictures.push(furnace("30 shells of two materials".into(), things, two, outside(), 1.0, way));
+        // A camera in the middle of every layer.
+        for level in 0..6 {
+            let (things, materials) = shells(6, INDICES[2].1);
+            let eye = vec3(0.02, 0.01, 1.0 - (level as f32 + 0.5) / 7.0);
+            let view = camera(eye, vec3(0.3, 0.2, -1.0), 90.0);
+            let name = format!("a camera inside of {} of 6 shells", level + 1);
+            pictures.push(furnace(name, things, materials, view, INDICES[2].1(level), way));
+        }
+        let two = |outer: Thing, inner: Thing| vec![outer, inner];
+        let (o, r) = (Vec3::ZERO, 0.9);
+        let cases: Vec<(&str, Vec<Thing>)> = vec![
+            ("overlapping balls", two(ball(Vec3::X * 0.4, 0.7, 0), ball(Vec3::X * -0.3, 0.6, 1))),
+            ("touching balls", two(ball(Vec3::X * 0.5, 0.5, 0), ball(Vec3::X * -0.5, 0.5, 1))),
+            ("a shared skin", two(ball(o, r, 0), ball(o, r, 1))),
+            ("a ball that touches from inside", two(ball(o, r, 0), ball(Vec3::Y * 0.4, 0.5, 1))),
+            ("a ball half out of another", two(ball(o, r, 0), ball(Vec3::Y * 0.9, 0.5, 1))),
+            ("boxes that share a wall", {
+                let mut walls = quad_box(vec3(-0.5, 0.0, 0.0), Vec3::splat(0.5), 0);
+                walls.extend(quad_box(vec3(0.5, 0.0, 0.0), Vec3::splat(0.5), 1));
+                walls
+            }),
+            ("a box in a box with three common walls", {
+                let mut walls = quad_box(o, Vec3::splat(0.8), 0);
+                walls.extend(quad_box(Vec3::splat(-0.3), Vec3::splat(0.5), 1));
+                walls
+            }),
+            ("meshes within each other", {
+                let turned = |scale: f32| {
+                    Affine3A::from_scale_rotation_translation(
+                        Vec3::splat(scale),
+                        Quat::from_axis_angle(vec3(0.6, 0.8, 0.0), scale),
+                        Vec3::ZERO,
+                    )
+                };
+                (0..8).map(|i| mesh(procedural::icosphere(3).flat(), turned(1.0 - 0.11 * i as f32), i % 2)).collect()
+            }),
+            ("an open sheet from before", vec![sheet(Vec3::Z)]),
+            ("an open sheet from behind", vec![sheet(Vec3::NEG_Z)]),
+            ("a half-space", vec![(Shape::Plane { point: Vec3::ZERO, normal: Vec3::Y }, 0, None)]),
+        ];
+        for (name, things) in cases {
+            pictures.push(furnace(name.into(), things, vec![glass(1.5), glass(1.2)], outside(), 1.0, way));
+        }
+        // What is inside of a blend with glass is that glass.
+        let others = [diffuse(1.0), Material::Mirror { reflectance: grey(1.0) }, glass(1.7), metal(0.3)];
+        for (name, other) in ["diffuse", "mirror", "a second glass", "metal"].into_iter().zip(others) {
+            let materials = vec![glass(1.5), glass(1.3), other, blend(0.5, 1, 2)];
+            let alone = vec![ball(o, 0.6, 3)];
+            pictures.push(furnace(format!("glass and {name}"), alone, materials.clone(), outside(), 1.0, way));
+            let inside = two(ball(o, r, 0), ball(o, 0.6, 3));
+            pictures.push(furnace(
+                format!("glass and {name}, in glass"),
+                inside,
+                materials.clone(),
+                outside(),
+                1.0,
+                way,
+            ));
+            let around = two(ball(o, r, 3), ball(o, 0.6, 0));
+            pictures.push(furnace(format!("glass and {name}, around glass"), around, materials, outside(), 1.0, way));
+        }
+    }
+    pictures
+}
+
+fn sheet(normal: Vec3) -> Thing {
+    let edge_u = 1.6 * Vec3::X * normal.z;
+    (Shape::Quad { corner: -0.5 * edge_u - 0.8 * Vec3::Y, edge_u, edge_v: 1.6 * Vec3::Y }, 0, None)
+}
+
+/// How many scenes [`random`] makes.
+pub const N_RANDOM: u64 = 2000;
+
+/// Random lossless scenes: spheres, clouds, meshes and boxes, nested, overlapping and apart, of every material.
+pub fn random() -> Vec<Picture> {
+    (0..N_RANDOM).map(random_scene).collect()
+}
+
+/// A closed body that can tell what is inside of it.
+struct Body {
+    center: Vec3,
+    /// Of the sphere, or half the sides of the box.
+    half: Vec3,
+    is_box: bool,
+    material: usize,
+}
+
+impl Body {
+    fn has(&self, point: Vec3) -> bool {
+        let d = point - self.center;
+        if self.is_box { d.abs().cmplt(self.half).all() } else { d.length() < self.half.x }
+    }
+
+    /// Whether a point lies so near its surface that a mesh in its place may tell otherwise.
+    fn is_near(&self, point: Vec3) -> bool {
+        let d = (point - self.center).abs();
+        let distance = if self.is_box { (d - self.half).max_element() } else { d.length() - self.half.x };
+        distance.abs() < 0.2 * self.half.min_element()
+    }
+
+    fn volume(&self) -> f32 {
+        if self.is_box {
+            8.0 * self.half.element_product()
+        } else {
+            4.0 / 3.0 * std::f32::consts::PI * self.half.x.powi(3)
+        }
+    }
+}
+
+fn random_scene(seed: u64) -> Picture {
+    let mut random = Random::new(0xF0_12AC, seed);
+    let mut materials = Vec::new();
+    for _ in 0..4 {
+        let ior = [1.0, 1.0 + 1e-4, 1.2, 1.33, 1.5, 1.9, 2.4, 0.8][random.below(8)];
+        materials.push(match random.below(10) {
+            0..=5 => glass(ior),
+            6 => diffuse(1.0),
+            7 => Material::Mirror { reflectance: grey(1.0) },
+            8 => metal([0.0, 0.02, 0.1, 0.2, 0.4][random.below(5)]),
+            _ => classic(random.unit(), random.unit(), ior),
+        });
+    }
+    for _ in 0..3 {
+        let parts = materials.len();
+        // A blend of blends comes to eight lobes at most, of which each classic material has three.
+        let (a, b) = (random.below(4.min(parts)) as u32, random.below(4) as u32);
+        materials.push(blend([0.02, 0.3, 0.5, 0.9][random.below(4)], a, b));
+    }
+    let n = 1 + random.below(7);
+    let is_concentric = random.below(2) == 0;
+    let mut bodies: Vec<Body> = Vec::new();
+    for i in 0..n {
+        let (center, size) = if is_concentric {
+            (0.02 * random.point(), 1.0 - 0.9 * i as f32 / n as f32)
+        } else {
+            (0.6 * random.point(), 0.2 + 0.6 * random.unit())
+        };
+        let is_box = random.below(4) == 0;
+        let half = if is_box { Vec3::splat(size * 0.57) } else { Vec3::splat(size) };
+        bodies.push(Body { center, half, is_box, material: random.below(materials.len()) });
+    }
+    let mut things = Vec::new();
+    for body in &bodies {
+        let Body { center, half, material, .. } = *body;
+        let id = material as u32;
+        match (body.is_box, random.below(4)) {
+            (true, 0..=1) => {
+                let place = Affine3A::from_translation(center);
+                things.push(mesh(procedural::cuboid((2.0 * half).as_dvec3()), place, id));
+            }
+            (true, _) => {
+                // Boxes of quads with one material are one body together: each gets a copy of its own.
+                materials.push(materials[material].clone());
+                things.extend(quad_box(center, half, materials.len() as u32 - 1));
+            }
+            (false, 0) => {
+                let place = Affine3A::from_scale_rotation_translation(
+                    half,
+                    Quat::from_axis_angle(random.direction(), 3.0 * random.unit()),
+                    center,
+                );
+                things.push(mesh(procedural::icosphere(3).flat(), place, id));
+            }
+            (false, 1) => {
+                let (far, tiny) = (vec3(50.0, 0.0, 0.0), 1e-3);
+                let tree = Arc::new(SphereTree::build(&[center, far], &[half.x, tiny]));
+                things.push((Shape::Spheres { tree, world_from_object: Affine3A::IDENTITY }, id, None));
+            }
+            (false, _) => things.push(ball(center, half.x, id)),
+        }
+    }
+    let (view, index, is_inside) = random_camera(&mut random, &bodies, &materials);
+    let way = WAYS[random.below(3)];
+    let mut picture = furnace(format!("scene {seed}"), things, materials, view, index, way);
+    (picture.width, picture.height, picture.spp) = (12, 12, 8);
+    // Dense glass of many corners holds some paths for longer than they live; seen from inside, some never get out.
+    picture.allowed_loss = if is_inside { 1.0 } else { 0.05 };
+    picture
+}
+
+/// Outside, or inside of transparent bodies; the index there, which the smallest of them has; and whether it is inside.
+fn random_camera(random: &mut Random, bodies: &[Body], materials: &[Material]) -> (Camera, f32, bool) {
+    let towards = 0.3 * random.point();
+    for _ in 0..20 {
+        if random.below(3) > 0 {
+            break;
+        }
+        let eye = 0.8 * random.point();
+        if bodies.iter().any(|body| body.is_near(eye)) {
+            continue;
+        }
+        let mut within: Vec<&Body> = bodies.iter().filter(|body| body.has(eye)).collect();
+        within.sort_by(|a, b| b.volume().total_cmp(&a.volume()));
+        let iors: Option<Vec<f32>> = within.iter().map(|body| first_ior(materials, body.material)).collect();
+        if let Some(iors) = iors {
+            let view = camera(eye, eye + random.direction(), 70.0);
+            return (view, iors.last().copied().unwrap_or(1.0), !iors.is_empty());
+        }
+    }
+    (camera(towards + 4.0 * random.direction(), towards, 40.0), 1.0, false)
+}
+
+/// Of the first transparent part of a material; `None` if it has none.
+fn first_ior(materials: &[Material], id: usize) -> Option<f32> {
+    match &materials[id] {
+        Material::Glass { ior, .. } => Some(*ior),
+        Material::Phong { ior, transparency, .. } => (*transparency > 0.0).then_some(*ior),
+        Material::Blend { a, b, .. } => first_ior(materials, *a as usize).or_else(|| first_ior(materials, *b as usize)),
+        _ => None,
+    }
+}
