@@ -24,6 +24,8 @@ pub const LIMITS: Limits = Limits {
     picture_pixels: 1 << 18,
     film_pixels: 1 << 12,
     note_bytes: 1 << 18,
+    recording_bytes: 1 << 18,
+    settings_bytes: 1 << 16,
 };
 
 /// One folder a process, holding the file under test and what it may refer to.

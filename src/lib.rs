@@ -5,6 +5,7 @@
 //! | row | room | what lives there |
 //! |---|---|---|
 //! | 0 | [`geometry`], [`sampling`], `lanes` | rays, boxes, robust arithmetic; sequences, warps, distributions; sixteen numbers at a time |
+//! | 0 | [`printable`], [`console`] | foreign text made fit to be printed; what is said on a terminal |
 //! | 1 | [`kdtree`], [`mesh`] | build and traversal; mesh data, normals, simplification |
 //! | 2 | [`render`] | snapshot, camera, film, integrators, lights, materials, textures |
 //! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
@@ -13,11 +14,13 @@
 //! | 5 | [`stability`] | the hard cases, counted |
 //! | 5 | `viewer` (feature) | the window: input, overlays, presenting |
 
+pub mod console;
 pub mod frame;
 pub mod geometry;
 pub mod kdtree;
 pub(crate) mod lanes;
 pub mod mesh;
+pub mod printable;
 pub mod render;
 pub mod report;
 pub mod sampling;

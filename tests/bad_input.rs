@@ -231,7 +231,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),
         (&["simplify", "none.obj", "-o", "nowhere/a.obj", "--ratio", "0.5"], "there is no folder nowhere"),
-        (&["simplify", "none.obj", "-o", "a.obj", "--ratio", "0.5"], "No such file"),
+        (&["simplify", "none.obj", "-o", "a.obj", "--ratio", "0.5"], "no such file"),
     ] {
         let said = fails(path, args, 1);
         assert!(!said.contains(".firstlight-"), "temporary names are nobody's business: {said}");

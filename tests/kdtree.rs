@@ -254,6 +254,40 @@ fn degenerate_meshes_build_in_bounds_and_agree() {
     assert_eq!(SceneTree::build(vec![]).closest_hit(&Ray::new(Vec3::ZERO, Vec3::X)), None);
 }
 
+/// Copies lie in every leaf of one another, and no split parts them: only the first of each can be hit.
+#[test]
+fn copies_are_tested_once_and_hit_as_if_all_were_there() {
+    let mut random = Random(21);
+    let mut soup = triangle_soup(5, 300);
+    let corners = [vec3(-0.5, 0.1, -0.4), vec3(0.7, 0.3, -0.2), vec3(0.1, -0.6, 0.5)];
+    for i in 0..6000 {
+        let mut turned = corners;
+        turned.rotate_left(i % 3);
+        if i % 2 == 1 {
+            turned.swap(0, 1);
+        }
+        soup.push(turned);
+        if i % 100 == 0 {
+            let p = random.point();
+            soup.push([p, p + random.point() * 0.2, p + random.point() * 0.2]);
+        }
+    }
+    for preset in PRESETS {
+        let tree = soup.tree(preset);
+        tree.check_invariants();
+        let rays = awkward_rays(8, &soup, 400);
+        let blocks: usize = rays.iter().map(|ray| tree.count_visits(ray).blocks).sum();
+        // Of 375 blocks of copies none is looked at.
+        assert!(blocks < 100 * rays.len(), "{preset:?}: {blocks} blocks for {} rays", rays.len());
+        let scene = SceneTree::build(vec![mesh(&tree, Affine3A::IDENTITY)]);
+        assert_agrees(&scene, &rays, &format!("{preset:?}"));
+    }
+    let centers: Vec<Vec3> = (0..3000).map(|i| vec3((i % 3) as f32, 0.0, 0.5)).collect();
+    let balls = Arc::new(SphereTree::build(&centers, &vec![0.4; centers.len()]));
+    let scene = SceneTree::build(vec![Shape::Spheres { tree: balls, world_from_object: Affine3A::IDENTITY }]);
+    assert_agrees(&scene, &awkward_rays(9, &soup, 400), "balls");
+}
+
 #[test]
 fn no_ray_leaves_a_closed_mesh() {
     // A ball of triangles around the origin, subdivided from an octahedron: seams on the axes, where splits lie.

@@ -143,6 +143,15 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
     }
     does(path, "merge c.exr d.exr e.exr -o cde.exr --picture cde.png");
     assert_equal(path, "whole.png", "cde.png");
+    // Not a byte depends on the order in which they are named, nor on how each of them is shown.
+    does(path, "render cornell-balls -o f.png --film f.exr --size 40x33 --samples 128..129 --exposure 2");
+    let orders = ["c d e f", "f e d c", "e c f d", "d f c e"];
+    for (i, order) in orders.iter().enumerate() {
+        let names: String = order.split(' ').map(|name| format!("{name}.exr ")).collect();
+        does(path, &format!("merge {names} -o order-{i}.exr --picture order-{i}.png"));
+        assert_equal(path, "order-0.exr", &format!("order-{i}.exr"));
+        assert_equal(path, "order-0.png", &format!("order-{i}.png"));
+    }
 
     // What cannot be added up is refused with the reason.
     for (line, expected) in [
@@ -227,6 +236,16 @@ fn a_film_that_is_cut_short_or_damaged_is_refused() {
     std::fs::write(path.join("cut.exr"), &damaged).unwrap();
     let said = fails(path, "render dof-balls -o b.png --film cut.exr --resume", 1);
     assert!(said.contains("is cut short or damaged"), "{said}");
+    // What is not light: the samples that it has, and the note.
+    for (from, to) in [("samples:[(0,2)]", "samples:[(0,4)]"), ("seed: 0", "seed: 1"), ("spp: 2", "spp: 4")] {
+        let place = whole.windows(from.len()).position(|part| part == from.as_bytes());
+        let place = place.unwrap_or_else(|| panic!("{from} is not in the file"));
+        let mut edited = whole.clone();
+        edited.splice(place..place + from.len(), to.bytes());
+        std::fs::write(path.join("cut.exr"), &edited).unwrap();
+        let said = fails(path, "render dof-balls -o b.png --film cut.exr --resume", 1);
+        assert!(said.contains("its checksum is wrong"), "{from}: {said}");
+    }
     // A picture without a film in it.
     does(path, "render dof-balls -o plain.exr --size 20x20 --spp 2");
     let said = fails(path, "render dof-balls -o b.png --film plain.exr --resume", 1);
@@ -259,8 +278,9 @@ fn ctrl_c_saves_what_is_there_and_it_can_be_gone_on_with() {
     let mut waits = [1.0, 5.0, 25.0].into_iter();
     let output = loop {
         let output = pressed_after(waits.next().expect("a sample takes less than half a minute"));
+        let said = String::from_utf8_lossy(&output.stderr);
         let nothing_yet =
-            output.status.code().is_none() || String::from_utf8_lossy(&output.stderr).contains("nothing to save");
+            output.status.code().is_none() || said.contains("nothing to save") || said.contains("nothing was saved");
         if !nothing_yet {
             break output;
         }

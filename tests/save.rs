@@ -216,6 +216,25 @@ fn what_a_program_spawned_is_saved_as_well() {
     assert_eq!(format!("{albedo:?}"), "Rgb(Vec3(0.5, 0.5, 0.5))");
 }
 
+/// The name of such a mesh may be that of one which the scene reads, or of somebody's own.
+#[test]
+fn a_mesh_that_is_written_beside_a_scene_takes_the_place_of_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("made.ron");
+    let other = folder.path().join("made-mesh-1.obj");
+    std::fs::write(&other, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut world = World::new();
+    world.spawn(Shape::Mesh(firstlight::mesh::procedural::torus(1.0, 0.3, 24, 12).into()));
+    let saved = save_scene(&mut world, None, &path).unwrap();
+    assert_eq!(saved.notes, ["a mesh that came from no file was saved as made-mesh-2.obj"]);
+    assert!(saved.text.contains("made-mesh-2.obj"));
+    assert_eq!(std::fs::metadata(&other).unwrap().len(), 32);
+    // Saved again, it is there already.
+    let again = save_scene(&mut world, None, &path).unwrap();
+    assert_eq!((again.text, again.notes), (saved.text, vec![]));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}
+
 #[test]
 fn a_scene_that_cannot_be_saved_leaves_the_old_file_alone() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,8 @@
 //! A session as a window drives it: pictures come, changes cancel, loading goes on beside, and at the end it sleeps.
 
-use firstlight::frame::{Command, MessageKind, Session, SessionOptions, Status, StopAt, Target, render_offline};
+use firstlight::frame::{
+    Command, Edit, History, MessageKind, Selection, Session, SessionOptions, Status, StopAt, Target, render_offline,
+};
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::render::Film;
 use firstlight::scene::{
@@ -63,6 +65,67 @@ impl Driver {
         let messages = self.session.status().messages.iter();
         messages.filter(|message| message.kind == kind).map(|message| message.text.as_str()).collect()
     }
+}
+
+/// The key for it does nothing where there is nothing to do: no sample is lost, and there is nothing to undo.
+#[test]
+fn levelling_a_level_view_is_no_change() {
+    let mut driver = Driver::new(64, 48, spp(4));
+    driver.open("cornell");
+    driver.run_until(|session| session.is_idle() && session.status().spp == 4);
+    driver.session.send(Command::Turn { yaw_deg: 12.0, pitch_deg: -20.0 });
+    driver.run_until(|session| session.is_idle() && session.status().spp == 4);
+    let view = driver.session.status().rig.view;
+    let (restarts, revision) = (driver.session.status().restarts, History::revision(driver.session.world_mut()));
+    driver.session.send(Command::Level);
+    driver.frame();
+    driver.frame();
+    assert_eq!(driver.session.status().rig.view, view);
+    assert_eq!(driver.session.status().restarts, restarts);
+    assert_eq!(History::revision(driver.session.world_mut()), revision);
+    driver.session.send(Command::Roll { angle_deg: 3.0 });
+    driver.session.send(Command::Level);
+    driver.frame();
+    assert!((driver.session.status().rig.view.up - view.up).length() < 1e-12);
+}
+
+#[test]
+fn it_is_known_whether_edits_are_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.ron");
+    let mut driver = Driver::new(64, 48, spp(2));
+    driver.open("cornell-balls");
+    driver.run_until(|session| session.is_idle() && session.status().spp == 2);
+    assert!(!driver.session.has_unsaved_edits());
+    driver.session.send(Command::Turn { yaw_deg: 12.0, pitch_deg: -20.0 });
+    driver.session.send(Command::AdjustExposure { stops: 1.0 });
+    driver.frame();
+    assert!(!driver.session.has_unsaved_edits(), "a view is no edit");
+    let delete = |driver: &mut Driver| {
+        let entity = driver.session.inputs().objects.last().expect("it has objects").entity;
+        driver.session.world_mut().resource_mut::<Selection>().0 = vec![entity];
+        driver.session.send(Command::Edit(Edit::Delete));
+        driver.frame();
+    };
+    delete(&mut driver);
+    assert!(driver.session.has_unsaved_edits());
+    driver.session.send(Command::Edit(Edit::Undo));
+    driver.frame();
+    assert!(!driver.session.has_unsaved_edits(), "what is undone is as it was");
+    driver.session.send(Command::Edit(Edit::Redo));
+    driver.frame();
+    assert!(driver.session.has_unsaved_edits());
+    driver.session.send(Command::SaveScene { path: path.clone() });
+    assert!(driver.session.is_saving());
+    driver.run_until(|session| !session.is_saving());
+    assert!(!driver.session.has_unsaved_edits() && path.exists());
+    driver.session.send(Command::Edit(Edit::Undo));
+    driver.frame();
+    assert!(driver.session.has_unsaved_edits(), "the file has it otherwise");
+    // Another scene has nothing to be saved.
+    driver.open("cornell");
+    driver.run_until(|session| session.status().scene == "cornell" && session.is_idle());
+    assert!(!driver.session.has_unsaved_edits());
 }
 
 fn spp(spp: u32) -> Target {

@@ -267,6 +267,106 @@ fn a_person_edits_inspects_and_takes_it_back() {
     assert!(program.ended().success());
 }
 
+/// Deletes the ball in front, and waits until the title says that there are changes.
+fn delete_something(program: &Program, title: &str) {
+    until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+    until("a clean title", || (program.title() == format!("firstlight — {title}")).then_some(()));
+    program.drag(1, (250, 250), (0, 0));
+    std::thread::sleep(Duration::from_millis(500));
+    program.key("Delete");
+    until("the title to tell of changes", || (program.title() == format!("firstlight — *{title}")).then_some(()));
+}
+
+fn objects_in(path: &Path) -> usize {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    SceneFile::parse(&text, path).unwrap_or_else(|error| panic!("{error}")).objects.len()
+}
+
+#[test]
+fn a_window_with_unsaved_changes_asks_before_it_closes() {
+    let Some(desktop) = Desktop::start() else { return };
+    let source = firstlight::scene::SceneSource::Builtin("cornell-balls".to_owned());
+    let whole = firstlight::scene::load(&source, &Default::default()).expect("a built-in scene").file.objects.len();
+    let mut program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
+    delete_something(&program, "cornell-balls");
+    program.key("p");
+    let middle = |program: &Program| image::imageops::crop_imm(&program.pixels(), 180, 120, 280, 120).to_image();
+    let asks = |program: &Program, bare: &image::RgbImage| {
+        until("the question", || (difference(bare, &middle(program)) > 15.0).then_some(()));
+    };
+    std::thread::sleep(Duration::from_secs(1));
+    let bare = middle(&program);
+    // However it is closed, it asks; Esc goes on as if nothing had been.
+    program.key("Escape");
+    for way in 0..3 {
+        match way {
+            0 => {}
+            1 => program.close(),
+            _ => program.key("ctrl+q"),
+        }
+        asks(&program, &bare);
+        program.must_live();
+        program.key("Escape");
+        until("the question to go", || (difference(&bare, &middle(&program)) < 5.0).then_some(()));
+        program.must_live();
+    }
+    // What is undone is not unsaved, and what is done again is.
+    program.key("ctrl+z");
+    until("a clean title", || (program.title() == "firstlight — cornell-balls").then_some(()));
+    program.key("ctrl+y");
+    until("changes again", || (program.title() == "firstlight — *cornell-balls").then_some(()));
+    program.key("ctrl+q");
+    asks(&program, &bare);
+    program.key("Return");
+    assert!(program.ended().success());
+    assert_eq!(objects_in(&desktop.folder().join("cornell-balls-0001.ron")), whole - 1);
+    // Not saved at the person's wish: nothing is written, and nothing is offered later.
+    let program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
+    delete_something(&program, "cornell-balls");
+    program.close();
+    std::thread::sleep(Duration::from_millis(700));
+    program.key("d");
+    assert!(program.ended().success());
+    assert!(!desktop.folder().join("cornell-balls-0002.ron").exists());
+    assert_eq!(left_behind(&desktop), 0);
+}
+
+/// Scenes that are kept for the next start.
+fn left_behind(desktop: &Desktop) -> usize {
+    let Ok(entries) = std::fs::read_dir(desktop.settings().join("recovery")) else { return 0 };
+    let paths = entries.map(|entry| entry.expect("a folder that can be read").path());
+    paths.filter(|path| path.extension().is_some_and(|extension| extension == "ron")).count()
+}
+
+#[test]
+fn changes_that_could_not_be_saved_are_offered_at_the_next_start() {
+    let Some(desktop) = Desktop::start() else { return };
+    // Killed, and told to end: what was edited is kept in either case.
+    for (signal, code, number) in [("KILL", None, 1), ("TERM", Some(130), 2)] {
+        let program = desktop.open(&["cornell-balls", "--size", "640x360"], &[]);
+        delete_something(&program, "cornell-balls");
+        if signal == "KILL" {
+            until("the changes to be kept", || (left_behind(&desktop) == 1).then_some(()));
+        }
+        program.signal(signal);
+        let (status, said) = program.left();
+        assert_eq!(status.code(), code, "{said}");
+        assert_eq!(left_behind(&desktop), 1, "{said}");
+        let program = desktop.open(&["cornell", "--size", "640x360"], &[]);
+        until("the box to be seen", || has_content(&program.pixels()).then_some(()));
+        std::thread::sleep(Duration::from_secs(1));
+        program.key("Return");
+        let name = format!("cornell-balls-{number:04}.ron");
+        until("the scene to come back", || (program.title() == format!("firstlight — {name}")).then_some(()));
+        assert_eq!(left_behind(&desktop), 0);
+        program.key("ctrl+q");
+        assert!(program.ended().success());
+        let [restored, first] =
+            [name.as_str(), "cornell-balls-0001.ron"].map(|name| objects_in(&desktop.folder().join(name)));
+        assert_eq!(restored, first);
+    }
+}
+
 #[test]
 fn a_hidden_window_rests() {
     let Some(desktop) = Desktop::start() else { return };

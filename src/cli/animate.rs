@@ -7,27 +7,46 @@ use super::render::{Job, RenderArgs};
 use super::stop::Stop;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{SettingsStore, along, turntable};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Renders every frame to `FILE-0001.png` and so on; each is a picture as any other, and opens as one.
-pub(super) fn animate(args: &RenderArgs, mut job: Job, mut progress: Progress, stop: &Stop) -> Result<(), Failure> {
+pub(super) fn animate(
+    args: &RenderArgs,
+    mut job: Job,
+    mut progress: Progress,
+    n_replaced: usize,
+    stop: &Stop,
+) -> Result<(), Failure> {
     let rigs = way(args, &mut job)?;
     let target = job.target(args);
-    let digits = rigs.len().to_string().len().max(4);
+    let digits = digits(rigs.len());
+    let replace = args.overwrite.replace();
     for (i, rig) in rigs.iter().enumerate() {
         progress.at(i as f64 / rigs.len() as f64, format!("picture {} of {}", i + 1, rigs.len()));
         job.set_rig(rig);
-        let film = job.picture(args, target, stop)?;
-        if stop.is_asked() {
-            progress.finish();
-            return Err(Failure::Stopped(format!("stopped after {i} of {} pictures", rigs.len())));
-        }
-        job.write(&film, &numbered(&args.output, i + 1, digits))?;
+        let film = job.picture(args, target)?;
+        job.write(&film, &numbered(&args.output, i + 1, digits), replace)?;
+        stop.has_saved(format!("{} of {} pictures are saved", i + 1, rigs.len()));
     }
     progress.finish();
     let (first, last) = (numbered(&args.output, 1, digits), numbered(&args.output, rigs.len(), digits));
-    remark(format_args!("{} to {}: {} pictures", first.display(), last.display(), rigs.len()));
+    let replaced = match n_replaced {
+        0 => String::new(),
+        n => format!(", {n} of them in place of files that were there"),
+    };
+    remark(format_args!("{} to {}: {} pictures{replaced}", first.display(), last.display(), rigs.len()));
     Ok(())
+}
+
+/// The names of all pictures, if there are to be several.
+pub(super) fn frames(args: &RenderArgs) -> Option<impl Iterator<Item = PathBuf>> {
+    let n = args.turntable.or(args.bookmarks.as_ref().and(args.frames))? as usize;
+    Some((1..=n).map(move |number| numbered(&args.output, number, digits(n))))
+}
+
+fn digits(n: usize) -> usize {
+    n.to_string().len().max(4)
 }
 
 /// Where the camera is in each frame.
@@ -55,7 +74,8 @@ fn way(args: &RenderArgs, job: &mut Job) -> Result<Vec<Rig>, Failure> {
 
 /// `FILE-0007.png` of `FILE.png`.
 fn numbered(path: &Path, number: usize, digits: usize) -> PathBuf {
-    let stem = path.file_stem().map_or("frame".into(), |stem| stem.to_string_lossy());
-    let extension = path.extension().map_or("png".into(), |extension| extension.to_string_lossy());
-    path.with_file_name(format!("{stem}-{number:0digits$}.{extension}"))
+    let mut name = path.file_stem().map_or_else(|| "frame".into(), OsStr::to_os_string);
+    name.push(format!("-{number:0digits$}."));
+    name.push(path.extension().unwrap_or(OsStr::new("png")));
+    path.with_file_name(name)
 }

@@ -1,14 +1,13 @@
 //! `firstlight explain SCENE --pixel X,Y`: why a pixel looks as it does, without a window.
 
 use super::console::{print, remark};
-use super::stop::Stop;
 use super::{Failure, SceneArgs, parse_size};
 use clap::Args;
 use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
+use firstlight::printable;
 use firstlight::render::{Integrator, RenderSettings, explain, light_from_lamps};
-use firstlight::scene::{Extraction, FilmSize, Rendering, SceneInputs};
+use firstlight::scene::{Extraction, Files, FilmSize, Rendering, SceneInputs};
 use glam::{DVec3, UVec2};
-use std::fmt::Write as _;
 
 #[derive(Args, Clone, Debug)]
 pub struct ExplainArgs {
@@ -36,7 +35,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         check_pixel(args.pixel, size.into())?;
     }
     let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
-    let scene = args.scene.load(aspect, &|_| ())?;
+    let scene = args.scene.load(aspect, &mut Files::default(), &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let FilmSize { width, height } = *world.resource();
@@ -52,12 +51,8 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let settings =
         RenderSettings { integrator: Integrator::Path, seed: args.seed.unwrap_or(of_scene.seed), ..of_scene };
     let snapshot = &extraction.snapshot;
-    let stop = Stop::on_interrupt();
     let explanation = explain(snapshot, &settings, size, args.pixel, 0..args.spp).expect("path tracing has paths");
-    let from_lamps = light_from_lamps(snapshot, &settings, size, args.pixel, 0..args.spp, &|| stop.is_asked());
-    if stop.is_asked() {
-        return Err(Failure::Stopped("stopped".to_owned()));
-    }
+    let from_lamps = light_from_lamps(snapshot, &settings, size, args.pixel, 0..args.spp, &|| false);
     let story = PixelStory::new(&explanation, from_lamps, &SnapshotNames::of(&extraction, &inputs));
     if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
 }
@@ -77,9 +72,9 @@ fn check_pixel(UVec2 { x, y }: UVec2, size: UVec2) -> Result<(), Failure> {
 }
 
 /// For people; luminance, since a table of three channels is hard to read.
-fn text(title: &str, story: &PixelStory) -> String {
-    let mut out = String::new();
-    let mut line = |text: String| writeln!(out, "{text}").expect("a string takes all");
+fn text(title: &str, story: &PixelStory) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut line = |text: String| out.push(text);
     let (UVec2 { x, y }, size) = (story.pixel, story.film_size);
     let last = story.samples.end - 1;
     line(format!("{title}: pixel {x},{y} of {} x {}, samples {} to {last}", size.x, size.y, story.samples.start));
@@ -89,7 +84,8 @@ fn text(title: &str, story: &PixelStory) -> String {
     let from_lamps = story.from_lamps.unwrap_or_default();
     let all = brightness(story.total());
     let share = |part: f64| if all > 0.0 { format!("{:.1} %", 100.0 * part / all) } else { "–".to_owned() };
-    let width = story.lights.iter().map(|light| light.name.chars().count()).max().unwrap_or(0).max(22);
+    let width =
+        story.lights.iter().map(|light| printable::name(&light.name).chars().count()).max().unwrap_or(0).max(22);
     let columns = |name: &str, cells: [String; 5]| {
         let cells: String = cells.iter().map(|cell| format!("{cell:>13}")).collect();
         format!("  {name:width$}{cells}").trim_end().to_owned()
@@ -103,7 +99,7 @@ fn text(title: &str, story: &PixelStory) -> String {
     };
     line(columns("light", ["seen", "direct", "indirect", "together", "share"].map(str::to_owned)));
     for light in &story.lights {
-        line(row(&light.name, light.parts()));
+        line(row(&printable::name(&light.name), light.parts()));
     }
     if from_lamps != DVec3::ZERO {
         let total = brightness(from_lamps);
@@ -123,7 +119,7 @@ fn text(title: &str, story: &PixelStory) -> String {
     line(format!("  found by     running into it: {itself}   asking for it: {asked}"));
     let DVec3 { x: r, y: g, z: b } = story.total();
     line(format!("  radiance     {r:.5} {g:.5} {b:.5}, ± {:.5} in brightness", brightness(story.deviation)));
-    out.trim_end().to_owned()
+    out
 }
 
 /// For machines.

@@ -4,9 +4,12 @@ use super::console::{print, remark};
 use super::{Failure, SceneArgs};
 use clap::Args;
 use firstlight::mesh::{Faults, Mesh};
+use firstlight::printable;
 use firstlight::render::{Environment, Film, Material};
-use firstlight::scene::{Extraction, FilmSize, Lens, LoadedScene, SceneInputs, Shape};
-use std::collections::BTreeMap;
+use firstlight::scene::{
+    self, Extraction, FilmSize, Lens, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
+};
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 #[derive(Args, Clone, Debug)]
@@ -22,7 +25,7 @@ pub struct InfoArgs {
 }
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
-    let scene = args.scene.load(None, &|_| ())?;
+    let scene = args.scene.load(None, &mut firstlight::scene::Files::default(), &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let inputs = SceneInputs::of(&mut world);
@@ -41,7 +44,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
     }
     let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, faults };
-    if args.json { print(told.json()) } else { print(told.text().trim_end()) }
+    if args.json { print(told.json()) } else { print(told.text()) }
 }
 
 /// What is told of a scene.
@@ -59,17 +62,17 @@ const NOT_MODELLED: [&str; 6] =
 
 impl Told<'_> {
     /// For people.
-    fn text(&self) -> String {
+    fn text(&self) -> Vec<String> {
         let Self { scene, inputs, extraction, film, .. } = self;
-        let mut out = format!("{}\n", scene.source.title());
-        let mut row = |name: &str, text: String| out += &format!("  {name:14}{text}\n");
+        let mut out = vec![scene.source.title()];
+        let mut row = |name: &str, text: String| out.push(format!("  {name:14}{text}"));
         let counts = |counts: BTreeMap<&str, usize>| {
             let parts: Vec<String> = counts.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
             if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
         };
         row("objects", counts(self.objects()));
         for object in &inputs.objects {
-            let name = object.name.as_deref().unwrap_or("(no name)");
+            let name = printable::name(object.name.as_deref().unwrap_or("(no name)"));
             match &object.shape {
                 Shape::Mesh(mesh) => {
                     let triangles = counted(mesh.triangles.len(), "triangle", "triangles");
@@ -152,7 +155,10 @@ impl Told<'_> {
     }
 
     fn emitters(&self) -> usize {
-        self.inputs.objects.iter().filter(|object| glows(object, self.inputs)).count()
+        let emits = |material: &&MaterialInput| matches!(material.material, scene::Material::Emissive { .. });
+        let glowing: HashSet<_> = self.inputs.materials.iter().filter(emits).map(|material| material.entity).collect();
+        let glows = |object: &&ObjectInput| object.slots.iter().any(|slot| glowing.contains(slot));
+        self.inputs.objects.iter().filter(glows).count()
     }
 
     fn lens(&self) -> Lens {
@@ -212,12 +218,6 @@ fn kind_of_material(material: &Material) -> &'static str {
         Material::Phong { .. } => "phong",
         Material::Emissive { .. } => "emissive",
     }
-}
-
-fn glows(object: &firstlight::scene::ObjectInput, inputs: &SceneInputs) -> bool {
-    use firstlight::scene::Material::Emissive;
-    (inputs.materials.iter())
-        .any(|material| matches!(material.material, Emissive { .. }) && object.slots.contains(&material.entity))
 }
 
 fn environment(environment: &Environment) -> String {

@@ -1,11 +1,11 @@
 //! `firstlight merge A.exr B.exr -o C.exr`: films of the same picture with different samples, added up.
 
-use super::Failure;
 use super::console::{print, remark};
+use super::{Failure, OverwriteArgs};
 use clap::Args;
-use firstlight::frame::{FilmFile, PictureFormat, Print, read_film_file, write_film_file};
+use firstlight::frame::{FilmFile, PictureFormat, Print, check_replaced_film, read_film_file, write_film_into};
 use firstlight::scene::Shot;
-use firstlight::scene::whole_file::check_writable;
+use firstlight::scene::whole_file::Replace;
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
@@ -19,6 +19,8 @@ pub struct MergeArgs {
     /// Also a picture of it: .png is developed, .exr is linear light.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -29,15 +31,24 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         let message = "films are OpenEXR pictures: end the name in .exr (--picture writes a .png of it)";
         return Err(Failure::Usage(format!("{}: {message}", args.output.display())));
     }
-    check_writable(&args.output).map_err(Failure::Failed)?;
+    let mut files = args.overwrite.files();
+    files.read_all(args.films.iter().cloned())?;
+    // It may take the place of a film of which it has all samples, which is known only when it is there.
+    let claim = files.claim(&args.output, Replace::Anything)?;
     if let Some(picture) = &args.picture {
         PictureFormat::of(picture).map_err(Failure::Usage)?;
-        check_writable(picture).map_err(Failure::Failed)?;
+        files.write(picture)?;
     }
-    let (first, others) = args.films.split_first().expect("two films at least");
-    let FilmFile { mut film, shot } = read_film_file(first).map_err(Failure::Failed)?;
+    // In the order of their samples, so that the result does not depend on how they were named.
+    let mut films: Vec<&PathBuf> = args.films.iter().collect();
+    films.sort_by_cached_key(|path| Shot::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
+    let (first, others) = films.split_first().expect("two films at least");
+    let FilmFile { mut film, shot, warning } = read_film_file(first).map_err(Failure::Failed)?;
+    let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
+    warn(warning);
     for path in others {
-        let other = read_film_file(path).map_err(Failure::Failed)?;
+        let mut other = read_film_file(path).map_err(Failure::Failed)?;
+        warn(other.warning.take());
         let failed = |reason: String| {
             Failure::Failed(format!("{} and {} cannot be added up: {reason}", first.display(), path.display()))
         };
@@ -50,11 +61,17 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         let samples = (film.first_sample(), film.spp(), film.max_spp() > film.spp());
         Shot { first_sample: samples.0, spp: samples.1, uneven: samples.2, ..shot.clone() }.moved(first, path).to_note()
     };
-    write_film_file(&film, &note(&args.output), &args.output).map_err(Failure::Failed)?;
+    let note_of_film = note(&args.output);
+    if !args.overwrite.overwrite {
+        check_replaced_film(&film, &note_of_film, &args.output).map_err(Failure::Failed)?;
+    }
+    write_film_into(&film, &note_of_film, claim).map_err(Failure::Failed)?;
     if let Some(path) = &args.picture {
         let (size, note) = ((film.width(), film.height()), note(path));
         let display = shot.display.into();
-        Print { film: &film, display: &display, size, note: Some(&note) }.write(path).map_err(Failure::Failed)?;
+        Print { film: &film, display: &display, size, note: Some(&note) }
+            .write(path, files.replace())
+            .map_err(Failure::Failed)?;
     }
     let error = film.error_estimate().map(|error| error.relative);
     if args.json {

@@ -1,5 +1,7 @@
 //! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
 //! understood; 130: stopped by Ctrl+C, what there was is saved.
+//!
+//! A command is obedient by construction: it runs where it can be left behind (see `stop`).
 
 mod animate;
 mod console;
@@ -19,16 +21,23 @@ mod trees;
 mod waiting;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use console::remark;
+use console::{lines, remark};
+use firstlight::console::LogWriter;
+use firstlight::printable;
 use firstlight::render::{Integrator, PixelFilter};
-use firstlight::scene::{BUILTIN_SCENES, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+use firstlight::scene::whole_file::Replace;
+use firstlight::scene::{
+    BUILTIN_SCENES, Files, FilesError, LoadOptions, LoadedScene, SceneError, SceneSource, UpAxis, load,
+};
 use number::{parse_positive, parse_size};
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
+use stop::Stop;
 
 /// An interactive, progressive path tracer: open a model, fly through it, watch it converge.
 #[derive(Parser)]
-#[command(name = "firstlight", version, args_conflicts_with_subcommands = true, after_help = builtin_help())]
+#[command(name = "firstlight", bin_name = "firstlight", version, args_conflicts_with_subcommands = true, after_help = builtin_help())]
 struct CommandLine {
     #[command(subcommand)]
     command: Option<Command>,
@@ -56,12 +65,27 @@ enum Command {
     Simplify(simplify::SimplifyArgs),
 }
 
+impl Command {
+    fn run(&self, stop: &Stop) -> Result<(), Failure> {
+        match self {
+            Self::Render(args) => render::run(args, stop),
+            Self::Report(args) => report::run(args, stop),
+            Self::Merge(args) => merge::run(args),
+            Self::Save(args) => save::run(args),
+            Self::Stability(args) => stability::run(args),
+            Self::Info(args) => info::run(args),
+            Self::Explain(args) => explain::run(args),
+            Self::Simplify(args) => simplify::run(args, stop),
+        }
+    }
+}
+
 /// What to open, and how.
 #[derive(Args, Clone, Debug)]
 struct SceneArgs {
     /// A built-in scene, a scene file (.ron), a model (.obj), or a picture (.png, .exr) that this program made.
     #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
-    scene: String,
+    scene: OsString,
     /// Which axis of a model points up; guessed from how it would stand when not given.
     #[arg(long, value_enum)]
     up: Option<UpArg>,
@@ -119,11 +143,21 @@ impl SceneArgs {
         })
     }
 
-    /// Loads the scene, or says why it cannot be had.
-    fn load(&self, aspect: Option<f64>, progress: &(dyn Fn(&str) + Sync)) -> Result<LoadedScene, Failure> {
+    /// Loads the scene, or says why it cannot be had; `files` learns what is read for it, and refuses when one of
+    /// the outputs that it knows is among that.
+    fn load(
+        &self,
+        aspect: Option<f64>,
+        files: &mut Files,
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Result<LoadedScene, Failure> {
         let source = self.source()?;
+        if let Some(path) = source.path() {
+            files.read(path)?;
+        }
         let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), ..LoadOptions::default() };
-        let scene = load(&source, &options).map_err(|error| Failure::Failed(error.to_string()))?;
+        let scene = load(&source, &options).map_err(Failure::from)?;
+        files.read_all(scene.files())?;
         for warning in &scene.warnings {
             remark(format_args!("warning: {warning}"));
         }
@@ -140,44 +174,96 @@ impl SceneArgs {
     }
 }
 
-/// Why a command did not do its work; each line becomes a message of its own.
+/// Why a command did not do its work; a message of one line, but for [`Failure::Problems`].
 enum Failure {
     /// The command itself cannot be right.
     Usage(String),
     Failed(String),
+    /// It failed for several reasons; each is a message of its own.
+    Problems(Vec<String>),
     /// Somebody pressed Ctrl+C; says what was saved.
     Stopped(String),
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Self::Problems(error.problems.iter().map(ToString::to_string).collect())
+    }
+}
+
+impl From<FilesError> for Failure {
+    fn from(error: FilesError) -> Self {
+        match error {
+            FilesError::Collision(message) => Self::Usage(message),
+            FilesError::Unwritable(message) => Self::Failed(message),
+        }
+    }
+}
+
+/// What outputs may take the place of.
+#[derive(Args, Clone, Copy, Debug, Default)]
+struct OverwriteArgs {
+    /// Let an output take the place of a film, whose samples are lost then.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl OverwriteArgs {
+    fn replace(self) -> Replace {
+        if self.overwrite { Replace::Anything } else { Replace::AllButFilms }
+    }
+
+    /// The files of a command that writes.
+    fn files(self) -> Files {
+        Files::new(self.replace())
+    }
 }
 
 /// Runs what the command line asks for.
 pub fn main() -> ExitCode {
     start_log();
-    // clap itself ends with status 2 and the nearest known option when it does not understand.
-    let line = CommandLine::parse();
+    let line = match CommandLine::try_parse() {
+        Ok(line) => line,
+        Err(error) => return not_understood(error),
+    };
     let result = match line.command {
-        Some(Command::Render(args)) => render::run(&args),
-        Some(Command::Report(args)) => report::run(&args),
-        Some(Command::Merge(args)) => merge::run(&args),
-        Some(Command::Save(args)) => save::run(&args),
-        Some(Command::Stability(args)) => stability::run(&args),
-        Some(Command::Info(args)) => info::run(&args),
-        Some(Command::Explain(args)) => explain::run(&args),
-        Some(Command::Simplify(args)) => simplify::run(&args),
+        Some(command) => Stop::obeyed_by(move |stop| command.run(stop)),
         None => show::run(&line.show),
     };
-    let (message, code) = match result {
+    let (messages, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Usage(message)) => (message, 2),
-        Err(Failure::Failed(message)) => (message, 1),
+        Err(Failure::Usage(message)) => (vec![message], 2),
+        Err(Failure::Failed(message)) => (vec![message], 1),
+        Err(Failure::Problems(messages)) => (messages, 1),
         Err(Failure::Stopped(message)) => {
             remark(message);
             return ExitCode::from(stop::STOPPED);
         }
     };
-    for line in message.lines() {
-        remark(format_args!("error: {line}"));
+    for message in messages {
+        remark(format_args!("error: {message}"));
     }
     ExitCode::from(code)
+}
+
+/// What clap has to say: help on standard output, or what it did not understand, with status 2 and the nearest known
+/// option.
+fn not_understood(error: clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        // The program's own words. Whoever closed the pipe has read enough.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    // It quotes what was typed, and a line end in that would begin a line of its own: asked again with words that are fit
+    // to be printed, it says the same of those.
+    let words: Vec<_> = std::env::args_os().collect();
+    let shown: Vec<String> = words.iter().map(|word| printable::name(&word.to_string_lossy()).into_owned()).collect();
+    let error = match words.iter().zip(&shown).all(|(word, shown)| word == shown.as_str()) {
+        true => error,
+        false => CommandLine::try_parse_from(shown).err().filter(clap::Error::use_stderr).unwrap_or(error),
+    };
+    remark(lines(error.render().to_string().trim_end()));
+    ExitCode::from(2)
 }
 
 /// Warnings go to the terminal, those of the window libraries only when something fails; `RUST_LOG` asks for more.
@@ -187,7 +273,8 @@ fn start_log() {
         EnvFilter::new("warn,winit=error,egui_wgpu=error,wgpu_core=error,wgpu_hal=error,naga=error")
     });
     // Only a second logger can fail, and then the first one does the work.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(|| LogWriter);
+    let _ = log.try_init();
 }
 
 fn builtin_help() -> String {

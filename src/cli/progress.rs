@@ -1,23 +1,17 @@
 //! How far a rendering is: a bar on a terminal, a line every few seconds in a pipe or a log.
 
+use super::console::Bar;
 use super::waiting::Waiting;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
 
 /// Ends by itself when it is dropped.
 pub struct Progress {
-    bar: ProgressBar,
+    bar: Bar,
     lines: Option<Waiting>,
 }
 
 impl Progress {
     pub fn new() -> Self {
-        let is_watched = std::io::stderr().is_terminal();
-        let target = if is_watched { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
-            .expect("the template is well formed");
-        let bar = ProgressBar::with_draw_target(Some(1000), target).with_style(style);
-        Self { bar, lines: (!is_watched).then(|| Waiting::new("reading")) }
+        Self { bar: Bar::new(1000), lines: (!Bar::is_watched()).then(|| Waiting::new("reading")) }
     }
 
     /// What is being done, before it is known how long it takes.

@@ -1,23 +1,23 @@
 //! `firstlight render SCENE -o out.png`: a picture without a window, and the film that it can go on from.
 
-use super::animate::animate;
+use super::animate::{animate, frames};
 use super::console::{print, remark};
 use super::number::{parse_share, parse_stops};
 use super::progress::Progress;
 use super::stop::Stop;
-use super::{Failure, FilterArg, IntegratorArg, SceneArgs, parse_positive, parse_size};
+use super::{Failure, FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, parse_positive, parse_size};
 use bevy_ecs::prelude::World;
 use clap::Args;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{
     FilmFile, OfflineReport, PictureFormat, Print, Target, read_film_file, render_offline_until, render_region_until,
-    write_errors, write_film_file,
+    write_errors, write_film_into,
 };
 use firstlight::render::{BadSample, Display, Film, NoRoom, Purpose, Region, RenderSettings, Room};
 use firstlight::report::cpu_seconds;
-use firstlight::scene::whole_file::check_writable;
+use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{
-    Developing, Extraction, FilmSize, LoadedScene, Part, Rendering, SceneInputs, SceneSource, Shot, ShotDraft,
+    Developing, Extraction, Files, FilmSize, LoadedScene, Part, Rendering, SceneInputs, SceneSource, Shot, ShotDraft,
     ShotSamples,
 };
 use glam::UVec2;
@@ -71,6 +71,8 @@ pub struct RenderArgs {
     /// Go on with the film that is there: with --film, or with the film that is named as the scene.
     #[arg(long)]
     pub resume: bool,
+    #[command(flatten)]
+    pub overwrite: OverwriteArgs,
     /// Stop after so many seconds of rendering.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     pub time: Option<f64>,
@@ -103,11 +105,28 @@ pub struct RenderArgs {
     pub announcement: Option<String>,
 }
 
-pub fn run(args: &RenderArgs) -> Result<(), Failure> {
+pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     PictureFormat::of(&args.output).map_err(Failure::Usage)?;
     let film_path = film_path(args)?;
     // A picture that cannot be written is not worth the wait.
-    check_writable(&args.output).map_err(Failure::Failed)?;
+    let mut files = args.overwrite.files();
+    if let Some(path) = args.scene.source()?.path() {
+        files.read(path)?;
+    }
+    let film = match film_path {
+        None => None,
+        Some(path) if args.resume => Some(files.go_on(&path)?),
+        Some(path) if path.exists() && files.replace() == Replace::AllButFilms => {
+            let message =
+                "is there already: go on with it by --resume, name another file, or replace it by --overwrite";
+            return Err(Failure::Failed(format!("{}: {message}", path.display())));
+        }
+        Some(path) => Some(files.claim(&path, files.replace())?),
+    };
+    match frames(args) {
+        Some(frames) => files.write_all(frames)?,
+        None => files.write(&args.output)?,
+    }
     if let Some(path) = &args.error_picture {
         if !is_exr(path) {
             return Err(Failure::Usage(format!(
@@ -115,24 +134,13 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
                 path.display()
             )));
         }
-        if path == &args.output || Some(path) == film_path.as_ref() {
-            return Err(Failure::Usage("--error-picture needs a name of its own".to_owned()));
-        }
-        check_writable(path).map_err(Failure::Failed)?;
-    }
-    if let Some(path) = &film_path {
-        check_writable(path).map_err(Failure::Failed)?;
-        if path.exists() && !args.resume {
-            let message = "is there already: go on with it by --resume, or name another file";
-            return Err(Failure::Failed(format!("{}: {message}", path.display())));
-        }
+        files.write(path)?;
     }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
-    let stop = Stop::on_interrupt();
-    pool.install(|| render(args, film_path.as_deref(), &stop))
+    pool.install(|| render(args, film, &mut files, stop))
 }
 
 fn is_exr(path: &Path) -> bool {
@@ -144,9 +152,6 @@ fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
     match &args.film {
         Some(path) if !is_exr(path) => {
             Err(Failure::Usage(format!("{}: films are OpenEXR pictures: end the name in .exr", path.display())))
-        }
-        Some(path) if path == &args.output => {
-            Err(Failure::Usage("the picture and the film cannot be one file: name another for --film".to_owned()))
         }
         Some(path) => Ok(Some(path.clone())),
         None if !args.resume => Ok(None),
@@ -170,9 +175,9 @@ pub(super) struct Job {
 }
 
 impl Job {
-    fn new(args: &RenderArgs, kept: Option<&Shot>, progress: &Progress) -> Result<Self, Failure> {
+    fn new(args: &RenderArgs, kept: Option<&Shot>, files: &mut Files, progress: &Progress) -> Result<Self, Failure> {
         let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
-        let scene = args.scene.load(aspect, &|text| progress.stage(text.to_owned()))?;
+        let scene = args.scene.load(aspect, files, &|text| progress.stage(text.to_owned()))?;
         if let Some(announcement) = &args.announcement {
             progress.suspend(|| remark(announcement));
         }
@@ -226,10 +231,9 @@ impl Job {
     }
 
     /// Renders a whole picture.
-    pub fn picture(&self, args: &RenderArgs, target: Target, stop: &Stop) -> Result<Film, Failure> {
+    pub fn picture(&self, args: &RenderArgs, target: Target) -> Result<Film, Failure> {
         let mut film = self.new_film(&purposes(args))?;
-        let asked = || stop.is_asked();
-        render_offline_until(&self.extraction.snapshot, &self.settings, &mut film, target, &asked, |_| true);
+        render_offline_until(&self.extraction.snapshot, &self.settings, &mut film, target, &|| false, |_| true);
         Ok(film)
     }
 
@@ -247,10 +251,10 @@ impl Job {
     }
 
     /// Writes a picture with its note.
-    pub fn write(&self, film: &Film, path: &Path) -> Result<(), Failure> {
+    pub fn write(&self, film: &Film, path: &Path, replace: Replace) -> Result<(), Failure> {
         let note = self.note(film, path);
         let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
-        picture.write(path).map_err(Failure::Failed)
+        picture.write(path, replace).map_err(Failure::Failed)
     }
 
     /// The note of a picture of this film at `path`.
@@ -263,7 +267,7 @@ impl Job {
     fn film(&self, args: &RenderArgs, kept: Option<(FilmFile, &Path)>) -> Result<Film, Failure> {
         let shot = self.scene.shot.as_ref();
         let first = args.samples.as_ref().map(|samples| samples.start).or(shot.map(|shot| shot.first_sample));
-        let Some((FilmFile { film, shot }, path)) = kept else {
+        let Some((FilmFile { film, shot, .. }, path)) = kept else {
             return Ok(self.new_film(&purposes(args))?.starting_at(first.unwrap_or(0)));
         };
         let ours = Shot::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
@@ -286,19 +290,25 @@ impl Job {
     }
 }
 
-fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<(), Failure> {
+/// - `film_file`: where the film is kept, if it is; nobody else writes to it in the meantime.
+fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, stop: &Stop) -> Result<(), Failure> {
     let mut progress = Progress::new();
+    let film_path = film_file.as_ref().map(|file| file.path().to_path_buf());
+    let film_path = film_path.as_deref();
     let kept = match film_path.filter(|_| args.resume) {
         Some(path) => Some((read_film_file(path).map_err(Failure::Failed)?, path)),
         None => None,
     };
-    let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), &progress)?;
+    if let Some(warning) = kept.as_ref().and_then(|(kept, _)| kept.warning.as_ref()) {
+        progress.suspend(|| remark(format_args!("warning: {warning}")));
+    }
+    let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
         let message = format!("the picture was stopped in the middle of a pass; the new one has {} samples", shot.spp);
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
     if args.turntable.is_some() || args.bookmarks.is_some() {
-        return animate(args, job, progress, stop);
+        return animate(args, job, progress, files.replaced().len(), stop);
     }
     let mut film = job.film(args, kept)?;
     if let Some(path) = film_path.filter(|_| args.resume) {
@@ -309,8 +319,9 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
     let target = job.target(args);
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
-    let asked = || stop.is_asked();
     let region = args.region.map(|region| region_in(&film, region)).transpose()?;
+    stop.attend();
+    let asked = || stop.is_asked();
     if region.is_some() && film.spp() == 0 {
         // A pixel without a sample shows nothing.
         let once = Target { spp: Some(1), ..Target::default() };
@@ -342,12 +353,13 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
 
     drop(room);
     // The film first: a picture can be made of it.
-    if let Some(path) = film_path {
-        write_film_file(&film, &job.note(&film, path), path).map_err(Failure::Failed)?;
+    if let Some(file) = film_file {
+        let note = job.note(&film, file.path());
+        write_film_into(&film, &note, file).map_err(Failure::Failed)?;
     }
-    job.write(&film, &args.output)?;
+    job.write(&film, &args.output, files.replace())?;
     if let Some(path) = &args.error_picture {
-        write_errors(&film, path).map_err(Failure::Failed)?;
+        write_errors(&film, path, files.replace()).map_err(Failure::Failed)?;
     }
     if film.n_bad() > bad_before {
         let total = report.rays.camera;
@@ -373,13 +385,16 @@ fn render(args: &RenderArgs, film_path: Option<&Path>, stop: &Stop) -> Result<()
         ));
     }
     if args.json {
-        print(json(&job, &report, cpu_seconds, &film, stopped))?;
+        print(json(&job, &report, cpu_seconds, &film, files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output.display(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
         let error = error.map_or(String::new(), |error| format!(", error about {:.2} %", 100.0 * error));
         let kept = film_path.map_or(String::new(), |path| format!(", the film kept in {}", path.display()));
-        remark(format_args!("{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{kept}"));
+        let replaced = replaced(files.replaced(), &args.output);
+        remark(format_args!(
+            "{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{kept}{replaced}"
+        ));
     }
     match (stopped, film_path) {
         (false, _) => Ok(()),
@@ -462,8 +477,28 @@ fn first_of(samples: &[BadSample]) -> String {
     samples.first().map(place).unwrap_or_default()
 }
 
+/// Tells which files are not there any more.
+fn replaced(paths: &[PathBuf], output: &Path) -> String {
+    match paths {
+        [] => String::new(),
+        [path] if path == output => ", in place of the file that was there".to_owned(),
+        paths => {
+            let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+            format!(", in place of what was there: {}", names.join(", "))
+        }
+    }
+}
+
 /// One line for machines.
-fn json(job: &Job, report: &OfflineReport, cpu_seconds: Option<f64>, film: &Film, stopped: bool) -> serde_json::Value {
+fn json(
+    job: &Job,
+    report: &OfflineReport,
+    cpu_seconds: Option<f64>,
+    film: &Film,
+    replaced: &[PathBuf],
+    stopped: bool,
+) -> serde_json::Value {
+    let replaced: Vec<_> = replaced.iter().map(|path| path.to_string_lossy()).collect();
     let error = film.error_estimate();
     let places = |samples: &[BadSample]| -> Vec<_> {
         samples.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect()
@@ -493,5 +528,6 @@ fn json(job: &Job, report: &OfflineReport, cpu_seconds: Option<f64>, film: &Film
         "bad_samples_at": places(&report.bad),
         "samples_above_bound": report.n_above,
         "samples_above_bound_at": places(&report.above),
+        "replaced": replaced,
     })
 }

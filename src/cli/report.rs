@@ -1,8 +1,8 @@
 //! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
 
-use super::console::{print, remark};
+use super::console::{Bar, lines, print, remark};
 use super::stop::Stop;
-use super::{Failure, SceneArgs, parse_positive, parse_size};
+use super::{Failure, OverwriteArgs, SceneArgs, parse_positive, parse_size};
 use clap::Args;
 use firstlight::render::{Purpose, RenderSettings, Room, Snapshot, Techniques};
 use firstlight::report::{
@@ -10,9 +10,10 @@ use firstlight::report::{
     foreign_share, page, summary_text,
 };
 use firstlight::scene::whole_file::write_whole;
-use firstlight::scene::{BUILTIN_SCENES, Developing, Extraction, FilmSize, LoadedScene, Rendering, SceneInputs, Trees};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use firstlight::scene::{
+    BUILTIN_SCENES, Developing, Extraction, Files, FilmSize, LoadedScene, Rendering, SceneInputs, Trees,
+};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Samples per pixel of the last step, unless given.
@@ -31,7 +32,7 @@ const DEFAULT_PIXELS: f64 = 50_000.0;
 pub struct ReportArgs {
     /// Built-in scenes, scene files (.ron) or models (.obj); all built-in scenes when not given.
     #[arg(value_name = "SCENES")]
-    scenes: Vec<String>,
+    scenes: Vec<OsString>,
     /// A converged linear picture (.exr) of the one scene; a long render of its own, kept for next time, when not given:
     /// 16 times the samples of the last step, and so about 16 times as long.
     #[arg(long, value_name = "FILE")]
@@ -60,9 +61,9 @@ pub struct ReportArgs {
     no_ablation: bool,
 }
 
-pub fn run(args: &ReportArgs) -> Result<(), Failure> {
-    let names: Vec<String> = if args.scenes.is_empty() {
-        BUILTIN_SCENES.iter().map(|(name, _, _)| (*name).to_owned()).collect()
+pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
+    let names: Vec<OsString> = if args.scenes.is_empty() {
+        BUILTIN_SCENES.iter().map(|(name, _, _)| OsString::from(name)).collect()
     } else {
         args.scenes.clone()
     };
@@ -74,22 +75,26 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     }
     let given = args.reference.as_deref().map(Reference::read).transpose().map_err(Failure::Failed)?;
     let folder = OutFolder::new(&args.out)?;
+    let again = folder.clone();
+    stop.undo(move || drop(again));
+    let (html, table) = (args.out.join("index.html"), args.out.join("steps.csv"));
+    let mut files = OverwriteArgs::default().files();
+    files.read_all(args.reference.clone())?;
+    files.write_all([html.clone(), table.clone()])?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
-    let stop = Stop::on_interrupt();
-    let (outcomes, missing) = pool.install(|| measure_all(args, &names, given.as_ref(), &stop))?;
+    let (outcomes, missing) = pool.install(|| measure_all(args, &names, given.as_ref(), &mut files, stop))?;
     if let (true, Some(missing)) = (outcomes.is_empty(), &missing) {
         return Err(Failure::Stopped(format!("stopped before anything was measured: nothing is written ({missing})")));
     }
     folder.keep();
 
-    let (html, table) = (args.out.join("index.html"), args.out.join("steps.csv"));
     write_whole(&html, page(&outcomes, &command_line(), missing.as_deref()).as_bytes()).map_err(Failure::Failed)?;
     write_whole(&table, csv(&outcomes).as_bytes()).map_err(Failure::Failed)?;
-    print(summary_text(&outcomes).trim_end())?;
-    print(format_args!("{}\n{}", html.display(), table.display()))?;
+    print(lines(summary_text(&outcomes).trim_end()))?;
+    print(vec![html.display().to_string(), table.display().to_string()])?;
     for mismatch in outcomes.iter().filter_map(SceneOutcome::mismatch) {
         remark(format_args!("warning: {mismatch}"));
     }
@@ -100,6 +105,7 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
 }
 
 /// The folder of the report, taken away again where nothing came of it and it was not there before.
+#[derive(Clone)]
 struct OutFolder {
     /// Those that were made, the innermost first.
     made: Vec<PathBuf>,
@@ -133,23 +139,26 @@ impl Drop for OutFolder {
 /// What was measured, and what is missing if somebody has stopped it.
 fn measure_all(
     args: &ReportArgs,
-    names: &[String],
+    names: &[OsString],
     given: Option<&Reference>,
+    files: &mut Files,
     stop: &Stop,
 ) -> Result<(Vec<SceneOutcome>, Option<String>), Failure> {
     // Every scene is read first: a mistake in the last name should not cost the wait for the others.
     let mut scenes = Vec::new();
     for name in names {
         let scene = SceneArgs { scene: name.clone(), up: None };
-        scenes.push(Prepared::new(args, &scene.load(None, &|_| ())?, given)?);
+        scenes.push(Prepared::new(args, &scene.load(None, files, &|_| ())?, given)?);
     }
     let limits =
         Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
     let mut progress = Progress::new(&scenes, !args.no_ablation, given.is_some());
     if let (Some(seconds), None) = (limits.seconds, given) {
         let longest = duration(f64::from(REFERENCE_FACTOR) * seconds * scenes.len() as f64);
-        progress.bar.println(format!("references that were not kept take up to {longest} in all, beside --time"));
+        let message = format!("references that were not kept take up to {longest} in all, beside --time");
+        progress.bar.suspend(|| remark(message));
     }
+    stop.attend();
     let mut outcomes = Vec::new();
     let mut missing: Option<String> = None;
     for (i, scene) in scenes.iter().enumerate() {
@@ -335,7 +344,7 @@ fn modest(width: u32, height: u32) -> (u32, u32) {
 
 /// How far all of it is; a ladder's share is its pixels, and a reference is as long as many ladders.
 struct Progress {
-    bar: ProgressBar,
+    bar: Bar,
     done: f64,
 }
 
@@ -347,12 +356,7 @@ impl Progress {
         let ladders = 1 + if ablation { Techniques::ablations().len() } else { 0 };
         let weight = Self::LADDER * ladders as f64 + if given { 0.0 } else { Self::REFERENCE };
         let pixels: f64 = scenes.iter().map(|scene| f64::from(scene.size.0) * f64::from(scene.size.1)).sum();
-        let target =
-            if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
-            .expect("the template is well formed");
-        let bar = ProgressBar::with_draw_target(Some((weight * pixels) as u64), target).with_style(style);
-        Self { bar, done: 0.0 }
+        Self { bar: Bar::new((weight * pixels) as u64), done: 0.0 }
     }
 
     /// Begins a part of the work, and counts it as done when the next one begins.

@@ -1,10 +1,9 @@
 //! `firstlight save SCENE -o out.ron`: a model, a built-in scene or what a picture shows, as a scene file.
 
 use super::console::remark;
-use super::{Failure, SceneArgs};
+use super::{Failure, OverwriteArgs, SceneArgs};
 use clap::Args;
 use firstlight::scene::save_scene;
-use firstlight::scene::whole_file::check_writable;
 use std::path::PathBuf;
 
 #[derive(Args, Clone, Debug)]
@@ -20,8 +19,9 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")) {
         return Err(Failure::Usage(format!("{}: scene files end in .ron", args.output.display())));
     }
-    check_writable(&args.output).map_err(Failure::Failed)?;
-    let scene = args.scene.load(None, &|_| ())?;
+    let mut files = OverwriteArgs::default().files();
+    files.write(&args.output)?;
+    let scene = args.scene.load(None, &mut files, &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let saved = save_scene(&mut world, Some(&scene), &args.output).map_err(Failure::Failed)?;

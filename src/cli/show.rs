@@ -3,12 +3,12 @@
 use super::console::remark;
 use super::render::{self, RenderArgs};
 use super::stop::Stop;
-use super::{Failure, SceneArgs};
+use super::{Failure, OverwriteArgs, SceneArgs};
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
 use firstlight::scene::ShotSamples;
-use firstlight::scene::whole_file::check_writable;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
@@ -33,6 +33,8 @@ pub struct ShowArgs {
     /// The picture of --replay.
     #[arg(short, long, value_name = "FILE", default_value = "replay.png", requires = "replay")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
     /// Samples per pixel of that picture; as many as when it was recorded when not given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)), requires = "replay")]
     spp: Option<u32>,
@@ -48,21 +50,30 @@ pub struct ShowArgs {
 }
 
 pub fn run(args: &ShowArgs) -> Result<(), Failure> {
-    if let Some(path) = &args.replay {
-        return play(args, path);
+    if args.replay.is_some() {
+        let args = args.clone();
+        return Stop::obeyed_by(move |_| play(&args));
     }
     #[cfg(feature = "viewer")]
     if firstlight::viewer::display::find() != firstlight::viewer::display::Display::None {
         return open_window(args);
     }
-    render_instead(args)
+    let args = args.clone();
+    Stop::obeyed_by(move |stop| render_instead(&args, stop))
 }
 
 #[cfg(feature = "viewer")]
 fn open_window(args: &ShowArgs) -> Result<(), Failure> {
-    use firstlight::frame::SettingsStore;
-    use firstlight::viewer::{ViewerOptions, run};
+    use super::console::lines;
+    use firstlight::frame::{SettingsStore, check_recordable};
+    use firstlight::viewer::{ViewerError, ViewerOptions, run};
     let source = args.scene.source()?;
+    if let Some(record) = &args.record {
+        let mut files = OverwriteArgs::default().files();
+        files.read_all(source.path().map(Path::to_path_buf))?;
+        check_recordable(record).map_err(Failure::Failed)?;
+        files.write(record)?;
+    }
     let store = SettingsStore::of_platform();
     let (mut settings, trouble) = store.settings();
     if let Some(trouble) = trouble {
@@ -87,19 +98,22 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
         record: args.record.clone(),
         print_figures: args.figures,
     };
-    run(options).map_err(|error| Failure::Failed(error.to_string()))
+    run(options).map_err(|error| match error {
+        ViewerError::Stopped(message) => Failure::Stopped(message),
+        error => Failure::Problems(lines(&error.to_string())),
+    })
 }
 
 /// Plays a recording, and keeps the picture at its end.
-fn play(args: &ShowArgs, path: &Path) -> Result<(), Failure> {
+fn play(args: &ShowArgs) -> Result<(), Failure> {
+    let Some(path) = &args.replay else { return Ok(()) };
     PictureFormat::of(&args.output).map_err(Failure::Usage)?;
-    check_writable(&args.output).map_err(Failure::Failed)?;
-    let stop = Stop::on_interrupt();
+    let mut files = args.overwrite.files();
+    files.read(path)?;
+    files.write(&args.output)?;
     let options = ReplayOptions { threads: args.threads.map(usize::from), spp: args.spp };
-    let mut played = replay(path, options, &|| stop.is_asked()).map_err(Failure::Failed)?;
-    if stop.is_asked() {
-        return Err(Failure::Stopped("stopped: nothing was saved".to_owned()));
-    }
+    let mut played = replay(path, options, &|| false).map_err(Failure::Failed)?;
+    files.read_all(played.files())?;
     for warning in &played.warnings {
         remark(format_args!("warning: {warning}"));
     }
@@ -108,17 +122,17 @@ fn play(args: &ShowArgs, path: &Path) -> Result<(), Failure> {
     let samples = ShotSamples { first: 0, spp: film.spp(), uneven: false };
     let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
     let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
-    print.write(&args.output).map_err(Failure::Failed)
+    print.write(&args.output, files.replace()).map_err(Failure::Failed)
 }
 
-fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
+fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
     if args.record.is_some() {
         let message = "there is no display, so there is no window whose use could be recorded";
         return Err(Failure::Failed(message.to_owned()));
     }
     let output = free_name(&args.scene.scene);
     let announcement = Some(format!("no display: rendering to {} instead", output.display()));
-    render::run(&RenderArgs {
+    let args = RenderArgs {
         announcement,
         scene: args.scene.clone(),
         output,
@@ -131,6 +145,7 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         bookmarks: None,
         frames: None,
         resume: false,
+        overwrite: OverwriteArgs::default(),
         spp: None,
         time: None,
         error: None,
@@ -142,17 +157,19 @@ fn render_instead(args: &ShowArgs) -> Result<(), Failure> {
         max_depth: None,
         exposure: 0.0,
         json: false,
-    })
+    };
+    render::run(&args, stop)
 }
 
 /// `firstlight-NAME.png` in the current folder, with a number when that is taken.
-fn free_name(scene: &str) -> PathBuf {
-    let stem = PathBuf::from(scene).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy().into_owned());
-    let mut name = PathBuf::from(format!("firstlight-{stem}.png"));
-    let mut number = 2;
-    while name.exists() {
-        name = PathBuf::from(format!("firstlight-{stem}-{number}.png"));
-        number += 1;
-    }
-    name
+fn free_name(scene: &OsStr) -> PathBuf {
+    let stem = Path::new(scene).file_stem().unwrap_or(OsStr::new("scene"));
+    let name = |end: &str| {
+        let mut name = OsString::from("firstlight-");
+        name.push(stem);
+        name.push(end);
+        PathBuf::from(name)
+    };
+    let ends = std::iter::once(".png".to_owned()).chain((2_u64..).map(|number| format!("-{number}.png")));
+    ends.map(|end| name(&end)).find(|name| !name.exists()).expect("numbers do not end")
 }

@@ -1,14 +1,14 @@
 //! `firstlight simplify IN.obj -o OUT.obj`: fewer triangles, with the error measured.
 
-use super::Failure;
 use super::console::{print, remark};
 use super::number::{parse_error, parse_faces, parse_ratio};
+use super::stop::Stop;
 use super::waiting::Waiting;
+use super::{Failure, OverwriteArgs};
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Faults, Topology};
 use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
-use firstlight::scene::whole_file::check_writable;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -48,7 +48,7 @@ enum MethodArg {
 /// Points for each direction of the measured error.
 const SAMPLES: usize = 200_000;
 
-pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
+pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     let target = match (args.ratio, args.faces, args.error) {
         (Some(ratio), ..) => Target::Ratio(ratio),
         (_, Some(faces), _) => Target::Faces(faces),
@@ -64,7 +64,9 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         let message = format!("{}: models are written as Wavefront OBJ: end the name in .obj", args.output.display());
         return Err(Failure::Usage(message));
     }
-    check_writable(&args.output).map_err(Failure::Failed)?;
+    let mut files = OverwriteArgs::default().files();
+    files.read(&args.input)?;
+    files.write(&args.output)?;
     let waiting = Waiting::new(format!("reading {}", args.input.display()));
     // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
     let mut model = load_obj_with(&args.input, &ObjOptions::default()).map_err(|error| failed(&error))?;
@@ -72,6 +74,7 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
         let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
         model = load_obj_with(&args.input, &options).map_err(|error| failed(&error))?;
     }
+    files.read_all(model.libraries.iter().cloned())?;
     for warning in model.warnings.iter().chain(&model.material_warnings) {
         remark(format_args!("warning: {warning}"));
     }
@@ -100,6 +103,7 @@ pub fn run(args: &SimplifyArgs) -> Result<(), Failure> {
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
     waiting.next(format!("writing {}", args.output.display()));
     save_obj(&args.output, &result, &extras).map_err(|error| failed(&error))?;
+    stop.has_saved(format!("{} is saved, how far it is from the original was not measured", args.output.display()));
     waiting.next("measuring how far the two surfaces are apart");
     let deviation = Deviation::between(&model.mesh, &result, SAMPLES);
     let diagonal = model.mesh.bounds().size().as_dvec3().length();

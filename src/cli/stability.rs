@@ -1,12 +1,10 @@
 //! `firstlight stability`: the hard cases, counted, as a table or for machines. Fails if there is a finding.
 
 use super::Failure;
-use super::console::print;
+use super::console::{Bar, lines, print};
 use clap::Args;
 use firstlight::report::cpu_seconds;
 use firstlight::stability::{CASES, Case, Tally, Worst};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
 use std::time::Instant;
 
 /// Rays of the largest case, unless given.
@@ -67,7 +65,7 @@ fn replay(args: &StabilityArgs, cases: &[&Case], stage: usize, ray: u64) -> Resu
     let told = case.replay(stage, ray, args.rays);
     let told = told.map_err(|error| Failure::Usage(format!("--replay: {}: {error}", case.name)))?;
     if !args.json {
-        return print(told);
+        return print(lines(&told.to_string()));
     }
     let rows = told.rows().map(|(label, value)| (label.to_owned(), value.json()));
     let mut object: serde_json::Map<_, _> = rows.collect();
@@ -95,13 +93,9 @@ fn chosen(args: &StabilityArgs) -> Result<Vec<&'static Case>, Failure> {
 
 fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
     let total: u64 = cases.iter().map(|case| case.rays(args.rays)).sum();
-    let watched = std::io::stderr().is_terminal();
-    let target = if watched { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
-        .expect("the template is well formed");
-    let bar = ProgressBar::with_draw_target(Some(total.max(1)), target).with_style(style);
+    let bar = Bar::new(total);
     if !args.json {
-        print(HEAD.trim_end())?;
+        print(lines(HEAD.trim_end()))?;
     }
     let (start, cpu_before) = (Instant::now(), cpu_seconds());
     let mut rows = Vec::new();
@@ -128,10 +122,11 @@ fn count(args: &StabilityArgs, cases: &[&Case]) -> Result<(), Failure> {
             serde_json::json!({ "cases": cases, "rays": rays, "findings": findings, "seconds": seconds, "cpu_s": cpu }),
         )?;
     } else {
-        print(format_args!("\n{rays} rays, {findings} findings, {:.0} s", start.elapsed().as_secs_f64()))?;
+        let seconds = start.elapsed().as_secs_f64();
+        print(vec![String::new(), format!("{rays} rays, {findings} findings, {seconds:.0} s")])?;
         for (case, tally, _) in rows.iter().filter(|(_, tally, _)| tally.findings() > 0) {
             let Some(worst) = &tally.worst else { continue };
-            print(format_args!("\nworst of {}: {}", case.name, worst.what))?;
+            print(vec![String::new(), format!("worst of {}: {}", case.name, worst.what)])?;
             if case.can_replay() {
                 print(format_args!("  firstlight stability {}", replay_args(args, case, worst)))?;
             }

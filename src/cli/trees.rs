@@ -1,12 +1,14 @@
 //! `firstlight info --tree SCENE|MODEL`: what each way to split each mesh costs to build and to trace.
 
 use super::Failure;
-use super::console::{print, remark};
+use super::console::{lines, print, remark};
 use firstlight::kdtree::{self, BuildPreset};
 use firstlight::mesh::Mesh;
+use firstlight::printable;
 use firstlight::report::{MeanVisits, TreePlan, TreeRow, TreeTable, tree_plans};
 use firstlight::scene::{Extraction, SceneInputs, Shape};
 use glam::Affine3A;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -22,10 +24,10 @@ pub fn run(inputs: &SceneInputs, extraction: &Extraction, json: bool) -> Result<
         let table = TreeTable::measure(mesh, *world_from_mesh, &plans, |plan| {
             done += 1;
             let what = plan_name(plan);
-            remark(format_args!("{name}: tree {done} of {}, {} {}", plans.len(), what.0, what.1));
+            remark(format_args!("{}: tree {done} of {}, {} {}", printable::name(name), plans.len(), what.0, what.1));
         });
         if !json {
-            print(text(name, &table))?;
+            print(lines(&text(&printable::name(name), &table)))?;
         }
         tables.push(as_json(name, &table));
     }
@@ -37,12 +39,14 @@ pub fn run(inputs: &SceneInputs, extraction: &Extraction, json: bool) -> Result<
 
 /// Each mesh once, with its name and how its first object stands.
 fn meshes(inputs: &SceneInputs, extraction: &Extraction) -> Vec<(String, Arc<Mesh>, Affine3A)> {
+    let objects: HashMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
+    let mut known = HashSet::new();
     let mut found: Vec<(String, Arc<Mesh>, Affine3A)> = Vec::new();
     for (entity, shape) in extraction.entities.iter().zip(extraction.snapshot.geometry.tree.shapes()) {
         let kdtree::Shape::Mesh { world_from_object, .. } = shape else { continue };
-        let Some(object) = inputs.objects.iter().find(|object| object.entity == *entity) else { continue };
+        let Some(object) = objects.get(entity) else { continue };
         let Shape::Mesh(mesh) = &object.shape else { continue };
-        if !found.iter().any(|(_, known, _)| Arc::ptr_eq(known, mesh)) {
+        if known.insert(Arc::as_ptr(mesh)) {
             let name = object.name.clone().unwrap_or_else(|| format!("mesh {}", found.len() + 1));
             found.push((name, mesh.clone(), *world_from_object));
         }
@@ -61,7 +65,8 @@ fn plan_name(plan: TreePlan) -> (&'static str, String) {
 
 fn text(name: &str, table: &TreeTable) -> String {
     let mut text = format!(
-        "{name}: {} triangles; seconds on {} threads, the lesser of two runs; views of 500 x 500 pixels\n",
+        "{name}: {} triangles; seconds on {} threads, the lesser of two runs; views of 500 x 500 pixels, of fewer where \
+         they would take longer than half a second\n",
         table.triangles, table.threads
     );
     let _ = writeln!(

@@ -4,9 +4,10 @@
 //! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
 //! so the same list of commands always leads to the same picture.
 
+use super::navigation::Rig;
 use super::{Bookmarks, Edit, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
-use crate::scene::{Lens, Projection, View};
+use crate::scene::{BadValue, Lens, Projection, View, check_film_size};
 use bevy_ecs::message::Message;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -120,6 +121,7 @@ pub enum Command {
     },
     /// Save the scene as a scene file; one that is there is replaced.
     SaveScene {
+        #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },
     /// When the picture is good enough.
@@ -167,6 +169,27 @@ pub enum Command {
     Edit(Edit),
     /// Open a scene file, a model or, when there is no such file, the built-in scene of that name.
     Open {
+        #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },
+}
+
+impl Command {
+    /// Whether it can be carried out, whoever sends it: the same limits as those of scene files. Amounts that a camera is
+    /// moved by need none, for what makes no sense moves nothing.
+    ///
+    /// # Errors
+    /// When it sets something to a value that nothing is made from.
+    pub fn check(&self) -> Result<(), BadValue> {
+        match self {
+            Self::SetView(view) => view.check(),
+            Self::SetProjection(projection) => projection.check(),
+            Self::SetLens(lens) => lens.check(),
+            Self::SetBookmarks(bookmarks) => bookmarks.0.iter().flatten().try_for_each(Rig::check),
+            // A window without pixels is a minimised one.
+            Self::Resize { width, height } => check_film_size((*width).max(1), (*height).max(1)),
+            Self::SetTarget(target) => target.check(),
+            _ => Ok(()),
+        }
+    }
 }

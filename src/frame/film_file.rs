@@ -2,32 +2,32 @@
 //!
 //! Red, green and blue are the means, as in any picture. Beside them, each `f64` of a pixel (see
 //! [`FilmRecord`]) lies in two channels of 32-bit integers, its upper and its lower half, so nothing is rounded. Sample
-//! numbers and the state of the error estimate are RON text in the attribute `firstlight.film` of the layer, with a
-//! checksum; the note of the picture ([`Shot`]) says which scene it is, and makes it open as any picture.
+//! numbers and the state of the error estimate are RON text in the attribute `firstlight.film` of the layer; the note of
+//! the picture ([`Shot`]) says which scene it is, and makes it open as any picture. The same attribute has a checksum of
+//! every byte of the file but its own digits, so that a change of anything is noticed.
 
 use super::picture_file::mean_channels;
 use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, Purpose, Room};
 use crate::scene::file::check_film_size;
-use crate::scene::limits::open_file;
-use crate::scene::shot::NOTE_KEY;
-use crate::scene::whole_file::{WholeFile, unwritable};
-use crate::scene::{Fingerprint, Limits, Shot, plain_io};
+use crate::scene::shot::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
+use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
+use crate::scene::{FileKind, Fingerprint, InputFile, Limits, ReadError, Shot};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
     ReadLayers, Text, WritableImage,
 };
 use serde::{Deserialize, Serialize};
-use std::io::{Read, Write};
+use std::io::{Read, Seek, Write};
+use std::ops::Range;
 use std::path::Path;
-
-/// The attribute that makes a picture a film.
-const FILM_KEY: &str = "firstlight.film";
 
 /// A film and what it is a film of.
 #[derive(Clone, Debug)]
 pub struct FilmFile {
     pub film: Film,
     pub shot: Shot,
+    /// What cannot be known of it; for people, with its name.
+    pub warning: Option<String>,
 }
 
 /// What stands in the attribute.
@@ -35,21 +35,49 @@ pub struct FilmFile {
 struct Header {
     /// A newer program that writes something else counts this up.
     format: u32,
-    /// Of all numbers.
+    /// 32 digits, of all bytes of the file with zeros in their place. In format 1, of the numbers of all pixels alone.
     check: String,
     layout: FilmLayout,
 }
 
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
+
+/// Header and note are not under its checksum.
+const OLD_FORMAT: u32 = 1;
+
+/// Stands where the checksum will be.
+const NO_CHECK: &str = "00000000000000000000000000000000";
 
 /// Of all channels: three means, and two words for each number of the film.
 const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * N_PLANES as u64);
 
-/// Writes a film with the note of what it shows; whole or not at all.
+/// Writes a film with the note of what it shows; whole or not at all. It may take the place of a film of the same
+/// picture whose samples it has, and of no other.
+///
+/// # Errors
+/// When samples would be lost, another process has the file, or it cannot be written.
 pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), String> {
+    let claim = WholeFile::claim(path, Replace::Anything)?;
+    check_replaced_film(film, note, path)?;
+    write_film_into(film, note, claim)
+}
+
+/// The same into a file that was claimed before, whatever it replaces.
+pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<(), String> {
+    let path = &out.path().to_path_buf();
     drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, &error))?);
+    let mut bytes = encode(film, note, FORMAT, NO_CHECK).map_err(|error| unwritable(path, &error))?;
+    let place = place_of_check(&bytes).expect("the header has just been written");
+    let check = checksum(&bytes, &place).to_string();
+    bytes[place].copy_from_slice(check.as_bytes());
+    out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
+    out.finish()
+}
+
+/// A whole file in memory, with this for its checksum.
+fn encode(film: &Film, note: &str, format: u32, check: &str) -> Result<Vec<u8>, exr::error::Error> {
     let record = film.to_record();
-    let header = Header { format: FORMAT, check: checksum(&record).to_string(), layout: record.layout };
+    let header = Header { format, check: check.to_owned(), layout: record.layout };
     // Plain structs and numbers can always be written.
     let header = ron::to_string(&header).expect("a film's header is plain data");
     let mut channels = mean_channels(film);
@@ -64,12 +92,45 @@ pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), Strin
     let size = (film.width() as usize, film.height() as usize);
     let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels));
     let mut image = Image::from_layer(layer);
-    image.attributes.other.insert(Text::from(NOTE_KEY), AttributeValue::Text(Text::from(note)));
-    let mut out = WholeFile::begin(path)?;
+    image.attributes.other.insert(Text::from(NOTE_KEY), exr_text(note));
     let mut memory = std::io::Cursor::new(Vec::new());
-    image.write().non_parallel().to_buffered(&mut memory).map_err(|error| unwritable(path, &error))?;
-    out.write_all(memory.get_ref()).map_err(|error| unwritable(path, &error))?;
-    out.finish()
+    image.write().non_parallel().to_buffered(&mut memory)?;
+    Ok(memory.into_inner())
+}
+
+/// Where the digits of the checksum are.
+fn place_of_check(bytes: &[u8]) -> Option<Range<usize>> {
+    let find = |what: &[u8], from: usize| {
+        let within = bytes.get(from..)?;
+        within.windows(what.len()).position(|part| part == what).map(|at| from + at + what.len())
+    };
+    let header = find(&[FILM_KEY.as_bytes(), b"\0string\0"].concat(), 0)?;
+    let start = find(b"check:\"", header)?;
+    let place = start..start + NO_CHECK.len();
+    bytes.get(place.clone()).map(|_| place)
+}
+
+/// Of everything but what is at `place`.
+fn checksum(bytes: &[u8], place: &Range<usize>) -> Fingerprint {
+    let (before, after) = (&bytes[..place.start], &bytes[place.end..]);
+    Fingerprint::default().with([before, NO_CHECK.as_bytes(), after].concat())
+}
+
+/// Whether `film` can take the place of what is at `path` and lose nothing.
+///
+/// # Errors
+/// When a film is there that has other samples, is of another picture, or cannot be read.
+pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), String> {
+    if !is_film(path) {
+        return Ok(());
+    }
+    const WHAT_TO_DO: &str = "name another file, or allow it by --overwrite";
+    let refused = |why: String| format!("{}: is a film {why}, and would be lost: {WHAT_TO_DO}", path.display());
+    let old = read(path, &Limits::of_this_process()).map_err(|reason| refused(format!("that {reason}")))?;
+    if let Some(what) = Shot::from_note(note)?.differs_from(&old.shot) {
+        return Err(refused(format!("of another {what}")));
+    }
+    if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
 }
 
 /// Reads a film back, to the last bit.
@@ -85,23 +146,43 @@ pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, S
     read(path, limits).map_err(|reason| format!("{}: {reason}", path.display()))
 }
 
+const NO_FILM: &str = "is no film to go on with: those are written by render --film FILE.exr";
+
 fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
-    let unreadable = |error: std::io::Error| format!("cannot be read: {}", plain_io(&error));
-    let mut bytes = Vec::new();
-    open_file(path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(unreadable)?;
-    const NO_FILM: &str = "is no film to go on with: those are written by render --film FILE.exr";
+    let limit = FileKind::Film.limit(limits);
+    let mut file = InputFile::open_within(path, FileKind::Film, limit).map_err(|error| error.to_string())?;
+    let unreadable = |error: std::io::Error| ReadError::from(error).to_string();
+    // Before gigabytes of something else are read.
+    let mut start = [0; 4];
+    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(unreadable)?;
+    if start[..n] != [0x76, 0x2f, 0x31, 0x01] {
+        return Err(NO_FILM.to_owned());
+    }
+    let bytes = file.bytes().map_err(|error| error.to_string())?;
+    decode(&bytes, path, limits)
+}
+
+/// A film from the bytes of its file.
+fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String> {
     if bytes.get(..4) != Some(&[0x76, 0x2f, 0x31, 0x01]) {
         return Err(NO_FILM.to_owned());
     }
     let damaged = |error: &dyn std::fmt::Display| format!("is cut short or damaged, and no film any more: {error}");
-    let meta = exr::meta::MetaData::read_from_buffered(&bytes[..], false).map_err(|error| damaged(&error))?;
+    let meta = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(|error| damaged(&error))?;
     let header = meta.headers.first().ok_or(NO_FILM)?;
     let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
         return Err(NO_FILM.to_owned());
     };
-    let film: Header = ron::from_str(&text.to_string()).map_err(|error| damaged(&error))?;
+    let film: Header = ron::from_str(&string_of(text)).map_err(|error| damaged(&error))?;
     if film.format > FORMAT {
         return Err("was written by a newer firstlight, in a way that this one does not know".to_owned());
+    }
+    const WRONG: &str = "its checksum is wrong";
+    if film.format >= FORMAT {
+        let place = place_of_check(bytes).ok_or_else(|| damaged(&WRONG))?;
+        if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
+            return Err(damaged(&WRONG));
+        }
     }
     let FilmLayout { width, height, .. } = film.layout;
     check_film_size(width, height)?;
@@ -126,7 +207,7 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
         .first_valid_layer()
         .all_attributes()
         .non_parallel()
-        .from_buffered(std::io::Cursor::new(&bytes))
+        .from_buffered(std::io::Cursor::new(bytes))
         .map_err(|error| damaged(&error))?;
     let channels = &image.layer_data.channel_data.list;
     let words = |name: String| {
@@ -143,11 +224,22 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
         planes.push(pairs.map(|(&u, &l)| f64::from_bits(u64::from(u) << 32 | u64::from(l))).collect());
     }
     let record = FilmRecord { layout: film.layout, planes };
-    if checksum(&record).to_string() != film.check {
-        return Err(damaged(&"its checksum is wrong"));
+    let is_old = film.format <= OLD_FORMAT;
+    if is_old && checksum_of_numbers(&record).to_string() != film.check {
+        return Err(damaged(&WRONG));
     }
     let film = Film::from_record(&record).map_err(|error| damaged(&error))?;
-    Ok(FilmFile { film, shot: Shot::read_within(path, limits)? })
+    let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
+    let shot = Shot::from_note(&note.ok_or_else(|| damaged(&"its note is missing or too long"))?)?;
+    let of_film = (film.width(), film.height(), film.first_sample(), film.spp());
+    if (shot.film.width, shot.film.height, shot.first_sample, shot.spp) != of_film {
+        return Err(damaged(&"its note has another size or other samples"));
+    }
+    let warning = is_old.then(|| {
+        let path = path.display();
+        format!("{path}: is a film of an older format, in which a change of its header or note is not noticed")
+    });
+    Ok(FilmFile { film, shot, warning })
 }
 
 fn plane_names() -> impl Iterator<Item = String> {
@@ -156,8 +248,100 @@ fn plane_names() -> impl Iterator<Item = String> {
         .flat_map(|part| ["R", "G", "B"].map(|channel| format!("{part}.{channel}")))
 }
 
-fn checksum(record: &FilmRecord) -> Fingerprint {
+/// The checksum of [`OLD_FORMAT`].
+fn checksum_of_numbers(record: &FilmRecord) -> Fingerprint {
     record.planes.iter().fold(Fingerprint::default(), |print, plane| {
         print.with(plane.iter().flat_map(|number| number.to_bits().to_le_bytes()))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::{Target, render_offline};
+    use crate::render::RenderSettings;
+    use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, ShotDraft, ShotSamples, load};
+
+    /// A film of a scene with paths from the lights, and its note.
+    fn tiny(spp: u32) -> (Film, String) {
+        let loaded = load(&SceneSource::Builtin("cornell-balls".to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        loaded.spawn(&mut world);
+        let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
+        let mut film = Film::new(3, 2);
+        let target = Target { spp: Some(spp), ..Target::default() };
+        render_offline(&extraction.snapshot, &RenderSettings::default(), &mut film, target, |_| true);
+        let samples = ShotSamples { first: 0, spp, uneven: false };
+        let draft = ShotDraft::of(&mut world, Some(&loaded));
+        let note = draft.note(Path::new("a.exr"), (3, 2), samples, crate::render::Display::default().into());
+        (film, note)
+    }
+
+    fn read_bytes(bytes: &[u8]) -> Result<FilmFile, String> {
+        decode(bytes, Path::new("a.exr"), &Limits::USUAL)
+    }
+
+    #[test]
+    fn whatever_byte_of_a_film_is_changed_it_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (film, note) = tiny(4);
+        write_film_file(&film, &note, &folder.path().join("a.exr")).unwrap();
+        let whole = std::fs::read(folder.path().join("a.exr")).unwrap();
+        let kept = read_bytes(&whole).unwrap();
+        assert!(kept.film.to_record() == film.to_record() && kept.shot.to_note() == note && kept.warning.is_none());
+        for at in 0..whole.len() {
+            for flip in [1, 2, 0x20, 0x80, 0xff] {
+                let mut changed = whole.clone();
+                changed[at] ^= flip;
+                assert!(read_bytes(&changed).is_err(), "byte {at} ^ {flip:#x}");
+            }
+        }
+        // The changes that a person would make.
+        let text = |text: &str| text.as_bytes().to_vec();
+        for (from, to) in [
+            (text("samples:[(0,4)]"), text("samples:[(0,8)]")),
+            (text("mean_of:4"), text("mean_of:2")),
+            (text("seed: 0"), text("seed: 1")),
+            (text("spp: 4"), text("spp: 8")),
+            (text("format:2"), text("format:1")),
+            (text("format:2"), text("format:0")),
+            (text("cornell-balls"), text("cornell-bells")),
+        ] {
+            let at = whole.windows(from.len()).position(|part| part == from);
+            let at = at.unwrap_or_else(|| panic!("{} is not in the file", String::from_utf8_lossy(&from)));
+            let mut changed = whole.clone();
+            changed.splice(at..at + from.len(), to);
+            assert!(read_bytes(&changed).is_err(), "{}", String::from_utf8_lossy(&from));
+        }
+    }
+
+    #[test]
+    fn a_film_of_the_old_format_is_read_with_a_warning_and_written_in_the_new_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let (film, note) = tiny(4);
+        let check = checksum_of_numbers(&film.to_record()).to_string();
+        let old = encode(&film, &note, OLD_FORMAT, &check).unwrap();
+        let kept = read_bytes(&old).unwrap();
+        assert!(kept.film.to_record() == film.to_record());
+        assert!(kept.warning.unwrap().contains("a.exr: is a film of an older format"));
+        // Its numbers were always under the checksum, and its two counts of samples must agree.
+        assert!(read_bytes(&encode(&film, &note, OLD_FORMAT, NO_CHECK).unwrap()).is_err());
+        let counted = note.replace("spp: 4", "spp: 8");
+        assert!(read_bytes(&encode(&film, &counted, OLD_FORMAT, &check).unwrap()).is_err());
+        let path = folder.path().join("b.exr");
+        write_film_file(&kept.film, &kept.shot.to_note(), &path).unwrap();
+        assert_eq!(read_film_file(&path).unwrap().warning, None);
+    }
+
+    /// Attributes are bytes, whatever the library thinks of letters.
+    #[test]
+    fn a_note_may_have_letters_of_any_language() {
+        let folder = tempfile::tempdir().unwrap();
+        let (film, note) = tiny(1);
+        let note = note.replace("cornell-balls", "部屋 é");
+        write_film_file(&film, &note, &folder.path().join("a.exr")).unwrap();
+        let kept = read_film_file(&folder.path().join("a.exr")).unwrap();
+        assert_eq!(kept.shot.to_note(), note);
+        assert_eq!(Shot::read(&folder.path().join("a.exr")).unwrap().to_note(), note);
+    }
 }

@@ -45,6 +45,12 @@ struct State {
     camera: Option<(Entity, Rig)>,
 }
 
+impl State {
+    fn content(&self) -> Content {
+        Content { entities: self.entities.clone(), environment: self.environment.clone() }
+    }
+}
+
 /// A state that can be gone back to, and what was done in it.
 #[derive(Clone, Debug)]
 struct Step {
@@ -56,9 +62,19 @@ struct Step {
     merge: Option<String>,
 }
 
+/// What a scene file holds of a state beside the view and how it is shown.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Content {
+    entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
+    environment: Option<SceneEnvironment>,
+}
+
 #[derive(Resource, Default)]
 pub struct History {
     now: Option<State>,
+    /// What was opened or saved last.
+    clean: Option<Content>,
+    unsaved: bool,
     /// What was selected when that was read.
     selected: Vec<Entity>,
     undo: Vec<Step>,
@@ -104,6 +120,30 @@ impl History {
         remember(world);
     }
 
+    /// Whether the scene is neither what was opened nor what was saved last; the view and how it is shown do not count.
+    pub fn is_unsaved(&self) -> bool {
+        self.unsaved
+    }
+
+    /// For [`Self::mark_clean`].
+    pub(super) fn content(world: &mut World) -> Content {
+        Self::remember_now(world);
+        world.resource::<Self>().now.as_ref().map(State::content).unwrap_or_default()
+    }
+
+    /// This is on disk now.
+    pub(super) fn mark_clean(&mut self, content: Content) {
+        self.clean = Some(content);
+        self.compare();
+    }
+
+    fn compare(&mut self) {
+        let Some(now) = &self.now else { return };
+        let clean = self.clean.get_or_insert_with(|| now.content());
+        let same = Arc::ptr_eq(&now.entities, &clean.entities) || now.entities == clean.entities;
+        self.unsaved = !same || now.environment != clean.environment;
+    }
+
     /// How many changes there have been.
     pub fn revision(world: &mut World) -> u64 {
         Self::remember_now(world);
@@ -129,6 +169,7 @@ impl History {
         let now = history.now.replace(step.before.clone())?;
         history.redo.push(Step { before: now.clone(), ..step.clone() });
         history.begun = None;
+        history.compare();
         restore(world, &now, &step.before);
         select_what_came(world, &now, &step.before, &step.selected);
         Some(())
@@ -143,6 +184,7 @@ impl History {
         let now = history.now.replace(step.before.clone())?;
         history.undo.push(Step { before: now.clone(), ..step.clone() });
         history.begun = None;
+        history.compare();
         restore(world, &now, &step.before);
         select_what_came(world, &now, &step.before, &[]);
         Some(())
@@ -151,7 +193,7 @@ impl History {
     fn record(&mut self, new: State) {
         let Some(old) = self.now.take() else {
             self.now = Some(new);
-            return;
+            return self.compare();
         };
         if old == new {
             self.now = Some(old);
@@ -172,6 +214,7 @@ impl History {
         }
         self.redo.clear();
         self.now = Some(new);
+        self.compare();
     }
 }
 

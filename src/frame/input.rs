@@ -6,12 +6,13 @@ use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
 use super::saving::Saving;
 use super::selection::{Picked, Selection, pick};
+use super::session::MAX_THREADS;
 use super::status::{MessageKind, Status};
 use super::systems::{Around, Brush, Clock, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads};
 use super::views::{Bookmarks, ViewTrail};
 use super::{Command, beside::Beside};
 use crate::render::ToneCurve;
-use crate::scene::file::check_film_size;
+use crate::scene::bounds::MOST_STOPS;
 use crate::scene::{Developing, Lens, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
@@ -71,6 +72,10 @@ pub fn input(mut queue: ResMut<CommandQueue>, mut desk: Desk) {
 
 impl Desk<'_, '_> {
     fn carry_out(&mut self, command: Command) {
+        if let Err(bad) = command.check() {
+            self.status.say(self.clock.0, MessageKind::Error, bad);
+            return;
+        }
         let surroundings = self.around.surroundings(self.size.aspect());
         if let Some(rig) = self.rig()
             && let Some(steered) = navigation::steer(&rig, &command, &surroundings)
@@ -176,8 +181,8 @@ impl Desk<'_, '_> {
                 let settings = crate::render::RenderSettings { integrator, ..self.rendering.0 };
                 self.rendering.set_if_neq(Rendering(settings));
             }
-            Command::SetThreads { threads } => drop(self.threads.set_if_neq(Threads(threads.min(1024)))),
-            Command::Open { path } => match SceneSource::parse(&path.to_string_lossy()) {
+            Command::SetThreads { threads } => drop(self.threads.set_if_neq(Threads(threads.min(MAX_THREADS)))),
+            Command::Open { path } => match SceneSource::parse(&path) {
                 Ok(source) => self.beside.load(source, self.up.0, self.size.aspect(), self.renderer.0.pool()),
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
@@ -211,10 +216,8 @@ impl Desk<'_, '_> {
     }
 
     fn set_exposure(&mut self, stops: f32) {
-        /// Beyond this, everything is black or white.
-        const LIMIT: f32 = 64.0;
         if !stops.is_nan() {
-            let exposure_stops = stops.clamp(-LIMIT, LIMIT);
+            let exposure_stops = stops.clamp(-MOST_STOPS, MOST_STOPS);
             let display = crate::render::Display { exposure_stops, ..self.developing.0 };
             self.developing.set_if_neq(Developing(display));
         }
@@ -226,10 +229,7 @@ impl Desk<'_, '_> {
     }
 
     fn resize(&mut self, size: PictureSize) {
-        match check_film_size(size.width.max(1), size.height.max(1)) {
-            Ok(()) => drop(self.size.set_if_neq(size)),
-            Err(message) => self.status.say(self.clock.0, MessageKind::Error, message),
-        }
+        self.size.set_if_neq(size);
     }
 
     /// What is at this place in the picture (0..1 from the upper left), if anything.

@@ -26,6 +26,7 @@ pub mod navigation;
 mod offline;
 mod picture_file;
 mod recording;
+mod recovery;
 mod reload;
 mod remesh;
 mod reset;
@@ -45,12 +46,15 @@ pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PixelStory, SnapshotNames, Stop, Way, brightness};
-pub use film_file::{FilmFile, read_film_file, read_film_file_within, write_film_file};
+pub use film_file::{
+    FilmFile, check_replaced_film, read_film_file, read_film_file_within, write_film_file, write_film_into,
+};
 pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
 pub use picture_file::{PictureFormat, Print, write_errors, write_film};
-pub use recording::{ReplayOptions, Replayed, replay};
+pub use recording::{ReplayOptions, Replayed, check_recordable, replay};
+pub use recovery::{LeftBehind, Recovery};
 pub use remesh::{MeshMeasure, wanted_mesh};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use saving::SavedAs;

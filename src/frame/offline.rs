@@ -1,6 +1,7 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
 use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, Region, RenderSettings, Snapshot, advance_region};
+use crate::scene::BadValue;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
@@ -15,6 +16,21 @@ pub struct Target {
 }
 
 impl Target {
+    /// # Errors
+    /// When it can never be reached, or always is.
+    pub fn check(&self) -> Result<(), BadValue> {
+        for (field, value) in [("seconds", self.seconds), ("error", self.error)] {
+            if value.is_some_and(|value| !(value > 0.0)) {
+                return Err(BadValue::OutOfRange {
+                    field,
+                    value: value.unwrap_or_default().to_string(),
+                    allowed: "be a positive number".to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Whether a film with so many samples a pixel, seconds of rendering and relative error is good enough.
     pub fn reached(&self, spp: u32, seconds: f64, error: Option<f64>) -> bool {
         self.spp.is_some_and(|goal| spp >= goal)

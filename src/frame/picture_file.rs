@@ -3,11 +3,10 @@
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
 use crate::render::{Display, Film, Purpose, Room, develop, relative_errors};
-use crate::scene::shot::NOTE_KEY;
-use crate::scene::whole_file::{WholeFile, unwritable};
+use crate::scene::shot::{NOTE_KEY, exr_text};
+use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
-    WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text, WritableImage,
 };
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -55,48 +54,48 @@ pub struct Print<'a> {
 
 /// Writes a film as its name asks, without a note.
 pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), String> {
-    Print { film, display, size: (film.width(), film.height()), note: None }.write(path)
+    Print { film, display, size: (film.width(), film.height()), note: None }.write(path, Replace::AllButFilms)
 }
 
 /// Writes the relative error of each pixel ([`relative_errors`]) as a grey EXR: 0.05 is 5 %.
 ///
 /// # Errors
 /// When it is not known yet, or the file cannot be written.
-pub fn write_errors(film: &Film, path: &Path) -> Result<(), String> {
+pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), String> {
     let errors = relative_errors(film)
         .ok_or_else(|| format!("{}: no error is known before every pixel has two samples", path.display()))?;
     let channel = |name: &str| AnyChannel::new(name, FlatSamples::F32(errors.clone()));
     let channels = ["R", "G", "B"].map(channel).into_iter().collect();
     let bytes = encode(film, channels, None).map_err(|error| unwritable(path, &error))?;
-    let mut out = WholeFile::begin(path)?;
+    let mut out = WholeFile::begin(path, replace)?;
     out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
     out.finish()
 }
 
 impl Print<'_> {
     /// Writes the picture as its name asks: to a temporary name first, which then takes the place of `path`.
-    pub fn write(&self, path: &Path) -> Result<(), String> {
-        self.encode_beside(PictureFormat::of(path)?, path)?.finish()
+    pub fn write(&self, path: &Path, replace: Replace) -> Result<(), String> {
+        self.encode_beside(PictureFormat::of(path)?, path, replace)?.finish()
     }
 
     /// Writes the picture into `folder` as `STEM-0001`, or with the first higher number that is free: never over a
     /// file that is there, even one that another program makes at the same moment. Answers with the path.
     pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, String> {
         let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
-        let file = self.encode_beside(format, &name(1))?;
+        let file = self.encode_beside(format, &name(0), Replace::AllButFilms)?;
         let taken = || format!("{}: every number is taken: move some of the pictures away", name(u32::MAX).display());
         file.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
     }
 
     /// The whole picture in a temporary file in the folder of `path`.
-    fn encode_beside(&self, format: PictureFormat, path: &Path) -> Result<WholeFile, String> {
+    fn encode_beside(&self, format: PictureFormat, path: &Path, replace: Replace) -> Result<WholeFile, String> {
         // What is asked for below is not asked whether it can be had.
         let room = match format {
             PictureFormat::Png => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
             PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr]),
         };
         drop(room.map_err(|error| unwritable(path, &error))?);
-        let mut out = WholeFile::begin(path)?;
+        let mut out = WholeFile::begin(path, replace)?;
         match format {
             PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, &error))?,
             PictureFormat::Exr => {
@@ -143,7 +142,7 @@ fn encode(
     let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels));
     let mut image = Image::from_layer(layer);
     if let Some(note) = note {
-        image.attributes.other.insert(Text::from(NOTE_KEY), AttributeValue::Text(Text::from(note)));
+        image.attributes.other.insert(Text::from(NOTE_KEY), exr_text(note));
     }
     let mut memory = std::io::Cursor::new(Vec::new());
     image.write().non_parallel().to_buffered(&mut memory)?;

@@ -9,17 +9,24 @@ use super::beside::Beside;
 use super::input::CommandQueue;
 use super::systems::{Adopted, Clock, CurrentScene, PictureSize, Shown, StopAt};
 use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
-use crate::render::Film;
-use crate::scene::{Developing, Rendering, SceneSource, UpAxis, absolute, relative_path};
+use crate::render::{Film, Room};
+use crate::scene::whole_file::{Replace, WholeFile, unwritable};
+use crate::scene::{
+    Developing, FileKind, InputFile, ReadError, Rendering, SceneSource, UpAxis, absolute, check_film_size,
+    relative_path, text_to_path,
+};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// A newer program that writes something else counts this up.
 const FORMAT: u32 = 1;
+
+/// The first line takes less.
+const HEADER_BYTES: u64 = 1 << 16;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,8 +120,8 @@ impl Session {
     /// # Errors
     /// When the file cannot be made.
     pub fn record(&mut self, path: &Path, source: &SceneSource, up: Option<UpAxis>) -> Result<(), String> {
-        let failed = |error: std::io::Error| format!("{}: cannot be written: {error}", path.display());
-        let file = File::create(path).map_err(failed)?;
+        check_recordable(path)?;
+        let mut out = WholeFile::claim(path, Replace::AllButFilms)?;
         let folder = folder_of(path);
         let scene = match source {
             SceneSource::Builtin(name) => SceneWord::Builtin(name.clone()),
@@ -132,15 +139,12 @@ impl Session {
             height,
             seed: self.world().resource::<Rendering>().0.seed,
         };
-        let mut recorder = Recorder { out: Some((file, path.to_path_buf())), ..Recorder::default() };
-        recorder.write(&header);
-        match recorder.trouble.take() {
-            Some(trouble) => Err(trouble),
-            None => {
-                self.world_mut().insert_resource(recorder);
-                Ok(())
-            }
-        }
+        // Only with its first line does it take the place of an older recording; the others are added one by one.
+        let first = ron::to_string(&header).expect("a line is plain data") + "\n";
+        out.write_all(first.as_bytes()).map_err(|error| unwritable(path, &error))?;
+        let file = out.finish_open()?;
+        self.world_mut().insert_resource(Recorder { out: Some((file, path.to_path_buf())), ..Recorder::default() });
+        Ok(())
     }
 
     /// Ends the recording with how far the picture is.
@@ -151,6 +155,29 @@ impl Session {
         let line = Line::End(recorder.frame, spp);
         recorder.write(&line);
         recorder.out = None;
+    }
+}
+
+/// Whether a recording may be written here: where no file is, an empty one, or an older recording. Anything else could
+/// be a part of the scene that is about to be read.
+///
+/// # Errors
+/// When another file is there.
+pub fn check_recordable(path: &Path) -> Result<(), String> {
+    let Ok(info) = std::fs::metadata(path) else { return Ok(()) };
+    // What is no file at all is refused by the writer, in its own words.
+    if !info.is_file() || info.len() == 0 {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    let read = InputFile::open_within(path, FileKind::Recording, u64::MAX)
+        .map_err(std::io::Error::other)
+        .and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
+    let text = String::from_utf8_lossy(&start);
+    let is_recording = text.lines().next().is_some_and(|line| ron::from_str::<Header>(line).is_ok());
+    match read {
+        Ok(_) if is_recording => Ok(()),
+        _ => Err(format!("{}: is there already and is no recording: name another file", path.display())),
     }
 }
 
@@ -177,18 +204,23 @@ pub struct ReplayOptions {
 /// # Errors
 /// When it cannot be read, or its scene cannot be opened.
 pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sync)) -> Result<Replayed, String> {
-    let (header, lines) = read(path)?;
+    let (header, lines) = read(path, stop)?;
     let failed = |reason: String| format!("{}: {reason}", path.display());
     let source = match &header.scene {
         SceneWord::Builtin(name) => SceneSource::Builtin(name.clone()),
         SceneWord::File(file) => {
-            let file = folder_of(path).join(file);
-            SceneSource::parse(&file.to_string_lossy()).map_err(|error| failed(error.to_string()))?
+            let file = folder_of(path).join(text_to_path(file));
+            SceneSource::parse(&file).map_err(|error| failed(error.to_string()))?
         }
     };
     let up = header.up.map(|up| if up == 'z' { UpAxis::Z } else { UpAxis::Y });
     // Nobody looks at the pictures in between: the fewest samples there can be.
     let idle = Target { spp: Some(1), ..Target::default() };
+    // Before the workers begin with a picture that there is no memory for.
+    drop(
+        Room::for_film(header.width.max(1), header.height.max(1), false, &[])
+            .map_err(|error| failed(error.to_string()))?,
+    );
     let mut session = Session::new(SessionOptions {
         width: header.width,
         height: header.height,
@@ -226,7 +258,8 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     let snapshot = extraction.map(|extraction| extraction.snapshot.clone());
     let snapshot = snapshot.ok_or_else(|| failed("nothing is open".to_owned()))?;
     let settings = world.resource::<Rendering>().0;
-    let mut film = Film::try_new(width.max(1), height.max(1)).map_err(|error| failed(error.to_string()))?;
+    check_film_size(width, height).map_err(|bad| failed(bad.to_string()))?;
+    let mut film = Film::try_new(width, height).map_err(|error| failed(error.to_string()))?;
     let target = Target { spp: Some(spp.max(1)), ..Target::default() };
     let pool = session.pool();
     pool.install(|| render_offline_until(&snapshot, &settings, &mut film, target, stop, |_| true));
@@ -234,6 +267,11 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
 }
 
 impl Replayed {
+    /// Every file that the scene at its end was read from.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.session.world().get_resource::<CurrentScene>().map_or_else(Vec::new, |current| current.0.files())
+    }
+
     /// How the picture is shown.
     pub fn display(&self) -> crate::render::Display {
         self.session.world().resource::<Developing>().0
@@ -301,7 +339,7 @@ impl Player {
             let errors = self.session.status().messages.iter().filter(|message| message.kind == MessageKind::Error);
             let lines: Vec<&str> = errors.map(|message| message.text.as_str()).collect();
             if !lines.is_empty() && self.session.status().loading.is_none() {
-                return Err(lines.join("\n"));
+                return Err(lines.join("; ").replace('\n', "; "));
             }
             if nothing_comes {
                 (self.edited, was_edited) = (self.edited + 1, true);
@@ -328,29 +366,55 @@ impl Player {
     }
 }
 
-fn read(path: &Path) -> Result<(Header, Vec<Line>), String> {
+fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(Header, Vec<Line>), String> {
+    /// Bytes of one line; the longest that is written has the views of all bookmarks.
+    const LONGEST_LINE: usize = 1 << 20;
     let failed = |reason: String| format!("{}: {reason}", path.display());
-    let file =
-        File::open(path).map_err(|error| failed(format!("cannot be read: {}", crate::scene::plain_io(&error))))?;
-    let mut lines = BufReader::new(file).lines().enumerate();
+    let file = InputFile::open(path, FileKind::Recording).map_err(|error| failed(error.to_string()))?;
+    let bytes = file.stopping(stop).bytes().map_err(|error| failed(error.to_string()))?;
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
     let no_recording = || failed("is no recording: those are written by --record FILE".to_owned());
+    let mut lines = bytes.split(|&byte| byte == b'\n').enumerate();
+    let is_bearable = |line: &&[u8]| line.len() <= LONGEST_LINE;
     let (_, first) = lines.next().ok_or_else(no_recording)?;
-    let first = first.map_err(|_| no_recording())?;
-    let header: Header = ron::from_str(&first).map_err(|_| no_recording())?;
+    let first = Some(first).filter(is_bearable).and_then(|line| str::from_utf8(line).ok()).ok_or_else(no_recording)?;
+    let header: Header = ron::from_str(first).map_err(|_| no_recording())?;
     if header.format > FORMAT {
         return Err(failed(format!("was written by {}, in a way that this program does not know", header.program)));
     }
+    let Header { width, height, up, .. } = header;
+    // A window that had no size yet has it in a command.
+    check_film_size(width.max(1), height.max(1)).map_err(|bad| format!("{}:1: {bad}", path.display()))?;
+    if let Some(up) = up.filter(|up| !matches!(up, 'y' | 'z')) {
+        return Err(format!("{}:1: `up` is {up:?}, but must be 'y' or 'z'", path.display()));
+    }
     let mut events = Vec::new();
     let mut lines = lines.peekable();
-    while let Some((number, line)) = lines.next() {
-        let text = line.map_err(|error| failed(format!("cannot be read: {error}")))?;
-        match ron::from_str(&text) {
+    while let Some((i, line)) = lines.next() {
+        if stop() {
+            return Err(failed(ReadError::Stopped.to_string()));
+        }
+        // What follows the last line end is a line that was not written to its end, or nothing.
+        let is_last = lines.peek().is_none();
+        let at = |reason: &dyn std::fmt::Display| format!("{}:{}: {reason}", path.display(), i + 1);
+        let understood = match str::from_utf8(line) {
+            _ if !is_bearable(&line) => {
+                return Err(at(&format!("the line is longer than {LONGEST_LINE} bytes: no recording has such lines")));
+            }
+            Ok(text) => match ron::from_str(text) {
+                // Written to its end, so nothing was lost, and it is wrong wherever it stands.
+                Ok(Line::Do(_, _, command)) if command.check().is_err() => {
+                    return Err(at(&command.check().map_or_else(|bad| bad.to_string(), |()| String::new())));
+                }
+                understood => understood.map_err(|error| at(&format!("cannot be understood: {error}"))),
+            },
+            Err(_) => Err(at(&"is not UTF-8 text")),
+        };
+        match understood {
             Ok(line) => events.push(line),
             // The program was ended while it wrote.
-            Err(_) if lines.peek().is_none() => break,
-            Err(error) => {
-                return Err(format!("{}:{}: cannot be understood: {error}", path.display(), number + 1));
-            }
+            Err(_) if is_last => {}
+            Err(error) => return Err(error),
         }
     }
     Ok((header, events))
@@ -358,4 +422,53 @@ fn read(path: &Path) -> Result<(Header, Vec<Line>), String> {
 
 fn folder_of(path: &Path) -> PathBuf {
     absolute(path).parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn session() -> Session {
+        Session::new(SessionOptions { width: 16, height: 12, threads: Some(1), ..SessionOptions::default() }).unwrap()
+    }
+
+    #[test]
+    fn a_recording_replaces_an_older_one_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, target) = (folder.path().join("s.ron"), folder.path().join("a.rec"));
+        let text = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)))\n";
+        std::fs::write(&scene, text).unwrap();
+        let source = SceneSource::Scene(scene.clone());
+        let mut first = session();
+        assert!(
+            first.record(&scene, &source, None).unwrap_err().contains("s.ron: is there already and is no recording")
+        );
+        assert_eq!(std::fs::read_to_string(&scene).unwrap(), text);
+        // While it is written, no other process writes it.
+        first.record(&target, &source, None).unwrap();
+        let begun = std::fs::read_to_string(&target).unwrap();
+        assert!(begun.lines().count() == 1 && begun.contains("File(\"s.ron\")"), "{begun}");
+        assert!(session().record(&target, &source, None).unwrap_err().contains("is being written by another process"));
+        first.send(Command::Pause);
+        first.update(Duration::ZERO);
+        first.end_record();
+        assert_eq!(read(&target, &|| false).unwrap().1.len(), 2, "a command and the end");
+        let mut second = session();
+        second.record(&target, &source, None).unwrap();
+        second.end_record();
+        assert_eq!(read(&target, &|| false).unwrap().1.len(), 1);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
+    }
+
+    /// Names of any bytes are in the lines too.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_command_with_a_name_that_is_no_utf_8_is_played_as_it_was_given() {
+        use std::os::unix::ffi::OsStringExt;
+        let path = PathBuf::from(std::ffi::OsString::from_vec(b"r\xffm.ron".to_vec()));
+        for command in [Command::SaveScene { path: path.clone() }, Command::Open { path }] {
+            let line = ron::to_string(&Line::Do(1, 0.5, command.clone())).unwrap();
+            assert_eq!(ron::from_str::<Line>(&line).unwrap(), Line::Do(1, 0.5, command));
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::Waker;
 use super::beside::Beside;
+use super::history::{Content, History};
 use super::status::{MessageKind, Status};
 use super::systems::{Clock, CurrentScene};
 use crate::scene::{Description, Fingerprint, SavedScene, SceneContent};
@@ -21,6 +22,7 @@ struct Saved {
     path: PathBuf,
     result: Result<SavedScene, String>,
     content: Fingerprint,
+    clean: Content,
 }
 
 /// What is to be saved, and what has been.
@@ -68,7 +70,7 @@ pub fn save(world: &mut World) {
         saving.threads.retain(|thread| !thread.is_finished());
         std::mem::take(&mut *saving.finished.lock().unwrap_or_else(PoisonError::into_inner))
     };
-    for Saved { path, result, content } in finished {
+    for Saved { path, result, content, clean } in finished {
         match result {
             Ok(saved) => {
                 let notes: String = saved.notes.iter().map(|note| format!("; {note}")).collect();
@@ -76,12 +78,14 @@ pub fn save(world: &mut World) {
                 status.scene = path.display().to_string();
                 status.say(now, MessageKind::Note, format!("saved {}{notes}", path.display()));
                 world.insert_resource(SavedAs { path: Some(path), content: Some(content) });
+                world.resource_mut::<History>().mark_clean(clean);
             }
             Err(error) => world.resource_mut::<Status>().say(now, MessageKind::Error, error),
         }
     }
     for path in std::mem::take(&mut world.resource_mut::<Saving>().requests) {
         let current = world.get_resource::<CurrentScene>().map(|current| current.0.clone());
+        let clean = History::content(world);
         let description = Description::of(world, current.as_deref());
         let content = SceneContent::of(world, &description);
         if let Some(title) = world.resource::<Beside>().mesh_in_the_making() {
@@ -94,7 +98,7 @@ pub fn save(world: &mut World) {
         let work = move || {
             let content = content.fingerprint();
             let result = description.save(&path);
-            finished.lock().unwrap_or_else(PoisonError::into_inner).push(Saved { path, result, content });
+            finished.lock().unwrap_or_else(PoisonError::into_inner).push(Saved { path, result, content, clean });
             if let Some(waker) = waker {
                 waker();
             }

@@ -21,7 +21,8 @@ use super::worker::{Waker, Worker};
 use super::{Command, Target, Waits};
 use crate::render::{Film, RenderSettings, Snapshot};
 use crate::scene::{
-    Developing, Extent, Inventory, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis,
+    Description, Developing, Extent, Inventory, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis,
+    check_film_size,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -68,6 +69,9 @@ pub enum Stage {
     Present,
 }
 
+/// Worker threads at most.
+pub(super) const MAX_THREADS: usize = 1024;
+
 #[derive(ScheduleLabel, Clone, Debug, PartialEq, Eq, Hash)]
 struct Frame;
 
@@ -81,9 +85,13 @@ impl Session {
     /// A session without a scene: [`open`](Self::open) one, or spawn entities into its [`world_mut`](Self::world_mut).
     ///
     /// # Errors
-    /// When the threads cannot be started.
+    /// When the threads cannot be started, or no picture may have that size.
     pub fn new(options: SessionOptions) -> Result<Self, String> {
-        let threads = options.threads.unwrap_or(0);
+        if options.width > 0 && options.height > 0 {
+            check_film_size(options.width, options.height)?;
+        }
+        options.target.check()?;
+        let threads = options.threads.unwrap_or(0).min(MAX_THREADS);
         let worker = Worker::start(threads, options.yielding, options.target, options.waker.clone())?;
         let mut world = World::new();
         world.insert_resource(Renderer(worker));
@@ -243,6 +251,22 @@ impl Session {
             SceneSource::Scene(path) => Some(path.clone()),
             _ => None,
         })
+    }
+
+    /// Whether something has been edited since the scene was opened or saved.
+    pub fn has_unsaved_edits(&self) -> bool {
+        self.world.resource::<History>().is_unsaved()
+    }
+
+    /// Something is to be saved, or is being saved.
+    pub fn is_saving(&self) -> bool {
+        !self.world.resource::<Saving>().is_idle() || !self.world.resource::<CommandQueue>().0.is_empty()
+    }
+
+    /// The scene in words, as [`Command::SaveScene`] would write it.
+    pub fn describe(&mut self) -> Description {
+        let current = self.world.get_resource::<CurrentScene>().map(|current| current.0.clone());
+        Description::of(&mut self.world, current.as_deref())
     }
 
     /// As many threads as the workers have, for work beside them.

@@ -4,7 +4,9 @@
 use super::navigation::Rig;
 use crate::scene::file::DisplayPart;
 use crate::scene::whole_file::write_whole;
-use crate::scene::{Fingerprint, SceneSource, absolute, plain_io};
+use crate::scene::{
+    BadValue, FileKind, Fingerprint, InputFile, ReadError, SceneSource, absolute, check_film_size, path_to_text,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -45,6 +47,24 @@ pub struct SceneBookmarks {
     pub views: BTreeMap<u8, Rig>,
 }
 
+/// What is read from a file that anybody may have changed.
+trait Kept {
+    fn check(&self) -> Result<(), BadValue>;
+}
+
+impl Kept for Settings {
+    fn check(&self) -> Result<(), BadValue> {
+        self.window.map_or(Ok(()), |(width, height)| check_film_size(width, height))?;
+        self.display.as_ref().map_or(Ok(()), DisplayPart::check)
+    }
+}
+
+impl Kept for SceneBookmarks {
+    fn check(&self) -> Result<(), BadValue> {
+        self.views.values().try_for_each(Rig::check)
+    }
+}
+
 /// Where all of it is kept.
 #[derive(Clone, Debug)]
 pub struct SettingsStore {
@@ -60,6 +80,11 @@ impl SettingsStore {
 
     pub fn in_folder(folder: &Path) -> Self {
         Self { folder: Some(folder.to_path_buf()) }
+    }
+
+    /// Where it is, if anything is kept.
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
     }
 
     /// Defaults when there are none; the second part says why a file could not be read.
@@ -86,16 +111,15 @@ impl SettingsStore {
         self.write(&bookmark_file(source), &bookmarks)
     }
 
-    fn read<T: DeserializeOwned + Default>(&self, name: &str) -> (T, Option<String>) {
+    fn read<T: DeserializeOwned + Default + Kept>(&self, name: &str) -> (T, Option<String>) {
         let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return (T::default(), None) };
-        let text = match std::fs::read_to_string(&path) {
+        let text = match InputFile::open(&path, FileKind::Settings).and_then(InputFile::text) {
             Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return (T::default(), None),
-            Err(error) => {
-                return (T::default(), Some(format!("{}: cannot be read: {}", path.display(), plain_io(&error))));
-            }
+            Err(ReadError::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => return (T::default(), None),
+            Err(error) => return (T::default(), Some(format!("{}: {error}", path.display()))),
         };
-        match options().from_str(&text) {
+        let understood = options().from_str::<T>(&text).map_err(|error| error.to_string());
+        match understood.and_then(|value| value.check().map(|()| value).map_err(|bad| format!(" {bad}"))) {
             Ok(value) => (value, None),
             Err(error) => {
                 // Set aside, so that what is in it is not lost when new settings are kept.
@@ -134,7 +158,7 @@ fn name_of(source: &SceneSource) -> String {
     match source {
         SceneSource::Builtin(name) => name.clone(),
         SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
-            absolute(path).display().to_string()
+            path_to_text(&absolute(path))
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What a session has to show: the picture, and how it is getting on.
 
 use super::navigation::Rig;
+use crate::printable;
 use crate::render::{BadSample, Display, Inspection, Integrator, Legend, RayCounts, Region};
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
@@ -103,7 +104,7 @@ impl Status {
     }
 
     pub fn say(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>) {
-        let text = text.into();
+        let text = printable::lines(&text.into());
         // Whoever holds the session tells people; the log only keeps it for those who look for it.
         tracing::info!("{kind:?}: {text}");
         if self.messages.len() == Self::MAX_MESSAGES {

@@ -16,7 +16,7 @@ use crate::scene::{
     Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
 };
 use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Changed, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
+use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
 use bevy_ecs::system::SystemParam;
 use std::sync::Arc;
 use std::time::Duration;
@@ -274,7 +274,19 @@ pub fn rebuild(
     mut status: ResMut<Status>,
 ) {
     let mut changes = Changes::default();
-    let settings = rendering.map(|rendering| rendering.0).unwrap_or_default();
+    let settings = match rendering {
+        None => RenderSettings::default(),
+        Some(rendering) => match rendering.0.check() {
+            Ok(()) => rendering.0,
+            // As it was before somebody set what no picture comes of.
+            Err(bad) => {
+                if rendering.is_changed() {
+                    status.say(clock.0, MessageKind::Error, bad.to_string());
+                }
+                shown.settings
+            }
+        },
+    };
     compare_settings(&shown.settings, &settings, &mut changes);
     shown.settings = settings;
     if let Some(cause) = shown.restart.take() {
@@ -287,6 +299,10 @@ pub fn rebuild(
     let environment_changed = queries.environment() != shown.inputs.environment;
     if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
         let mut inputs = queries.collect();
+        if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
+            status.say(clock.0, MessageKind::Error, format!("the camera stays where it was: {bad}"));
+            inputs.camera = shown.inputs.camera;
+        }
         let missing = missing_trees(&inputs, &mut shown.trees);
         if !missing.is_empty() {
             // The old picture stays until the trees are there, and the camera keeps moving in it.

@@ -14,6 +14,7 @@ use super::split::{Split, median_split};
 use super::split_lanes::find_split;
 use crate::geometry::Aabb;
 use glam::Vec3;
+use std::collections::HashSet;
 
 /// What the builder weighs; [`super::BuildPreset`] has the values.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +48,10 @@ pub(super) trait Primitives: Sync {
     fn bounds(&self, prim: u32) -> Aabb;
     /// Box of the part of the primitive with `axis <= limit` (`below`) or `axis >= limit`, padded by `padding`.
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb>;
+    /// What every hit of a primitive follows from, bit by bit: of primitives that share it only the first can be hit.
+    fn shape(&self, _prim: u32) -> Option<[u32; 9]> {
+        None
+    }
 }
 
 /// A primitive in a cell: the box of what the cell holds of it.
@@ -226,6 +231,10 @@ struct Builder<'a, P, M> {
     set: InstructionSet,
 }
 
+/// Leaves of more primitives than this are searched for copies. No split parts those, and a ray would test all of them for a
+/// hit that is always the first one's.
+const TWINS_BEYOND: usize = 64;
+
 /// Subtrees with more references than this are built side by side.
 const FORK_ABOVE: usize = 1024;
 
@@ -297,6 +306,10 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
         prims.extend(references.iter().map(|reference| reference.prim));
         prims.sort_unstable();
         prims.dedup();
+        if prims.len() > TWINS_BEYOND {
+            let mut seen = HashSet::new();
+            prims.retain(|&prim| self.primitives.shape(prim).is_none_or(|shape| seen.insert(shape)));
+        }
         let (first, count) = self.maker.make(&mut arena.leaves, prims);
         arena.nodes.push(ArenaNode::Leaf { first, count });
     }

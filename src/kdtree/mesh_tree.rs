@@ -80,6 +80,11 @@ impl Primitives for Triangles<'_> {
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
         clip_triangle(&self.vertices(prim), axis, limit, below, padding)
     }
+
+    fn shape(&self, prim: u32) -> Option<[u32; 9]> {
+        let [a, b, c] = self.vertices(prim).map(|vertex| vertex.to_array().map(f32::to_bits));
+        Some([a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]])
+    }
 }
 
 impl MeshTree {

@@ -64,6 +64,12 @@ impl Primitives for Balls<'_> {
         let (center, radius) = self.ball(prim);
         Some(clip_ball(center, radius, axis, limit, below, padding))
     }
+
+    fn shape(&self, prim: u32) -> Option<[u32; 9]> {
+        let (center, radius) = self.ball(prim);
+        let [x, y, z] = center.to_array().map(f32::to_bits);
+        Some([x, y, z, radius.to_bits(), 0, 0, 0, 0, 0])
+    }
 }
 
 impl SphereTree {

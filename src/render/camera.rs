@@ -3,6 +3,7 @@
 use crate::geometry::Ray;
 use crate::sampling::{polygon_disc, uniform_disc};
 use glam::{Vec2, Vec3};
+use thiserror::Error;
 
 /// A thin-lens camera in the space of the snapshot. The focal *plane* is perpendicular to `forward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +25,47 @@ pub struct Camera {
     pub blade_rotation: f32,
 }
 
+/// A camera that takes no picture: which field, what it is, and what is allowed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("camera: `{field}` is {value}, but must {allowed}")]
+pub struct CameraError {
+    pub field: &'static str,
+    pub value: String,
+    pub allowed: &'static str,
+}
+
 impl Camera {
+    /// Whether rays through every point of the film and the lens have an origin and a direction.
+    pub fn check(&self) -> Result<(), CameraError> {
+        let wrong = |field, value: &dyn std::fmt::Display, allowed| {
+            let value = value.to_string();
+            Err(CameraError { field, value, allowed })
+        };
+        let Self { eye, right, up, forward, tan_half_vfov, lens_radius, focus_distance, blades: _, blade_rotation } =
+            *self;
+        if !eye.is_finite() {
+            return wrong("eye", &eye, "be finite");
+        }
+        for (field, axis) in [("right", right), ("up", up), ("forward", forward)] {
+            if !((axis.length() - 1.0).abs() <= 1e-3) {
+                return wrong(field, &axis, "be of length 1");
+            }
+        }
+        if !(tan_half_vfov > 0.0 && tan_half_vfov.is_finite()) {
+            return wrong("tan_half_vfov", &tan_half_vfov, "be positive and finite");
+        }
+        if !(lens_radius >= 0.0 && lens_radius.is_finite()) {
+            return wrong("lens_radius", &lens_radius, "be 0 or positive, and finite");
+        }
+        if !(focus_distance > 0.0) {
+            return wrong("focus_distance", &focus_distance, "be positive; infinity is allowed");
+        }
+        if !blade_rotation.is_finite() {
+            return wrong("blade_rotation", &blade_rotation, "be finite");
+        }
+        Ok(())
+    }
+
     /// The ray through a point of the film, with a unit direction.
     ///
     /// - `film`: pixels from the upper left corner; `size`: width and height of the film in pixels.
@@ -111,6 +152,31 @@ mod tests {
             focus_distance,
             blades: 0,
             blade_rotation: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_camera_without_rays_is_refused_by_its_field() {
+        let good = camera(0.3, 4.0);
+        assert_eq!(good.check(), Ok(()));
+        assert_eq!(camera(0.0, f32::INFINITY).check(), Ok(()));
+        let (nan, inf) = (f32::NAN, f32::INFINITY);
+        for (bad, field) in [
+            (Camera { eye: Vec3::new(nan, 0.0, 0.0), ..good }, "eye"),
+            (Camera { eye: Vec3::splat(inf), ..good }, "eye"),
+            (Camera { up: Vec3::ZERO, ..good }, "up"),
+            (Camera { right: Vec3::splat(nan), ..good }, "right"),
+            (Camera { forward: Vec3::Z * 2.0, ..good }, "forward"),
+            (Camera { tan_half_vfov: 0.0, ..good }, "tan_half_vfov"),
+            (Camera { tan_half_vfov: -1.0, ..good }, "tan_half_vfov"),
+            (Camera { tan_half_vfov: nan, ..good }, "tan_half_vfov"),
+            (Camera { lens_radius: -0.1, ..good }, "lens_radius"),
+            (Camera { lens_radius: inf, ..good }, "lens_radius"),
+            (Camera { focus_distance: 0.0, ..good }, "focus_distance"),
+            (Camera { focus_distance: nan, ..good }, "focus_distance"),
+            (Camera { blade_rotation: inf, ..good }, "blade_rotation"),
+        ] {
+            assert_eq!(bad.check().unwrap_err().field, field);
         }
     }
 

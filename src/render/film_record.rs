@@ -4,6 +4,7 @@ use super::Film;
 use super::caustics::LightLayer;
 use super::estimate::TileConvergence;
 use super::exact_sum::ExactSum;
+use super::film::FilmTile;
 use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
@@ -54,11 +55,45 @@ pub struct TileRecord {
     pub steps: Vec<u64>,
 }
 
+impl FilmLayout {
+    /// Whether every sample of `other` is here too, if both are of one picture.
+    pub fn has_all_of(&self, other: &Self) -> bool {
+        fn covers<T: PartialOrd>(ranges: &[(T, T)], others: &[(T, T)]) -> bool {
+            let is_covered = |(start, end): &(T, T)| start >= end || ranges.iter().any(|(s, e)| s <= start && end <= e);
+            others.iter().all(is_covered)
+        }
+        let batches = |layout: &Self| layout.lamps.as_ref().map_or_else(Vec::new, |lamps| lamps.batches.clone());
+        (self.width, self.height, self.tile_size) == (other.width, other.height, other.tile_size)
+            && self.tiles.iter().zip(&other.tiles).all(|(tile, other)| covers(&tile.samples, &other.samples))
+            && covers(&batches(self), &batches(other))
+    }
+}
+
 impl Film {
+    /// What is not a number for each pixel.
+    pub fn layout(&self) -> FilmLayout {
+        let record = |tile: &FilmTile| TileRecord {
+            samples: tile.ranges.iter().map(|range| (range.start, range.end)).collect(),
+            bad: tile.bad.clone(),
+            mean_of: tile.convergence.checkpoint_spp,
+            steps: tile.convergence.steps.iter().map(|step| step.to_bits()).collect(),
+        };
+        let of_light = |light: &LightLayer| LampRecord {
+            batches: light.done.iter().map(|range| (range.start, range.end)).collect(),
+            spp: light.spp,
+        };
+        FilmLayout {
+            width: self.width(),
+            height: self.height(),
+            tile_size: self.tile_size(),
+            tiles: self.tiles.iter().map(record).collect(),
+            lamps: self.light.as_ref().map(of_light),
+        }
+    }
+
     pub fn to_record(&self) -> FilmRecord {
         let n_pixels = self.width() as usize * self.height() as usize;
         let mut planes = vec![vec![0.0; n_pixels]; N_PLANES];
-        let mut tiles = Vec::new();
         for tile in &self.tiles {
             for (local, sum) in tile.sums.iter().enumerate() {
                 let (x, y) = (local as u32 % tile.size.x, local as u32 / tile.size.x);
@@ -69,25 +104,16 @@ impl Film {
                     plane[at] = number;
                 }
             }
-            tiles.push(TileRecord {
-                samples: tile.ranges.iter().map(|range| (range.start, range.end)).collect(),
-                bad: tile.bad.clone(),
-                mean_of: tile.convergence.checkpoint_spp,
-                steps: tile.convergence.steps.iter().map(|step| step.to_bits()).collect(),
-            });
         }
-        let lamps = self.light.as_ref().map(|light| {
+        if let Some(light) = &self.light {
             for (at, sum) in light.sums.iter().enumerate() {
                 let numbers = [sum.sum, sum.rest];
                 for (plane, number) in planes[9..].iter_mut().zip(numbers.iter().flat_map(DVec3::to_array)) {
                     plane[at] = number;
                 }
             }
-            LampRecord { batches: light.done.iter().map(|range| (range.start, range.end)).collect(), spp: light.spp }
-        });
-        let (width, height, tile_size) = (self.width(), self.height(), self.tile_size());
-        let layout = FilmLayout { width, height, tile_size, tiles, lamps };
-        FilmRecord { layout, planes }
+        }
+        FilmRecord { layout: self.layout(), planes }
     }
 
     /// # Errors

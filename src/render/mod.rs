@@ -33,7 +33,7 @@ mod techniques;
 mod texture;
 mod wide;
 
-pub use camera::Camera;
+pub use camera::{Camera, CameraError};
 pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
 pub use environment::Environment;
 pub use estimate::ErrorEstimate;
@@ -48,7 +48,7 @@ pub use light::LightTable;
 pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
 pub use region::Region;
 pub use renderer::{
-    BadSample, Integrator, PassReport, RayCounts, RenderSettings, advance, advance_region, replay_sample,
+    BadSample, Integrator, PassReport, RayCounts, RenderSettings, SettingsError, advance, advance_region, replay_sample,
 };
 pub use room::{NoRoom, Purpose, Room};
 pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};

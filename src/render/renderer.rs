@@ -18,6 +18,7 @@ use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Range};
+use thiserror::Error;
 
 /// The light model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +43,20 @@ pub struct RenderSettings {
     /// tests compare with. All sets give the same bits.
     #[doc(hidden)]
     pub lanes: Option<InstructionSet>,
+}
+
+/// Settings that no picture comes of.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum SettingsError {
+    #[error("a path of 0 segments sees nothing: use at least 1 for `max_depth`, or leave it out for no limit")]
+    NoDepth,
+}
+
+impl RenderSettings {
+    /// Whether a picture comes of them.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        if self.max_depth == 0 { Err(SettingsError::NoDepth) } else { Ok(()) }
+    }
 }
 
 impl Default for RenderSettings {
@@ -108,6 +123,10 @@ pub struct PassReport {
 ///
 /// Tiles are spread over the current rayon pool. `stop` is asked often, from all workers; what a wave had not
 /// finished is dropped, never half kept.
+///
+/// # Panics
+/// When [`RenderSettings::check`] or [`Camera::check`](super::Camera::check) refuses what it is given: the picture would be
+/// black, and its error estimate nothing.
 pub fn advance(
     snapshot: &Snapshot,
     settings: &RenderSettings,
@@ -127,6 +146,8 @@ pub fn advance_region(
     target_spp: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
+    settings.check().unwrap_or_else(|error| panic!("{error}"));
+    snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
     let size = UVec2::new(film.width(), film.height());
     let pass = Pass::new(snapshot, settings, size);
     let Some(caustics) = &pass.caustics else {

@@ -4,6 +4,7 @@ use super::curve::Seconds;
 use super::outcome::{Ablation, SceneOutcome};
 use super::plot::{Band, Plot, Series, Style, escape, number};
 use super::{Ladder, LinearPicture};
+use crate::printable;
 use crate::render::{Display, develop_pixel};
 use base64::Engine;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
@@ -47,7 +48,8 @@ pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>)
 
 /// The most important figures of each scene, as plain text.
 pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
-    let width = outcomes.iter().map(|outcome| outcome.title.chars().count()).max().unwrap_or(0).max(5);
+    let width =
+        outcomes.iter().map(|outcome| printable::name(&outcome.title).chars().count()).max().unwrap_or(0).max(5);
     let mut text = format!("{:width$}  {:>9}", "scene", "size");
     for target in TARGETS {
         let _ = write!(text, "  {:>9}", format!("s to {}%", 100.0 * target));
@@ -55,7 +57,12 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
     let _ = writeln!(text, "  {:>6}  {:>8}  {:>7}  {:>9}  foretold/taken", "slope", "Mrays/s", "error %", "est./true");
     for outcome in outcomes {
         let ladder = &outcome.ladder;
-        let _ = write!(text, "{:width$}  {:>9}", outcome.title, format!("{}x{}", outcome.width, outcome.height));
+        let _ = write!(
+            text,
+            "{:width$}  {:>9}",
+            printable::name(&outcome.title),
+            format!("{}x{}", outcome.width, outcome.height)
+        );
         for target in TARGETS {
             let _ = write!(text, "  {:>9}", seconds(ladder.seconds_to(target)));
         }

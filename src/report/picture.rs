@@ -1,8 +1,8 @@
 //! Linear pictures in memory and as OpenEXR files.
 
 use crate::render::Film;
+use crate::scene::{Limits, decode_picture, picture_reader};
 use glam::Vec3;
-use image::ImageReader;
 use std::path::Path;
 
 /// Mean radiance a pixel, row by row from the top; linear Rec. 709.
@@ -23,18 +23,19 @@ impl LinearPicture {
     /// # Errors
     /// When the file cannot be read, is no such picture, or holds a number that is not finite.
     pub fn read_exr(path: &Path) -> Result<Self, String> {
-        let fail = |reason: &dyn std::fmt::Display| format!("{}: cannot be read: {reason}", path.display());
-        let reader =
-            ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|error| fail(&error))?;
+        let fail = |reason: String| format!("{}: {reason}", path.display());
+        let limits = Limits::of_this_process();
+        let reader = picture_reader(path, &limits).map_err(fail)?;
         if reader.format() != Some(image::ImageFormat::OpenExr) {
-            return Err(fail(&"it is not an OpenEXR picture; a reference holds linear light, so it must be .exr"));
+            let reason = "is not an OpenEXR picture; a reference holds linear light, so it must be .exr";
+            return Err(fail(reason.to_owned()));
         }
-        let picture = reader.decode().map_err(|error| fail(&error))?.into_rgb32f();
+        let picture = decode_picture(reader, &limits).map_err(fail)?.into_rgb32f();
         let (width, height) = picture.dimensions();
         let pixels: Vec<Vec3> = picture.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
         if let Some(at) = pixels.iter().position(|pixel| !pixel.is_finite()) {
             let (x, y) = (at as u32 % width, at as u32 / width);
-            return Err(fail(&format!("pixel {x}, {y} is {}, which is not finite", pixels[at])));
+            return Err(fail(format!("cannot be used: pixel {x}, {y} is {}, which is not finite", pixels[at])));
         }
         Ok(Self { width, height, pixels })
     }

@@ -6,7 +6,8 @@
 use super::LinearPicture;
 use crate::frame::write_film;
 use crate::render::{Display, Film, RenderSettings, Snapshot, advance};
-use crate::scene::Fingerprint;
+use crate::scene::whole_file::write_whole;
+use crate::scene::{FileKind, Fingerprint, InputFile};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -71,7 +72,8 @@ impl ReferenceStore {
     /// A render with at least `min_spp` samples a pixel, if one was kept and can be read.
     pub fn find(&self, key: &Key, min_spp: u32) -> Option<Reference> {
         let path = self.folder.as_ref()?.join(format!("{}.exr", key.name));
-        let made: Made = serde_json::from_slice(&std::fs::read(path.with_extension("json")).ok()?).ok()?;
+        let note = InputFile::open(&path.with_extension("json"), FileKind::Settings).ok()?.bytes().ok()?;
+        let made: Made = serde_json::from_slice(&note).ok()?;
         let picture = LinearPicture::read_exr(&path).ok()?;
         let fits = made.spp >= min_spp && (picture.width, picture.height) == key.size;
         fits.then_some(Reference { picture, made: Some(made), path: Some(path) })
@@ -125,7 +127,7 @@ impl ReferenceStore {
         }
         write_film(film, &Display::default(), &path)?;
         let text = serde_json::to_vec(made).map_err(|error| error.to_string())?;
-        std::fs::write(&note, text).map_err(|error| format!("{}: {error}", note.display()))?;
+        write_whole(&note, &text)?;
         Ok(Some(path))
     }
 }

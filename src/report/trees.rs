@@ -4,6 +4,9 @@
 //! lights in the classic light model, at 500 × 500 pixels and one sample each, then four times nearer by a factor of
 //! 1.2. Every row shows the very same pictures, for the tree decides how long an answer takes and never which.
 //!
+//! Where thousands of triangles meet in one point every ray tests all of them, in any tree: there fewer pixels stand for the
+//! picture ([`LONGEST_VIEW`]), and fewer rays for the means ([`MOST_BLOCKS`]).
+//!
 //! Start reading at [`TreeTable::measure`].
 
 use crate::geometry::{Ray, robust::offset_ray_origin};
@@ -30,6 +33,12 @@ pub struct TreePlan {
     /// Triangles; `None` leaves it to the preset.
     pub leaf_limit: Option<usize>,
 }
+
+/// Seconds: a view that would take longer is shown in fewer pixels, and its time and its rays are multiplied.
+pub const LONGEST_VIEW: f64 = 0.5;
+
+/// Blocks of triangles that the rays of one kind look at in one tree; the means are of the rays that come before that.
+pub const MOST_BLOCKS: usize = 1 << 20;
 
 /// All rows of the table.
 pub fn tree_plans() -> Vec<TreePlan> {
@@ -114,6 +123,8 @@ impl TreeTable {
             rays: RayCounts::default(),
             no_tree_seconds_per_ray: 0.0,
         };
+        let mut sample_rays = None;
+        let mut sharpest = 0;
         for &plan in plans {
             before(plan);
             let build = || match plan.leaf_limit {
@@ -126,15 +137,16 @@ impl TreeTable {
             let mut view_seconds = [0.0; VIEWS];
             for (view, seconds) in view_seconds.iter_mut().enumerate() {
                 let snapshot = stage.seen_from(view);
-                let (rays, least) = least_seconds(|| picture(&snapshot).1);
+                let (side, rays, least) = timed_view(&snapshot);
                 *seconds = least;
-                if view == 0 {
-                    table.rays = rays;
+                if view == 0 && side > sharpest {
+                    (table.rays, sharpest) = (rays, side);
                 }
             }
-            let rays = SampleRays::of(&tree, &stage, world_from_mesh);
+            // The same for all trees.
+            let rays = sample_rays.get_or_insert_with(|| SampleRays::of(&tree, &stage, world_from_mesh));
             if table.rows.is_empty() {
-                table.no_tree_seconds_per_ray = no_tree_seconds(&rays);
+                table.no_tree_seconds_per_ray = no_tree_seconds(rays);
             }
             let (stats, visits) = (tree.stats(), rays.visits(&tree));
             table.rows.push(TreeRow { plan, build_seconds, view_seconds, stats, visits });
@@ -160,10 +172,32 @@ fn least_seconds<T>(mut work: impl FnMut() -> T) -> (T, f64) {
     (result, first.min(second))
 }
 
+/// Pixels along a side of what was traced, and the rays and the least seconds of a whole picture.
+fn timed_view(snapshot: &Snapshot) -> (u32, RayCounts, f64) {
+    /// Whole pictures, a sixteenth of their pixels, and a first guess at what those take.
+    const SIDES: [u32; 3] = [SIDE, SIDE / 4, SIDE / 16];
+    let whole = |side: u32| f64::from(SIDE * SIDE) / f64::from(side * side);
+    let (mut side, mut seconds, mut rays) = (SIDES[2], 0.0, RayCounts::default());
+    for next in SIDES.into_iter().rev() {
+        if next > side && seconds / whole(next) > LONGEST_VIEW {
+            break;
+        }
+        let (counted, least) = least_seconds(|| picture(snapshot, next).1);
+        (side, seconds) = (next, least * whole(next));
+        let scaled = |count: u64| (count as f64 * whole(next)).round() as u64;
+        rays = RayCounts {
+            camera: scaled(counted.camera),
+            bounce: scaled(counted.bounce),
+            shadow: scaled(counted.shadow),
+        };
+    }
+    (side, rays, seconds)
+}
+
 /// One sample a pixel in the classic light model.
-fn picture(snapshot: &Snapshot) -> (Film, RayCounts) {
+fn picture(snapshot: &Snapshot, side: u32) -> (Film, RayCounts) {
     let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
-    let mut film = Film::new(SIDE, SIDE);
+    let mut film = Film::new(side, side);
     let report = advance(snapshot, &settings, &mut film, 1, &|| false);
     (film, report.rays)
 }
@@ -280,7 +314,11 @@ impl SampleRays {
                 Ray::new(origin, mesh_from_world.transform_vector3(ray.dir).normalize())
             })
             .collect();
-        let bounce = camera.iter().zip(0..).filter_map(|(ray, i)| bounce(&scene, ray, i)).collect();
+        let mut left = MOST_BLOCKS;
+        let bounce = (camera.iter().zip(0..))
+            .take_while(|(ray, _)| spend(&mut left, tree.count_visits_through(ray).blocks))
+            .filter_map(|(ray, i)| bounce(&scene, ray, i))
+            .collect();
         let bounds = tree.bounds();
         let (middle, reach) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.size().length());
         let lines = (0..SAMPLES).map(|i| line(middle, reach, &Sampler::new(2, 0, 0, i))).collect();
@@ -318,10 +356,27 @@ fn bounce(scene: &SceneTree, ray: &Ray, number: u32) -> Option<Ray> {
     Some(Ray::new(offset_ray_origin(point.position, point.error, point.geometric_normal, dir), dir))
 }
 
+/// Over the first of `rays` that look at [`MOST_BLOCKS`] blocks, at least one.
 fn mean_visits(rays: &[Ray], count: impl Fn(&Ray) -> Visits) -> MeanVisits {
-    let counted: Vec<Visits> = rays.iter().map(count).filter(|visits| visits.inner + visits.leaves > 0).collect();
+    let mut left = MOST_BLOCKS;
+    let mut counted: Vec<Visits> = Vec::new();
+    for ray in rays {
+        let visits = count(ray);
+        if visits.inner + visits.leaves > 0 {
+            counted.push(visits);
+        }
+        if !spend(&mut left, visits.blocks) {
+            break;
+        }
+    }
     let mean = |of: fn(&Visits) -> usize| counted.iter().map(of).sum::<usize>() as f64 / counted.len().max(1) as f64;
     MeanVisits { inner: mean(|v| v.inner), leaves: mean(|v| v.leaves), blocks: mean(|v| v.blocks) }
+}
+
+/// Whether there is something left.
+fn spend(left: &mut usize, blocks: usize) -> bool {
+    *left = left.saturating_sub(blocks);
+    *left > 0
 }
 
 /// Tries every triangle for as many camera rays as fit into a fifth of a second, at least four.
@@ -342,6 +397,7 @@ fn no_tree_seconds(rays: &SampleRays) -> f64 {
 mod tests {
     use super::*;
     use crate::mesh::procedural::{DisplacedSphere, displaced_sphere};
+    use glam::DVec3;
 
     fn stone() -> Arc<Mesh> {
         Arc::new(displaced_sphere(&DisplacedSphere { frequency: 24, ..DisplacedSphere::default() }))
@@ -354,7 +410,7 @@ mod tests {
         let shown = |plan: TreePlan| {
             let limit = plan.leaf_limit.unwrap_or(1);
             let tree = MeshTree::build_limited(&mesh.positions, &mesh.triangles, plan.preset, limit);
-            picture(&Stage::new(&Arc::new(tree), &mesh, turned).seen_from(2)).0.means()
+            picture(&Stage::new(&Arc::new(tree), &mesh, turned).seen_from(2), SIDE).0.means()
         };
         let plans = tree_plans();
         let first = shown(plans[0]);
@@ -362,6 +418,38 @@ mod tests {
         for &plan in &plans[1..] {
             assert!(shown(plan) == first, "{plan:?}");
         }
+    }
+
+    #[test]
+    fn dear_rays_are_counted_until_the_blocks_are_spent() {
+        let rays = vec![Ray::new(Vec3::ZERO, Vec3::X); SAMPLES as usize];
+        for (blocks, most) in [(10, rays.len()), (1000, MOST_BLOCKS / 1000 + 1), (2 * MOST_BLOCKS, 1)] {
+            let calls = std::cell::Cell::new(0);
+            let mean = mean_visits(&rays, |_| {
+                calls.set(calls.get() + 1);
+                Visits { inner: 3, leaves: 1, blocks }
+            });
+            assert_eq!(calls.get(), most);
+            assert_eq!(mean, MeanVisits { inner: 3.0, leaves: 1.0, blocks: blocks as f64 });
+        }
+    }
+
+    /// Every ray through the middle tests thousands of blocks, so no machine shows such a view in full in time.
+    #[test]
+    fn a_view_that_takes_too_long_is_shown_in_fewer_pixels() {
+        let n = 400_000_u32;
+        let rim = (0..n)
+            .map(|i| (TAU * i as f32 / n as f32).sin_cos())
+            .map(|(sin, cos)| DVec3::new(cos.into(), sin.into(), 0.0));
+        let points: Vec<DVec3> = std::iter::once(DVec3::ZERO).chain(rim).collect();
+        let mesh = Mesh::from_f64(&points, (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect()).unwrap();
+        let tree = MeshTree::build_limited(&mesh.positions, &mesh.triangles, BuildPreset::Median, 64);
+        let stage = Stage::new(&Arc::new(tree), &Arc::new(mesh), Affine3A::IDENTITY);
+        let (side, rays, seconds) = timed_view(&stage.seen_from(0));
+        assert!(side < SIDE && seconds > LONGEST_VIEW, "{side}: {seconds} s");
+        // As many rays as a whole picture has, about.
+        let of_eye = f64::from(SIDE * SIDE);
+        assert!((rays.camera as f64 / of_eye - 1.0).abs() < 0.01, "{rays:?}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! beside it; many balls that were made by a program are listed one by one; surfaces without a material get a grey
 //! one. Comments and the spelling of a file that was read are not kept.
 
+use super::bounds::radians;
 use super::components::{
     Amount, Balls, Developing, FilmSize, Material, MeshOrigin, Ordinal, Paint, Rendering, SceneEnvironment, Shape,
     SurfaceTexture,
@@ -15,7 +16,9 @@ use super::file::{
 };
 use super::inputs::SceneInputs;
 use super::load::LoadedScene;
+use super::meshes::LoadedMesh;
 use super::placement::Placement;
+use super::relative::path_to_text;
 use super::spawn::camera;
 use super::view::{Lens, Projection, View};
 use crate::mesh::Mesh;
@@ -43,7 +46,7 @@ impl Description {
     /// Of what `world` holds; `loaded` is the scene that was opened into it, if one was.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let inputs = SceneInputs::of(world);
-        let mut writer = Writer { loaded, ..Writer::default() };
+        let mut writer = Writer::new(loaded);
         let objects = writer.objects(world, &inputs);
         writer.name_materials(world, &objects);
         let parts = objects.iter().map(|object| writer.object(object)).collect();
@@ -119,6 +122,10 @@ struct Item {
 #[derive(Default)]
 struct Writer<'a> {
     loaded: Option<&'a LoadedScene>,
+    /// What was loaded, by the address of the mesh and of the balls, and by the name of the texture.
+    loaded_meshes: HashMap<usize, &'a LoadedMesh>,
+    loaded_balls: HashMap<usize, &'a ObjectPart>,
+    loaded_textures: HashMap<&'a str, &'a TexturePart>,
     /// Every material that gets a name, in order.
     named: Vec<(Entity, String, Material)>,
     names: HashMap<Entity, String>,
@@ -126,12 +133,30 @@ struct Writer<'a> {
     grey: Option<String>,
     /// Textures in use, in the order in which they are met.
     textures: Vec<(Arc<SurfaceTexture>, String)>,
+    /// Their names, by address.
+    texture_names: HashMap<usize, String>,
+    taken_by_textures: Taken,
     loose_meshes: Vec<(usize, Arc<Mesh>)>,
     n_objects: usize,
     losses: Vec<String>,
 }
 
-impl Writer<'_> {
+impl<'a> Writer<'a> {
+    fn new(loaded: Option<&'a LoadedScene>) -> Self {
+        let mut writer = Self { loaded, ..Self::default() };
+        let Some(loaded) = loaded else { return writer };
+        for mesh in loaded.meshes.iter().flatten() {
+            writer.loaded_meshes.entry(address(&mesh.mesh)).or_insert(mesh);
+        }
+        for (balls, object) in loaded.balls.iter().zip(&loaded.file.objects) {
+            if let Some(balls) = balls {
+                writer.loaded_balls.entry(address(balls)).or_insert(object);
+            }
+        }
+        writer.loaded_textures = loaded.file.textures.iter().collect();
+        writer
+    }
+
     fn objects(&self, world: &mut World, inputs: &SceneInputs) -> Vec<Item> {
         let item = |object: &super::inputs::ObjectInput| {
             let origin = world.get::<MeshOrigin>(object.entity).cloned();
@@ -153,9 +178,7 @@ impl Writer<'_> {
     fn has_own_materials(&self, world: &World, shape: &Shape, slots: &[Entity]) -> bool {
         let Shape::Mesh(mesh) = shape else { return false };
         let Some(loaded) = self.loaded else { return false };
-        let Some(known) = loaded.meshes.iter().flatten().find(|known| Arc::ptr_eq(&known.mesh, mesh)) else {
-            return false;
-        };
+        let Some(known) = self.loaded_meshes.get(&address(mesh)) else { return false };
         let paint = |written: &file::Paint, now: &Paint| match (written, now) {
             (file::Paint::Rgb(a), Paint::Rgb(b)) => a == b,
             (file::Paint::Texture(name), Paint::Texture(texture)) => *name == texture.name,
@@ -201,12 +224,12 @@ impl Writer<'_> {
                 needed.extend([*a, *b]);
             }
         }
-        let mut taken = HashSet::new();
+        let mut taken = Taken::default();
         for (_, entity, name, material) in all {
             if own.contains(&entity) && !needed.contains(&entity) {
                 continue;
             }
-            let name = free_name(if name.is_empty() { "material" } else { &name }, &mut taken);
+            let name = taken.free_name(if name.is_empty() { "material" } else { &name });
             self.names.insert(entity, name.clone());
             self.named.push((entity, name, material));
         }
@@ -217,8 +240,9 @@ impl Writer<'_> {
         if let Some(name) = entity.and_then(|entity| self.names.get(&entity)) {
             return name.clone();
         }
-        let mut taken: HashSet<String> = self.names.values().cloned().collect();
-        self.grey.get_or_insert_with(|| free_name("grey", &mut taken)).clone()
+        let names = &self.names;
+        let new = || Taken { names: names.values().cloned().collect(), ..Taken::default() }.free_name("grey");
+        self.grey.get_or_insert_with(new).clone()
     }
 
     fn materials(&mut self) -> Named<MaterialPart> {
@@ -277,18 +301,16 @@ impl Writer<'_> {
     }
 
     fn texture_name(&mut self, texture: &Arc<SurfaceTexture>) -> String {
-        if let Some((_, name)) = self.textures.iter().find(|(known, _)| Arc::ptr_eq(known, texture)) {
+        if let Some(name) = self.texture_names.get(&address(texture)) {
             return name.clone();
         }
-        let mut taken: HashSet<String> = self.textures.iter().map(|(_, name)| name.clone()).collect();
         // Names of the file that nothing uses any more stay taken: they are written as well.
-        let of_file = |name: &str| self.loaded.is_some_and(|loaded| loaded.file.textures.get(name).is_some());
-        if of_file(&texture.name) && self.loaded.and_then(|l| l.file.textures.get(&texture.name)) != Some(&texture.part)
-        {
-            taken.insert(texture.name.clone());
+        if self.loaded_textures.get(&*texture.name).is_some_and(|part| **part != texture.part) {
+            self.taken_by_textures.names.insert(texture.name.clone());
         }
-        let name = free_name(if texture.name.is_empty() { "texture" } else { &texture.name }, &mut taken);
+        let name = self.taken_by_textures.free_name(if texture.name.is_empty() { "texture" } else { &texture.name });
         self.textures.push((texture.clone(), name.clone()));
+        self.texture_names.insert(address(texture), name.clone());
         name
     }
 
@@ -297,7 +319,7 @@ impl Writer<'_> {
         let of_file = self.loaded.map(|loaded| loaded.file.textures.0.clone()).unwrap_or_default();
         let mut textures = of_file;
         for (texture, name) in &self.textures {
-            if !textures.iter().any(|(known, _)| known == name) {
+            if !self.loaded_textures.contains_key(&**name) {
                 textures.push((name.clone(), self.with_path_from_folder(texture)));
             }
         }
@@ -313,7 +335,7 @@ impl Writer<'_> {
                 textures.clone().find(|(name, ..)| name == file).map(|(.., path)| path.clone())
             });
             if let Some(path) = from_mesh.and_then(|path| std::path::absolute(path).ok()) {
-                *file = path.to_string_lossy().into_owned();
+                *file = path_to_text(&path);
             }
         }
         part
@@ -328,7 +350,7 @@ impl Writer<'_> {
                 EnvironmentPart::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
             }
             (Environment::Image { scale, rotation, .. }, EnvironmentPart::Image { file, rotate, .. }) => {
-                let kept = rotate.to_radians() as f32 == *rotation;
+                let kept = radians(*rotate) == *rotation;
                 let rotate = if kept { *rotate } else { f64::from(*rotation).to_degrees() };
                 EnvironmentPart::Image { file: file.clone(), scale: Rgb(*scale), rotate }
             }
@@ -383,11 +405,7 @@ impl Writer<'_> {
         material: String,
         transform: TransformPart,
     ) -> ObjectPart {
-        let written = self.loaded.and_then(|loaded| {
-            let known = |known: &Option<Arc<Balls>>| known.as_ref().is_some_and(|known| Arc::ptr_eq(known, balls));
-            loaded.balls.iter().position(known).map(|i| &loaded.file.objects[i])
-        });
-        match written {
+        match self.loaded_balls.get(&address(balls)) {
             Some(ObjectPart::BallGrid { first, steps, radius, .. }) => {
                 let (first, steps, radius) = (*first, steps.clone(), *radius);
                 ObjectPart::BallGrid { name, first, steps, radius, material, transform }
@@ -405,9 +423,7 @@ impl Writer<'_> {
     }
 
     fn mesh(&mut self, index: usize, item: &Item, mesh: &Arc<Mesh>) -> ObjectPart {
-        let file_has_materials = self.loaded.is_some_and(|loaded| {
-            loaded.meshes.iter().flatten().any(|known| Arc::ptr_eq(&known.mesh, mesh) && !known.slots.is_empty())
-        });
+        let file_has_materials = self.loaded_meshes.get(&address(mesh)).is_some_and(|known| !known.slots.is_empty());
         let (material, materials) = match &item.slots[..] {
             _ if item.own => (None, None),
             [] if !file_has_materials => (None, None),
@@ -427,11 +443,31 @@ impl Writer<'_> {
     }
 }
 
-/// `wanted`, or with the first number that makes it new.
-fn free_name(wanted: &str, taken: &mut HashSet<String>) -> String {
-    let numbered = (2_u64..).map(|number| format!("{wanted} {number}"));
-    let name = std::iter::once(wanted.to_owned()).chain(numbered).find(|name| !taken.contains(name));
-    let name = name.expect("there are more numbers than names");
-    taken.insert(name.clone());
-    name
+/// Names in use.
+#[derive(Default)]
+struct Taken {
+    names: HashSet<String>,
+    /// The number that is tried next for a name; smaller ones are taken.
+    next: HashMap<String, u64>,
+}
+
+impl Taken {
+    /// `wanted`, or with the first number that makes it new.
+    fn free_name(&mut self, wanted: &str) -> String {
+        if self.names.insert(wanted.to_owned()) {
+            return wanted.to_owned();
+        }
+        let next = self.next.entry(wanted.to_owned()).or_insert(2);
+        loop {
+            let name = format!("{wanted} {next}");
+            *next += 1;
+            if self.names.insert(name.clone()) {
+                return name;
+            }
+        }
+    }
+}
+
+fn address<T>(shared: &Arc<T>) -> usize {
+    Arc::as_ptr(shared) as usize
 }

@@ -1,5 +1,6 @@
 //! What can be wrong with what a user gave us, said so that they can mend it.
 
+use crate::printable;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -15,9 +16,10 @@ pub struct Problem {
 }
 
 impl fmt::Display for Problem {
+    /// One line, whatever the names in it hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(file) = &self.file {
-            write!(f, "{}:", file.display())?;
+            write!(f, "{}:", printable::escape(&file.to_string_lossy()))?;
         }
         if let Some((line, column)) = self.at {
             write!(f, "{line}:{column}:")?;
@@ -25,7 +27,7 @@ impl fmt::Display for Problem {
         if self.file.is_some() || self.at.is_some() {
             f.write_str(" ")?;
         }
-        f.write_str(&self.message)
+        f.write_str(&printable::escape(&self.message))
     }
 }
 
@@ -36,6 +38,19 @@ pub struct SceneError {
 }
 
 impl SceneError {
+    /// Problems that are told one by one: nobody reads more, and each place is looked for in the whole text.
+    pub(super) const MAX_TOLD: usize = 20;
+
+    /// These problems, and a last line that says how many more there are of them in `file`.
+    pub(super) fn of(mut problems: Vec<Problem>, untold: usize, file: Option<&Path>) -> Self {
+        if untold > 0 {
+            let problem = if untold == 1 { "problem" } else { "problems" };
+            let message = format!("and {untold} more {problem}");
+            problems.push(Problem { file: file.map(Path::to_path_buf), at: None, message });
+        }
+        Self { problems }
+    }
+
     /// One problem without a place.
     pub fn new(message: impl Into<String>) -> Self {
         Self { problems: vec![Problem { file: None, at: None, message: message.into() }] }
@@ -68,17 +83,41 @@ impl fmt::Display for SceneError {
 }
 
 /// ` (did you mean …?)` when one of `known` is close to `found`, else the list when it is short, else nothing.
+///
+/// Names are compared in their order until [`MOST_CELLS`] are spent; those whose length alone rules them out are free.
 pub fn suggestion<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known.into_iter().collect();
-    let close = known
-        .iter()
-        .map(|name| (strsim::damerau_levenshtein(&found.to_lowercase(), &name.to_lowercase()), *name))
-        .filter(|(distance, name)| *distance <= (name.chars().count().max(found.chars().count()) / 3).max(1))
-        .min();
+    suggestion_within(found, known, &mut { MOST_CELLS })
+}
+
+/// Cells of tables of edit distances that one suggestion may fill in: 65,000 names of eight letters, or half a second at most
+/// for all the problems that are told.
+const MOST_CELLS: usize = 1 << 22;
+
+/// - `cells`: what may still be spent.
+fn suggestion_within<'a>(found: &str, known: impl IntoIterator<Item = &'a str>, cells: &mut usize) -> String {
+    const SHORT_LIST: usize = 16;
+    let (lower, length) = (found.to_lowercase(), found.chars().count());
+    let (mut names, mut close) = (Vec::new(), None);
+    for name in known {
+        if names.len() <= SHORT_LIST {
+            names.push(name);
+        }
+        let other = name.chars().count();
+        let allowed = (other.max(length) / 3).max(1);
+        if other.abs_diff(length) > allowed {
+            continue;
+        }
+        let Some(left) = cells.checked_sub((other + 1).saturating_mul(length + 1)) else { continue };
+        *cells = left;
+        let distance = strsim::damerau_levenshtein(&lower, &name.to_lowercase());
+        if distance <= allowed && close.is_none_or(|best| (distance, name) < best) {
+            close = Some((distance, name));
+        }
+    }
     match close {
         Some((_, name)) => format!(" (did you mean `{name}`?)"),
-        None if known.is_empty() => String::new(),
-        None if known.len() <= 16 => format!(" (known: {})", known.join(", ")),
+        None if names.is_empty() => String::new(),
+        None if names.len() <= SHORT_LIST => format!(" (known: {})", names.join(", ")),
         None => String::new(),
     }
 }
@@ -103,5 +142,25 @@ mod tests {
         assert_eq!(suggestion("zebra", []), "");
         let many: Vec<String> = (0..40).map(|i| format!("material_{i}")).collect();
         assert_eq!(suggestion("zebra", many.iter().map(String::as_str)), "");
+    }
+
+    #[test]
+    fn a_suggestion_is_looked_for_within_bounds() {
+        let names: Vec<String> = (0..100_000).map(|i| format!("material_{i}")).collect();
+        let known = || names.iter().map(String::as_str);
+        let spent = |found: &str| {
+            let mut cells = MOST_CELLS;
+            (suggestion_within(found, known(), &mut cells), MOST_CELLS - cells)
+        };
+        let (hint, cells) = spent("materal_7000");
+        assert_eq!(hint, " (did you mean `material_7000`?)");
+        assert!(cells <= MOST_CELLS);
+        assert_eq!(spent("a name that is three times as long as any of those").1, 0, "no table is filled in");
+        assert_eq!(spent(&"m".repeat(1 << 20)), (String::new(), 0));
+        // Long names of about equal length.
+        let (long, other) = ("a".repeat(1 << 20), "b".repeat(1 << 20));
+        let mut cells = MOST_CELLS;
+        assert_eq!(suggestion_within(&long, [other.as_str(); 40], &mut cells), "");
+        assert_eq!(cells, MOST_CELLS, "a table too large for the budget is not begun");
     }
 }

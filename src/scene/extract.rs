@@ -3,7 +3,8 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`Part`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{Amount, Balls, MAX_LOBES, Material, PHONG_LOBES, Paint, Shape, SurfaceTexture};
+use super::bounds::radians;
+use super::components::{Amount, Balls, MAX_LOBES, Material, PHONG_LOBES, Paint, PointLight, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
@@ -221,6 +222,11 @@ impl Extraction {
         let origin = origin_for(&camera_of(inputs).view);
         let mut materials = MaterialTable::default();
         let mut problems = Vec::new();
+        if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
+            problems.push(format!(
+                "the camera is left out, and the picture is taken from where it would be without one: {bad}"
+            ));
+        }
         let mut geometry = (Vec::new(), Vec::new());
         let mut entities = Vec::new();
         for object in &inputs.objects {
@@ -320,7 +326,7 @@ pub fn origin_for(view: &View) -> DVec3 {
 }
 
 fn camera_of(inputs: &SceneInputs) -> CameraInput {
-    inputs.camera.unwrap_or(CameraInput {
+    inputs.camera.filter(|camera| camera.check().is_ok()).unwrap_or(CameraInput {
         entity: Entity::PLACEHOLDER,
         view: View::default(),
         projection: Projection::default(),
@@ -338,7 +344,7 @@ fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: D
         lens_radius: if lens.enabled { lens.radius as f32 } else { 0.0 },
         focus_distance: lens.focus_distance as f32,
         blades: lens.blades,
-        blade_rotation: lens.blade_rotation_deg.to_radians() as f32,
+        blade_rotation: radians(lens.blade_rotation_deg),
     }
 }
 
@@ -435,6 +441,7 @@ impl MaterialTable {
 /// The shading under the materials that `table` lists; what they blend is added to it.
 fn shading_of(inputs: &SceneInputs, geometry: &Geometry, table: &mut MaterialTable) -> Shading {
     let by_entity: HashMap<Entity, &Material> = inputs.materials.iter().map(|m| (m.entity, &m.material)).collect();
+    let lights: HashMap<Entity, &PointLight> = inputs.lights.iter().map(|light| (light.entity, &light.light)).collect();
     let mut textures = TextureTable::default();
     let mut materials = Vec::new();
     // Blends add to the table while it is walked, so its length is asked anew each time.
@@ -447,10 +454,10 @@ fn shading_of(inputs: &SceneInputs, geometry: &Geometry, table: &mut MaterialTab
                 material_of(material, table, &mut textures, &by_entity)
             }
             MaterialKey::Light(entity) => render::Material::Emissive {
-                radiance: ColorInput::Constant(inputs.lights.iter().find(|light| light.entity == entity).map_or(
+                radiance: ColorInput::Constant(lights.get(&entity).map_or(
                     Vec3::ZERO,
                     // A ball of radiance L and radius r has the radiant intensity π r² L in every direction.
-                    |light| light.light.intensity * (1.0 / (PI * light.light.radius.powi(2))) as f32,
+                    |light| light.intensity * (1.0 / (PI * light.radius.powi(2))) as f32,
                 )),
             },
         });

@@ -1,5 +1,6 @@
 //! What the picture depends on, copied out of the world in a fixed order.
 
+use super::bounds::BadValue;
 use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
@@ -50,6 +51,16 @@ pub struct CameraInput {
     pub view: View,
     pub projection: Projection,
     pub lens: Lens,
+}
+
+impl CameraInput {
+    /// # Errors
+    /// When no picture can be taken with it.
+    pub fn check(&self) -> Result<(), BadValue> {
+        self.view.check()?;
+        self.projection.check()?;
+        self.lens.check()
+    }
 }
 
 type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);

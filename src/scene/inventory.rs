@@ -5,6 +5,7 @@
 
 use super::components::{Material, Ordinal, Shape};
 use super::inputs::SceneInputs;
+use crate::printable;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use std::collections::{BTreeMap, BTreeSet};
@@ -56,7 +57,7 @@ impl Inventory {
         let (mut objects, mut lights) = (Vec::new(), Vec::new());
         for (i, object) in inputs.objects.iter().enumerate() {
             let kind = object.shape.kind();
-            let label = object.name.clone().unwrap_or_else(|| format!("{kind} {i}"));
+            let label = shown(&object.name).unwrap_or_else(|| format!("{kind} {i}"));
             let mut of_object = BTreeSet::new();
             for slot in &object.slots {
                 of_object.extend(parts.entry(*slot).or_insert_with(|| parts_of(world, *slot)).iter().copied());
@@ -73,7 +74,7 @@ impl Inventory {
         }
         for (i, light) in inputs.lights.iter().enumerate() {
             let (entity, kind) = (light.entity, "point light");
-            let label = light.name.clone().unwrap_or_else(|| format!("{kind} {i}"));
+            let label = shown(&light.name).unwrap_or_else(|| format!("{kind} {i}"));
             lights.push(LightEntry { entity, label: label.clone(), kind, material: None });
             objects.push(ObjectEntry { entity, label, kind });
         }
@@ -88,7 +89,7 @@ impl Inventory {
         }
         let materials = all.into_iter().map(|(entity, name)| {
             let users = users.remove(&entity).unwrap_or_default();
-            let label = name.unwrap_or_else(|| match users.first().and_then(|user| labels.get(user)) {
+            let label = shown(&name).unwrap_or_else(|| match users.first().and_then(|user| labels.get(user)) {
                 Some(user) => format!("of {user}"),
                 None => "no name".to_owned(),
             });
@@ -100,6 +101,11 @@ impl Inventory {
     pub fn material(&self, entity: Entity) -> Option<&MaterialEntry> {
         self.materials.iter().find(|entry| entry.entity == entity)
     }
+}
+
+/// As lists show it.
+fn shown(name: &Option<String>) -> Option<String> {
+    name.as_ref().map(|name| printable::name(name).into_owned())
 }
 
 /// The objects that use a material, directly or in a blend.

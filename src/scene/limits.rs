@@ -1,8 +1,7 @@
 //! How much a file of unknown origin may ask for, and where one number raises all of it.
 
-use std::fs::File;
-use std::io;
-use std::path::Path;
+/// Bytes of a picture file beside its pixels and its note: profiles, thumbnails, tables.
+const BESIDE: u64 = 64 << 20;
 
 /// What is refused for its size. `docs/stability.md` says what each number means in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +18,10 @@ pub struct Limits {
     pub film_pixels: u64,
     /// Bytes of the note that a picture carries.
     pub note_bytes: u64,
+    /// Bytes of a recording; reading takes up to about 10 bytes of memory for each.
+    pub recording_bytes: u64,
+    /// Bytes of settings, of the views of a scene, and of other small files of the program's own.
+    pub settings_bytes: u64,
 }
 
 impl Limits {
@@ -33,6 +36,8 @@ impl Limits {
         picture_pixels: 1 << 27,
         film_pixels: 1 << 26,
         note_bytes: 64 << 20,
+        recording_bytes: 256 << 20,
+        settings_bytes: 1 << 20,
     };
 
     /// The usual limits times the number in [`Self::VARIABLE`], where there is one.
@@ -53,26 +58,28 @@ impl Limits {
             picture_pixels: scaled(self.picture_pixels),
             film_pixels: scaled(self.film_pixels),
             note_bytes: scaled(self.note_bytes),
+            recording_bytes: scaled(self.recording_bytes),
+            settings_bytes: scaled(self.settings_bytes),
         }
+    }
+
+    /// Bytes of a picture file: the most pixels, not compressed, and all that may stand beside them.
+    pub fn picture_bytes(&self) -> u64 {
+        const BYTES_A_PIXEL: u64 = 16;
+        self.picture_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
+    }
+
+    /// Bytes of a film, likewise.
+    pub fn film_bytes(&self) -> u64 {
+        /// Of some thirty channels of four bytes, and what packing may add.
+        const BYTES_A_PIXEL: u64 = 160;
+        self.film_pixels.saturating_mul(BYTES_A_PIXEL).saturating_add(self.note_bytes).saturating_add(BESIDE)
     }
 
     /// What to do about a refusal.
     pub(crate) fn advice() -> String {
         format!("set {}=2 in the environment to double all limits", Self::VARIABLE)
     }
-}
-
-/// Opens a file whose end is known: a pipe would be waited for and a device might never end.
-pub(crate) fn open_file(path: &Path) -> io::Result<File> {
-    // Asked by name first, for opening a pipe already waits.
-    let info = std::fs::metadata(path)?;
-    if info.is_dir() {
-        return Err(io::Error::other("it is a folder"));
-    }
-    if !info.is_file() {
-        return Err(io::Error::other("it is not a regular file"));
-    }
-    File::open(path)
 }
 
 #[cfg(test)]
@@ -87,12 +94,5 @@ mod tests {
             assert_eq!(Limits::USUAL.times(nonsense), Limits::USUAL);
         }
         assert_eq!(Limits::USUAL.times(1e30).model_bytes, u64::MAX);
-    }
-
-    #[test]
-    fn folders_and_devices_are_not_opened() {
-        assert!(open_file(&std::env::temp_dir()).unwrap_err().to_string().contains("folder"));
-        #[cfg(unix)]
-        assert!(open_file(Path::new("/dev/zero")).unwrap_err().to_string().contains("regular"));
     }
 }

@@ -7,15 +7,17 @@ use super::extract::Trees;
 use super::file::{
     EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, ball_grid, locate,
 };
-use super::limits::{Limits, open_file};
-use super::meshes::{LoadedMesh, load_mesh, plain_io};
+use super::input_file::{FileKind, InputFile};
+use super::meshes::{LoadedMesh, load_mesh};
 use super::picture::read_picture;
+use super::relative::{path_to_text, text_to_path};
 use super::shot::Shot;
 use super::showcase;
 use super::stamp::{Stamp, stamp};
 use crate::render::ImageTexture;
-use std::collections::HashMap;
-use std::io::Read;
+use glam::DVec3;
+use std::collections::{HashMap, HashSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -95,8 +97,9 @@ impl SceneSource {
     ///
     /// # Errors
     /// When it is neither a built-in scene nor a file that can be opened here.
-    pub fn parse(word: &str) -> Result<Self, SceneError> {
-        let path = Path::new(word);
+    pub fn parse(word: impl AsRef<OsStr>) -> Result<Self, SceneError> {
+        let path = Path::new(word.as_ref());
+        let word = &*word.as_ref().to_string_lossy();
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         if !path.is_file() && builtin_text(word).is_some() {
             return Ok(Self::Builtin(word.to_owned()));
@@ -116,6 +119,14 @@ impl SceneSource {
                 let hint = suggestion(word, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
                 Err(SceneError::in_file(path, format!("neither a file nor a built-in scene{hint}")))
             }
+        }
+    }
+
+    /// The file that is opened, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Builtin(_) => None,
+            Self::Scene(path) | Self::Model(path) | Self::Picture(path) => Some(path),
         }
     }
 
@@ -149,7 +160,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             resolve(source, SceneFile::parse(&text, path)?, &text, folder, options)?
         }
         SceneSource::Model(path) => {
-            let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             let mesh_source = MeshSourcePart::Obj(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
@@ -222,39 +233,42 @@ fn resolve(
 ) -> Result<LoadedScene, SceneError> {
     let mut scene = LoadedScene::empty(source, file, folder);
     let title = PathBuf::from(source.title());
-    let mut problems = Vec::new();
+    let (mut problems, mut untold) = (Vec::new(), 0);
     // An error inside a file that the scene points at names that file; the scene's line is told beside it.
-    let mut note = |path: String, error: SceneError| {
-        for problem in error.problems {
-            let at = Some(locate(text, &path));
-            problems.push(Problem { file: Some(title.clone()), at, message: problem.to_string() });
+    let mut note = |path: String, error: &SceneError| {
+        for problem in &error.problems {
+            if problems.len() < SceneError::MAX_TOLD {
+                let at = Some(locate(text, &path));
+                problems.push(Problem { file: Some(title.clone()), at, message: problem.to_string() });
+            } else {
+                untold += 1;
+            }
         }
     };
-    let mut known: HashMap<(MeshSourcePart, MeshShadingPart, Option<u64>), LoadedMesh> = HashMap::new();
+    let before = options.known.map(Known::new);
+    let mut known: HashMap<MeshKey, Result<LoadedMesh, SceneError>> = HashMap::new();
     for (i, object) in scene.file.objects.iter().enumerate() {
         let (mut mesh, mut balls) = (None, None);
         match object {
             ObjectPart::Mesh { source, shading, simplify, .. } => {
-                let key = (source.clone(), *shading, simplify.map(f64::to_bits));
-                if let Some(loaded) = known.get(&key) {
-                    mesh = Some(loaded.clone());
-                } else {
+                let read = || {
                     let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = source;
                     options.say(&format!("reading {name}"));
-                    let kept = options.known.and_then(|known| known.fresh_mesh(&scene.folder, object));
-                    match kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok) {
-                        Ok(loaded) => {
-                            scene.warnings.extend(loaded.warnings.iter().cloned());
-                            mesh = Some(known.entry(key).or_insert(loaded).clone());
-                        }
-                        Err(error) => note(format!("objects/{i}/source"), error),
-                    }
+                    let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
+                    let loaded = kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok);
+                    let warnings = loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);
+                    scene.warnings.extend_from_slice(warnings);
+                    loaded
+                };
+                match known.entry((source.clone(), *shading, simplify.map(f64::to_bits))).or_insert_with(read) {
+                    Ok(loaded) => mesh = Some(loaded.clone()),
+                    Err(error) => note(format!("objects/{i}/source"), error),
                 }
             }
             ObjectPart::BallGrid { .. } | ObjectPart::Spheres { .. }
-                if options.known.is_some_and(|known| known.same_balls(object).is_some()) =>
+                if let Some(same) = before.as_ref().and_then(|before| before.same_balls(object)) =>
             {
-                balls = options.known.and_then(|known| known.same_balls(object));
+                balls = Some(same);
             }
             ObjectPart::BallGrid { first, steps, radius, .. } => {
                 let centers = ball_grid(*first, steps);
@@ -281,20 +295,17 @@ fn resolve(
         wanted.push(("environment/file".to_owned(), file.clone()));
     }
     for (place, file) in wanted {
-        let path = scene.folder.join(&file);
+        let path = scene.folder.join(text_to_path(&file));
         if let Err(error) = scene.add_picture(&file, &path, options) {
-            note(place, error);
+            note(place, &error);
         }
     }
     scene.add_mesh_pictures(options);
-    let mut of_materials: Vec<String> = Vec::new();
-    for warning in scene.meshes_with_own_materials().flat_map(|mesh| &mesh.material_warnings) {
-        if !of_materials.contains(warning) {
-            of_materials.push(warning.clone());
-        }
-    }
+    let mut told = HashSet::new();
+    let of_materials = scene.meshes_with_own_materials().flat_map(|mesh| &mesh.material_warnings);
+    let of_materials: Vec<String> = of_materials.filter(|warning| told.insert(*warning)).cloned().collect();
     scene.warnings.extend(of_materials);
-    if problems.is_empty() { Ok(scene) } else { Err(SceneError { problems }) }
+    if problems.is_empty() { Ok(scene) } else { Err(SceneError::of(problems, untold, Some(&title))) }
 }
 
 impl LoadedScene {
@@ -372,39 +383,9 @@ impl LoadedScene {
         files
     }
 
-    /// The mesh of an object that asks for the same, if its files are still the same.
-    fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
-        let key = |object: &ObjectPart| match object {
-            ObjectPart::Mesh { source, shading, simplify, .. } => {
-                Some((source.clone(), *shading, simplify.map(f64::to_bits)))
-            }
-            _ => None,
-        };
-        let wanted = key(wanted)?;
-        let is_builtin = matches!(wanted.0, MeshSourcePart::Builtin(_));
-        let place = self.file.objects.iter().position(|object| key(object).as_ref() == Some(&wanted))?;
-        let mesh = self.meshes[place].as_ref()?;
-        ((is_builtin || self.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
-    }
-
     /// The mesh of a model, if its files are still the same.
     fn fresh_model(&self) -> Option<LoadedMesh> {
         self.meshes.iter().flatten().find(|mesh| mesh.is_fresh()).cloned()
-    }
-
-    /// The balls of an object that has the same.
-    fn same_balls(&self, wanted: &ObjectPart) -> Option<Arc<Balls>> {
-        let same = |object: &ObjectPart| match (object, wanted) {
-            (
-                ObjectPart::BallGrid { first: a, steps: b, radius: c, .. },
-                ObjectPart::BallGrid { first, steps, radius, .. },
-            ) => (a, b, c) == (first, steps, radius),
-            (ObjectPart::Spheres { centers: a, radii: b, .. }, ObjectPart::Spheres { centers, radii, .. }) => {
-                (a, b) == (centers, radii)
-            }
-            _ => false,
-        };
-        self.balls[self.file.objects.iter().position(same)?].clone()
     }
 
     fn build_trees(&mut self, options: &LoadOptions) -> Result<(), SceneError> {
@@ -430,15 +411,81 @@ impl LoadedScene {
     }
 }
 
+/// What tells one mesh from another: where it comes from, and what is made of it.
+type MeshKey = (MeshSourcePart, MeshShadingPart, Option<u64>);
+
+/// What was read before, by what it was read for.
+struct Known<'a> {
+    scene: &'a LoadedScene,
+    meshes: HashMap<MeshKey, usize>,
+    balls: HashMap<BallsKey, usize>,
+}
+
+/// First centre, steps, radii and other centres, bit by bit.
+#[derive(PartialEq, Eq, Hash)]
+enum BallsKey {
+    Grid([u64; 4], Vec<(u32, [u64; 3])>),
+    Spheres(Vec<[u64; 3]>, Vec<u64>, bool),
+}
+
+impl<'a> Known<'a> {
+    fn new(scene: &'a LoadedScene) -> Self {
+        let mut known = Self { scene, meshes: HashMap::new(), balls: HashMap::new() };
+        for (i, object) in scene.file.objects.iter().enumerate() {
+            if let Some(key) = Self::mesh_key(object) {
+                known.meshes.entry(key).or_insert(i);
+            } else if let Some(key) = Self::balls_key(object) {
+                known.balls.entry(key).or_insert(i);
+            }
+        }
+        known
+    }
+
+    fn mesh_key(object: &ObjectPart) -> Option<MeshKey> {
+        match object {
+            ObjectPart::Mesh { source, shading, simplify, .. } => {
+                Some((source.clone(), *shading, simplify.map(f64::to_bits)))
+            }
+            _ => None,
+        }
+    }
+
+    fn balls_key(object: &ObjectPart) -> Option<BallsKey> {
+        let bits = |v: &DVec3| v.to_array().map(f64::to_bits);
+        match object {
+            ObjectPart::BallGrid { first, steps, radius, .. } => {
+                let [x, y, z] = bits(first);
+                let steps = steps.iter().map(|(count, step)| (*count, bits(step))).collect();
+                Some(BallsKey::Grid([x, y, z, radius.to_bits()], steps))
+            }
+            ObjectPart::Spheres { centers, radii, .. } => {
+                let (radii, each) = match radii {
+                    RadiiPart::All(radius) => (vec![radius.to_bits()], false),
+                    RadiiPart::Each(radii) => (radii.iter().map(|radius| radius.to_bits()).collect(), true),
+                };
+                Some(BallsKey::Spheres(centers.iter().map(bits).collect(), radii, each))
+            }
+            _ => None,
+        }
+    }
+
+    /// The mesh of an object that asks for the same, if its files are still the same.
+    fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
+        let key = Self::mesh_key(wanted)?;
+        let is_builtin = matches!(key.0, MeshSourcePart::Builtin(_));
+        let mesh = self.scene.meshes[*self.meshes.get(&key)?].as_ref()?;
+        ((is_builtin || self.scene.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
+    }
+
+    /// The balls of an object that has the same.
+    fn same_balls(&self, wanted: &ObjectPart) -> Option<Arc<Balls>> {
+        self.scene.balls[*self.balls.get(&Self::balls_key(wanted)?)?].clone()
+    }
+}
+
 /// The text of a scene file, within its limit.
 fn read_text(path: &Path) -> Result<String, SceneError> {
-    let fail = |error: std::io::Error| SceneError::in_file(path, format!("cannot be read: {}", plain_io(&error)));
-    let limit = Limits::of_this_process().scene_bytes;
-    let mut text = String::new();
-    open_file(path).map_err(fail)?.take(limit.saturating_add(1)).read_to_string(&mut text).map_err(fail)?;
-    if text.len() as u64 > limit {
-        let advice = Limits::advice();
-        return Err(SceneError::in_file(path, format!("is longer than {limit} bytes, the limit for scenes: {advice}")));
-    }
-    Ok(text)
+    InputFile::open(path, FileKind::Scene)
+        .and_then(InputFile::text)
+        .map_err(|error| SceneError::in_file(path, error.to_string()))
 }

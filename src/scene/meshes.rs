@@ -2,11 +2,12 @@
 
 use super::error::SceneError;
 use super::file::{Amount, MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
-use super::obj::{ImportedMaterial, ImportedObj, ObjError, ObjNormals, ObjOptions, load_obj_with};
+use super::obj::{ImportedMaterial, ImportedObj, ObjNormals, ObjOptions, load_obj_with};
+use super::relative::text_to_path;
 use super::stamp::{Stamp, stamp};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
 use glam::{DVec2, DVec3, Vec3};
-use std::io;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -65,7 +66,7 @@ pub fn load_mesh(
     folder: &Path,
 ) -> Result<LoadedMesh, SceneError> {
     match source {
-        MeshSourcePart::Obj(file) => read_obj(source, &folder.join(file), shading, simplify),
+        MeshSourcePart::Obj(file) => read_obj(source, &folder.join(text_to_path(file)), shading, simplify),
         MeshSourcePart::Builtin(_) => {
             let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
             Ok(LoadedMesh {
@@ -103,7 +104,7 @@ impl MeshBase {
     ) -> Result<Self, SceneError> {
         let (mesh, crease) = match source {
             MeshSourcePart::Obj(file) => {
-                let (imported, crease) = read_obj_base(&folder.join(file), shading, simplify.is_some())?;
+                let (imported, crease) = read_obj_base(&folder.join(text_to_path(file)), shading, simplify.is_some())?;
                 (imported.mesh, crease)
             }
             MeshSourcePart::Builtin(name) => {
@@ -172,6 +173,9 @@ fn read_obj(
             let part = loaded.material(material);
             loaded.slots.push((material.name.clone(), part));
         }
+        // Materials may share a picture.
+        let mut known = HashSet::new();
+        loaded.textures.retain(|(name, ..)| known.insert(name.clone()));
     }
     Ok(loaded)
 }
@@ -183,13 +187,8 @@ fn read_obj_base(
     simplify: bool,
 ) -> Result<(ImportedObj, Option<f32>), SceneError> {
     let read = |normals| {
-        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() }).map_err(|error| match error {
-            // The reader's own words for a missing file speak of an error number.
-            ObjError::Read { path, source } => {
-                SceneError::in_file(path, format!("cannot be read: {}", plain_io(&source)))
-            }
-            other => SceneError::new(other.to_string()),
-        })
+        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() })
+            .map_err(|error| SceneError::new(error.to_string()))
     };
     let computed = ObjOptions::default().normals;
     let ObjNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
@@ -268,17 +267,15 @@ impl LoadedMesh {
     fn texture(&mut self, file: Option<&PathBuf>) -> Option<Paint> {
         let file = file?;
         let name = file.display().to_string();
-        if !self.textures.iter().any(|(known, ..)| *known == name) {
-            let part = TexturePart::Image {
-                file: name.clone(),
-                repeat: DVec2::ONE,
-                offset: DVec2::ZERO,
-                rotate: 0.0,
-                wrap: WrapPart::Repeat,
-                smooth: true,
-            };
-            self.textures.push((name.clone(), part, file.clone()));
-        }
+        let part = TexturePart::Image {
+            file: name.clone(),
+            repeat: DVec2::ONE,
+            offset: DVec2::ZERO,
+            rotate: 0.0,
+            wrap: WrapPart::Repeat,
+            smooth: true,
+        };
+        self.textures.push((name.clone(), part, file.clone()));
         Some(Paint::Texture(name))
     }
 }
@@ -296,17 +293,6 @@ fn highlight_of(material: &ImportedMaterial) -> Option<(f32, f32)> {
     let strength = strength.clamp(Vec3::ZERO, Vec3::ONE).element_sum() / 3.0;
     let share = (2.0 * strength / (shininess + 1.0)).min(1.0);
     (share >= LEAST).then_some((share, shininess.max(1.0)))
-}
-
-/// What went wrong with a file, in plain words.
-pub fn plain_io(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "no such file".to_owned(),
-        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
-        io::ErrorKind::InvalidData => "it is not UTF-8 text".to_owned(),
-        _ => error.to_string(),
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! The way of a scene: text or OBJ → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`] (entities)
 //! → [`Extraction`] (a [`crate::render::Snapshot`] about an origin near the camera).
 
+pub(crate) mod bounds;
 mod builtin;
 mod components;
 mod describe;
@@ -13,12 +14,14 @@ mod extract;
 pub mod file;
 mod fingerprint;
 mod front;
+pub mod input_file;
 mod inputs;
 mod inventory;
 pub(crate) mod limits;
 mod load;
 mod meshes;
 pub mod obj;
+mod outputs;
 mod picture;
 mod placement;
 mod relative;
@@ -31,6 +34,7 @@ mod upright;
 mod view;
 pub mod whole_file;
 
+pub use bounds::{BadValue, check_film_size, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use components::{
     Amount, Balls, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
@@ -41,14 +45,17 @@ pub use error::{Problem, SceneError, suggestion};
 pub use extent::{Extent, ExtentCache};
 pub use extract::{Extraction, Part, Trees, origin_for};
 pub use fingerprint::{Fingerprint, SceneContent};
+pub use input_file::{FileKind, InputFile, ReadError, plain_io};
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
 pub use limits::Limits;
 pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
-pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase, plain_io};
+pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase};
+pub use outputs::{Files, FilesError};
+pub(crate) use picture::{decode_picture, picture_reader};
 pub use picture::{read_picture, read_picture_within};
 pub use placement::{Linear, Placement};
-pub use relative::{absolute, relative_path};
+pub use relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
 pub use save::{SavedScene, save_scene};
 pub use shot::{Shot, ShotDraft, ShotSamples, ShotScene};
 pub(crate) use spawn::texture_of;

@@ -1,10 +1,11 @@
 //! Picture files as textures: decoded once, linear, within limits.
 
-use super::limits::{Limits, open_file};
+use super::input_file::{FileKind, InputFile, ReadError};
+use super::limits::Limits;
 use crate::render::ImageTexture;
 use glam::Vec3;
 use image::{DynamicImage, ImageDecoder, ImageReader};
-use std::io::BufReader;
+use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
 /// Pixels along one side at most.
@@ -20,27 +21,11 @@ pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), Strin
 
 /// The same within limits of the caller's choice.
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), String> {
-    let mut reader = open_file(path)
-        .and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format())
-        .map_err(|error| format!("cannot be read: {}", super::meshes::plain_io(&error)))?;
-    let mut of_decoder = image::Limits::default();
-    of_decoder.max_image_width = Some(MAX_SIDE);
-    of_decoder.max_image_height = Some(MAX_SIDE);
-    of_decoder.max_alloc = Some(limits.picture_pixels.saturating_mul(BYTES_A_PIXEL));
-    reader.limits(of_decoder);
+    let reader = picture_reader(path, limits)?;
     if reader.format().is_none() {
         return Err("is no picture that can be read: use PNG, JPEG, HDR or EXR".to_owned());
     }
-    let undecodable = |error: image::ImageError| format!("cannot be decoded: {error}");
-    // A few bytes can claim any size, so it is asked for before anything is decoded.
-    let decoder = reader.into_decoder().map_err(undecodable)?;
-    let (width, height) = decoder.dimensions();
-    let pixels = u64::from(width) * u64::from(height);
-    if pixels > limits.picture_pixels {
-        let (limit, advice) = (limits.picture_pixels, Limits::advice());
-        return Err(format!("has {width} x {height} pixels, but the limit for pictures is {limit}: {advice}"));
-    }
-    let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?;
+    let picture = decode_picture(reader, limits)?;
     let (width, height) = (picture.width(), picture.height());
     let is_float = matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let mut texels: Vec<Vec3> = if is_float {
@@ -55,6 +40,40 @@ pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture
     texels.iter_mut().filter(|texel| !is_good(texel)).for_each(|texel| *texel = Vec3::ZERO);
     let warning = (bad > 0).then(|| format!("{bad} pixels are negative or not finite and were made black"));
     Ok((ImageTexture { width, height, texels }, warning))
+}
+
+/// A picture of whatever format its first bytes tell, not decoded yet.
+pub(crate) fn picture_reader(
+    path: &Path,
+    limits: &Limits,
+) -> Result<ImageReader<BufReader<InputFile<'static>>>, String> {
+    let file = InputFile::open_within(path, FileKind::Image, FileKind::Image.limit(limits));
+    let mut reader = file
+        .and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(ReadError::from))
+        .map_err(|error| error.to_string())?;
+    let mut of_decoder = image::Limits::default();
+    of_decoder.max_image_width = Some(MAX_SIDE);
+    of_decoder.max_image_height = Some(MAX_SIDE);
+    of_decoder.max_alloc = Some(limits.picture_pixels.saturating_mul(BYTES_A_PIXEL));
+    reader.limits(of_decoder);
+    Ok(reader)
+}
+
+/// The pixels, if there are no more than the limit.
+pub(crate) fn decode_picture<R: BufRead + Seek>(
+    reader: ImageReader<R>,
+    limits: &Limits,
+) -> Result<DynamicImage, String> {
+    let undecodable = |error: image::ImageError| format!("cannot be decoded: {error}");
+    // A few bytes can claim any size, so it is asked for before anything is decoded.
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > limits.picture_pixels {
+        let (limit, advice) = (limits.picture_pixels, Limits::advice());
+        return Err(format!("has {width} x {height} pixels, but the limit for pictures is {limit}: {advice}"));
+    }
+    DynamicImage::from_decoder(decoder).map_err(undecodable)
 }
 
 /// The sRGB transfer function backwards (IEC 61966-2-1).

@@ -2,9 +2,10 @@
 
 use super::describe::Description;
 use super::file::{EnvironmentPart, MeshSourcePart, ObjectPart, SceneFile, TexturePart};
+use super::input_file::{FileKind, InputFile};
 use super::load::LoadedScene;
-use super::obj::{ObjExtras, save_obj};
-use super::relative::{absolute, relative_path};
+use super::obj::{NewObj, ObjExtras, save_new_obj};
+use super::relative::{absolute, path_to_text, relative_path, text_to_path};
 use super::whole_file::write_whole;
 use bevy_ecs::prelude::World;
 use std::path::Path;
@@ -41,13 +42,22 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     move_paths(&mut description.file, &description.folder, &folder);
     let mut notes = std::mem::take(&mut description.losses);
-    let stem = path.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
-    for (number, (object, mesh)) in description.loose_meshes.iter().enumerate() {
-        let name = format!("{stem}-mesh-{}.obj", number + 1);
+    let stem = path.file_stem().map_or_else(|| "scene".to_owned(), |stem| path_to_text(stem.as_ref()));
+    let mut number = 0;
+    for (object, mesh) in &description.loose_meshes {
         let comment = format!("a mesh of {}", path.display());
-        save_obj(&folder.join(&name), mesh, &ObjExtras { comment: &comment, ..ObjExtras::default() })
-            .map_err(|error| error.to_string())?;
-        notes.push(format!("a mesh that came from no file was saved as {name}"));
+        let extras = ObjExtras { comment: &comment, ..ObjExtras::default() };
+        let name = loop {
+            number += 1;
+            let name = format!("{stem}-mesh-{number}.obj");
+            // A file that is there may be another mesh of this scene: it is replaced by nothing but itself.
+            match save_new_obj(&folder.join(text_to_path(&name)), mesh, &extras).map_err(|error| error.to_string())? {
+                NewObj::Written => notes.push(format!("a mesh that came from no file was saved as {name}")),
+                NewObj::Same => {}
+                NewObj::Taken => continue,
+            }
+            break name;
+        };
         if let Some(ObjectPart::Mesh { source, .. }) = description.file.objects.get_mut(*object) {
             *source = MeshSourcePart::Obj(name);
         }
@@ -58,7 +68,7 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
     if again != description.file {
         return Err(failed(&"it would not read back as the same scene; this is a bug in firstlight"));
     }
-    if std::fs::read_to_string(path).is_ok_and(|old| has_comments(&old)) {
+    if InputFile::open(path, FileKind::Scene).and_then(InputFile::text).is_ok_and(|old| has_comments(&old)) {
         notes.push("the comments of the old file are not kept".to_owned());
     }
     write_whole(path, text.as_bytes())?;
@@ -74,7 +84,7 @@ fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
     let moved = |path: &mut String| {
         // What was written relative to the same folder stays as it was written.
         if !(path.is_empty() || same && Path::new(path.as_str()).is_relative()) {
-            *path = relative_path(&to, &from.join(path.as_str()));
+            *path = relative_path(&to, &from.join(text_to_path(path)));
         }
     };
     for object in &mut file.objects {

@@ -5,21 +5,26 @@
 //! count from the picture. It also holds a fingerprint of the scene, so that a scene that has changed since is noticed;
 //! a scene with changes that were never saved is written into the note as a whole.
 
+use super::bounds::{check_film_size, check_max_depth};
 use super::describe::Description;
 use super::file::{CameraPart, DisplayPart, FilmPart, IntegratorPart, SceneFile};
-use super::limits::open_file;
 use super::load::{LoadedScene, SceneSource, UpAxis};
-use super::relative::{absolute, relative_path};
+use super::relative::{absolute, relative_path, text_to_path};
 use super::spawn::camera;
-use super::{Fingerprint, Limits, SceneContent};
+use super::{FileKind, Fingerprint, InputFile, Limits, ReadError, SceneContent};
+use crate::render::Film;
 use bevy_ecs::prelude::World;
+use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 /// The name of the note in a picture: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
+
+/// The attribute that makes a picture a film.
+pub const FILM_KEY: &str = "firstlight.film";
 
 /// A newer program that writes something else counts this up.
 const FORMAT: u32 = 1;
@@ -160,7 +165,7 @@ impl Shot {
 
     /// The same with limits of one's own.
     pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, String> {
-        Self::from_note(&note_of(path, limits.note_bytes)?)
+        Self::from_note(&note_of(path, limits)?)
     }
 
     /// The text of the note.
@@ -173,7 +178,7 @@ impl Shot {
     /// The note of the same picture when it is not at `from` but at `to`.
     pub fn moved(mut self, from: &Path, to: &Path) -> Self {
         let folder = |path: &Path| absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
-        let moved = |path: &str| relative_path(&folder(to), &folder(from).join(path));
+        let moved = |path: &str| relative_path(&folder(to), &folder(from).join(text_to_path(path)));
         match &mut self.scene {
             ShotScene::Scene(path) | ShotScene::Model { path, .. } => *path = moved(path),
             ShotScene::Builtin(_) | ShotScene::None => {}
@@ -190,7 +195,28 @@ impl Shot {
         if shot.format > FORMAT {
             return Err(format!("it was made by {}, which writes notes that this program does not know", shot.program));
         }
+        shot.check().map_err(|bad| format!("its note on how it was made cannot be right: {bad}"))?;
         Ok(shot)
+    }
+
+    /// Whether the program could have written it: the same limits as those of scene files.
+    fn check(&self) -> Result<(), String> {
+        if let Err(problems) = self.camera.components() {
+            return Err(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "));
+        }
+        check_film_size(self.film.width, self.film.height)?;
+        check_max_depth(self.max_depth)?;
+        self.display.check()?;
+        if self.first_sample.checked_add(self.spp).is_none_or(|end| end > Film::MAX_SAMPLES) {
+            let (first, spp) = (self.first_sample, self.spp);
+            return Err(format!("{spp} samples from {first} on: they are numbered below {}", Film::MAX_SAMPLES));
+        }
+        match self.scene {
+            ShotScene::Model { up: Some(up), .. } if !matches!(up, 'y' | 'z') => {
+                Err(format!("`up` is {up:?}, but must be 'y' or 'z'"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The scene that the picture at `path` shows, if it is there.
@@ -198,11 +224,15 @@ impl Shot {
     /// # Errors
     /// When its file is not there.
     pub fn source(&self, path: &Path) -> Result<Option<SceneSource>, String> {
-        let folder = path.parent().unwrap_or(Path::new(""));
+        // Its paths count from where it lies, not from a link that leads there.
+        let lies_at = if path.is_symlink() { absolute(path) } else { path.to_path_buf() };
+        let folder = lies_at.parent().unwrap_or(Path::new(""));
         let find = |relative: &str| {
-            let beside = Path::new(relative).file_name().map(|name| folder.join(name));
-            let found = [Some(folder.join(relative)), beside].into_iter().flatten().find(|path| path.is_file());
-            found.ok_or_else(|| format!("the scene that it shows, {relative}, is not there: put it beside the picture"))
+            let from_picture = text_to_path(relative);
+            let beside = from_picture.file_name().map(|name| folder.join(name));
+            let found = [Some(folder.join(&from_picture)), beside].into_iter().flatten().find(|path| path.is_file());
+            let name = from_picture.display();
+            found.ok_or_else(|| format!("the scene that it shows, {name}, is not there: put it beside the picture"))
         };
         Ok(match &self.scene {
             ShotScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
@@ -259,19 +289,45 @@ fn options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
-/// The text of the note, which may take `most` bytes.
-fn note_of(path: &Path, most: u64) -> Result<String, String> {
-    let file = open_file(path).map_err(|error| format!("cannot be read: {}", super::plain_io(&error)))?;
-    let most = usize::try_from(most).unwrap_or(usize::MAX);
-    let mut reader = BufReader::new(file);
+/// The note among the attributes of an OpenEXR picture.
+pub(crate) fn note_in(meta: &exr::meta::MetaData) -> Option<String> {
+    let mut notes = meta
+        .headers
+        .iter()
+        .flat_map(|header| header.shared_attributes.other.iter().chain(&header.own_attributes.other));
+    match notes.find(|(key, _)| **key == *NOTE_KEY) {
+        Some((_, AttributeValue::Text(text))) => Some(string_of(text)),
+        _ => None,
+    }
+}
+
+/// Any text as that of an attribute: its bytes in UTF-8, where the library's own way knows no more than Latin-1.
+pub(crate) fn exr_text(text: &str) -> AttributeValue {
+    AttributeValue::Text(Text::from_slice_unchecked(text.as_bytes()))
+}
+
+/// The way back; what is no UTF-8 was written as Latin-1.
+pub(crate) fn string_of(text: &Text) -> String {
+    let bytes = text.as_slice();
+    str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
+}
+
+/// The text of the note, within the limits.
+fn note_of(path: &Path, limits: &Limits) -> Result<String, String> {
+    let unreadable = |error: std::io::Error| ReadError::from(error).to_string();
+    // A film carries a note too, and is the longest of all pictures.
+    let longest = FileKind::Film.limit(limits).max(FileKind::Image.limit(limits));
+    let mut file = InputFile::open_within(path, FileKind::Image, longest).map_err(|error| error.to_string())?;
     let mut start = [0; 8];
-    let n = reader.read(&mut start).map_err(|error| format!("cannot be read: {error}"))?;
+    let n = file.read(&mut start).map_err(unreadable)?;
+    file.rewind().map_err(unreadable)?;
     let none = "it has no note on how it was made, so it cannot be opened as a scene: only pictures by firstlight can";
     if start[..n] == *b"\x89PNG\r\n\x1a\n" {
-        reader.seek_relative(-(n as i64)).map_err(|error| format!("cannot be read: {error}"))?;
         let unreadable = |error: png::DecodingError| format!("cannot be read: {error}");
-        let limits = png::Limits { bytes: most };
-        let decoder = png::Decoder::new_with_limits(reader, limits).read_info().map_err(unreadable)?;
+        let most = usize::try_from(limits.note_bytes).unwrap_or(usize::MAX);
+        let reader = BufReader::new(file);
+        let decoder =
+            png::Decoder::new_with_limits(reader, png::Limits { bytes: most }).read_info().map_err(unreadable)?;
         let info = decoder.info();
         let mut chunk = info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(none)?.clone();
         // A few kilobytes may claim to unpack to gigabytes.
@@ -279,17 +335,12 @@ fn note_of(path: &Path, most: u64) -> Result<String, String> {
         return chunk.get_text().map_err(unreadable);
     }
     if start[..n.min(4)] == [0x76, 0x2f, 0x31, 0x01] {
-        let meta =
-            exr::meta::MetaData::read_from_file(path, false).map_err(|error| format!("cannot be read: {error}"))?;
-        let notes = meta
-            .headers
-            .iter()
-            .flat_map(|header| header.shared_attributes.other.iter().chain(&header.own_attributes.other));
-        let mut texts = notes.filter(|(key, _)| **key == *NOTE_KEY);
-        return match texts.next() {
-            Some((_, exr::meta::attribute::AttributeValue::Text(text))) => Ok(text.to_string()),
-            _ => Err(none.to_owned()),
-        };
+        /// Of all that stands before the pixels beside the note.
+        const HEADER_BYTES: u64 = 1 << 20;
+        let header = BufReader::new(file).take(limits.note_bytes.saturating_add(HEADER_BYTES));
+        let meta = exr::meta::MetaData::read_from_buffered(header, false)
+            .map_err(|error| format!("cannot be read: {error}"))?;
+        return note_in(&meta).ok_or_else(|| none.to_owned());
     }
     Err("is neither a PNG nor an OpenEXR picture".to_owned())
 }

@@ -1,5 +1,6 @@
 //! From a loaded scene to entities.
 
+use super::bounds::{lens_radius_of, radians};
 use super::components::{
     Amount, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
     SceneEnvironment, Shape, SurfaceTexture,
@@ -7,7 +8,7 @@ use super::components::{
 use super::file::{self, CameraPart, EnvironmentPart, LightPart, MaterialPart, ObjectPart, TexturePart};
 use super::load::LoadedScene;
 use super::placement::Placement;
-use super::view::{Lens, Projection, View};
+use super::view::{Lens, Projection, View, unit_direction};
 use crate::render::{Display, Environment, ImageTexture, RenderSettings, Texture, TexturePattern};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
@@ -115,9 +116,7 @@ impl LoadedScene {
                 Environment::Gradient { zenith: zenith.0, horizon: horizon.0, ground: ground.0 }
             }
             EnvironmentPart::Image { file, scale, rotate } => match self.pictures.get(file) {
-                Some(image) => {
-                    Environment::Image { image: image.clone(), scale: scale.0, rotation: rotate.to_radians() as f32 }
-                }
+                Some(image) => Environment::Image { image: image.clone(), scale: scale.0, rotation: radians(*rotate) },
                 None => Environment::Black,
             },
         }
@@ -160,7 +159,7 @@ pub fn texture_of(part: &TexturePart, picture: impl FnOnce(&str) -> Option<Arc<I
             (TexturePattern::Image { image, wrap: (*wrap).into(), smooth: *smooth }, *repeat, *offset, *rotate)
         }
     };
-    let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(rotate.to_radians() as f32);
+    let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate));
     Some(Texture { pattern, uv_matrix, uv_offset: as_vec2(offset) })
 }
 
@@ -219,9 +218,11 @@ pub(super) fn material(
     }
 }
 
-/// The camera that a scene file describes.
+/// The camera that a scene file describes; [`CameraPart::components`] is the same with all checks.
 pub fn camera(part: &CameraPart) -> (View, Projection, Lens) {
-    let level = |forward: DVec3| part.up.reject_from_normalized(forward).normalize();
+    // Of a length that can be squared.
+    let wanted = if part.up.length_squared().is_normal() { part.up } else { along(part.up) };
+    let level = |forward: DVec3| wanted.reject_from_normalized(forward).normalize();
     let view = match (part.forward, part.look_at) {
         // A saved view comes back to the last bit: nothing is normalised that is unit and square already.
         (Some(forward), _) => {
@@ -232,13 +233,11 @@ pub fn camera(part: &CameraPart) -> (View, Projection, Lens) {
         }
         (None, look_at) => {
             let offset = look_at.unwrap_or(part.eye + DVec3::NEG_Z) - part.eye;
-            let forward = offset.normalize();
+            let forward = along(offset);
             View { eye: part.eye, forward, up: level(forward), pivot_distance: offset.length() }
         }
     };
-    // A film 24 mm high sees this angle through a lens of focal length 12 mm / tan(vfov / 2).
-    let focal_length = 0.012 / (0.5 * part.vfov).to_radians().tan();
-    let radius = part.f_stop.map(|stop| 0.5 * focal_length / stop).or(part.lens_radius).unwrap_or(0.0);
+    let radius = part.f_stop.map(|stop| lens_radius_of(part.vfov, stop)).or(part.lens_radius).unwrap_or(0.0);
     let lens = Lens {
         radius,
         focus_distance: part.focus_distance.unwrap_or(view.pivot_distance),
@@ -258,7 +257,12 @@ fn is_unit(vector: DVec3) -> bool {
 
 /// Of length 1; one that is so already keeps its bits.
 fn unit(vector: DVec3) -> DVec3 {
-    if is_unit(vector) { vector } else { vector.normalize() }
+    if is_unit(vector) { vector } else { along(vector) }
+}
+
+/// Of length 1; NaN for what has no direction, as `normalize` has it.
+fn along(vector: DVec3) -> DVec3 {
+    unit_direction(vector).unwrap_or(DVec3::NAN)
 }
 
 fn as_vec2(value: DVec2) -> Vec2 {

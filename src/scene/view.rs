@@ -4,6 +4,7 @@
 //! (metres, right-handed, Y up) and f64, so that a camera far from the origin moves as smoothly as one at it.
 //! How a person moves a view is in `frame::navigation`; what the renderer makes of it is `render::Camera`.
 
+use super::bounds::LEAST_SINE;
 use bevy_ecs::prelude::Component;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -59,8 +60,7 @@ impl View {
             return Err(ViewError::NotFinite { name: "look_at", value: look_at });
         }
         let (up_dir, _) = direction(up).ok_or(ViewError::NoUp)?;
-        // Below the root of the machine precision, less than half of the digits of the cross product mean anything.
-        if forward.cross(up_dir).length() < f64::EPSILON.sqrt() {
+        if forward.cross(up_dir).length() < LEAST_SINE {
             // The axis least like the view direction, so that the advice cannot fail in turn.
             let suggestion = if forward.y.abs() > forward.z.abs() { DVec3::Z } else { DVec3::Y };
             return Err(ViewError::UpAlongView { up, forward, suggestion });
@@ -95,10 +95,19 @@ impl View {
     }
 }
 
+/// The unit vector along `v`, whatever its length; `None` where it has none or is not finite.
+///
+/// Where the square of the length is a normal number, the same bits as `normalize`.
+pub(crate) fn unit_direction(v: DVec3) -> Option<DVec3> {
+    let squared = v.length_squared();
+    if squared.is_normal() { Some(v.normalize()) } else { direction(v).map(|(unit, _)| unit) }
+}
+
 /// The unit vector along `v` and the largest of its coordinates, or `None` for the zero vector.
 fn direction(v: DVec3) -> Option<(DVec3, f64)> {
     let scale = v.abs().max_element();
-    (scale > 0.0 && scale.is_finite()).then(|| ((v / scale).normalize(), scale))
+    // The largest of numbers is not told of one that is none.
+    (scale > 0.0 && v.is_finite()).then(|| ((v / scale).normalize(), scale))
 }
 
 impl Default for View {

@@ -1,124 +1,483 @@
-//! Files that appear whole or not at all: written under a temporary name in the same folder, then renamed.
+//! Files that appear whole or not at all: written under a temporary name in the same folder, then renamed. Everything
+//! that the program writes goes through here.
+//!
+//! - A symbolic link is followed and kept; what it leads to is replaced.
+//! - What is no regular file, or is read-only, is refused; so is a film, unless [`Replace`] allows it.
+//! - The temporary file is locked while it is written. One that a killed process left behind is not, and the next who
+//!   writes the same output takes it over.
+//! - A file that is claimed ([`WholeFile::claim`]) has one writer at a time, from the claim to the end of writing.
 
+use super::Fingerprint;
+use super::input_file::{FileKind, InputFile};
+use super::relative::absolute;
+use super::shot::FILM_KEY;
+use std::collections::BTreeSet;
+use std::error::Error;
 use std::fmt::Display;
-use std::io::{BufWriter, ErrorKind, Write};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tempfile::{NamedTempFile, TempPath};
+
+/// What a file may take the place of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Replace {
+    /// Of any file but a film: its samples took long and are nowhere else.
+    #[default]
+    AllButFilms,
+    Anything,
+}
 
 /// A file that is being written, and has not taken its name yet. Dropped, it leaves nothing behind.
 pub struct WholeFile {
-    out: BufWriter<NamedTempFile>,
+    out: BufWriter<File>,
+    part: TempPath,
+    /// As it was asked for.
     path: PathBuf,
+    /// Where that leads.
+    target: PathBuf,
+    in_progress: InProgress,
+}
+
+/// The temporary files of this process, and whether the program is about to end without them.
+static PARTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+static GIVEN_UP: AtomicBool = AtomicBool::new(false);
+
+fn parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Knows of one temporary file for as long as it lives.
+struct InProgress(PathBuf);
+
+impl InProgress {
+    fn of(part: &Path) -> Self {
+        parts().insert(part.to_path_buf());
+        Self(part.to_path_buf())
+    }
+
+    fn check(&self) -> io::Result<()> {
+        if GIVEN_UP.load(Ordering::SeqCst) { Err(io::Error::other("the program is ending")) } else { Ok(()) }
+    }
+}
+
+impl Drop for InProgress {
+    fn drop(&mut self) {
+        parts().remove(&self.0);
+    }
+}
+
+/// For a program that ends while other threads write: no file takes its name any more, and those in progress are taken
+/// away.
+pub fn give_up() {
+    GIVEN_UP.store(true, Ordering::SeqCst);
+    for part in std::mem::take(&mut *parts()) {
+        // One that has just taken its name is whole.
+        let _ = std::fs::remove_file(part);
+    }
 }
 
 /// Finds out whether a file can be written here, without leaving anything behind.
 ///
 /// # Errors
 /// A sentence that names the path, and what is in the way.
-pub fn check_writable(path: &Path) -> Result<(), String> {
-    if path.is_dir() {
-        return Err(format!("{}: is a folder: name a file", path.display()));
-    }
-    WholeFile::begin(path).map(drop)
+pub fn check_writable(path: &Path, replace: Replace) -> Result<(), String> {
+    WholeFile::begin(path, replace).map(drop)
 }
 
-/// Writes a whole file; one that was there stays until the new one is complete.
+/// The same as far as the file itself is asked, if it is there; its folder is not tried.
+pub fn check_replaceable(path: &Path, replace: Replace) -> Result<(), String> {
+    check_target(path, &absolute(path), replace)
+}
+
+/// Writes a whole file; one that was there stays until the new one is complete. Films are not replaced.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let mut file = WholeFile::begin(path)?;
+    let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     file.write_all(bytes).map_err(|error| unwritable(path, &error))?;
     file.finish()
+}
+
+/// Whether a file says of itself that it is a film, whole or damaged.
+pub fn is_film(path: &Path) -> bool {
+    /// The attribute comes soon after those that every picture has.
+    const LOOKED_AT: u64 = 1 << 16;
+    let mut start = Vec::new();
+    let read = InputFile::open_within(path, FileKind::Film, u64::MAX)
+        .map_err(std::io::Error::other)
+        .and_then(|file| file.take(LOOKED_AT).read_to_end(&mut start));
+    let name = [FILM_KEY.as_bytes(), b"\0"].concat();
+    read.is_ok() && start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) && start.windows(name.len()).any(|part| part == name)
 }
 
 impl WholeFile {
     /// # Errors
     /// As [`check_writable`].
-    pub fn begin(path: &Path) -> Result<Self, String> {
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".firstlight-").suffix(".part");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // As any new file: the user's mask decides.
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
+    pub fn begin(path: &Path, replace: Replace) -> Result<Self, String> {
+        let target = absolute(path);
+        check_target(path, &target, replace)?;
+        // Somebody may have claimed it.
+        let claimed = part_name(&target, None);
+        if let Ok(file) = OpenOptions::new().read(true).open(&claimed) {
+            match file.try_lock() {
+                Err(TryLockError::WouldBlock) => return Err(busy(path)),
+                // Left behind by a process that was killed.
+                Ok(()) if is_at(&file, &claimed) => drop(std::fs::remove_file(&claimed)),
+                _ => {}
+            }
         }
-        let file = builder.tempfile_in(folder).map_err(|error| {
-            // The library's own words name the temporary file, which nobody asked for.
-            let reason = match error.kind() {
-                _ if folder.exists() && !folder.is_dir() => format!("{} is not a folder", folder.display()),
-                ErrorKind::NotFound if !folder.is_dir() => format!("there is no folder {}", folder.display()),
-                ErrorKind::StorageFull => "the disk is full".to_owned(),
-                ErrorKind::ReadOnlyFilesystem => format!("{} lies on a read-only disk", folder.display()),
-                // Some folders that the system makes up answer `not found` to whoever wants to write.
-                _ => format!("the folder {} takes no new files", folder.display()),
-            };
-            unwritable(path, &reason)
-        })?;
-        Ok(Self { out: BufWriter::with_capacity(1 << 16, file), path: path.to_path_buf() })
+        /// Processes that write one output at the same moment.
+        const WRITERS: u32 = 64;
+        let mut begun = (0..WRITERS).map(|number| open_part(&target, Some(number)));
+        match begun.find(|part| !matches!(part, Ok(None))) {
+            Some(Ok(Some(part))) => {
+                remove_left_over(&target, WRITERS - begun.len() as u32, WRITERS);
+                Ok(Self::new(part, path, target))
+            }
+            Some(Err(error)) => Err(cannot_begin(path, &target, &error)),
+            _ => Err(busy(path)),
+        }
+    }
+
+    /// The same for a file that one process at a time may work on: nobody else can begin to write it until this is
+    /// finished or dropped.
+    ///
+    /// # Errors
+    /// As [`check_writable`], and when another process has claimed the file.
+    pub fn claim(path: &Path, replace: Replace) -> Result<Self, String> {
+        let target = absolute(path);
+        check_target(path, &target, replace)?;
+        match open_part(&target, None) {
+            Ok(Some(part)) => Ok(Self::new(part, path, target)),
+            Ok(None) => Err(busy(path)),
+            Err(error) => Err(cannot_begin(path, &target, &error)),
+        }
+    }
+
+    fn new(part: NamedTempFile, path: &Path, target: PathBuf) -> Self {
+        // Without the name: messages are about the file that was asked for.
+        let (file, part) = part.into_parts();
+        let in_progress = InProgress::of(&part);
+        Self { out: BufWriter::with_capacity(1 << 16, file), part, path: path.to_path_buf(), target, in_progress }
+    }
+
+    /// The file that was asked for.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Takes the place of whatever had the name.
     pub fn finish(self) -> Result<(), String> {
-        let path = self.path.clone();
-        self.complete()?.persist(&path).map(drop).map_err(|error| unwritable(&path, &error.error))
+        self.finish_open().map(drop)
+    }
+
+    /// The same for what goes on being written; locked, so that no other process begins to write it.
+    pub fn finish_open(self) -> Result<File, String> {
+        let (path, target) = (self.path.clone(), self.target.clone());
+        let (file, part) = self.complete()?;
+        if let Ok(old) = std::fs::metadata(&target) {
+            // Not all disks keep them, and the file is whole without.
+            let _ = file.set_permissions(old.permissions());
+        }
+        part.persist(&target).map_err(|error| unwritable(&path, &error.error))?;
+        Ok(file)
     }
 
     /// Takes the first of `names` that is free: never over a file that is there, even one that another program makes
     /// at the same moment. Answers with the name; `None` when all are taken.
     pub fn finish_new(self, names: impl Iterator<Item = PathBuf>) -> Result<Option<PathBuf>, String> {
-        let mut file = self.complete()?;
+        let (_file, mut part) = self.complete()?;
         for path in names {
-            file = match file.persist_noclobber(&path) {
+            part = match part.persist_noclobber(&path) {
                 Ok(_) => return Ok(Some(path)),
-                Err(error) if error.error.kind() == ErrorKind::AlreadyExists => error.file,
+                Err(error) if error.error.kind() == ErrorKind::AlreadyExists => error.path,
                 Err(error) => return Err(unwritable(&path, &error.error)),
             };
         }
         Ok(None)
     }
 
-    fn complete(self) -> Result<NamedTempFile, String> {
-        let path = self.path;
-        let file = self.out.into_inner().map_err(|error| unwritable(&path, error.error()))?;
-        file.as_file().sync_all().map_err(|error| unwritable(&path, &error))?;
-        Ok(file)
+    fn complete(self) -> Result<(File, TempPath), String> {
+        let Self { out, part, path, in_progress, .. } = self;
+        let file = out.into_inner().map_err(|error| unwritable(&path, error.error()))?;
+        file.sync_all().and_then(|()| in_progress.check()).map_err(|error| unwritable(&path, &error))?;
+        Ok((file, part))
     }
 }
 
 impl Write for WholeFile {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.in_progress.check()?;
         self.out.write(bytes)
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 }
 
 /// What every failure to write a file says.
-pub fn unwritable(path: &Path, reason: &dyn Display) -> String {
+pub fn unwritable(path: &Path, reason: &(dyn Error + 'static)) -> String {
+    // Libraries wrap what the system says in words of their own.
+    let mut cause = Some(reason);
+    let kind = std::iter::from_fn(|| {
+        let this = cause?;
+        cause = this.source();
+        Some(this.downcast_ref::<io::Error>().map(io::Error::kind))
+    });
+    match kind.flatten().next() {
+        Some(ErrorKind::StorageFull) => cannot_be_written(path, &"the disk is full"),
+        Some(ErrorKind::QuotaExceeded) => {
+            cannot_be_written(path, &"no more of the disk may be used: its quota is full")
+        }
+        Some(ErrorKind::FileTooLarge) => cannot_be_written(path, &"it would be larger than a file may be here"),
+        _ => cannot_be_written(path, reason),
+    }
+}
+
+fn cannot_be_written(path: &Path, reason: &(impl Display + ?Sized)) -> String {
     format!("{}: cannot be written: {reason}", path.display())
+}
+
+fn busy(path: &Path) -> String {
+    format!("{}: is being written by another process: wait until that has ended, or name another file", path.display())
+}
+
+/// Whether what is there may be replaced.
+fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), String> {
+    // All links have been followed.
+    if target.is_symlink() {
+        return Err(cannot_be_written(path, &"its links lead nowhere"));
+    }
+    let Ok(info) = std::fs::metadata(target) else { return Ok(()) };
+    if info.is_dir() {
+        return Err(format!("{}: is a folder: name a file", path.display()));
+    }
+    if !info.is_file() {
+        return Err(format!("{}: is not a regular file, so it is not replaced: name another", path.display()));
+    }
+    let read_only = || format!("{}: is read-only, so it is not replaced: name another file", path.display());
+    if info.permissions().readonly() {
+        return Err(read_only());
+    }
+    // Nothing is written by this: the system is asked what it would allow.
+    match OpenOptions::new().write(true).open(target) {
+        Ok(file) if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) => return Err(busy(path)),
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => return Err(read_only()),
+        _ => {}
+    }
+    if replace == Replace::AllButFilms && is_film(target) {
+        return Err(format!(
+            "{}: is a film, and its samples would be lost: name another file, or allow it by --overwrite",
+            path.display()
+        ));
+    }
+    Ok(())
+}
+
+/// The name under which `target` is written: that of the claim, or of the writer with this number.
+fn part_name(target: &Path, number: Option<u32>) -> PathBuf {
+    let name = target.file_name().unwrap_or_default().as_encoded_bytes();
+    let hash = Fingerprint::default().with(name.iter().copied()).0 as u64;
+    let number = number.map_or_else(String::new, |number| format!("-{number}"));
+    target.with_file_name(format!(".firstlight-{hash:016x}{number}.part"))
+}
+
+/// Makes or takes over the temporary file of that name, empty and locked; `None` when somebody else has it.
+fn open_part(target: &Path, number: Option<u32>) -> io::Result<Option<NamedTempFile>> {
+    let name = part_name(target, number);
+    let folder = name.parent().unwrap_or(Path::new(".")).to_path_buf();
+    let new_file = || {
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).create(true).truncate(false);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::OpenOptionsExt;
+            // As any new file: the user's mask decides.
+            options.mode(0o666);
+        }
+        options
+    };
+    /// It is gone again when its owner ends between opening and locking; not for ever.
+    const ATTEMPTS: u32 = 100;
+    for _ in 0..ATTEMPTS {
+        // A link that somebody has laid here would lead elsewhere.
+        if std::fs::symlink_metadata(&name).is_ok_and(|info| !info.is_file()) {
+            return Ok(None);
+        }
+        let file = match new_file().open(&name) {
+            Ok(file) => file,
+            // Somebody else's, in a folder that many share.
+            Err(error) if error.kind() == ErrorKind::PermissionDenied && name.exists() => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        match file.try_lock() {
+            Ok(()) if is_at(&file, &name) => {
+                file.set_len(0)?;
+                let mut file = Some(file);
+                let taken = || io::Error::from(ErrorKind::AlreadyExists);
+                let mut builder = tempfile::Builder::new();
+                builder.prefix(name.file_name().unwrap_or_default()).rand_bytes(0);
+                return builder.make_in(folder, |_| file.take().ok_or_else(taken)).map(Some);
+            }
+            // It was renamed or removed in between.
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            // Some disks know no locks: a name that nobody else has, then.
+            Err(TryLockError::Error(_)) => {
+                drop(file);
+                let _ = std::fs::remove_file(&name);
+                let mut builder = tempfile::Builder::new();
+                builder.prefix(".firstlight-").suffix(".part");
+                return builder.make_in(folder, |path| new_file().create_new(true).open(path)).map(Some);
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Removes what killed processes have left of earlier writers of the same output, from this number on.
+fn remove_left_over(target: &Path, from: u32, to: u32) {
+    for number in from..to {
+        let name = part_name(target, Some(number));
+        let Ok(file) = OpenOptions::new().read(true).open(&name) else { return };
+        if file.try_lock().is_ok() && is_at(&file, &name) {
+            // Whoever may not remove it may leave it.
+            let _ = std::fs::remove_file(&name);
+        }
+    }
+}
+
+/// Whether the name still leads to the file that was opened by it.
+fn is_at(file: &File, name: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let (opened, named) = (file.metadata(), std::fs::symlink_metadata(name));
+        matches!((opened, named), (Ok(a), Ok(b)) if (a.dev(), a.ino()) == (b.dev(), b.ino()))
+    }
+    #[cfg(not(unix))]
+    {
+        // A file that is open keeps its name there.
+        let _ = file;
+        name.exists()
+    }
+}
+
+fn cannot_begin(path: &Path, target: &Path, error: &io::Error) -> String {
+    // As it was asked for, not where links lead.
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let lies_in = target.parent().unwrap_or(folder);
+    let reason = match error.kind() {
+        _ if folder.exists() && !folder.is_dir() => format!("{} is not a folder", folder.display()),
+        ErrorKind::NotFound if !lies_in.is_dir() => format!("there is no folder {}", folder.display()),
+        ErrorKind::StorageFull => "the disk is full".to_owned(),
+        ErrorKind::ReadOnlyFilesystem => format!("{} lies on a read-only disk", folder.display()),
+        // Some folders that the system makes up answer `not found` to whoever wants to write.
+        _ => format!("the folder {} takes no new files", folder.display()),
+    };
+    cannot_be_written(path, &reason)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap().flatten();
+        let mut names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
     #[test]
     fn a_file_appears_whole_and_a_dropped_one_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         write_whole(&path, b"old").unwrap();
-        let mut file = WholeFile::begin(&path).unwrap();
+        let mut file = WholeFile::begin(&path, Replace::AllButFilms).unwrap();
         file.write_all(b"half").unwrap();
         drop(file);
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(names(folder.path()), ["a.txt"]);
         write_whole(&path, b"new").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn what_a_killed_writer_left_is_removed_and_what_a_living_one_writes_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let [first, second, claimed] = [Some(0), Some(1), None].map(|number| part_name(&path, number));
+        for left in [&first, &second, &claimed] {
+            std::fs::write(left, "a half").unwrap();
+        }
+        write_whole(&path, b"whole").unwrap();
+        assert_eq!(
+            (names(folder.path()), std::fs::read(&path).unwrap()),
+            (vec!["a.txt".to_owned()], b"whole".to_vec())
+        );
+        // Two at once: each has a file of its own, and the last one counts.
+        let mut living = WholeFile::begin(&path, Replace::AllButFilms).unwrap();
+        living.write_all(b"living").unwrap();
+        write_whole(&path, b"quicker").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"quicker");
+        living.finish().unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"living");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_claimed_file_has_one_writer_until_it_is_done() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let mut claim = WholeFile::claim(&path, Replace::AllButFilms).unwrap();
+        let beside = folder.path().join("../").join(folder.path().file_name().unwrap()).join("a.exr");
+        for refused in [WholeFile::claim(&beside, Replace::Anything), WholeFile::begin(&beside, Replace::Anything)] {
+            assert!(refused.err().is_some_and(|error| error.contains("is being written by another process")));
+        }
+        claim.write_all(b"mine").unwrap();
+        claim.finish().unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"mine");
+        // What goes on being written stays claimed under its own name.
+        let open = WholeFile::claim(&path, Replace::Anything).unwrap().finish_open().unwrap();
+        assert!(write_whole(&path, b"yours").unwrap_err().contains("is being written"));
+        drop(open);
+        write_whole(&path, b"yours").unwrap();
+        assert_eq!(names(folder.path()), ["a.exr"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_kept_and_read_only_files_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        std::fs::create_dir(root.join("far")).unwrap();
+        symlink("far/b.txt", root.join("a.txt")).unwrap();
+        // First what is not there yet, then what is.
+        for text in ["one", "two"] {
+            write_whole(&root.join("a.txt"), text.as_bytes()).unwrap();
+            assert_eq!(std::fs::read_to_string(root.join("far/b.txt")).unwrap(), text);
+            assert_eq!(std::fs::read_link(root.join("a.txt")).unwrap(), Path::new("far/b.txt"));
+        }
+        let mode =
+            |mode: u32| std::fs::set_permissions(root.join("far/b.txt"), PermissionsExt::from_mode(mode)).unwrap();
+        mode(0o640);
+        write_whole(&root.join("a.txt"), b"three").unwrap();
+        assert_eq!(std::fs::metadata(root.join("far/b.txt")).unwrap().permissions().mode() & 0o777, 0o640);
+        mode(0o444);
+        assert!(write_whole(&root.join("a.txt"), b"four").unwrap_err().contains("a.txt: is read-only"));
+        assert_eq!(std::fs::read(root.join("far/b.txt")).unwrap(), b"three");
+        symlink("/dev/null", root.join("null")).unwrap();
+        assert!(write_whole(&root.join("null"), b"").unwrap_err().contains("is not a regular file"));
+        symlink("round", root.join("round")).unwrap();
+        assert!(write_whole(&root.join("round"), b"").is_err());
     }
 
     #[test]
@@ -131,13 +490,19 @@ mod tests {
             (plain.join("a.txt"), "is not a folder"),
             (folder.path().to_path_buf(), "is a folder: name a file"),
         ] {
-            let error = check_writable(&path).unwrap_err();
+            let error = check_writable(&path, Replace::AllButFilms).unwrap_err();
             assert!(error.contains(expected) && !error.contains(".firstlight"), "{error}");
         }
         #[cfg(target_os = "linux")]
         {
-            let error = check_writable(Path::new("/proc/a.txt")).unwrap_err();
+            let error = check_writable(Path::new("/proc/a.txt"), Replace::AllButFilms).unwrap_err();
             assert!(error.contains("/proc takes no new files"), "{error}");
         }
+        // However deep a library has wrapped it.
+        #[derive(Debug, thiserror::Error)]
+        #[error("wrapped")]
+        struct Wrapped(#[source] io::Error);
+        let full = Wrapped(io::Error::from(ErrorKind::StorageFull));
+        assert_eq!(unwritable(Path::new("a.png"), &full), "a.png: cannot be written: the disk is full");
     }
 }

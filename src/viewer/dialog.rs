@@ -48,12 +48,12 @@ impl Purpose {
         match self {
             Self::Open => Command::Open { path },
             Self::AddMesh => {
-                let path = path.to_string_lossy().into_owned();
+                let path = crate::scene::path_to_text(&path);
                 Command::Edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path))))
             }
             Self::Texture { id } => {
                 let part = TexturePart::Image {
-                    file: path.to_string_lossy().into_owned(),
+                    file: crate::scene::path_to_text(&path),
                     repeat: DVec2::ONE,
                     offset: DVec2::ZERO,
                     rotate: 0.0,

@@ -19,6 +19,7 @@
 //! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
 //! | `saver` | pictures to disk, on the side |
 //! | `dialog` | a file chosen in a dialog of the desktop |
+//! | `question` | what is asked before edits are lost |
 //! | [`display`] | is there a display at all |
 
 mod app;
@@ -33,6 +34,7 @@ pub mod keys;
 mod overlay;
 mod panel;
 mod presenter;
+mod question;
 mod reaction;
 mod saver;
 mod status;

@@ -2,6 +2,7 @@
 
 use super::keys::{BINDINGS, Binding, Group, finds};
 use super::toasts::{Toast, Tone};
+use crate::printable;
 use crate::render::{Legend, scale_color};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
 
@@ -31,6 +32,7 @@ pub fn style(context: &Context) {
 
 /// The line at the lower edge; it takes no mouse.
 pub fn status_line(context: &Context, left: &str, right: &str) {
+    let (left, right) = (&*printable::line(left), &*printable::line(right));
     let screen = context.content_rect();
     egui::Area::new("status".into())
         .order(Order::Foreground)
@@ -59,6 +61,11 @@ pub fn status_line(context: &Context, left: &str, right: &str) {
                 ui.painter().galley(at, right, TEXT);
             }
         });
+}
+
+/// The name of a key, beside what it does.
+pub fn style_key(key: &str) -> RichText {
+    RichText::new(key).size(TEXT_SIZE - 1.0).color(KEY)
 }
 
 /// Messages in the upper left corner; they take no mouse.

@@ -79,16 +79,16 @@ impl Saver {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
             let Larger { snapshot, settings, size, spp, threads } = larger;
-            let failed = |reason: String| format!("the picture was not saved: {reason}");
-            check_film_size(size.0, size.1).map_err(failed)?;
+            let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
+            check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
             // Threads of its own: those of the window belong to what is seen, and must not wait for this.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let pool = pool.map_err(|error| failed(format!("no threads can be started: {error}")))?;
-            let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(error.to_string()))?;
+            let pool = pool.map_err(|error| failed(&format!("no threads can be started: {error}")))?;
+            let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(&error))?;
             let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
             pool.install(|| render_offline_until(&snapshot, &settings, &mut film, target, &stop, |_| true));
             if film.spp() == 0 {
-                return Err(failed("the window was closed before each of its pixels had a sample".to_owned()));
+                return Err(failed(&"the window was closed before each of its pixels had a sample"));
             }
             print(&folder, &stem, &film, draft, &display, size, format)
         });

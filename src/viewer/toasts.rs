@@ -1,5 +1,6 @@
 //! Short messages over the picture that go away by themselves. Told the time, so that they can be tested.
 
+use crate::printable;
 use std::time::{Duration, Instant};
 
 /// News, or something that went wrong.
@@ -27,7 +28,7 @@ impl Toasts {
     const MOST: usize = 5;
 
     pub fn add(&mut self, tone: Tone, text: impl Into<String>, now: Instant) {
-        let text = text.into();
+        let text = printable::lines(&text.into());
         // Long enough to read: a problem is read twice.
         let reading = Duration::from_millis(1500 + 40 * text.len() as u64);
         let until = now + if tone == Tone::Problem { 2 * reading + Duration::from_secs(3) } else { reading };

@@ -223,6 +223,12 @@ impl Program<'_> {
         self.xdotool(&format!("mouseup {button}"));
     }
 
+    /// Tells the process something, such as `TERM`.
+    pub fn signal(&self, name: &str) {
+        let told = Command::new("kill").args([format!("-{name}"), self.child.0.id().to_string()]).status();
+        assert!(told.expect("a command of every system").success(), "{}", self.errors());
+    }
+
     pub fn resize(&self, width: u32, height: u32) {
         self.xdotool(&format!("windowsize {} {width} {height}", self.window));
     }

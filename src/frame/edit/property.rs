@@ -117,8 +117,9 @@ pub(super) fn paint_mut(material: &mut Material) -> Option<&mut Paint> {
 
 /// Sets one property; the sky needs no entity.
 pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value: DVec3) -> Result<(), String> {
-    if !value.is_finite() {
-        return Err("a number must be finite".to_owned());
+    // Many of them end in single precision.
+    if !value.as_vec3().is_finite() {
+        return Err(format!("a number must be finite, and at most {:e}", f32::MAX));
     }
     if property.is_of_sky() {
         return sky::set(world, property, value);

@@ -3,6 +3,7 @@
 use super::Property;
 use crate::render::Environment;
 use crate::scene::SceneEnvironment;
+use crate::scene::bounds::radians;
 use crate::scene::file::{EnvironmentPart, Rgb};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
@@ -22,7 +23,7 @@ pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), St
     let sky = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default();
     let light = match property {
         Property::SkyStrength => with_strength(&sky.light, (value.x as f32).max(0.0)),
-        Property::SkyRotation => turned(&sky.light, value.x.to_radians() as f32),
+        Property::SkyRotation => turned(&sky.light, radians(value.x)),
         _ => with_color(&sky.light, property, value.max(DVec3::ZERO).as_vec3()),
     };
     let light = light.ok_or_else(|| format!("this sky has no {property:?}"))?;

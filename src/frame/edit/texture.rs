@@ -48,7 +48,7 @@ pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(),
     };
     if let (TexturePart::Image { file, .. }, None) = (&part, &known) {
         let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
-        let path = folder.join(file);
+        let path = folder.join(crate::scene::text_to_path(file));
         world.resource::<Beside>().read_picture(entity, part, path);
         return Ok(());
     }

@@ -14,7 +14,7 @@ pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth
 pub use moves::{VERTICAL, dolly, fly, frame_points, level, orbit, pan, roll, turn, zoom};
 
 use super::Command;
-use crate::scene::{Lens, Projection, View};
+use crate::scene::{BadValue, Lens, Projection, View};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +24,16 @@ pub struct Rig {
     pub view: View,
     pub projection: Projection,
     pub lens: Lens,
+}
+
+impl Rig {
+    /// # Errors
+    /// When no picture can be taken with it.
+    pub fn check(&self) -> Result<(), BadValue> {
+        self.view.check()?;
+        self.projection.check()?;
+        self.lens.check()
+    }
 }
 
 /// What turning keeps.

@@ -67,9 +67,13 @@ pub fn roll(view: &View, angle: f64) -> View {
     finite_or(view, View { up, ..*view }.orthonormalized())
 }
 
-/// Takes the roll out. A view straight up or down has no horizon and stays.
+/// Takes the roll out. A view straight up or down has no horizon and stays, and so does one without roll, bit by bit.
 pub fn level(view: &View) -> View {
-    if elevation(view).abs() > MAX_ELEVATION {
+    /// Sine of the angle; a thousandth of a pixel over the widest film.
+    const NONE: f64 = 1e-8;
+    let right = view.forward.cross(VERTICAL).normalize_or_zero();
+    let is_level = view.up.dot(right).abs() <= NONE && view.up.dot(VERTICAL) > 0.0;
+    if is_level || elevation(view).abs() > MAX_ELEVATION {
         return *view;
     }
     View { up: VERTICAL, ..*view }.orthonormalized()
@@ -146,6 +150,21 @@ mod tests {
 
     fn start() -> View {
         View::look_at(DVec3::new(3.0, 2.0, 4.0), DVec3::new(0.5, 0.25, -0.5), DVec3::Y).unwrap()
+    }
+
+    #[test]
+    fn what_is_level_stays_bit_by_bit_and_what_leans_is_levelled() {
+        for (yaw, pitch) in [(0.0, 0.0), (0.3, -0.4), (2.0, 0.9), (-1.1, -1.2)] {
+            let view = turn(&start(), yaw, pitch, Turning::default());
+            let level_view = level(&view);
+            assert_eq!(level_view, level(&level_view));
+            assert_eq!(level(&start()), start());
+            for angle in [1e-3, -0.5, 3.0] {
+                let leaning = roll(&level_view, angle);
+                let again = level(&leaning);
+                assert!(again != leaning && close(again.up, level_view.up, 1e-12), "{angle}");
+            }
+        }
     }
 
     fn close(a: DVec3, b: DVec3, tolerance: f64) -> bool {

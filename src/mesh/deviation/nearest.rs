@@ -3,9 +3,15 @@
 //! Boxes lie along the axes, and where that leaves them mostly empty, as with a fan of needles, turned ones beside them
 //! (as in OBB trees, Gottschalk, Lin and Manocha 1996): a point that lies in the boxes of all needles lies in the turned
 //! boxes of a few.
+//!
+//! Distances are right to rounding. Where thousands of triangles share an edge or lie on each other, rounding is all that
+//! tells which of them is the nearest, and to find out would mean to look at each; the first that is met will do. Where
+//! thousands are about as near, the distance is right to a thousandth ([`PATIENCE`]).
 
 use crate::mesh::Mesh;
 use glam::{DMat3, DVec3};
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// Triangles a leaf.
 const LEAF: usize = 4;
@@ -16,7 +22,16 @@ pub(super) struct NearestTree {
     frames: Vec<Frame>,
     /// In the order of the leaves.
     triangles: Vec<[DVec3; 3]>,
+    /// Metres: by how much distances to triangles and to boxes may be off.
+    rounding: f64,
 }
+
+/// The share of a squared distance by which it may be off beside that.
+const PRECISION: f64 = 1e-12;
+
+/// Nodes that are looked into before [`ROUGHLY`] takes the place of [`PRECISION`].
+const PATIENCE: usize = 1024;
+const ROUGHLY: f64 = 2e-3;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -49,58 +64,137 @@ impl NearestTree {
         let mut triangles: Vec<[DVec3; 3]> =
             (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| p.as_dvec3() + offset)).collect();
         if triangles.is_empty() {
-            return Self { nodes: Vec::new(), frames: Vec::new(), triangles };
+            return Self { nodes: Vec::new(), frames: Vec::new(), triangles, rounding: 0.0 };
         }
         let Branch { nodes, frames, .. } = build(&mut triangles, 0);
-        Self { nodes, frames, triangles }
+        let largest = nodes[0].min.abs().max(nodes[0].max.abs()).max_element();
+        Self { nodes, frames, triangles, rounding: 64.0 * f64::EPSILON * largest }
     }
 
-    /// The squared distance to the nearest point; infinite for an empty mesh.
+    /// The squared distance to the nearest point, to rounding; infinite for an empty mesh.
     ///
     /// - `guess`: the nearest triangle of a point close by, if known; set to this point's.
     pub fn nearest(&self, point: DVec3, guess: &mut Option<u32>) -> f64 {
         self.search(point, guess, || ())
     }
 
+    /// Depth first, which is quick where little is looked at. What takes longer goes on with the nearest box of all: where
+    /// large boxes hold the point and nothing near it, all that lies in them would be looked at first.
+    ///
     /// - `look`: called for each triangle that is looked at.
     #[inline(always)]
     fn search(&self, point: DVec3, guess: &mut Option<u32>, mut look: impl FnMut()) -> f64 {
+        const DEPTH_FIRST: usize = 128;
         let Some(root) = self.nodes.first() else { return f64::INFINITY };
-        let mut best = guess.map_or(f64::INFINITY, |t| distance2_to_triangle(point, &self.triangles[t as usize]));
+        let best = guess.map_or(f64::INFINITY, |t| distance2_to_triangle(point, &self.triangles[t as usize]));
+        let mut found = Found { best, precision: PRECISION, limit: self.worthwhile(best, PRECISION), guess };
         // Splits halve the count, so 64 levels hold any mesh.
-        let mut stack = [(0.0, 0_u32); 64];
-        stack[0] = (distance2_to_box(point, root), 0);
-        let mut top = 1;
-        while top > 0 {
+        let mut stack = [Open { bound: 0.0, node: 0 }; 64];
+        stack[0] = Open { bound: distance2_to_box(point, root), node: 0 };
+        let (mut top, mut steps) = (1, 0);
+        while top > 0 && steps < DEPTH_FIRST {
             top -= 1;
-            let (bound, index) = stack[top];
-            if bound >= best {
+            let open = stack[top];
+            if open.bound >= found.limit {
                 continue;
             }
-            let node = &self.nodes[index as usize];
-            if node.count > 0 {
-                for t in node.link..node.link + node.count {
-                    look();
-                    let distance2 = distance2_to_triangle(point, &self.triangles[t as usize]);
-                    if distance2 < best {
-                        best = distance2;
-                        *guess = Some(t);
-                    }
-                }
-                continue;
+            steps += 1;
+            if let Some([near, far]) = self.step(point, open.node, &mut found, &mut look) {
+                stack[top] = far;
+                stack[top + 1] = near;
+                top += 2;
             }
-            let children = [index + 1, node.link].map(|i| (self.bound(point, &self.nodes[i as usize]), i));
-            let [near, far] = if children[0].0 <= children[1].0 { children } else { [children[1], children[0]] };
-            stack[top] = far;
-            stack[top + 1] = near;
-            top += 2;
         }
-        best
+        if top > 0 {
+            self.search_on(point, BinaryHeap::from(stack[..top].to_vec()), &mut found, &mut look);
+        }
+        found.best
+    }
+
+    /// The nearest box first.
+    #[cold]
+    fn search_on(&self, point: DVec3, mut open: BinaryHeap<Open>, found: &mut Found, look: &mut impl FnMut()) {
+        let mut steps = 0;
+        while let Some(next) = open.pop()
+            && next.bound < found.limit
+        {
+            steps += 1;
+            if steps == PATIENCE {
+                found.precision = ROUGHLY;
+            }
+            let children = self.step(point, next.node, found, look);
+            open.extend(children.into_iter().flatten().filter(|child| child.bound < found.limit));
+        }
+    }
+
+    /// Looks at the triangles of a leaf, or answers with the children of an inner node, the nearer one first.
+    #[inline(always)]
+    fn step(&self, point: DVec3, index: u32, found: &mut Found, look: &mut impl FnMut()) -> Option<[Open; 2]> {
+        let node = &self.nodes[index as usize];
+        if node.count == 0 {
+            let child = |node: u32| Open { bound: self.bound(point, &self.nodes[node as usize]), node };
+            let [left, right] = [child(index + 1), child(node.link)];
+            return Some(if left.bound <= right.bound { [left, right] } else { [right, left] });
+        }
+        for t in node.link..node.link + node.count {
+            look();
+            let distance2 = distance2_to_triangle(point, &self.triangles[t as usize]);
+            if distance2 < found.best {
+                (found.best, *found.guess) = (distance2, Some(t));
+            }
+        }
+        found.limit = self.worthwhile(found.best, found.precision);
+        None
     }
 }
 
+/// The nearest so far.
+struct Found<'a> {
+    /// Squared distance.
+    best: f64,
+    /// The share of it by which it may be off.
+    precision: f64,
+    /// Boxes that are as far hold nothing nearer.
+    limit: f64,
+    guess: &'a mut Option<u32>,
+}
+
+/// A node that has not been looked into. The nearest is the greatest, of equals the first.
+#[derive(Clone, Copy, Debug)]
+struct Open {
+    bound: f64,
+    node: u32,
+}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.bound.total_cmp(&self.bound).then(other.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
 impl NearestTree {
-    /// No more than the squared distance of a point to what lies below a node.
+    /// The squared distance to a box from which on nothing in it is nearer than `best` by more than rounding and this share.
+    #[inline(always)]
+    fn worthwhile(&self, best: f64, precision: f64) -> f64 {
+        let nearer = (best.sqrt() - self.rounding).max(0.0);
+        nearer * nearer * (1.0 - precision)
+    }
+
+    /// The squared distance of a point to what holds all that lies below a node.
     #[inline(always)]
     fn bound(&self, point: DVec3, node: &Node) -> f64 {
         let straight = distance2_to_box(point, node);
@@ -141,12 +235,13 @@ fn build(triangles: &mut [[DVec3; 3]], first: u32) -> Branch {
         };
         join(node, left, right)
     };
-    // A surface that fills its box as surfaces do is not looked at any further.
+    // A surface that fills its box as surfaces do is not looked at any further: needles fill less of it, and the leaves of a
+    // book more.
     let DVec3 { x, y, z } = max - min;
-    let face = (x * y).max(y * z).max(z * x);
-    if 0.5 * branch.area < 0.25 * face
+    let (face, area) = ((x * y).max(y * z).max(z * x), 0.5 * branch.area);
+    if !(0.25 * face..=2.0 * face).contains(&area)
         && let Some(frame) = Frame::around(triangles, 0.5 * (min + max))
-        && frame.area() < 0.5 * (x * y + y * z + z * x)
+        && (frame.area() < 0.5 * (x * y + y * z + z * x) || frame.volume() < 0.25 * x * y * z)
     {
         branch.nodes[0].frame = branch.frames.len() as u32;
         branch.frames.push(frame);
@@ -203,16 +298,15 @@ impl Frame {
         x * y + y * z + z * x
     }
 
-    /// No more than the squared distance of a point to anything in the box.
+    fn volume(&self) -> f64 {
+        (self.max - self.min).element_product()
+    }
+
+    /// The squared distance of a point to the box.
     #[inline]
     fn distance2(&self, point: DVec3) -> f64 {
-        let from_center = point - self.center;
-        let place = self.axes * from_center;
-        let outside = (place - place.clamp(self.min, self.max)).abs();
-        // Each number of `place`, and of the corners of the box, is right to four roundings of the lengths that are
-        // multiplied; the axes are as good.
-        let reach = from_center.abs().element_sum() + self.min.abs().max(self.max.abs()).element_sum();
-        (outside - 16.0 * f64::EPSILON * reach).max(DVec3::ZERO).length_squared()
+        let place = self.axes * (point - self.center);
+        (place - place.clamp(self.min, self.max)).length_squared()
     }
 }
 
@@ -322,6 +416,49 @@ mod tests {
         }
     }
 
+    /// Triangles on one edge: the leaves of a book, of one near its back, and triangles that lie on each other in a plane.
+    #[test]
+    fn triangles_on_one_edge_are_looked_at_a_few_at_a_time() {
+        let books: [(&str, fn(f64) -> DVec3); 4] = [
+            ("a book", |t| DVec3::new(t.cos(), t.sin(), 0.5)),
+            ("a thin book", |t| DVec3::new(0.01 * t.cos(), 0.01 * t.sin(), 0.5)),
+            ("a plane", |t| DVec3::new(1.0 + 0.1 * t, 0.3 + 0.03 * t, 0.5)),
+            ("a steep plane", |t| DVec3::new(0.2 + 0.02 * t, 0.9 - 0.05 * t, 0.3)),
+        ];
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.5, 0.9, 0.3);
+        for (name, apex) in books {
+            let looks = [4000_u32, 32_000].map(|n| {
+                let apexes = (0..n).map(|i| apex(std::f64::consts::TAU * f64::from(i) / f64::from(n)));
+                let points: Vec<DVec3> = [DVec3::ZERO, DVec3::Z].into_iter().chain(apexes).map(|p| turn * p).collect();
+                let mesh = Mesh::from_f64(&points, (0..n).map(|i| [0, 1, 2 + i]).collect()).unwrap();
+                let tree = NearestTree::build(&mesh, DVec3::ZERO);
+                let (mut looks, queries) = (0, 500_usize);
+                for i in 0..queries {
+                    let t = i as f64;
+                    // Half of them on the surface, the others a little off it.
+                    let [a, b, c] = mesh.corners(i * 7 % n as usize).map(|p| p.as_dvec3());
+                    let (u, v) = ((t * 0.37).fract(), (t * 0.71).fract());
+                    let on = a + 0.5 * (u + v - u * v) * (b - a) + 0.5 * v * (c - a);
+                    let point = if i % 2 == 0 { on } else { on + 1e-4 * (b - a).cross(c - a).normalize() };
+                    let found = tree.search(point, &mut None, || looks += 1);
+                    if i % 10 < 2 {
+                        let expected = (0..mesh.triangles.len())
+                            .map(|t| distance2_to_triangle(point, &mesh.corners(t).map(|p| p.as_dvec3())))
+                            .fold(f64::INFINITY, f64::min);
+                        let over = found.sqrt() - expected.sqrt();
+                        assert!(
+                            (-1e-12..=1e-12 + 1e-3 * expected.sqrt()).contains(&over),
+                            "{name}: {over:e} over {expected:e}"
+                        );
+                    }
+                }
+                looks / queries
+            });
+            // Eight times as many triangles, and not twice the work.
+            assert!(looks[1] <= 2 * looks[0] + 8, "{name}: {looks:?}");
+        }
+    }
+
     #[test]
     fn agrees_with_looking_at_every_triangle() {
         let mesh = procedural::displaced_sphere(&procedural::DisplacedSphere { frequency: 12, ..Default::default() });
@@ -333,7 +470,8 @@ mod tests {
             let expected = (0..mesh.triangles.len())
                 .map(|t| distance2_to_triangle(point, &mesh.corners(t).map(|p| p.as_dvec3())))
                 .fold(f64::INFINITY, f64::min);
-            assert_eq!(tree.nearest(point, &mut guess), expected);
+            let found = tree.nearest(point, &mut guess);
+            assert!((found - expected).abs() <= 2.0 * PRECISION * expected, "{point}: {found:e} {expected:e}");
         }
     }
 }

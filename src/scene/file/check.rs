@@ -5,18 +5,30 @@ use super::parts::{
     TexturePart, TransformPart,
 };
 use super::value::{Amount, Paint, Rgb};
-use crate::render::Film;
+use crate::scene::bounds::{
+    check_film_size, check_max_depth, coordinate_rule, is_coordinate, is_size, number, size_rule, triple,
+};
 use crate::scene::components::{MAX_LOBES, PHONG_LOBES};
 use crate::scene::error::suggestion;
 use crate::scene::meshes::BUILTIN_NAMES;
 use crate::scene::placement::Placement;
+use crate::scene::view::unit_direction;
 use glam::{DVec2, DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// Everything wrong with `file`, each with the path of the value (see [`super::locate`]).
-pub fn check(file: &SceneFile) -> Vec<(String, String)> {
-    let materials = file.materials.iter().collect();
-    let mut check = Check { file, materials, problems: Vec::new() };
+/// What is wrong with a file.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// The first of them, each with the path of the value (see [`super::locate`]).
+    pub told: Vec<(String, String)>,
+    /// How many more there are.
+    pub untold: usize,
+}
+
+/// The first `most` of what is wrong with `file`, and how much more there is.
+pub fn check(file: &SceneFile, most: usize) -> Found {
+    let (materials, textures) = (file.materials.iter().collect(), file.textures.names().collect());
+    let mut check = Check { file, materials, textures, most, found: Found::default() };
     check.camera(&file.camera);
     check.film();
     check.environment();
@@ -35,88 +47,48 @@ pub fn check(file: &SceneFile) -> Vec<(String, String)> {
         check.light(&format!("lights/{i}/intensity"), *intensity);
         check.size(&format!("lights/{i}/radius"), "the radius", *radius);
     }
-    check.problems
+    check.found
 }
 
 struct Check<'a> {
     file: &'a SceneFile,
     materials: HashMap<&'a str, &'a MaterialPart>,
-    problems: Vec<(String, String)>,
+    textures: HashSet<&'a str>,
+    /// Problems that are told; the others are only counted.
+    most: usize,
+    found: Found,
 }
 
 impl Check<'_> {
     fn wrong(&mut self, path: &str, message: impl Into<String>) {
-        self.problems.push((path.to_owned(), message.into()));
+        if self.found.told.len() < self.most {
+            self.found.told.push((path.to_owned(), message.into()));
+        } else {
+            self.found.untold += 1;
+        }
+    }
+
+    /// What names nothing that is `known`. Near names are looked for only where somebody reads them.
+    fn misnamed<'k>(&mut self, path: &str, what: String, name: &str, known: impl Iterator<Item = &'k str>) {
+        let hint = if self.found.told.len() < self.most { suggestion(name, known) } else { String::new() };
+        self.wrong(path, what + &hint);
     }
 
     fn camera(&mut self, camera: &CameraPart) {
-        self.point("camera/eye", camera.eye);
-        self.vector("camera/up", "`up`", camera.up);
-        let view = match (camera.look_at, camera.forward) {
-            (Some(look_at), None) => {
-                self.point("camera/look_at", look_at);
-                look_at - camera.eye
-            }
-            (None, Some(forward)) => {
-                self.vector("camera/forward", "`forward`", forward);
-                forward
-            }
-            (None, None) => {
-                return self
-                    .wrong("camera", "the camera looks nowhere: give `look_at`, a point, or `forward`, a direction");
-            }
-            (Some(_), Some(_)) => {
-                return self.wrong("camera/forward", "`look_at` and `forward` say the same thing: give one of them");
-            }
-        };
-        if let Some(distance) = camera.pivot_distance {
-            if camera.forward.is_none() {
-                self.wrong("camera/pivot_distance", "`pivot_distance` goes with `forward`: here `look_at` says it");
-            } else {
-                self.size("camera/pivot_distance", "`pivot_distance`", distance);
-            }
+        for bad in camera.components().err().into_iter().flatten() {
+            let path = if bad.field() == "camera" { "camera".to_owned() } else { format!("camera/{}", bad.field()) };
+            self.wrong(&path, bad);
         }
-        if camera.look_at.is_some() && view.is_finite() && view.length() < SceneFile::MIN_SIZE {
-            self.wrong("camera/look_at", "`eye` and `look_at` are the same point: move one of them");
-        } else if view.is_finite() && camera.up.is_finite() {
-            let sine = view.normalize().cross(camera.up.normalize_or_zero()).length();
-            if camera.up != DVec3::ZERO && sine < 1e-9 {
-                self.wrong("camera/up", "`up` is parallel to the view direction: tilt one of them");
-            }
-        }
-        if !(camera.vfov > 0.0 && camera.vfov < 180.0) {
-            self.wrong("camera/vfov", format!("`vfov` is {}, but must lie above 0 and below 180 degrees", camera.vfov));
-        }
-        if camera.lens_radius.is_some() && camera.f_stop.is_some() {
-            self.wrong("camera/f_stop", "`lens_radius` and `f_stop` say the same thing: give one of them");
-        }
-        if let Some(radius) = camera.lens_radius
-            && !(0.0..=SceneFile::MAX_COORDINATE).contains(&radius)
-        {
-            self.wrong("camera/lens_radius", format!("`lens_radius` is {radius}, but must be 0 or positive"));
-        }
-        if let Some(f_stop) = camera.f_stop
-            && !is_positive(f_stop)
-        {
-            self.wrong("camera/f_stop", format!("`f_stop` is {f_stop}, but must be positive"));
-        }
-        if let Some(distance) = camera.focus_distance
-            && !is_positive(distance)
-        {
-            self.wrong("camera/focus_distance", format!("`focus_distance` is {distance}, but must be positive"));
-        }
-        self.finite("camera/blade_rotation", camera.blade_rotation);
     }
 
     fn film(&mut self) {
-        if let Err(message) = check_film_size(self.file.film.width, self.file.film.height) {
-            self.wrong("film", message);
-        }
-        if self.file.max_depth == Some(0) {
-            self.wrong("max_depth", "a path of 0 segments sees nothing: use at least 1, or leave it out for no limit");
-        }
-        if !self.file.display.exposure.is_finite() {
-            self.wrong("display/exposure", "`exposure` must be a finite number of stops");
+        let checks = [
+            ("film", check_film_size(self.file.film.width, self.file.film.height)),
+            ("max_depth", check_max_depth(self.file.max_depth)),
+            ("display/exposure", self.file.display.check()),
+        ];
+        for (path, bad) in checks.into_iter().filter_map(|(path, result)| Some((path, result.err()?))) {
+            self.wrong(path, bad);
         }
     }
 
@@ -147,11 +119,17 @@ impl Check<'_> {
             TexturePart::Image { repeat, offset, rotate, .. } => (("repeat", *repeat), *offset, *rotate),
         };
         let (field, DVec2 { x, y }) = size;
-        if !(x.is_finite() && y.is_finite() && x != 0.0 && y != 0.0) {
-            self.wrong(&format!("{path}/{field}"), format!("`{field}` must be two finite numbers other than 0"));
+        // Beyond these, single precision has no such number.
+        let (least, most) = (SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
+        if ![x, y].iter().all(|size| (least..=most).contains(&size.abs())) {
+            let allowed = format!("two finite numbers other than 0, from {least:e} to {most:e} either way");
+            let message = format!("`{field}` is ({}, {}), but must be {allowed}", number(x), number(y));
+            self.wrong(&format!("{path}/{field}"), message);
         }
-        if !offset.is_finite() {
-            self.wrong(&format!("{path}/offset"), "`offset` must be finite");
+        if !(offset.abs().max_element() <= most && offset.is_finite()) {
+            let (x, y) = (number(offset.x), number(offset.y));
+            let message = format!("`offset` is ({x}, {y}), but must be finite and at most {most:e} either way");
+            self.wrong(&format!("{path}/offset"), message);
         }
         self.finite(&format!("{path}/rotate"), rotate);
     }
@@ -274,12 +252,12 @@ impl Check<'_> {
             }
             ObjectPart::Plane { point, normal, .. } => {
                 self.point(&format!("{path}/point"), *point);
-                self.vector(&format!("{path}/normal"), "the normal", *normal);
+                self.direction(&format!("{path}/normal"), "the normal", *normal);
             }
             ObjectPart::Quad { corner, edge_u, edge_v, .. } => {
                 self.point(&format!("{path}/corner"), *corner);
-                self.vector(&format!("{path}/edge_u"), "`edge_u`", *edge_u);
-                self.vector(&format!("{path}/edge_v"), "`edge_v`", *edge_v);
+                self.edge(&format!("{path}/edge_u"), "`edge_u`", *edge_u);
+                self.edge(&format!("{path}/edge_v"), "`edge_v`", *edge_v);
                 self.area(path, "quad", *edge_u, *edge_v);
             }
             ObjectPart::Triangle { vertices: [a, b, c], .. } => {
@@ -298,8 +276,8 @@ impl Check<'_> {
                 if let MeshSourcePart::Builtin(name) = source
                     && !BUILTIN_NAMES.contains(&name.as_str())
                 {
-                    let hint = suggestion(name, BUILTIN_NAMES.iter().copied());
-                    self.wrong(&format!("{path}/source"), format!("there is no built-in mesh `{name}`{hint}"));
+                    let what = format!("there is no built-in mesh `{name}`");
+                    self.misnamed(&format!("{path}/source"), what, name, BUILTIN_NAMES.iter().copied());
                 }
                 if let Some(ratio) = simplify
                     && !(*ratio > 0.0 && *ratio <= 1.0)
@@ -377,15 +355,13 @@ impl Check<'_> {
 
     fn material_name(&mut self, path: &str, name: &str) {
         if !self.materials.contains_key(name) {
-            let hint = suggestion(name, self.file.materials.names());
-            self.wrong(path, format!("material `{name}` is not defined{hint}"));
+            self.misnamed(path, format!("material `{name}` is not defined"), name, self.file.materials.names());
         }
     }
 
     fn texture_name(&mut self, path: &str, name: &str) {
-        if self.file.textures.get(name).is_none() {
-            let hint = suggestion(name, self.file.textures.names());
-            self.wrong(path, format!("texture `{name}` is not defined{hint}"));
+        if !self.textures.contains(name) {
+            self.misnamed(path, format!("texture `{name}` is not defined"), name, self.file.textures.names());
         }
     }
 
@@ -423,29 +399,34 @@ impl Check<'_> {
 
     fn finite(&mut self, path: &str, value: f64) {
         if !value.is_finite() {
-            self.wrong(path, format!("{value} is not a finite number"));
+            self.wrong(path, format!("{} is not a finite number", number(value)));
         }
     }
 
     fn point(&mut self, path: &str, point: DVec3) {
         if !is_coordinate(point) {
-            let DVec3 { x, y, z } = point;
-            let limit = SceneFile::MAX_COORDINATE;
-            self.wrong(path, format!("({x}, {y}, {z}) must be finite and within {limit:e} m of the origin"));
+            self.wrong(path, format!("{} must {}", triple(point), coordinate_rule()));
         }
     }
 
-    fn vector(&mut self, path: &str, what: &str, vector: DVec3) {
+    /// Any length but none.
+    fn direction(&mut self, path: &str, what: &str, vector: DVec3) {
+        if unit_direction(vector).is_none() {
+            self.wrong(path, format!("{what} is {}, but must be finite and have a length", triple(vector)));
+        }
+    }
+
+    fn edge(&mut self, path: &str, what: &str, vector: DVec3) {
         if !is_coordinate(vector) || vector.length() < SceneFile::MIN_SIZE {
-            let DVec3 { x, y, z } = vector;
-            self.wrong(path, format!("{what} is ({x}, {y}, {z}), but must be finite and have a length"));
+            let (least, most) = (SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
+            let allowed = format!("be finite and have a length between {least:e} and {most:e} m");
+            self.wrong(path, format!("{what} is {}, but must {allowed}", triple(vector)));
         }
     }
 
     fn size(&mut self, path: &str, what: &str, size: f64) {
         if !is_size(size) {
-            let (least, most) = (SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
-            self.wrong(path, format!("{what} is {size}, but must lie between {least:e} and {most:e} m"));
+            self.wrong(path, format!("{what} is {}, but must {}", number(size), size_rule()));
         }
     }
 
@@ -456,37 +437,4 @@ impl Check<'_> {
             self.wrong(path, format!("the {what} has no area: its edges are parallel"));
         }
     }
-}
-
-/// Why a film cannot have this size, if it cannot.
-pub fn check_film_size(width: u32, height: u32) -> Result<(), String> {
-    let pixels = u64::from(width) * u64::from(height);
-    if width == 0 || height == 0 {
-        Err(format!("a film of {width} x {height} has no pixels: width and height must be at least 1"))
-    } else if width > SceneFile::MAX_FILM_SIDE
-        || height > SceneFile::MAX_FILM_SIDE
-        || pixels > SceneFile::MAX_FILM_PIXELS
-    {
-        let gib = pixels as f64 * Film::BYTES_A_PIXEL as f64 / f64::from(1 << 30);
-        Err(format!(
-            "a film of {width} x {height} would take {gib:.1} GiB: use at most {} pixels, {} a side",
-            SceneFile::MAX_FILM_PIXELS,
-            SceneFile::MAX_FILM_SIDE
-        ))
-    } else {
-        Ok(())
-    }
-}
-
-fn is_coordinate(point: DVec3) -> bool {
-    point.abs().max_element() <= SceneFile::MAX_COORDINATE && point.is_finite()
-}
-
-/// Infinity is; NaN is not.
-fn is_positive(value: f64) -> bool {
-    value > 0.0
-}
-
-fn is_size(size: f64) -> bool {
-    (SceneFile::MIN_SIZE..=SceneFile::MAX_COORDINATE).contains(&size)
 }

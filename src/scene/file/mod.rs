@@ -10,7 +10,7 @@ mod parts;
 mod syntax;
 mod value;
 
-pub use check::check_film_size;
+pub use super::bounds::check_film_size;
 pub use locate::locate;
 pub use parts::{
     CameraPart, DisplayPart, EnvironmentPart, FilmPart, FilterPart, FresnelPart, IntegratorPart, LightPart,
@@ -20,6 +20,7 @@ pub use parts::{
 pub use value::{Amount, Named, Paint, Rgb};
 
 use super::error::{Problem, SceneError};
+use super::input_file::BYTE_ORDER_MARK;
 use ron::extensions::Extensions;
 use std::path::Path;
 
@@ -30,8 +31,6 @@ impl SceneFile {
     pub const MAX_FILM_SIDE: u32 = 65_536;
     /// Pixels of a film at most: they take 72 bytes each, 18 GiB in all.
     pub const MAX_FILM_PIXELS: u64 = 1 << 28;
-    /// Problems that are told with their places; nobody reads more, and each place is looked for in the whole text.
-    const MAX_TOLD: usize = 20;
     /// Metres: beyond this, squared distances leave the range of `f32`.
     pub const MAX_COORDINATE: f64 = 1e12;
     /// Metres: below this, squared sizes leave the range of `f32`.
@@ -40,17 +39,13 @@ impl SceneFile {
     /// Reads and checks the text of a scene file; `name` is what messages call it.
     pub fn parse(text: &str, name: impl AsRef<Path>) -> Result<Self, SceneError> {
         let name = name.as_ref();
+        let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
         let file: Self = options().from_str(text).map_err(|error| syntax::explain(&error, text, name))?;
-        let found = check::check(&file);
-        let place = |path: &str| Some(locate(text, path));
-        let mut problems: Vec<Problem> = (found.iter().take(Self::MAX_TOLD))
-            .map(|(path, message)| Problem { file: Some(name.into()), at: place(path), message: message.clone() })
-            .collect();
-        if found.len() > problems.len() {
-            let message = format!("and {} more problems", found.len() - problems.len());
-            problems.push(Problem { file: Some(name.into()), at: None, message });
-        }
-        if problems.is_empty() { Ok(file) } else { Err(SceneError { problems }) }
+        let found = check::check(&file, SceneError::MAX_TOLD);
+        let problem =
+            |(path, message): (String, _)| Problem { file: Some(name.into()), at: Some(locate(text, &path)), message };
+        let problems: Vec<Problem> = found.told.into_iter().map(problem).collect();
+        if problems.is_empty() { Ok(file) } else { Err(SceneError::of(problems, found.untold, Some(name))) }
     }
 
     /// The text of this scene; reading it gives an equal value.
@@ -64,13 +59,12 @@ impl SceneFile {
         options().to_string_pretty(self, pretty).expect("a scene file is plain data") + "\n"
     }
 
-    /// Everything that is wrong with the values, without places.
+    /// What is wrong with the values, without places.
     pub fn check(&self) -> Result<(), SceneError> {
-        let problems: Vec<Problem> = check::check(self)
-            .into_iter()
-            .map(|(path, message)| Problem { file: None, at: None, message: format!("{path}: {message}") })
-            .collect();
-        if problems.is_empty() { Ok(()) } else { Err(SceneError { problems }) }
+        let found = check::check(self, SceneError::MAX_TOLD);
+        let problem = |(path, message)| Problem { file: None, at: None, message: format!("{path}: {message}") };
+        let problems: Vec<Problem> = found.told.into_iter().map(problem).collect();
+        if problems.is_empty() { Ok(()) } else { Err(SceneError::of(problems, found.untold, None)) }
     }
 }
 

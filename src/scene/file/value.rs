@@ -41,6 +41,15 @@ struct AnyValue {
     colours: bool,
 }
 
+/// As `f32`. What is finite and beyond its range would become infinite, and is refused.
+fn narrow<E: Error>(value: f64) -> Result<f32, E> {
+    let narrow = value as f32;
+    if value.is_finite() && narrow.is_infinite() {
+        return Err(E::custom(format!("{value:e} is too large: the largest number here is {:e}", f32::MAX)));
+    }
+    Ok(narrow)
+}
+
 enum Found {
     Number(f32),
     Rgb(Vec3),
@@ -59,7 +68,7 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 
     fn visit_f64<E: Error>(self, value: f64) -> Result<Found, E> {
-        Ok(Found::Number(value as f32))
+        narrow(value).map(Found::Number)
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<Found, E> {
@@ -84,7 +93,7 @@ impl<'de> Visitor<'de> for AnyValue {
         }
         let mut rgb = [0.0; 3];
         for (i, channel) in rgb.iter_mut().enumerate() {
-            *channel = seq.next_element()?.ok_or_else(|| A::Error::invalid_length(i, &self))?;
+            *channel = narrow(seq.next_element()?.ok_or_else(|| A::Error::invalid_length(i, &self))?)?;
         }
         if seq.next_element::<f32>()?.is_some() {
             return Err(A::Error::invalid_length(4, &self));

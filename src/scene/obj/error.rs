@@ -1,19 +1,15 @@
 use crate::mesh::MeshError;
-use crate::scene::Limits;
+use crate::scene::ReadError;
 use std::path::PathBuf;
 
 /// Why an OBJ file could not be loaded: which file, which line, what was expected.
 #[derive(Debug, thiserror::Error)]
 pub enum ObjError {
-    #[error("{}: cannot be read: {source}", path.display())]
-    Read { path: PathBuf, source: std::io::Error },
+    #[error("{}: {source}", path.display())]
+    Read { path: PathBuf, source: ReadError },
     /// A whole sentence.
     #[error("{0}")]
     Write(String),
-    #[error("{}: is not a regular file", path.display())]
-    NotAFile { path: PathBuf },
-    #[error("{}: has {bytes} bytes, more than the limit of {limit}: {}", path.display(), Limits::advice())]
-    TooLarge { path: PathBuf, bytes: u64, limit: u64 },
     #[error("{}: has no faces (lines that start with `f`): is it a Wavefront OBJ file?", path.display())]
     NoFaces { path: PathBuf },
     #[error(

@@ -14,14 +14,15 @@ mod write;
 
 pub use error::{LineProblem, ObjError};
 pub use mtl::ImportedMaterial;
+pub(super) use write::{NewObj, save_new_obj};
 pub use write::{ObjExtras, save_obj};
 
 use self::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight};
-use crate::scene::Limits;
+use crate::scene::{FileKind, InputFile, Limits, text_to_path};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// A model as its file has it.
@@ -155,19 +156,9 @@ fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
 }
 
 fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
-    let read_error = |source| ObjError::Read { path: path.into(), source };
-    // Opening a pipe would wait for ever, and a device may never end.
-    let info = std::fs::metadata(path).map_err(read_error)?;
-    if !info.is_file() {
-        return Err(ObjError::NotAFile { path: path.into() });
-    }
-    if info.len() > limit {
-        return Err(ObjError::TooLarge { path: path.into(), bytes: info.len(), limit });
-    }
-    let mut bytes = Vec::with_capacity(info.len() as usize);
-    // The file may grow while it is read.
-    std::fs::File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes)).map_err(read_error)?;
-    Ok(bytes)
+    InputFile::open_within(path, FileKind::Model, limit)
+        .and_then(InputFile::bytes)
+        .map_err(|source| ObjError::Read { path: path.into(), source })
 }
 
 fn parse(text: &[u8]) -> Result<tobj::Mesh, tobj::LoadError> {
@@ -292,9 +283,9 @@ fn find_materials(
         // A name may hold spaces, and a line may hold several names.
         let whole = line.replace('\\', "/");
         let names: Vec<&str> =
-            if folder.join(&whole).exists() { vec![&whole] } else { whole.split_whitespace().collect() };
+            if folder.join(text_to_path(&whole)).exists() { vec![&whole] } else { whole.split_whitespace().collect() };
         for name in names {
-            let library = folder.join(name);
+            let library = folder.join(text_to_path(name));
             if !seen.contains(&library) {
                 let materials = mtl::load_library(&library, max_bytes, warnings);
                 known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));

@@ -1,8 +1,9 @@
 //! Materials of an OBJ file (MTL), as numbers and paths.
 
 use super::warnings::Warnings;
+use crate::scene::{FileKind, InputFile};
 use glam::Vec3;
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// A material as its file states it; what is not stated is `None`. What it means is decided elsewhere.
@@ -33,7 +34,7 @@ pub struct ImportedMaterial {
 /// Reads one library; what cannot be used becomes a warning, and every other line still counts.
 pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings) -> Vec<ImportedMaterial> {
     let mut warn = |problem: String| warnings.push(format!("{}: {problem}", path.display()));
-    let bytes = match read_limited(path, max_bytes) {
+    let bytes = match InputFile::open_within(path, FileKind::Library, max_bytes).and_then(InputFile::bytes) {
         Ok(bytes) => bytes,
         Err(problem) => {
             warn(format!("{problem}; its materials get default values"));
@@ -51,22 +52,6 @@ pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings)
             Vec::new()
         }
     }
-}
-
-fn read_limited(path: &Path, max_bytes: u64) -> Result<Vec<u8>, String> {
-    // Opening a pipe would wait for ever.
-    let info = std::fs::metadata(path).map_err(|error| format!("cannot be read: {error}"))?;
-    if !info.is_file() {
-        return Err("is not a regular file".into());
-    }
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(max_bytes + 1).read_to_end(&mut bytes))
-        .map_err(|error| format!("cannot be read: {error}"))?;
-    if bytes.len() as u64 > max_bytes {
-        return Err(format!("has more than {max_bytes} bytes, the limit for materials"));
-    }
-    Ok(bytes)
 }
 
 /// Leaves only lines that tobj reads without an error, which would cost the whole file.

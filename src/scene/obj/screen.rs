@@ -6,6 +6,7 @@
 //! misread, checks each face where its line is still known, and keeps the materials to itself.
 
 use super::error::LineProblem;
+use crate::scene::relative::bytes_to_text;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -69,7 +70,7 @@ pub(super) fn screen(bytes: &[u8]) -> Result<Screened, Located> {
             }
             b"l" | b"p" => screened.lines_and_points += 1,
             b"usemtl" => (name, material) = (rest(&line), None),
-            b"mtllib" => screened.libraries.push(rest(&line)),
+            b"mtllib" => screened.libraries.push(bytes_to_text(rest_bytes(&line))),
             _ => {}
         }
     }
@@ -259,9 +260,13 @@ fn first_word(line: &[u8]) -> &[u8] {
 
 /// What follows the first word, without the white space around it.
 fn rest(line: &[u8]) -> String {
+    text_of(rest_bytes(line)).into_owned()
+}
+
+fn rest_bytes(line: &[u8]) -> &[u8] {
     let line = line.trim_ascii_start();
     let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
-    text_of(line[end..].trim_ascii()).into_owned()
+    line[end..].trim_ascii()
 }
 
 fn text_of(bytes: &[u8]) -> Cow<'_, str> {

@@ -2,9 +2,11 @@
 
 use super::ObjError;
 use crate::mesh::Mesh;
-use crate::scene::whole_file::{WholeFile, unwritable};
+use crate::scene::whole_file::{Replace, WholeFile, unwritable};
+use crate::scene::{FileKind, InputFile};
 use std::collections::HashMap;
-use std::io::Write;
+use std::ffi::OsStr;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// What stands around the mesh in its file.
@@ -23,10 +25,36 @@ pub struct ObjExtras<'a> {
 /// Appears whole or not at all: it is written beside `path` under another name first, and a file that was there
 /// stays until the new one is complete.
 pub fn save_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<(), ObjError> {
-    let mut file = WholeFile::begin(path).map_err(ObjError::Write)?;
+    let mut file = WholeFile::begin(path, Replace::AllButFilms).map_err(ObjError::Write)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     write(&mut file, mesh, extras, folder).map_err(|error| ObjError::Write(unwritable(path, &error)))?;
     file.finish().map_err(ObjError::Write)
+}
+
+/// What has become of a mesh under a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::scene) enum NewObj {
+    Written,
+    /// The file that is there is this mesh to the last byte.
+    Same,
+    /// The name is another file's.
+    Taken,
+}
+
+/// [`save_obj`] that replaces no file.
+pub(in crate::scene) fn save_new_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<NewObj, ObjError> {
+    if !path.exists() {
+        return save_obj(path, mesh, extras).map(|()| NewObj::Written);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut bytes = Vec::new();
+    write(&mut bytes, mesh, extras, folder).map_err(|error| ObjError::Write(unwritable(path, &error)))?;
+    let old = InputFile::open_within(path, FileKind::Model, u64::MAX).map_err(std::io::Error::other).and_then(|file| {
+        let mut old = Vec::new();
+        // A byte more tells a longer file.
+        file.take(bytes.len() as u64 + 1).read_to_end(&mut old).map(|_| old)
+    });
+    Ok(if old.is_ok_and(|old| old == bytes) { NewObj::Same } else { NewObj::Taken })
 }
 
 fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -> std::io::Result<()> {
@@ -37,8 +65,8 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
         // A path from here would be wrong from the file's own folder.
         let beside = library.parent().is_some_and(|parent| same_folder(parent, folder));
         match library.file_name() {
-            Some(name) if beside => writeln!(out, "mtllib {}", Path::new(name).display())?,
-            _ => writeln!(out, "mtllib {}", std::path::absolute(library)?.display())?,
+            Some(name) if beside => mtllib(out, name)?,
+            _ => mtllib(out, std::path::absolute(library)?.as_os_str())?,
         }
     }
     // Vertices that differ in texture coordinate or normal alone share a place, so that a closed surface is closed for
@@ -79,6 +107,13 @@ fn write(out: &mut impl Write, mesh: &Mesh, extras: &ObjExtras, folder: &Path) -
         writeln!(out)?;
     }
     Ok(())
+}
+
+/// The bytes of the name, whatever letters they are.
+fn mtllib(out: &mut impl Write, name: &OsStr) -> std::io::Result<()> {
+    out.write_all(b"mtllib ")?;
+    out.write_all(name.as_encoded_bytes())?;
+    writeln!(out)
 }
 
 /// Values in the order in which they come first, and for each element the number of its own, from 1.

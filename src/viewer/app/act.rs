@@ -1,6 +1,7 @@
 //! What keys and the panel ask for.
 
 use super::App;
+use crate::console;
 use crate::frame::{Command, Edit, Explaining, Focus, FocusTarget, Looking, PictureFormat, Selection, gizmo};
 use crate::render::{Inspection, Integrator};
 use crate::viewer::dialog::Purpose;
@@ -8,10 +9,8 @@ use crate::viewer::keys::Action;
 use crate::viewer::saver::{Larger, Saved, new_scene_file};
 use crate::viewer::toasts::Tone;
 use crate::viewer::{camera_text, panel};
-use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
-use winit::event_loop::ActiveEventLoop;
 use winit::window::{CursorGrabMode, Fullscreen};
 
 impl App {
@@ -22,7 +21,7 @@ impl App {
             self.stirred = true;
         }
         for command in asked.commands {
-            self.session.send(command);
+            self.open(command, now);
         }
         if let Some(speed) = asked.speed {
             self.input.set_speed(speed, now);
@@ -51,7 +50,7 @@ impl App {
         glam::DVec2::from_array(self.input.cursor_place()) / scale
     }
 
-    pub(super) fn act(&mut self, action: Action, event_loop: &ActiveEventLoop) {
+    pub(super) fn act(&mut self, action: Action) {
         let now = Instant::now();
         match action {
             Action::Send(command) => self.session.send(command),
@@ -67,15 +66,11 @@ impl App {
                 self.session.send(Command::SetIntegrator(other));
             }
             Action::Screenshot { linear } => self.screenshot(linear),
-            Action::SaveScene { new } => {
-                let known = self.session.scene_file().filter(|_| !new);
-                let path = known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene));
-                self.session.send(Command::SaveScene { path });
-            }
+            Action::SaveScene { new } => self.save_scene(new),
             Action::PrintView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
                 // Standard output may be closed; the window goes on.
-                match writeln!(std::io::stdout(), "{text}") {
+                match console::print(console::lines(&text)) {
                     Ok(()) => self.toasts.add(Tone::News, "camera printed to the terminal", now),
                     Err(error) => self.toasts.add(Tone::Problem, format!("the camera was not printed: {error}"), now),
                 }
@@ -139,9 +134,20 @@ impl App {
             Action::Leave if !self.session.world().resource::<Selection>().0.is_empty() => {
                 self.session.send(Command::Edit(Edit::SelectNone));
             }
-            Action::Leave | Action::Quit => event_loop.exit(),
+            Action::Leave | Action::Quit => self.leaving.wanted = true,
         }
         self.repaint_at = Some(now);
+    }
+
+    /// To the file that the scene is known by, or to a new one.
+    pub(super) fn save_scene(&mut self, new: bool) {
+        let path = self.scene_path(new);
+        self.session.send(Command::SaveScene { path });
+    }
+
+    pub(super) fn scene_path(&self, new: bool) -> PathBuf {
+        let known = self.session.scene_file().filter(|_| !new);
+        known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene))
     }
 
     fn toggle_drag(&mut self, now: Instant) {
@@ -183,8 +189,7 @@ impl App {
             match answer {
                 Ok((purpose, path)) => {
                     self.reaction.asked(now);
-                    self.session.send(purpose.command(path));
-                    self.stirred = true;
+                    self.open(purpose.command(path), now);
                 }
                 Err(reason) => self.toasts.add(Tone::Problem, reason, now),
             }
@@ -224,11 +229,11 @@ impl App {
             Ok(kept) => {
                 let coarse = if kept.coarse { ", coarse because the view changed at once" } else { "" };
                 let news = format!("saved {}{coarse}", kept.path.display());
-                eprintln!("{news}");
+                console::remark(&news);
                 self.toasts.add(Tone::News, news, now);
             }
             Err(error) => {
-                eprintln!("error: {error}");
+                console::remark(format_args!("error: {error}"));
                 self.toasts.add(Tone::Problem, error, now);
             }
         }

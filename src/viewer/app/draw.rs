@@ -3,8 +3,10 @@
 use super::{App, LIVELY, SETTLED};
 use crate::frame::{Around, Explaining, Looking, Projector};
 use crate::render::Inspection;
+use crate::scene::{FileKind, InputFile};
 use crate::viewer::presenter::{PresentError, Presenter};
 use crate::viewer::{overlay, panel, status, story};
+use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -51,6 +53,7 @@ impl App {
             recent: self.memory.recent(),
         };
         let mut asked = panel::Asked::default();
+        let (question, mut answer) = (&self.leaving.question, None);
         let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
         let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
         let presented = presenter.present(|context| {
@@ -79,6 +82,9 @@ impl App {
             if help.open {
                 overlay::help(context, help);
             }
+            if let Some(question) = question {
+                answer = question.show(context);
+            }
         })?;
         if !presented.again {
             let picture = self.session.picture();
@@ -103,6 +109,10 @@ impl App {
         // The overlays may have asked for a time that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
         self.carry_out(asked, now);
+        if let Some(answer) = answer {
+            self.leaving.answer = Some(answer);
+            self.stirred = true;
+        }
         Ok(())
     }
 
@@ -133,7 +143,7 @@ impl App {
 
 /// Bytes that the process holds, where the system tells.
 fn memory_of_process() -> Option<u64> {
-    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let statm = InputFile::open(Path::new("/proc/self/statm"), FileKind::Settings).ok()?.text().ok()?;
     let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
     Some(pages * PAGE)
 }

@@ -2,6 +2,7 @@
 
 use super::{App, FRAME, Wake};
 use crate::frame::{Command, Edit};
+use crate::viewer::question::Question;
 use crate::viewer::toasts::Tone;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -46,7 +47,7 @@ impl ApplicationHandler<Wake> for App {
         }
         self.stirred = true;
         match event {
-            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::CloseRequested => self.leaving.wanted = true,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.resized(),
             WindowEvent::Occluded(occluded) => {
                 self.occluded = occluded;
@@ -57,12 +58,18 @@ impl ApplicationHandler<Wake> for App {
                 self.capture_mouse(false, now);
                 self.input.release_all(now);
             }
-            WindowEvent::DroppedFile(path) => self.session.send(Command::Open { path }),
+            WindowEvent::DroppedFile(path) => self.open(Command::Open { path }, now),
             WindowEvent::ModifiersChanged(modifiers) => {
                 self.input.set_modifiers(modifiers.state(), now);
             }
             WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => {
                 let pressed = event.state.is_pressed();
+                if pressed && self.leaving.question.is_some() {
+                    if let Some(answer) = Question::key(&event.logical_key).filter(|_| !event.repeat) {
+                        self.answer(answer, now, event_loop);
+                    }
+                    return;
+                }
                 // Typing into the list of keys must not keep a person in it; and what is typed while it opens, before
                 // its field has the keyboard, is meant for it.
                 let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
@@ -75,7 +82,7 @@ impl ApplicationHandler<Wake> for App {
                 }
                 if let Some(action) = self.input.key(event.physical_key, &event.logical_key, pressed, event.repeat, now)
                 {
-                    self.act(action, event_loop);
+                    self.act(action);
                 }
             }
             WindowEvent::CursorMoved { position, .. } => {

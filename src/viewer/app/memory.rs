@@ -1,6 +1,6 @@
 //! What is kept from one run to the next: the bookmarks of each scene, what was opened lately, the window's size.
 
-use crate::frame::{Bookmarks, Command, CurrentScene, SceneBookmarks, Session, SettingsStore};
+use crate::frame::{Bookmarks, Command, CurrentScene, Recovery, SceneBookmarks, Session, SettingsStore};
 use crate::scene::SceneSource;
 
 /// What the store has, as far as it is known here.
@@ -23,6 +23,11 @@ impl Memory {
     fn of(store: SettingsStore) -> Self {
         let recent = store.settings().0.recent;
         Self { store, scene: None, adopted: 0, bookmarks: Bookmarks::default(), recent }
+    }
+
+    /// Keeps unsaved edits in the same place.
+    pub fn recovery(&self) -> Recovery {
+        Recovery::beside(self.store.folder())
     }
 
     /// What was opened last comes first: built-in names and paths.

@@ -11,11 +11,13 @@
 //! | `events` | what winit tells |
 //! | `draw` | picture and overlays onto the window |
 //! | `act` | what keys and the panel ask for |
+//! | `leave` | unsaved edits: asked about, kept, offered again |
 //! | `memory` | what is kept from one run to the next |
 
 mod act;
 mod draw;
 mod events;
+mod leave;
 mod memory;
 
 use super::brush::Brush;
@@ -35,9 +37,9 @@ use crate::frame::{
 };
 use crate::render::Inspection;
 use crate::scene::{SceneSource, UpAxis};
+use leave::Leaving;
 use memory::Memory;
 use serde_json::json;
-use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -75,7 +77,7 @@ pub enum ViewerError {
         "no window can be opened: the display does not answer; check DISPLAY or WAYLAND_DISPLAY, or render without a window: firstlight render SCENE -o out.png"
     )]
     NoDisplay,
-    #[error("the connection to the display is lost; settings and bookmarks are kept")]
+    #[error("the connection to the display is lost; settings, bookmarks and unsaved changes are kept")]
     DisplayLost,
     #[error("no window can be opened: {0}")]
     NoWindow(winit::error::OsError),
@@ -85,6 +87,9 @@ pub enum ViewerError {
     Session(String),
     #[error("{0}")]
     Scene(String),
+    /// Somebody asked the program to end, by Ctrl+C in the terminal or as systems do.
+    #[error("{0}")]
+    Stopped(String),
     #[error(transparent)]
     Present(#[from] PresentError),
 }
@@ -106,6 +111,8 @@ const LIVELY: Duration = Duration::from_millis(33);
 const FIGURES: Duration = Duration::from_millis(250);
 /// So long after the last change of its size a window has come to rest.
 const AT_REST: Duration = Duration::from_millis(500);
+/// The exit status of a program that is told to end twice, as shells count it.
+const STOPPED: i32 = 130;
 /// What a window stops at by itself, so that nothing runs hot for ever: an error that nobody sees.
 const GOOD_ENOUGH: Target = Target { spp: None, seconds: None, error: Some(0.005) };
 
@@ -133,13 +140,30 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
             }
         })
     };
-    let mut app = App::new(options, pending, waker)?;
+    let told_to_end = Arc::new(AtomicBool::new(false));
+    let (asked, proxy) = (told_to_end.clone(), event_loop.create_proxy());
+    let taken_over = ctrlc::set_handler(move || {
+        if asked.swap(true, Ordering::SeqCst) {
+            std::process::exit(STOPPED);
+        }
+        // The loop may be over, and then the program ends by itself.
+        let _ = proxy.send_event(Wake);
+    });
+    if let Err(error) = taken_over {
+        log::warn!("Ctrl+C will keep no unsaved edits: {error}");
+    }
+    let mut app = App::new(options, pending, waker, told_to_end)?;
     display::say_nothing_of_its_loss();
     let ended = match catch_unwind(AssertUnwindSafe(|| event_loop.run_app(&mut app))) {
         Ok(ended) => ended.map_err(ViewerError::EventLoop),
         Err(panic) if display::is_loss(panic.as_ref()) => Err(ViewerError::DisplayLost),
-        Err(panic) => resume_unwind(panic),
+        Err(panic) => {
+            // What can still be said of the scene is said.
+            let _ = catch_unwind(AssertUnwindSafe(|| app.keep_or_forget_edits()));
+            resume_unwind(panic)
+        }
     };
+    app.keep_or_forget_edits();
     // Also when the display is gone.
     app.session.end_record();
     app.keep_window_size();
@@ -148,6 +172,10 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     }
     if app.options.print_figures {
         app.print_figures();
+    }
+    if app.told_to_end.load(Ordering::SeqCst) {
+        let message = app.stopped_message();
+        app.failure.get_or_insert(ViewerError::Stopped(message));
     }
     let ended = ended.and(app.failure.take().map_or(Ok(()), Err));
     if matches!(ended, Err(ViewerError::DisplayLost)) {
@@ -206,10 +234,18 @@ struct App {
     /// When the overlays want to be drawn again.
     repaint_at: Option<Instant>,
     failure: Option<ViewerError>,
+    leaving: Leaving,
+    /// By Ctrl+C in the terminal, or by the system.
+    told_to_end: Arc<AtomicBool>,
 }
 
 impl App {
-    fn new(options: ViewerOptions, pending: Arc<AtomicBool>, waker: Waker) -> Result<Self, ViewerError> {
+    fn new(
+        options: ViewerOptions,
+        pending: Arc<AtomicBool>,
+        waker: Waker,
+        told_to_end: Arc<AtomicBool>,
+    ) -> Result<Self, ViewerError> {
         let mut session = Session::new(SessionOptions {
             width: options.width,
             height: options.height,
@@ -226,6 +262,8 @@ impl App {
             session.record(path, &options.source, options.up).map_err(ViewerError::Session)?;
         }
         session.open(options.source.clone());
+        let memory = Memory::of_platform();
+        let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();
         Ok(Self {
             start,
@@ -241,7 +279,9 @@ impl App {
             handles: Handles::default(),
             brush: Brush::default(),
             ways: WaysShown::default(),
-            memory: Memory::of_platform(),
+            memory,
+            leaving,
+            told_to_end,
             reaction: Reaction::default(),
             overlays: true,
             presenter: None,
@@ -267,7 +307,7 @@ impl App {
 
     fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), ViewerError> {
         let size = LogicalSize::new(self.options.width, self.options.height);
-        self.title = title(&self.options.source.title());
+        self.title = title(&self.options.source.title(), false);
         let attributes = Window::default_attributes().with_title(&self.title).with_inner_size(size);
         let window = Arc::new(event_loop.create_window(attributes).map_err(ViewerError::NoWindow)?);
         let presenter = Presenter::new(window.clone())?;
@@ -312,7 +352,7 @@ impl App {
             "seconds": status.elapsed,
         });
         // Standard output may be closed, and then nobody reads it.
-        let _ = writeln!(std::io::stdout(), "{figures}");
+        let _ = crate::console::print(figures);
     }
 
     /// The next window is as large. Not only at the end: X11 ends the program itself when the display goes.
@@ -365,10 +405,11 @@ impl App {
             self.tell_saved(saved);
         }
         self.take_files(now);
+        self.follow_edits(now, event_loop);
         if self.keep_size_at.is_some_and(|at| now >= at) {
             self.keep_window_size();
         }
-        let title = title(&self.session.status().scene);
+        let title = title(&self.session.status().scene, self.session.has_unsaved_edits());
         let n_toasts = self.toasts.len();
         self.toasts.at(now);
         let Some(window) = &self.window else { return };
@@ -395,16 +436,25 @@ impl App {
         let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
         let session = self.session.next_wake(clock).map(|at| self.start + at);
-        self.wake_at = [session, self.toasts.next_change(), moving, late, figures, repaint_at, self.keep_size_at]
-            .into_iter()
-            .flatten()
-            .min();
+        self.wake_at = [
+            session,
+            self.toasts.next_change(),
+            moving,
+            late,
+            figures,
+            repaint_at,
+            self.keep_size_at,
+            self.leaving.wake_at(),
+        ]
+        .into_iter()
+        .flatten()
+        .min();
     }
 
     /// Something on the window answers to the mouse.
     fn has_widgets(&self) -> bool {
         let explains = self.session.world().resource::<Explaining>().story.is_some();
-        self.help.open || self.overlays && (self.panel.shown || explains)
+        self.help.open || self.leaving.question.is_some() || self.overlays && (self.panel.shown || explains)
     }
 
     /// What is under the mouse is to be sharp, and the mouse is not in the panel.
@@ -439,7 +489,18 @@ impl App {
     }
 }
 
-fn title(scene: &str) -> String {
-    let name = Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy());
-    if name.is_empty() { "firstlight".to_owned() } else { format!("firstlight — {name}") }
+/// A star stands before what has edits that are not saved.
+fn title(scene: &str, unsaved: bool) -> String {
+    let name = short_name(scene);
+    let mark = if unsaved { "*" } else { "" };
+    if name.is_empty() {
+        "firstlight".to_owned()
+    } else {
+        format!("firstlight — {mark}{}", crate::printable::name(&name))
+    }
+}
+
+/// A scene without its folder.
+fn short_name(scene: &str) -> String {
+    Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy()).into_owned()
 }

@@ -78,7 +78,9 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
                 asked.edit(Edit::Set { id: material.to_bits(), property: Property::Color, value });
             }
         }
-        Some(Material::Emissive { radiance: Paint::Texture(texture) }) => drop(ui.weak(&texture.name)),
+        Some(Material::Emissive { radiance: Paint::Texture(texture) }) => {
+            drop(ui.weak(&*crate::printable::name(&texture.name)))
+        }
         _ => {}
     }
 }

@@ -95,7 +95,7 @@ fn paint(ui: &mut Ui, session: &Session, id: u64, material: &Material, asked: &m
                         asked.edit(Edit::Set { id, property: Property::Color, value });
                     }
                 }
-                Paint::Texture(texture) => drop(ui.label(&texture.name)),
+                Paint::Texture(texture) => drop(ui.label(&*crate::printable::name(&texture.name))),
             }
             texture::menu(ui, session, id, paint, asked);
         })

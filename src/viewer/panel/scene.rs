@@ -4,6 +4,7 @@ use super::list::{Listed, Which, list};
 use super::widgets::choice;
 use super::{Asked, PanelState};
 use crate::frame::{Command, Edit, NewThing, Selection, Session};
+use crate::printable;
 use crate::scene::ObjectEntry;
 use crate::scene::file::MeshSourcePart;
 use crate::viewer::dialog::Purpose;
@@ -51,8 +52,9 @@ pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked
     }
     for name in others {
         let short = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
-        if ui.selectable_label(false, short).on_hover_text(name).clicked() {
-            asked.send(Command::Open { path: name.into() });
+        let (short, whole) = (printable::name(&short), printable::line(name));
+        if ui.selectable_label(false, &*short).on_hover_text(&*whole).clicked() {
+            asked.send(Command::Open { path: crate::scene::text_to_path(name) });
         }
     }
 }

@@ -21,7 +21,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &Paint, asked: &mut 
     names.dedup();
     ui.menu_button("texture", |ui| {
         for name in names {
-            if ui.button(name).clicked() {
+            if ui.button(&*crate::printable::name(name)).clicked() {
                 asked.edit(Edit::SetTexture { id, name: name.to_owned() });
                 ui.close();
             }

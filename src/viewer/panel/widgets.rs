@@ -5,6 +5,7 @@
 
 use super::Asked;
 use crate::frame::Edit;
+use crate::printable;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
 
@@ -30,7 +31,8 @@ pub fn row_with_hint<R>(ui: &mut Ui, name: &str, hint: &str, contents: impl FnOn
 
 /// What an entity is called, to be typed anew; takes effect when the field is left.
 pub fn name_field(ui: &mut Ui, id: u64, name: Option<&str>, asked: &mut Asked) {
-    let old = name.unwrap_or_default();
+    // Left as it is shown, a name stays as it is.
+    let old = &*printable::name(name.unwrap_or_default());
     // What is being typed is kept by the field.
     let key = ui.id().with(("name", id));
     let mut text = ui.data(|data| data.get_temp::<String>(key)).unwrap_or_else(|| old.to_owned());

@@ -32,7 +32,7 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
                     ui.end_row();
                     for light in story.lights.iter().take(LIGHTS_SHOWN) {
                         let chosen = shown.light.as_ref() == Some(&light.name);
-                        if row(ui, &light.name, light.parts(), all, Some(chosen)) {
+                        if row(ui, &crate::printable::name(&light.name), light.parts(), all, Some(chosen)) {
                             shown.light = (!chosen).then(|| light.name.clone());
                         }
                     }

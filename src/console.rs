@@ -1,0 +1,159 @@
+//! The only way to a terminal: results on standard output, all else on standard error, every line of it fit to be
+//! printed ([`printable`]).
+//!
+//! What is said is a [`Message`], whose lines are known: a line end within a line came from a foreign name, and is
+//! escaped like anything else that does not print. JSON goes out as it is. `tests/gates.rs` looks for any other way.
+
+use crate::printable;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fmt;
+use std::io::{self, ErrorKind, IsTerminal, Write};
+
+/// Something that can be said.
+pub trait Message {
+    /// Its lines, fit to be printed, with line ends between them.
+    fn text(&self) -> String;
+}
+
+impl Message for str {
+    fn text(&self) -> String {
+        printable::line(self).into_owned()
+    }
+}
+
+impl Message for String {
+    fn text(&self) -> String {
+        self.as_str().text()
+    }
+}
+
+impl Message for fmt::Arguments<'_> {
+    fn text(&self) -> String {
+        self.to_string().text()
+    }
+}
+
+/// A line each.
+impl Message for Vec<String> {
+    fn text(&self) -> String {
+        self.iter().map(|line| printable::line(line)).collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// For machines: one line, in which the format itself escapes what would end it.
+impl Message for serde_json::Value {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl<M: Message + ?Sized> Message for &M {
+    fn text(&self) -> String {
+        (**self).text()
+    }
+}
+
+/// The lines of a text whose line ends are the program's own.
+pub fn lines(text: &str) -> Vec<String> {
+    text.lines().map(str::to_owned).collect()
+}
+
+/// Prints a part of a command's result.
+///
+/// Whoever closed the pipe (`| head`) has read enough, which is no failure.
+pub fn print(message: impl Message) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{}", message.text()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Prints something beside the result.
+pub fn remark(message: impl Message) {
+    // Nobody listens, and there is nobody left to tell.
+    let _ = writeln!(io::stderr().lock(), "{}", message.text());
+}
+
+/// Takes away what a bar has left in the line of a terminal; nobody is told if that fails.
+pub fn clear_line() {
+    let mut out = io::stderr().lock();
+    if out.is_terminal() {
+        let _ = write!(out, "\r\x1b[K");
+    }
+}
+
+/// Where a log goes: each write is an event, and becomes a line.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LogWriter;
+
+impl Write for LogWriter {
+    fn write(&mut self, event: &[u8]) -> io::Result<usize> {
+        let text = String::from_utf8_lossy(event);
+        remark(text.trim_end_matches('\n'));
+        Ok(event.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+/// How far something is: a bar on a terminal, nothing in a pipe or a log.
+#[derive(Clone, Debug)]
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// Whether there is somebody who could look at one.
+    pub fn is_watched() -> bool {
+        io::stderr().is_terminal()
+    }
+
+    pub fn new(length: u64) -> Self {
+        let target = if Self::is_watched() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}  {elapsed} (left: {eta})")
+            .expect("the template is well formed");
+        Self(ProgressBar::with_draw_target(Some(length.max(1)), target).with_style(style))
+    }
+
+    /// What is being done.
+    pub fn set_message(&self, message: impl Message) {
+        self.0.set_message(message.text());
+    }
+
+    pub fn set_position(&self, position: u64) {
+        self.0.set_position(position);
+    }
+
+    pub fn inc(&self, by: u64) {
+        self.0.inc(by);
+    }
+
+    /// Prints past the bar.
+    pub fn suspend<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.0.suspend(print)
+    }
+
+    pub fn finish_and_clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_has_the_lines_that_the_program_gave_it() {
+        assert_eq!("one\ntwo".text(), "one\\u{a}two");
+        assert_eq!(format_args!("{}\x1b", 1).text(), "1\\u{1b}");
+        assert_eq!(vec!["one\r".to_owned(), "two\u{202e}".to_owned()].text(), "one\\u{d}\ntwo\\u{202e}");
+        assert_eq!(lines("one\ntwo\n").text(), "one\ntwo");
+    }
+
+    #[test]
+    fn json_is_exact() {
+        let value = serde_json::json!({ "name": "a\u{202e}\u{1b}\n".repeat(9999) });
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&value.text()).unwrap(), value);
+    }
+}

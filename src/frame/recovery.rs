@@ -1,0 +1,215 @@
+//! Unsaved edits, kept beside the settings for as long as they are unsaved: what a crash, a lost display or a signal leaves
+//! behind is offered at the next start.
+//!
+//! Each window has a scene file of its own and locks a file beside it while it lives. A scene whose lock can be taken was left
+//! behind. Nothing here knows a window.
+
+use crate::scene::{Description, FileKind, InputFile, LoadOptions, SceneSource, load, save_scene};
+use bevy_ecs::prelude::World;
+use std::fs::{File, OpenOptions};
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
+
+/// Keeps the edits of one window.
+#[derive(Debug, Default)]
+pub struct Recovery {
+    /// `None` where nothing can be kept.
+    folder: Option<PathBuf>,
+    place: Option<Place>,
+    writer: Option<JoinHandle<Result<(), String>>>,
+}
+
+/// Where they are kept.
+#[derive(Debug)]
+struct Place {
+    scene: PathBuf,
+    /// Locked while it is open.
+    _lock: File,
+}
+
+/// Edits that somebody has left behind.
+#[derive(Debug)]
+pub struct LeftBehind {
+    /// What the scene was called.
+    pub title: String,
+    scene: PathBuf,
+    /// No other window offers them meanwhile.
+    _lock: File,
+}
+
+const SCENE: &str = "ron";
+const TITLE: &str = "title";
+const LOCK: &str = "lock";
+
+impl Recovery {
+    /// In a folder of its own in `folder`, the one for settings.
+    pub fn beside(folder: Option<&Path>) -> Self {
+        Self { folder: folder.map(|folder| folder.join("recovery")), ..Self::default() }
+    }
+
+    /// Something is kept.
+    pub fn has_kept(&self) -> bool {
+        self.place.is_some()
+    }
+
+    /// Writes a scene in the place of what was kept, on a thread of its own; what went wrong the last time.
+    pub fn keep(&mut self, description: Description, title: &str) -> Option<String> {
+        let trouble = self.wait();
+        let scene = match self.place() {
+            Ok(Some(scene)) => scene,
+            Ok(None) => return trouble,
+            Err(error) => return Some(error),
+        };
+        let title = title.to_owned();
+        let work = move || {
+            crate::scene::whole_file::write_whole(&scene.with_extension(TITLE), title.as_bytes())?;
+            description.save(&scene).map(drop)
+        };
+        match std::thread::Builder::new().name("firstlight recovery".to_owned()).spawn(work) {
+            Ok(writer) => {
+                self.writer = Some(writer);
+                trouble
+            }
+            Err(error) => Some(format!("unsaved edits are not kept: no thread can be started: {error}")),
+        }
+    }
+
+    /// Until what is being kept is on disk; why it is not.
+    pub fn wait(&mut self) -> Option<String> {
+        // A panic has been printed by the thread itself.
+        self.writer.take().and_then(|writer| writer.join().ok()).and_then(Result::err)
+    }
+
+    /// There is nothing unsaved any more.
+    pub fn forget(&mut self) {
+        self.wait();
+        if let Some(place) = self.place.take() {
+            remove(&place.scene);
+        }
+    }
+
+    /// The scene file of this window; `None` where nothing can be kept.
+    fn place(&mut self) -> Result<Option<PathBuf>, String> {
+        let Some(folder) = &self.folder else { return Ok(None) };
+        if let Some(place) = &self.place {
+            return Ok(Some(place.scene.clone()));
+        }
+        let failed = |error: std::io::Error| format!("{}: unsaved edits cannot be kept: {error}", folder.display());
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        for number in 0..1000 {
+            let scene = folder.join(format!("{}-{number}.{SCENE}", std::process::id()));
+            // What another process of this number has left behind stays.
+            if let Some(lock) = lock(&scene).map_err(failed)?.filter(|_| !scene.exists()) {
+                self.place = Some(Place { scene: scene.clone(), _lock: lock });
+                return Ok(Some(scene));
+            }
+        }
+        Err(format!("{}: unsaved edits cannot be kept: too many are left behind there", folder.display()))
+    }
+
+    /// What was left behind, the oldest first.
+    pub fn left_behind(&self) -> Vec<LeftBehind> {
+        let Some(entries) = self.folder.as_ref().and_then(|folder| std::fs::read_dir(folder).ok()) else {
+            return Vec::new();
+        };
+        let mut scenes: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        scenes.retain(|path| path.extension().is_some_and(|extension| extension == SCENE));
+        scenes.sort_by_key(|path| (path.metadata().and_then(|data| data.modified()).ok(), path.clone()));
+        let left = |scene: PathBuf| {
+            let lock = lock(&scene).ok()??;
+            let title = InputFile::open(&scene.with_extension(TITLE), FileKind::Settings).and_then(InputFile::text);
+            let title = title.unwrap_or_else(|_| "a scene".to_owned());
+            Some(LeftBehind { title, scene, _lock: lock })
+        };
+        scenes.into_iter().filter_map(left).collect()
+    }
+}
+
+impl LeftBehind {
+    /// Makes a scene file of it, which is not there yet; what was left behind is gone then.
+    ///
+    /// # Errors
+    /// When it cannot be read or written; then it stays.
+    pub fn restore(self, to: &Path) -> Result<(), String> {
+        let scene =
+            load(&SceneSource::Scene(self.scene.clone()), &LoadOptions { hasty: true, ..LoadOptions::default() });
+        let scene = scene.map_err(|error| error.to_string())?;
+        let mut world = World::new();
+        scene.spawn(&mut world);
+        save_scene(&mut world, Some(&scene), to)?;
+        self.discard();
+        Ok(())
+    }
+
+    /// For good.
+    pub fn discard(self) {
+        remove(&self.scene);
+    }
+}
+
+/// The lock beside a scene file, if nobody else has it.
+fn lock(scene: &Path) -> std::io::Result<Option<File>> {
+    let file = OpenOptions::new().create(true).truncate(false).write(true).open(scene.with_extension(LOCK))?;
+    Ok(file.try_lock().is_ok().then_some(file))
+}
+
+fn remove(scene: &Path) {
+    // The scene first: without it the others mean nothing, and what cannot be removed is offered again.
+    for extension in [SCENE, TITLE, LOCK] {
+        let _ = std::fs::remove_file(scene.with_extension(extension));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn description(name: &str) -> Description {
+        let scene = load(&SceneSource::Builtin(name.to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = World::new();
+        scene.spawn(&mut world);
+        Description::of(&mut world, Some(&scene))
+    }
+
+    #[test]
+    fn what_is_left_behind_is_found_and_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut window = Recovery::beside(Some(folder.path()));
+        assert!(window.left_behind().is_empty() && !window.has_kept());
+        assert_eq!(window.keep(description("cornell"), "cornell"), None);
+        assert_eq!(window.keep(description("cornell-balls"), "my room"), None);
+        assert_eq!(window.wait(), None);
+        // It lives, so another does not take it away.
+        let next = Recovery::beside(Some(folder.path()));
+        assert!(window.has_kept() && next.left_behind().is_empty());
+        drop(window);
+        let found = next.left_behind();
+        assert_eq!(found.iter().map(|left| left.title.as_str()).collect::<Vec<_>>(), ["my room"]);
+        assert!(next.left_behind().is_empty(), "another window is asking already");
+        let target = folder.path().join("back.ron");
+        found.into_iter().for_each(|left| left.restore(&target).unwrap());
+        let back = load(&SceneSource::Scene(target), &LoadOptions::default()).unwrap();
+        assert_eq!(back.file.objects, description("cornell-balls").file.objects);
+        assert_eq!(std::fs::read_dir(folder.path().join("recovery")).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn what_is_saved_or_discarded_is_not_offered() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut window = Recovery::beside(Some(folder.path()));
+        window.keep(description("cornell"), "cornell");
+        window.forget();
+        assert!(!window.has_kept());
+        window.keep(description("cornell"), "cornell");
+        window.wait();
+        drop(window);
+        let next = Recovery::beside(Some(folder.path()));
+        next.left_behind().into_iter().for_each(LeftBehind::discard);
+        assert!(next.left_behind().is_empty());
+        assert_eq!(std::fs::read_dir(folder.path().join("recovery")).unwrap().count(), 0);
+        // Without a folder for settings nothing is kept, and nothing goes wrong.
+        let mut nowhere = Recovery::beside(None);
+        assert_eq!(nowhere.keep(description("cornell"), "cornell"), None);
+        assert!(!nowhere.has_kept());
+    }
+}

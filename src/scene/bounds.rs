@@ -1,0 +1,376 @@
+//! What cameras, films and settings may be. Each limit stands here once, and every way in passes it: scene files, the
+//! notes of pictures and films, recordings, settings, the command line, and whoever uses the library.
+//!
+//! Start reading at [`CameraPart::components`], [`FilmSize::try_new`] and [`BadValue`].
+
+use super::components::FilmSize;
+use super::file::{CameraPart, DisplayPart, SceneFile};
+use super::spawn::camera;
+use super::view::{Lens, Projection, View, unit_direction};
+use crate::render::{Film, RenderSettings};
+use glam::DVec3;
+use std::fmt;
+use thiserror::Error;
+
+/// A value that nothing is made from: which field, what it is, and what is allowed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum BadValue {
+    #[error("`{field}` is {value}, but must {allowed}")]
+    OutOfRange { field: &'static str, value: String, allowed: String },
+    /// Values that do not go together.
+    #[error("{problem}")]
+    Unfit { field: &'static str, problem: String },
+}
+
+impl BadValue {
+    fn out_of_range(field: &'static str, value: impl fmt::Display, allowed: impl Into<String>) -> Self {
+        Self::OutOfRange { field, value: value.to_string(), allowed: allowed.into() }
+    }
+
+    fn unfit(field: &'static str, problem: impl Into<String>) -> Self {
+        Self::Unfit { field, problem: problem.into() }
+    }
+
+    /// As scene files call it; `camera` where the camera as a whole says too little.
+    pub fn field(&self) -> &'static str {
+        match self {
+            Self::OutOfRange { field, .. } | Self::Unfit { field, .. } => field,
+        }
+    }
+}
+
+impl From<BadValue> for String {
+    fn from(bad: BadValue) -> Self {
+        bad.to_string()
+    }
+}
+
+/// Two directions are parallel if the sine of the angle between them is less: below the root of the machine precision,
+/// less than half of the digits of their cross product mean anything.
+pub const LEAST_SINE: f64 = 1.5e-8;
+
+/// Degrees. Below this, all rays of a picture are one and the same in `f32`.
+pub const LEAST_VFOV_DEG: f64 = 1e-6;
+
+/// By how much the length of an axis, or the cosine between two, may be off: whatever moves a camera keeps them to rounding.
+const AXIS_SLACK: f64 = 1e-3;
+
+/// Stops of exposure, up or down. Beyond this, everything is black or white.
+pub const MOST_STOPS: f32 = 64.0;
+
+/// A number for a message: neither three hundred digits nor a NaN without a name.
+pub(crate) fn number(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-5..1e9).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+/// Three numbers for a message.
+pub(crate) fn triple(DVec3 { x, y, z }: DVec3) -> String {
+    format!("({}, {}, {})", number(x), number(y), number(z))
+}
+
+pub(crate) fn is_coordinate(point: DVec3) -> bool {
+    point.abs().max_element() <= SceneFile::MAX_COORDINATE && point.is_finite()
+}
+
+pub(crate) fn is_size(size: f64) -> bool {
+    (SceneFile::MIN_SIZE..=SceneFile::MAX_COORDINATE).contains(&size)
+}
+
+/// What a point must be.
+pub(crate) fn coordinate_rule() -> String {
+    format!("be finite and within {:e} m of the origin", SceneFile::MAX_COORDINATE)
+}
+
+/// What a size must be.
+pub(crate) fn size_rule() -> String {
+    format!("lie between {:e} and {:e} m", SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE)
+}
+
+fn check_point(field: &'static str, point: DVec3) -> Result<(), BadValue> {
+    let good = is_coordinate(point);
+    if good { Ok(()) } else { Err(BadValue::out_of_range(field, triple(point), coordinate_rule())) }
+}
+
+fn check_size(field: &'static str, size: f64) -> Result<(), BadValue> {
+    if is_size(size) { Ok(()) } else { Err(BadValue::out_of_range(field, number(size), size_rule())) }
+}
+
+/// The unit vector along a direction of any finite length.
+fn check_direction(field: &'static str, vector: DVec3) -> Result<DVec3, BadValue> {
+    let unit = unit_direction(vector);
+    unit.ok_or_else(|| BadValue::out_of_range(field, triple(vector), "be finite and have a length"))
+}
+
+fn check_not_parallel(view: DVec3, up: DVec3) -> Result<(), BadValue> {
+    if view.cross(up).length() >= LEAST_SINE {
+        return Ok(());
+    }
+    Err(BadValue::unfit(
+        "up",
+        format!("`up` is parallel to the view direction, to within {LEAST_SINE:e} rad: tilt one of them"),
+    ))
+}
+
+impl CameraPart {
+    /// The components that this says.
+    ///
+    /// # Errors
+    /// All that is wrong with it, in the order of its fields.
+    pub fn components(&self) -> Result<(View, Projection, Lens), Vec<BadValue>> {
+        let mut problems = Vec::new();
+        let mut note = |result: Result<(), BadValue>| problems.extend(result.err());
+        note(check_point("eye", self.eye));
+        let up = check_direction("up", self.up);
+        let view = match (self.look_at, self.forward) {
+            (Some(look_at), None) => {
+                note(check_point("look_at", look_at));
+                let offset = look_at - self.eye;
+                if offset.is_finite() && !offset.abs().cmpge(DVec3::splat(SceneFile::MIN_SIZE)).any() {
+                    let problem = "`eye` and `look_at` are the same point: move one of them";
+                    note(Err(BadValue::unfit("look_at", problem)));
+                    None
+                } else {
+                    unit_direction(offset)
+                }
+            }
+            (None, Some(forward)) => {
+                let forward = check_direction("forward", forward);
+                note(forward.clone().map(drop));
+                forward.ok()
+            }
+            (None, None) => {
+                let problem = "the camera looks nowhere: give `look_at`, a point, or `forward`, a direction";
+                note(Err(BadValue::unfit("camera", problem)));
+                None
+            }
+            (Some(_), Some(_)) => {
+                let problem = "`look_at` and `forward` say the same thing: give one of them";
+                note(Err(BadValue::unfit("forward", problem)));
+                None
+            }
+        };
+        match (view, &up) {
+            (Some(view), Ok(up)) => note(check_not_parallel(view, *up)),
+            (_, Err(bad)) => note(Err(bad.clone())),
+            (None, Ok(_)) => {}
+        }
+        if let Some(distance) = self.pivot_distance {
+            if self.look_at.is_some() {
+                let problem = "`pivot_distance` goes with `forward`: here `look_at` says it";
+                note(Err(BadValue::unfit("pivot_distance", problem)));
+            } else {
+                note(check_size("pivot_distance", distance));
+            }
+        }
+        let projection = Projection { vfov_deg: self.vfov }.check();
+        let is_open = projection.is_ok();
+        note(projection);
+        match (self.lens_radius, self.f_stop) {
+            (Some(_), Some(_)) => {
+                let problem = "`lens_radius` and `f_stop` say the same thing: give one of them";
+                note(Err(BadValue::unfit("f_stop", problem)));
+            }
+            (Some(radius), None) => note(check_lens_radius("lens_radius", radius)),
+            (None, Some(stop)) if !(stop > 0.0) => {
+                note(Err(BadValue::out_of_range("f_stop", number(stop), "be positive")));
+            }
+            (None, Some(stop)) if is_open => {
+                let radius = lens_radius_of(self.vfov, stop);
+                note(check_lens_radius("f_stop", radius).map_err(|_| {
+                    let opens = format!("`f_stop` is {}, which opens the lens to {} m", number(stop), number(radius));
+                    BadValue::unfit("f_stop", format!("{opens}: use at most {:e} m", SceneFile::MAX_COORDINATE))
+                }));
+            }
+            (None, _) => {}
+        }
+        if let Some(distance) = self.focus_distance {
+            note(check_focus(distance));
+        }
+        note(check_angle("blade_rotation", self.blade_rotation));
+        if problems.is_empty() { Ok(camera(self)) } else { Err(problems) }
+    }
+}
+
+/// Half the diameter of a lens, metres, for a film 24 mm high, which sees `vfov_deg` through a focal length of
+/// 12 mm / tan(vfov / 2).
+pub(crate) fn lens_radius_of(vfov_deg: f64, f_stop: f64) -> f64 {
+    let focal_length = 0.012 / (0.5 * vfov_deg).to_radians().tan();
+    0.5 * focal_length / f_stop
+}
+
+/// Degrees as `f32` radians. Whole turns are taken out first, which is exact, so that any finite angle means something.
+pub(crate) fn radians(angle_deg: f64) -> f32 {
+    (angle_deg % 360.0).to_radians() as f32
+}
+
+fn check_angle(field: &'static str, angle_deg: f64) -> Result<(), BadValue> {
+    let good = angle_deg.is_finite();
+    if good { Ok(()) } else { Err(BadValue::out_of_range(field, number(angle_deg), "be a finite number of degrees")) }
+}
+
+fn check_lens_radius(field: &'static str, radius: f64) -> Result<(), BadValue> {
+    if (0.0..=SceneFile::MAX_COORDINATE).contains(&radius) {
+        return Ok(());
+    }
+    let rule = format!("be 0 or positive, and at most {:e} m", SceneFile::MAX_COORDINATE);
+    Err(BadValue::out_of_range(field, number(radius), rule))
+}
+
+fn check_focus(distance: f64) -> Result<(), BadValue> {
+    if distance >= SceneFile::MIN_SIZE {
+        return Ok(());
+    }
+    let rule = format!("be positive, at least {:e} m; inf is allowed", SceneFile::MIN_SIZE);
+    Err(BadValue::out_of_range("focus_distance", number(distance), rule))
+}
+
+impl View {
+    /// # Errors
+    /// When no picture can be taken from here.
+    pub fn check(&self) -> Result<(), BadValue> {
+        check_point("eye", self.eye)?;
+        for (field, axis) in [("forward", self.forward), ("up", self.up)] {
+            check_direction(field, axis)?;
+            if (axis.length() - 1.0).abs() > AXIS_SLACK {
+                return Err(BadValue::out_of_range(field, triple(axis), "be of length 1"));
+            }
+        }
+        if self.forward.dot(self.up).abs() > AXIS_SLACK {
+            return Err(BadValue::unfit("up", "`up` is not perpendicular to `forward`"));
+        }
+        check_size("pivot_distance", self.pivot_distance)
+    }
+}
+
+impl Projection {
+    /// # Errors
+    /// When there is no flat picture of this field of view.
+    pub fn check(&self) -> Result<(), BadValue> {
+        if (LEAST_VFOV_DEG..180.0).contains(&self.vfov_deg) {
+            return Ok(());
+        }
+        let rule = format!("lie above 0 and below 180 degrees (at least {LEAST_VFOV_DEG:e})");
+        Err(BadValue::out_of_range("vfov", number(self.vfov_deg), rule))
+    }
+}
+
+impl Lens {
+    /// # Errors
+    /// When there is no such lens.
+    pub fn check(&self) -> Result<(), BadValue> {
+        check_lens_radius("lens_radius", self.radius)?;
+        check_focus(self.focus_distance)?;
+        check_angle("blade_rotation", self.blade_rotation_deg)
+    }
+}
+
+impl DisplayPart {
+    /// # Errors
+    /// When nothing would be seen.
+    pub fn check(&self) -> Result<(), BadValue> {
+        check_stops(self.exposure)
+    }
+}
+
+/// Whether there is such an exposure, factors of two.
+pub fn check_stops(stops: f32) -> Result<(), BadValue> {
+    if stops.abs() <= MOST_STOPS {
+        return Ok(());
+    }
+    let rule = format!("be a finite number of stops, from -{MOST_STOPS} to {MOST_STOPS}");
+    Err(BadValue::out_of_range("exposure", stops, rule))
+}
+
+/// Whether there are such paths, segments; `None` is without a limit.
+pub fn check_max_depth(max_depth: Option<u32>) -> Result<(), BadValue> {
+    let settings = RenderSettings { max_depth: max_depth.unwrap_or(u32::MAX), ..RenderSettings::default() };
+    settings.check().map_err(|error| BadValue::unfit("max_depth", error.to_string()))
+}
+
+impl FilmSize {
+    /// # Errors
+    /// When it has no pixels, or more than a film may have.
+    pub fn try_new(width: u32, height: u32) -> Result<Self, BadValue> {
+        let pixels = u64::from(width) * u64::from(height);
+        if width == 0 || height == 0 {
+            let problem = format!("a film of {width} x {height} has no pixels: width and height must be at least 1");
+            return Err(BadValue::unfit("film", problem));
+        }
+        let most = SceneFile::MAX_FILM_SIDE;
+        if width > most || height > most || pixels > SceneFile::MAX_FILM_PIXELS {
+            let gib = pixels as f64 * Film::BYTES_A_PIXEL as f64 / f64::from(1 << 30);
+            let problem = format!(
+                "a film of {width} x {height} would take {gib:.1} GiB: use at most {} pixels, {most} a side",
+                SceneFile::MAX_FILM_PIXELS
+            );
+            return Err(BadValue::unfit("film", problem));
+        }
+        Ok(Self { width, height })
+    }
+}
+
+/// Whether a film may have this size.
+pub fn check_film_size(width: u32, height: u32) -> Result<(), BadValue> {
+    FilmSize::try_new(width, height).map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> CameraPart {
+        CameraPart::looking_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO)
+    }
+
+    #[test]
+    fn directions_of_any_length_are_directions() {
+        let plain = good().components().unwrap();
+        for length in [1e300, 1e160, 1.0, 1e-160, 1e-300, f64::MAX, f64::MIN_POSITIVE] {
+            assert_eq!(CameraPart { up: DVec3::Y * length, ..good() }.components().unwrap(), plain, "{length:e}");
+            let forward = CameraPart { look_at: None, forward: Some(DVec3::NEG_Z * length), ..good() };
+            let (view, ..) = forward.components().unwrap();
+            assert_eq!((view.forward, view.up), (plain.0.forward, plain.0.up), "{length:e}");
+        }
+        let slanted = CameraPart { up: DVec3::new(1e300, 1e300, -1e300), ..good() };
+        let (view, ..) = slanted.components().unwrap();
+        assert!((view.up - DVec3::new(1.0, 1.0, 0.0).normalize()).length() < 1e-15, "{view:?}");
+        view.check().unwrap();
+    }
+
+    #[test]
+    fn only_what_is_parallel_is_called_so() {
+        for (tilt, is_parallel) in [(0.0, true), (1e-8, true), (2e-8, false), (1e-6, false)] {
+            let part = CameraPart { up: DVec3::new(0.0, tilt * 1e300, 1e300), ..good() };
+            let found = part.components();
+            assert_eq!(found.is_err(), is_parallel, "{tilt}: {found:?}");
+            if let Err(problems) = found {
+                assert!(problems[0].to_string().contains("parallel") && problems[0].to_string().contains("1.5e-8"));
+            }
+        }
+        // Too far away, and nothing else.
+        let far = CameraPart { look_at: Some(DVec3::NEG_Z * 1e300), ..good() };
+        let problems = far.components().unwrap_err();
+        assert!(problems.len() == 1 && problems[0].to_string().contains("(0, 0, -1e300), but must be finite"));
+    }
+
+    #[test]
+    fn angles_of_many_turns_are_reduced_exactly() {
+        assert_eq!(radians(360.0 * 1e6 + 90.0), radians(90.0));
+        assert_eq!(radians(-30.0), (-30f64).to_radians() as f32);
+        for angle in [1e300, -1e300, f64::MAX] {
+            let part = CameraPart { blade_rotation: angle, blades: 6, lens_radius: Some(0.1), ..good() };
+            assert!(part.components().is_ok() && radians(angle).abs() <= std::f32::consts::TAU);
+        }
+        assert!(CameraPart { blade_rotation: f64::INFINITY, ..good() }.components().is_err());
+    }
+
+    #[test]
+    fn what_a_part_gives_passes_the_checks_of_its_components() {
+        let lenses = [None, Some(0.0), Some(0.3), Some(1e12)];
+        for (lens_radius, vfov) in lenses.into_iter().flat_map(|lens| [1e-6, 0.1, 40.0, 179.99].map(|v| (lens, v))) {
+            let (view, projection, lens) = CameraPart { lens_radius, vfov, ..good() }.components().unwrap();
+            assert_eq!((view.check(), projection.check(), lens.check()), (Ok(()), Ok(()), Ok(())));
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! The only way in which the program reads a file: a regular file, no longer than the limit of its kind, within a
+//! deadline, and until somebody wants to stop.
+//!
+//! Pipes, devices, sockets and folders are refused at once: a pipe would be waited for, and a device may never end.
+//! `tests/gates.rs` looks for any other way. Start reading at [`InputFile::open`].
+
+use super::limits::Limits;
+use std::fs::{File, Metadata};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What a file is for, which decides how long it may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileKind {
+    /// The text of a scene.
+    Scene,
+    /// A model (OBJ).
+    Model,
+    /// A material library (MTL).
+    Library,
+    /// A texture, a picture of an environment, or a reference.
+    Image,
+    /// A film to go on with.
+    Film,
+    /// What a session was asked for.
+    Recording,
+    /// What the program remembers, and other small files of its own.
+    Settings,
+}
+
+/// Why a file could not be read. The words follow the path.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    #[error("cannot be read: {}", plain_io(.0))]
+    Io(#[source] io::Error),
+    #[error("cannot be read: it is a folder")]
+    Folder,
+    #[error("cannot be read: it is not a regular file but {0}")]
+    NotRegular(&'static str),
+    #[error("is longer than {limit} bytes, the limit for {}: {}", kind.plural(), Limits::advice())]
+    TooLong { kind: FileKind, limit: u64 },
+    #[error("cannot be read: line {line} is not UTF-8 text")]
+    NotText { line: usize },
+    #[error("cannot be read: it was not read to its end within {} s", DEADLINE.as_secs())]
+    TooSlow,
+    #[error("was not read to its end: somebody asked to stop")]
+    Stopped,
+}
+
+/// No file takes longer, unless what it lies on hangs.
+const DEADLINE: Duration = Duration::from_secs(600);
+
+/// Bytes between two looks at the clock and at whether to stop.
+const PORTION: usize = 1 << 20;
+
+/// A regular file that is open for reading, and gives no more than its limit.
+pub struct InputFile<'a> {
+    file: File,
+    kind: FileKind,
+    limit: u64,
+    /// When it was opened.
+    length: u64,
+    position: u64,
+    until: Instant,
+    stop: Option<&'a dyn Fn() -> bool>,
+}
+
+impl FileKind {
+    /// Bytes that a file of this kind may have.
+    pub fn limit(self, limits: &Limits) -> u64 {
+        match self {
+            Self::Scene => limits.scene_bytes,
+            Self::Model => limits.model_bytes,
+            Self::Library => limits.library_bytes,
+            Self::Image => limits.picture_bytes(),
+            Self::Film => limits.film_bytes(),
+            Self::Recording => limits.recording_bytes,
+            Self::Settings => limits.settings_bytes,
+        }
+    }
+
+    fn plural(self) -> &'static str {
+        match self {
+            Self::Scene => "scenes",
+            Self::Model => "models",
+            Self::Library => "material libraries",
+            Self::Image => "pictures",
+            Self::Film => "films",
+            Self::Recording => "recordings",
+            Self::Settings => "settings",
+        }
+    }
+}
+
+impl InputFile<'static> {
+    /// Opens a file of this kind within the limits of this process; never waits.
+    ///
+    /// # Errors
+    /// When it is not there, no regular file, or too long.
+    pub fn open(path: &Path, kind: FileKind) -> Result<Self, ReadError> {
+        Self::open_within(path, kind, kind.limit(&Limits::of_this_process()))
+    }
+
+    /// The same with a limit of the caller's own, bytes.
+    pub fn open_within(path: &Path, kind: FileKind, limit: u64) -> Result<Self, ReadError> {
+        // Asked by name first, for opening some devices already does something; and again of what was opened, which
+        // may be another by then.
+        check_regular(&std::fs::metadata(path).map_err(ReadError::Io)?)?;
+        let mut options = std::fs::OpenOptions::new();
+        options.read(true);
+        #[cfg(unix)]
+        {
+            use rustix::fs::OFlags;
+            use std::os::unix::fs::OpenOptionsExt;
+            // Should it have become a pipe, opening does not wait for a writer.
+            options.custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32);
+        }
+        let file = options.open(path).map_err(ReadError::Io)?;
+        let info = file.metadata().map_err(ReadError::Io)?;
+        check_regular(&info)?;
+        let length = info.len();
+        if length > limit {
+            return Err(ReadError::TooLong { kind, limit });
+        }
+        Ok(Self { file, kind, limit, length, position: 0, until: Instant::now() + DEADLINE, stop: None })
+    }
+}
+
+impl<'a> InputFile<'a> {
+    /// Asks `stop` once for every portion, and reads no further when it says so.
+    pub fn stopping(self, stop: &'a dyn Fn() -> bool) -> InputFile<'a> {
+        InputFile { stop: Some(stop), ..self }
+    }
+
+    /// Bytes that it had when it was opened.
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// All of it.
+    pub fn bytes(mut self) -> Result<Vec<u8>, ReadError> {
+        // A file may claim any length; what it has is found by reading.
+        let mut bytes = Vec::with_capacity(self.length.min(64 << 20) as usize);
+        self.read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// All of it as text, without a byte order mark.
+    pub fn text(self) -> Result<String, ReadError> {
+        let text = String::from_utf8(self.bytes()?).map_err(|error| {
+            let good = error.utf8_error().valid_up_to();
+            let line = 1 + error.as_bytes()[..good].iter().filter(|&&byte| byte == b'\n').count();
+            ReadError::NotText { line }
+        })?;
+        Ok(match text.strip_prefix(BYTE_ORDER_MARK) {
+            Some(rest) => rest.to_owned(),
+            None => text,
+        })
+    }
+
+    fn next(&mut self, bytes: &mut [u8]) -> Result<usize, ReadError> {
+        if self.stop.is_some_and(|stop| stop()) {
+            return Err(ReadError::Stopped);
+        }
+        if Instant::now() >= self.until {
+            return Err(ReadError::TooSlow);
+        }
+        // One byte more than the limit tells whether it has grown beyond it.
+        let room = usize::try_from(self.limit.saturating_sub(self.position).saturating_add(1)).unwrap_or(usize::MAX);
+        let portion = bytes.len().min(room).min(PORTION);
+        let n = self.file.read(&mut bytes[..portion]).map_err(ReadError::Io)?;
+        self.position += n as u64;
+        if self.position > self.limit {
+            return Err(ReadError::TooLong { kind: self.kind, limit: self.limit });
+        }
+        Ok(n)
+    }
+}
+
+/// What some editors put in front of UTF-8 text.
+pub const BYTE_ORDER_MARK: char = '\u{feff}';
+
+fn check_regular(info: &Metadata) -> Result<(), ReadError> {
+    if info.is_dir() {
+        return Err(ReadError::Folder);
+    }
+    if info.is_file() {
+        return Ok(());
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = info.file_type();
+        if kind.is_fifo() {
+            return Err(ReadError::NotRegular("a pipe"));
+        }
+        if kind.is_socket() {
+            return Err(ReadError::NotRegular("a socket"));
+        }
+    }
+    Err(ReadError::NotRegular("a device"))
+}
+
+impl Read for InputFile<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.next(bytes).map_err(|error| match error {
+            ReadError::Io(error) => error,
+            other => io::Error::other(other),
+        })
+    }
+}
+
+impl Seek for InputFile<'_> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.position = self.file.seek(to)?;
+        Ok(self.position)
+    }
+}
+
+impl From<io::Error> for ReadError {
+    /// Gives back what [`InputFile`] said, where it was passed through a reader.
+    fn from(error: io::Error) -> Self {
+        match error.downcast::<Self>() {
+            Ok(own) => own,
+            Err(error) => Self::Io(error),
+        }
+    }
+}
+
+/// What went wrong with a file, in plain words.
+pub fn plain_io(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        io::ErrorKind::InvalidData => "it is not UTF-8 text".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+    use std::io::Write;
+
+    fn says(result: Result<impl Sized, ReadError>) -> String {
+        result.err().expect("an error").to_string()
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(says(InputFile::open(folder.path(), FileKind::Scene)).contains("it is a folder"));
+        assert!(says(InputFile::open(&folder.path().join("none"), FileKind::Scene)).contains("no such file"));
+        #[cfg(unix)]
+        {
+            assert!(says(InputFile::open(Path::new("/dev/zero"), FileKind::Scene)).contains("but a device"));
+            let socket = folder.path().join("socket");
+            let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+            assert!(says(InputFile::open(&socket, FileKind::Scene)).contains("but a socket"));
+            let link = folder.path().join("link");
+            std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
+            assert!(says(InputFile::open(&link, FileKind::Scene)).contains("but a device"));
+        }
+        #[cfg(target_os = "linux")]
+        {
+            let pipe = folder.path().join("pipe");
+            rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
+            assert!(says(InputFile::open(&pipe, FileKind::Scene)).contains("but a pipe"));
+        }
+    }
+
+    #[test]
+    fn no_more_than_the_limit_is_read_also_of_a_file_that_grows() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, [7; 100]).unwrap();
+        let open = |limit| InputFile::open_within(&path, FileKind::Model, limit);
+        assert_eq!(open(100).unwrap().bytes().unwrap(), [7; 100]);
+        let error = says(open(99));
+        assert!(error.contains("99 bytes, the limit for models") && error.contains(Limits::VARIABLE), "{error}");
+        let opened = open(100).unwrap();
+        std::fs::OpenOptions::new().append(true).open(&path).unwrap().write_all(&[7]).unwrap();
+        assert!(matches!(opened.bytes(), Err(ReadError::TooLong { .. })));
+        // Decoders go back and forth.
+        let mut opened = open(101).unwrap();
+        for _ in 0..3 {
+            opened.seek(SeekFrom::Start(0)).unwrap();
+            assert_eq!(opened.read_to_end(&mut Vec::new()).unwrap(), 101);
+        }
+    }
+
+    #[test]
+    fn reading_stops_between_portions() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long");
+        std::fs::write(&path, vec![b' '; 5 * PORTION]).unwrap();
+        let asked = Cell::new(0);
+        let stop = || {
+            asked.set(asked.get() + 1);
+            asked.get() > 2
+        };
+        let result = InputFile::open(&path, FileKind::Scene).unwrap().stopping(&stop).bytes();
+        assert!(matches!(result, Err(ReadError::Stopped)));
+        assert_eq!(asked.get(), 3);
+    }
+
+    #[test]
+    fn text_has_no_byte_order_mark_and_bad_bytes_are_placed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        std::fs::write(&path, "\u{feff}one\u{feff}").unwrap();
+        assert_eq!(InputFile::open(&path, FileKind::Scene).unwrap().text().unwrap(), "one\u{feff}");
+        std::fs::write(&path, b"one\ntwo\n\xff").unwrap();
+        assert!(says(InputFile::open(&path, FileKind::Scene).unwrap().text()).contains("line 3 is not UTF-8"));
+    }
+}

@@ -1,0 +1,222 @@
+//! Unsaved edits: kept beside the settings some seconds after they are made, asked about when the window closes, and offered at
+//! the next start when it could not ask.
+
+use super::{App, short_name};
+use crate::frame::{Command, LeftBehind, Recovery, Waker};
+use crate::viewer::question::{Answer, Question};
+use crate::viewer::saver::new_scene_file;
+use crate::viewer::toasts::Tone;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+use winit::event_loop::ActiveEventLoop;
+
+/// Edits are kept so long after the last of them: not in the middle of a drag.
+const KEPT_AFTER: Duration = Duration::from_secs(2);
+
+pub(super) struct Leaving {
+    /// Somebody wants to close the window.
+    pub wanted: bool,
+    /// What is being asked.
+    pub question: Option<Question>,
+    /// What a button of it said.
+    pub answer: Option<Answer>,
+    /// What is done once the scene is saved: another is opened, or the window closes.
+    saving: Option<Option<Command>>,
+    /// Closed without saving, as the person wants it.
+    discarded: bool,
+    recovery: Recovery,
+    /// Still to be asked about.
+    left_behind: VecDeque<LeftBehind>,
+    /// Edits that were seen, that are to be kept, and that have been kept, by the session's count.
+    seen: u64,
+    keep_at: Option<Instant>,
+    restored: Receiver<Result<PathBuf, String>>,
+    sender: Sender<Result<PathBuf, String>>,
+    waker: Waker,
+}
+
+impl Leaving {
+    pub fn new(recovery: Recovery, waker: Waker) -> Self {
+        let (sender, restored) = channel();
+        let left_behind = recovery.left_behind().into();
+        Self {
+            wanted: false,
+            question: None,
+            answer: None,
+            saving: None,
+            discarded: false,
+            recovery,
+            left_behind,
+            seen: 0,
+            keep_at: None,
+            restored,
+            sender,
+            waker,
+        }
+    }
+
+    /// When edits are to be kept.
+    pub fn wake_at(&self) -> Option<Instant> {
+        self.keep_at
+    }
+
+    /// Takes back what was left behind, on a thread of its own.
+    fn restore(&self, left: LeftBehind, path: PathBuf) -> Result<(), String> {
+        let (sender, waker) = (self.sender.clone(), self.waker.clone());
+        let work = move || {
+            // The window may be gone, and then it is offered again.
+            let _ = sender.send(left.restore(&path).map(|()| path));
+            waker();
+        };
+        let spawned = std::thread::Builder::new().name("restore".to_owned()).spawn(work);
+        spawned.map(drop).map_err(|error| format!("nothing can be restored: no thread can be started: {error}"))
+    }
+}
+
+impl App {
+    /// Follows what is edited and saved, asks what is to be asked, and closes the window when nothing keeps it.
+    pub(super) fn follow_edits(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
+        if self.told_to_end.load(Ordering::SeqCst) {
+            return event_loop.exit();
+        }
+        if let Some(answer) = self.leaving.answer.take() {
+            self.answer(answer, now, event_loop);
+        }
+        while let Ok(restored) = self.leaving.restored.try_recv() {
+            match restored {
+                Ok(path) => {
+                    self.toasts.add(Tone::News, format!("restored as {}", path.display()), now);
+                    self.open(Command::Open { path }, now);
+                }
+                Err(reason) => self.toasts.add(Tone::Problem, format!("not restored: {reason}"), now),
+            }
+        }
+        let unsaved = self.session.has_unsaved_edits();
+        // What went wrong has been told, and the window stays.
+        if let Some(then) = self.leaving.saving.take_if(|_| !self.session.is_saving()).filter(|_| !unsaved) {
+            match then {
+                Some(command) => self.open(command, now),
+                None => return event_loop.exit(),
+            }
+        }
+        if std::mem::take(&mut self.leaving.wanted) && self.leaving.saving.is_none() {
+            if !unsaved {
+                return event_loop.exit();
+            }
+            self.ask_to_leave(None, now);
+        }
+        let is_shown = !self.session.status().scene.is_empty();
+        if self.leaving.question.is_none()
+            && is_shown
+            && let Some(left) = self.leaving.left_behind.pop_front()
+        {
+            self.ask(Question::Restore(left), now);
+        }
+        self.keep_edits(unsaved, now);
+    }
+
+    /// Carries out a command that may put another scene in the place of this one: with unsaved edits, once the person has said
+    /// what becomes of them.
+    pub(super) fn open(&mut self, command: Command, now: Instant) {
+        if matches!(command, Command::Open { .. }) && self.session.has_unsaved_edits() {
+            return self.ask_to_leave(Some(command), now);
+        }
+        self.session.send(command);
+        self.stirred = true;
+    }
+
+    fn ask_to_leave(&mut self, then: Option<Command>, now: Instant) {
+        let title = short_name(&self.session.status().scene);
+        let file = short_name(&self.scene_path(false).to_string_lossy());
+        self.ask(Question::Leave { title, file, then }, now);
+    }
+
+    fn ask(&mut self, question: Question, now: Instant) {
+        self.capture_mouse(false, now);
+        self.input.release_all(now);
+        if matches!(question, Question::Leave { .. })
+            && let Some(Question::Restore(left)) = self.leaving.question.take()
+        {
+            self.leaving.left_behind.push_front(left);
+        }
+        self.leaving.question = Some(question);
+        self.repaint_at = Some(now);
+    }
+
+    /// Does what the person wants.
+    pub(super) fn answer(&mut self, answer: Answer, now: Instant, event_loop: &ActiveEventLoop) {
+        let Some(question) = self.leaving.question.take() else { return };
+        self.repaint_at = Some(now);
+        self.stirred = true;
+        match (question, answer) {
+            (Question::Leave { then, .. }, Answer::Yes) => {
+                self.save_scene(false);
+                self.leaving.saving = Some(then);
+            }
+            (Question::Leave { then: Some(command), .. }, Answer::No) => self.session.send(command),
+            (Question::Leave { then: None, .. }, Answer::No) => {
+                self.leaving.discarded = true;
+                event_loop.exit();
+            }
+            // It is offered again by the next window.
+            (_, Answer::Later) => {}
+            (Question::Restore(left), Answer::Yes) => {
+                let path = new_scene_file(&self.options.folder, &left.title);
+                if let Err(reason) = self.leaving.restore(left, path) {
+                    self.toasts.add(Tone::Problem, reason, now);
+                }
+            }
+            (Question::Restore(left), Answer::No) => left.discard(),
+        }
+    }
+
+    fn keep_edits(&mut self, unsaved: bool, now: Instant) {
+        if !unsaved {
+            self.leaving.keep_at = None;
+            if self.leaving.recovery.has_kept() {
+                self.leaving.recovery.forget();
+            }
+            self.leaving.seen = self.session.revision();
+            return;
+        }
+        let revision = self.session.revision();
+        if revision != self.leaving.seen {
+            self.leaving.seen = revision;
+            self.leaving.keep_at = Some(now + KEPT_AFTER);
+        }
+        if self.leaving.keep_at.is_some_and(|at| now >= at) {
+            self.leaving.keep_at = None;
+            self.write_edits(now);
+        }
+    }
+
+    fn write_edits(&mut self, now: Instant) {
+        let title = short_name(&self.session.status().scene);
+        let description = self.session.describe();
+        if let Some(trouble) = self.leaving.recovery.keep(description, &title) {
+            self.toasts.add(Tone::Problem, trouble, now);
+        }
+    }
+
+    /// At the end, however it came: edits that nobody has saved or given up are there at the next start.
+    pub(super) fn keep_or_forget_edits(&mut self) {
+        if self.leaving.discarded || !self.session.has_unsaved_edits() {
+            return self.leaving.recovery.forget();
+        }
+        if self.leaving.keep_at.is_some() || !self.leaving.recovery.has_kept() {
+            self.write_edits(Instant::now());
+        }
+        if let Some(trouble) = self.leaving.recovery.wait() {
+            log::error!("{trouble}");
+        }
+    }
+
+    /// What is said of it when the program was told to end.
+    pub(super) fn stopped_message(&self) -> String {
+        let kept = self.leaving.recovery.has_kept();
+        if kept { "stopped: unsaved changes are offered at the next start" } else { "stopped" }.to_owned()
+    }
+}

@@ -1,0 +1,110 @@
+//! What a person is asked before something is lost: a small dialog in the middle, answered by mouse or by key.
+
+use super::overlay::style_key;
+use crate::frame::{Command, LeftBehind};
+use egui::{Align, Context, Frame, Id, Layout, Modal, RichText};
+use winit::keyboard::{Key, NamedKey};
+
+/// What is asked.
+#[derive(Debug)]
+pub enum Question {
+    /// The scene of this name has edits that are not saved, and is about to make room for another, or the window is about to
+    /// close.
+    ///
+    /// - `file`: what saving writes.
+    Leave { title: String, file: String, then: Option<Command> },
+    /// An earlier window ended before its edits were saved.
+    Restore(LeftBehind),
+}
+
+/// What the person wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Save and leave; or take back what was left behind.
+    Yes,
+    /// Leave without saving; or forget what was left behind.
+    No,
+    /// Go on as if nothing had been asked.
+    Later,
+}
+
+impl Question {
+    fn text(&self) -> (String, String) {
+        match self {
+            Self::Leave { title, file, .. } => (
+                format!("Save the changes to {title}?"),
+                format!("Saving writes {file}. Without saving they are lost."),
+            ),
+            Self::Restore(left) => (
+                format!("Restore the changes to {}?", left.title),
+                "firstlight ended before they were saved. They become a scene file of their own.".to_owned(),
+            ),
+        }
+    }
+
+    fn choices(&self) -> [(&'static str, &'static str, Answer); 3] {
+        match self {
+            Self::Leave { .. } => {
+                [("Save", "Enter", Answer::Yes), ("Don't save", "D", Answer::No), ("Cancel", "Esc", Answer::Later)]
+            }
+            Self::Restore(_) => {
+                [("Restore", "Enter", Answer::Yes), ("Discard", "D", Answer::No), ("Later", "Esc", Answer::Later)]
+            }
+        }
+    }
+
+    /// What a key that was pressed answers.
+    pub fn key(key: &Key) -> Option<Answer> {
+        match key {
+            Key::Named(NamedKey::Enter) => Some(Answer::Yes),
+            Key::Named(NamedKey::Escape) => Some(Answer::Later),
+            Key::Character(text) if text.eq_ignore_ascii_case("d") => Some(Answer::No),
+            _ => None,
+        }
+    }
+
+    /// Draws it; the answer when a button was pressed.
+    pub fn show(&self, context: &Context) -> Option<Answer> {
+        let (heading, explanation) = self.text();
+        let mut answer = None;
+        let frame = Frame::window(&context.style()).inner_margin(16.0);
+        Modal::new(Id::new("question")).frame(frame).show(context, |ui| {
+            ui.set_width(360.0_f32.min(context.content_rect().width() - 40.0));
+            ui.label(RichText::new(heading).size(16.0).strong());
+            ui.add_space(6.0);
+            ui.label(explanation);
+            ui.add_space(14.0);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                for (label, key, meaning) in self.choices() {
+                    let button = ui.button(label);
+                    ui.label(style_key(key));
+                    ui.add_space(6.0);
+                    if button.clicked() {
+                        answer = Some(meaning);
+                    }
+                }
+            });
+        });
+        answer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_choice_has_the_key_that_stands_beside_it() {
+        let question = Question::Leave { title: "gallery".to_owned(), file: "gallery-0001.ron".to_owned(), then: None };
+        for (_, name, answer) in question.choices() {
+            let key = match name {
+                "Enter" => Key::Named(NamedKey::Enter),
+                "Esc" => Key::Named(NamedKey::Escape),
+                letter => Key::Character(letter.into()),
+            };
+            assert_eq!(Question::key(&key), Some(answer), "{name}");
+        }
+        assert_eq!(Question::key(&Key::Named(NamedKey::Space)), None);
+        assert_eq!(Question::key(&Key::Character("x".into())), None);
+    }
+}
