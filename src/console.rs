@@ -6,8 +6,10 @@
 
 use crate::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::backtrace::{Backtrace, BacktraceStatus};
 use std::fmt;
 use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::panic::PanicHookInfo;
 
 /// Something that can be said.
 pub trait Message {
@@ -73,6 +75,27 @@ pub fn print(message: impl Message) -> io::Result<()> {
 pub fn remark(message: impl Message) {
     // Nobody listens, and there is nobody left to tell.
     let _ = writeln!(io::stderr().lock(), "{}", message.text());
+}
+
+/// From now on, panics are told like anything else: their messages quote foreign names too.
+pub fn tell_panics() {
+    std::panic::set_hook(Box::new(|panic| remark(panic_lines(panic, &Backtrace::capture()))));
+}
+
+fn panic_lines(panic: &PanicHookInfo, trace: &Backtrace) -> Vec<String> {
+    let thread = std::thread::current();
+    let name = thread.name().unwrap_or("without a name");
+    let place = panic.location().map_or(String::new(), |place| format!(" at {place}"));
+    let message = panic.payload_as_str().unwrap_or("no message");
+    let mut told = vec![
+        format!("error: the program has a fault, please report it: thread {name} panicked{place}"),
+        message.to_owned(),
+    ];
+    match trace.status() {
+        BacktraceStatus::Captured => told.extend(lines(&trace.to_string())),
+        _ => told.push("set RUST_BACKTRACE=1 to see where it came from".to_owned()),
+    }
+    told
 }
 
 /// Takes away what a bar has left in the line of a terminal; nobody is told if that fails.
@@ -149,6 +172,29 @@ mod tests {
         assert_eq!(format_args!("{}\x1b", 1).text(), "1\\u{1b}");
         assert_eq!(vec!["one\r".to_owned(), "two\u{202e}".to_owned()].text(), "one\\u{d}\ntwo\\u{202e}");
         assert_eq!(lines("one\ntwo\n").text(), "one\ntwo");
+    }
+
+    #[test]
+    fn a_panic_is_told_in_lines_that_print() {
+        static TOLD: std::sync::Mutex<Option<String>> = std::sync::Mutex::new(None);
+        let usual = std::panic::take_hook();
+        // Other tests panic side by side, on purpose.
+        std::panic::set_hook(Box::new(move |panic| match std::thread::current().name() {
+            Some("\u{1b}[31m") => {
+                *TOLD.lock().unwrap() = Some(panic_lines(panic, &Backtrace::disabled()).text());
+            }
+            _ => usual(panic),
+        }));
+        let thread = std::thread::Builder::new().name("\u{1b}[31m".to_owned());
+        let name = "a\u{202e}b\nerror: forged";
+        assert!(thread.spawn(move || panic!("no mesh `{name}`")).unwrap().join().is_err());
+        let _ = std::panic::take_hook();
+        let told = TOLD.lock().unwrap().take().unwrap();
+        let mut told = told.lines();
+        let first = told.next().unwrap();
+        assert!(first.contains("thread \\u{1b}[31m panicked at src/console.rs:"), "{first}");
+        assert_eq!(told.next(), Some("no mesh `a\\u{202e}b\\u{a}error: forged`"));
+        assert_eq!(told.count(), 1);
     }
 
     #[test]

@@ -221,6 +221,7 @@ impl OverwriteArgs {
 
 /// Runs what the command line asks for.
 pub fn main() -> ExitCode {
+    firstlight::console::tell_panics();
     start_log();
     let line = match CommandLine::try_parse() {
         Ok(line) => line,

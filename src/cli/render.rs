@@ -22,6 +22,7 @@ use firstlight::scene::{
 };
 use glam::UVec2;
 
+use std::mem::ManuallyDrop;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -227,7 +228,7 @@ impl Job {
         }
         let inputs = SceneInputs::of(&mut self.world);
         self.extraction.update(Part::Camera, &inputs, &self.scene.trees);
-        self.draft = ShotDraft::of(&mut self.world, Some(&self.scene));
+        self.draft = ShotDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
     }
 
     /// Renders a whole picture.
@@ -303,12 +304,14 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         progress.suspend(|| remark(format_args!("warning: {warning}")));
     }
     let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
+    // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
+    let job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
         let message = format!("the picture was stopped in the middle of a pass; the new one has {} samples", shot.spp);
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
     if args.turntable.is_some() || args.bookmarks.is_some() {
-        return animate(args, job, progress, files.replaced().len(), stop);
+        return animate(args, ManuallyDrop::into_inner(job), progress, files.replaced().len(), stop);
     }
     let mut film = job.film(args, kept)?;
     if let Some(path) = film_path.filter(|_| args.resume) {
@@ -320,6 +323,8 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
     let region = args.region.map(|region| region_in(&film, region)).transpose()?;
+    // From here on a stop saves what there is, which must not take long.
+    job.draft.prepare();
     stop.attend();
     let asked = || stop.is_asked();
     if region.is_some() && film.spp() == 0 {
@@ -328,7 +333,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         render_offline_until(&job.extraction.snapshot, &job.settings, &mut film, once, &asked, |_| true);
     }
     let region = region.as_ref();
-    let Job { extraction, settings, .. } = &job;
+    let Job { extraction, settings, .. } = &*job;
     let report = render_region_until(&extraction.snapshot, settings, &mut film, region, target, &asked, |now| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);

@@ -19,6 +19,7 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// The name of the note in a picture: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
@@ -83,6 +84,15 @@ pub struct ShotDraft {
     /// The scene as it was opened.
     loaded: Option<LoadedScene>,
     seed: u32,
+    prints: OnceLock<Prints>,
+}
+
+/// What takes a look at everything in the scene: some seconds where a million objects are.
+#[derive(Clone, Copy, Debug)]
+struct Prints {
+    content: Fingerprint,
+    /// The scene is another than the one that was opened, and can be said in words.
+    has_changed: bool,
 }
 
 impl ShotDraft {
@@ -97,7 +107,19 @@ impl ShotDraft {
             loaded: loaded.cloned(),
             description,
             seed,
+            prints: OnceLock::new(),
         }
+    }
+
+    /// Does now what takes long about [`note`](Self::note).
+    pub fn prepare(&self) {
+        self.prints();
+    }
+
+    /// The same, for a draft of the same scene seen from elsewhere.
+    pub fn prepared_as(mut self, other: &Self) -> Self {
+        self.prints = other.prints.clone();
+        self
     }
 
     /// The note of a picture that will lie at `path`, of a film of this size and so many samples.
@@ -114,12 +136,12 @@ impl ShotDraft {
             Some(SceneSource::Picture(_)) | None => ShotScene::None,
         };
         let file = &self.description.file;
-        let fingerprint = self.content.fingerprint();
+        let Prints { content, has_changed } = self.prints();
         let shot = Shot {
             format: FORMAT,
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
-            fingerprint: fingerprint.to_string(),
+            fingerprint: content.to_string(),
             camera: file.camera.clone(),
             film: FilmPart { width: size.0, height: size.1, filter: file.film.filter },
             integrator: file.integrator,
@@ -129,17 +151,19 @@ impl ShotDraft {
             first_sample: samples.first,
             spp: samples.spp,
             uneven: samples.uneven,
-            text: self.has_changed(fingerprint).then(|| file.to_ron()),
+            text: has_changed.then(|| file.to_ron()),
         };
         shot.to_note()
     }
 }
 
 impl ShotDraft {
-    /// Whether the scene is another than the one that was opened, and can be said in words.
-    fn has_changed(&self, now: Fingerprint) -> bool {
-        let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
-        opened != Some(now) && self.description.loose_meshes.is_empty()
+    fn prints(&self) -> Prints {
+        *self.prints.get_or_init(|| {
+            let content = self.content.fingerprint();
+            let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
+            Prints { content, has_changed: opened != Some(content) && self.description.loose_meshes.is_empty() }
+        })
     }
 }
 
