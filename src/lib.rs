@@ -1,29 +1,27 @@
 //! firstlight: an interactive, progressive path tracer whose scene is a bevy_ecs world.
 //!
-//! Rooms, from the ground up; a room imports only from rooms below it (ARCHITECTURE.md has the whole picture):
+//! From the ground up; imports point down (ARCHITECTURE.md has the whole picture):
 //!
-//! | row | room | what lives there |
-//! |---|---|---|
-//! | 0 | [`geometry`], [`sampling`], `lanes` | rays, boxes, robust arithmetic; sequences, warps, distributions; sixteen numbers at a time |
-//! | 0 | [`printable`], [`console`] | foreign text made fit to be printed; what is said on a terminal |
-//! | 1 | [`kdtree`], [`mesh`] | build and traversal; mesh data, normals, simplification |
-//! | 2 | [`render`] | snapshot, camera, film, integrators, lights, materials, textures |
-//! | 3 | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
-//! | 4 | [`frame`] | the ECS schedule in the order in which a frame runs |
-//! | 5 | [`report`] | speed against error: ladders, metrics, tables and plots |
-//! | 5 | [`stability`] | the hard cases, counted |
-//! | 5 | `viewer` (feature) | the window: input, overlays, presenting |
+//! | module | what lives there |
+//! |---|---|
+//! | [`geometry`], [`kdtree`] | rays, boxes, robust arithmetic; which surface a ray meets first |
+//! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
+//! | [`sampling`], [`render`] | sequences, warps, distributions; snapshot, camera, film, integrators, lights, materials |
+//! | [`printable`], [`console`] | foreign text made fit to be printed; what is said on a terminal |
+//! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
+//! | [`frame`] | the ECS schedule in the order in which a frame runs |
+//! | [`report`] | speed against error: convergence curves, metrics, tables and plots |
+//! | [`stability`] | the hard cases, counted |
+//! | `viewer` (feature) | the window: input, overlays, presenting |
+
+pub use firstlight_kdtree::{self as kdtree, geometry};
+pub use firstlight_mesh as mesh;
+pub use firstlight_render::{self as render, sampling};
 
 pub mod console;
 pub mod frame;
-pub mod geometry;
-pub mod kdtree;
-pub(crate) mod lanes;
-pub mod mesh;
 pub mod printable;
-pub mod render;
 pub mod report;
-pub mod sampling;
 pub mod scene;
 pub mod stability;
 #[cfg(feature = "viewer")]

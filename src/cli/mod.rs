@@ -23,6 +23,7 @@ mod waiting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use console::{lines, remark};
 use firstlight::console::LogWriter;
+use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::whole_file::Replace;
@@ -43,6 +44,29 @@ struct CommandLine {
     command: Option<Command>,
     #[command(flatten)]
     show: show::ShowArgs,
+    /// Instruction set of the renderer; the pictures are the same. Without it: the widest of the processor.
+    #[arg(long, value_name = "SET", value_enum, global = true)]
+    simd: Option<SimdArg>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SimdArg {
+    Avx512,
+    Avx2,
+    Portable,
+}
+
+impl SimdArg {
+    /// Makes it the one of this process.
+    fn choose(self) -> Result<(), Failure> {
+        let set = match self {
+            Self::Avx512 => InstructionSet::Avx512,
+            Self::Avx2 => InstructionSet::Avx2,
+            Self::Portable => InstructionSet::Portable,
+        };
+        let missing = || Failure::Failed(format!("this processor does not have {set:?}: leave out --simd"));
+        set.set_default().then_some(()).ok_or_else(missing)
+    }
 }
 
 #[derive(Subcommand)]
@@ -227,10 +251,10 @@ pub fn main() -> ExitCode {
         Ok(line) => line,
         Err(error) => return not_understood(error),
     };
-    let result = match line.command {
+    let result = line.simd.map_or(Ok(()), SimdArg::choose).and_then(|()| match line.command {
         Some(command) => Stop::obeyed_by(move |stop| command.run(stop)),
         None => show::run(&line.show),
-    };
+    });
     let (messages, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Usage(message)) => (vec![message], 2),

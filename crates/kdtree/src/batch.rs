@@ -1,0 +1,175 @@
+//! Rays and hits as structures of arrays: what a wave of the integrator hands to the kernel and gets back.
+
+use super::Hit;
+use crate::geometry::Ray;
+use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
+use glam::Vec3;
+
+/// Many rays, one array per coordinate. The arrays may be longer than there are rays.
+#[derive(Clone, Debug, Default)]
+pub struct RayBatch {
+    pub origin_x: Vec<f32>,
+    pub origin_y: Vec<f32>,
+    pub origin_z: Vec<f32>,
+    pub dir_x: Vec<f32>,
+    pub dir_y: Vec<f32>,
+    pub dir_z: Vec<f32>,
+    /// Lengths of `dir`, excluded.
+    pub t_max: Vec<f32>,
+    len: usize,
+}
+
+impl RayBatch {
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Forgets the rays and keeps the memory.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    #[inline]
+    pub fn push(&mut self, ray: &Ray) {
+        if self.len == self.t_max.len() {
+            self.make_room(self.len.max(64));
+        }
+        let i = self.len;
+        self.origin_x[i] = ray.origin.x;
+        self.origin_y[i] = ray.origin.y;
+        self.origin_z[i] = ray.origin.z;
+        self.dir_x[i] = ray.dir.x;
+        self.dir_y[i] = ray.dir.y;
+        self.dir_z[i] = ray.dir.z;
+        self.t_max[i] = ray.t_max;
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> Ray {
+        Ray {
+            origin: Vec3::new(self.origin_x[i], self.origin_y[i], self.origin_z[i]),
+            dir: Vec3::new(self.dir_x[i], self.dir_y[i], self.dir_z[i]),
+            t_max: self.t_max[i],
+        }
+    }
+
+    /// So that `n` more rays can be appended.
+    pub fn make_room(&mut self, n: usize) {
+        let least = self.len + n + LANES;
+        if self.t_max.len() < least {
+            for array in self.arrays() {
+                array.resize(least, 0.0);
+            }
+        }
+    }
+
+    /// Appends the rays of the lanes in `mask`; there must be room.
+    #[inline(always)]
+    pub fn append<S: Simd>(&mut self, mask: Mask, origin: Vector<S>, dir: Vector<S>, t_max: Float<S>) {
+        let at = self.len;
+        let [ox, oy, oz, dx, dy, dz, t] = self.arrays();
+        append(ox, at, mask, origin.x);
+        append(oy, at, mask, origin.y);
+        append(oz, at, mask, origin.z);
+        append(dx, at, mask, dir.x);
+        append(dy, at, mask, dir.y);
+        append(dz, at, mask, dir.z);
+        append(t, at, mask, t_max);
+        self.len += mask.count_ones() as usize;
+    }
+
+    #[inline(always)]
+    fn arrays(&mut self) -> [&mut Vec<f32>; 7] {
+        let Self { origin_x, origin_y, origin_z, dir_x, dir_y, dir_z, t_max, len: _ } = self;
+        [origin_x, origin_y, origin_z, dir_x, dir_y, dir_z, t_max]
+    }
+}
+
+/// Writes the lanes in `mask` to `to[at..]`, and anything to the rest of the sixteen numbers there.
+#[inline(always)]
+pub fn append<S: Simd>(to: &mut [f32], at: usize, mask: Mask, lanes: Float<S>) {
+    lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
+}
+
+/// The same of integers.
+#[inline(always)]
+pub fn append_bits<S: Simd>(to: &mut [u32], at: usize, mask: Mask, lanes: Bits<S>) {
+    lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
+}
+
+impl<'a> FromIterator<&'a Ray> for RayBatch {
+    fn from_iter<I: IntoIterator<Item = &'a Ray>>(rays: I) -> Self {
+        let mut batch = Self::default();
+        rays.into_iter().for_each(|ray| batch.push(ray));
+        batch
+    }
+}
+
+/// The nearest hit of each ray of a batch, one array per field.
+///
+/// | shape | `prim` | `u`, `v` |
+/// |---|---|---|
+/// | mesh, triangle | triangle index, 0 for a lone triangle | barycentric weights of vertices 1 and 2 |
+/// | quad | 0 | 0..1 along `edge_u` and `edge_v` |
+/// | sphere, spheres | sphere index, 0 for a lone sphere | 0 |
+/// | plane | 0 | 0 |
+#[derive(Clone, Debug, Default)]
+pub struct HitBatch {
+    /// Lengths of `dir`; `f32::INFINITY` when the ray met nothing before its `t_max`.
+    pub t: Vec<f32>,
+    pub u: Vec<f32>,
+    pub v: Vec<f32>,
+    pub prim: Vec<u32>,
+    /// Index of the object in the scene tree, [`HitBatch::MISS`] when there is none.
+    pub object: Vec<u32>,
+}
+
+impl HitBatch {
+    pub const MISS: u32 = u32::MAX;
+
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// The answer for ray `i`, `None` for a miss.
+    #[inline]
+    pub fn get(&self, i: usize) -> Option<Hit> {
+        let object = self.object[i];
+        let hit = Hit { t: self.t[i], u: self.u[i], v: self.v[i], prim: self.prim[i], object };
+        (object != Self::MISS).then_some(hit)
+    }
+
+    /// Makes room for `n` answers, which may still be those of an older batch.
+    pub(super) fn resize(&mut self, n: usize) {
+        self.t.resize(n, f32::INFINITY);
+        self.u.resize(n, 0.0);
+        self.v.resize(n, 0.0);
+        self.prim.resize(n, Self::MISS);
+        self.object.resize(n, Self::MISS);
+    }
+
+    /// Makes room for `n` answers, all of them misses.
+    pub fn reset(&mut self, n: usize) {
+        let Self { t, u, v, prim, object } = self;
+        for array in [t, u, v] {
+            array.clear();
+        }
+        for array in [&mut *prim, &mut *object] {
+            array.clear();
+        }
+        self.t.resize(n, f32::INFINITY);
+        self.u.resize(n, 0.0);
+        self.v.resize(n, 0.0);
+        self.prim.resize(n, Self::MISS);
+        self.object.resize(n, Self::MISS);
+    }
+}

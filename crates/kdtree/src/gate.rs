@@ -1,0 +1,177 @@
+//! Where rays wait to enter a tree, sixteen at a time: what each needs on its way is worked out for all of them at once.
+//!
+//! One by one it takes five divisions and branches on directions, which nothing foretells.
+
+use super::blocks::LeafRay;
+use super::lanes::{longest_axis, to_own_space};
+use super::ray::{Nearest, WIDEN};
+use super::simd::{LANES, Mask, Simd};
+use super::stream::Source;
+use super::wide::DescentRay;
+use crate::geometry::{Aabb, Ray, Shear};
+use firstlight_simd::three;
+use glam::Vec3;
+
+type Lanes = [f32; LANES];
+
+/// Sixteen rays in the tree's own space.
+#[repr(C, align(64))]
+pub(super) struct Gate {
+    origin: [Lanes; 3],
+    dir: [Lanes; 3],
+    /// As in `ray::TreeRay`.
+    inv_lo: [Lanes; 3],
+    inv_hi: [Lanes; 3],
+    slack: Lanes,
+    /// The part of the ray inside the bounds.
+    from: Lanes,
+    until: Lanes,
+    /// As in [`Shear`].
+    kz: [u32; LANES],
+    sx: Lanes,
+    sy: Lanes,
+    sz: Lanes,
+    /// What was hit before: `t`, and which primitive wins at equal `t`.
+    t: Lanes,
+    prim: [u32; LANES],
+    /// By which the source knows them.
+    id: [u32; LANES],
+    /// Those that have yet to enter.
+    waiting: Mask,
+}
+
+impl Gate {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            origin: [[0.0; LANES]; 3],
+            // Lanes without a ray are worked out too.
+            dir: [[1.0; LANES]; 3],
+            inv_lo: [[0.0; LANES]; 3],
+            inv_hi: [[0.0; LANES]; 3],
+            slack: [0.0; LANES],
+            from: [0.0; LANES],
+            until: [0.0; LANES],
+            kz: [0; LANES],
+            sx: [0.0; LANES],
+            sy: [0.0; LANES],
+            sz: [0.0; LANES],
+            t: [0.0; LANES],
+            prim: [0; LANES],
+            id: [0; LANES],
+            waiting: 0,
+        }
+    }
+
+    /// The lane of the next ray that meets the bounds; `None` if there are no more.
+    ///
+    /// - `extent`: the largest side of the tree's bounds.
+    #[inline(always)]
+    pub fn next<S: Simd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &mut impl Source) -> Option<usize> {
+        while self.waiting == 0 {
+            let n = self.fetch(source);
+            if n == 0 {
+                return None;
+            }
+            self.prepare(s, bounds, extent, source);
+            self.waiting &= Mask::MAX >> (LANES - n);
+        }
+        let lane = self.waiting.trailing_zeros() as usize % LANES;
+        self.waiting &= self.waiting - 1;
+        Some(lane)
+    }
+
+    /// Returns how many rays there were.
+    #[inline(always)]
+    fn fetch(&mut self, source: &mut impl Source) -> usize {
+        for lane in 0..LANES {
+            let Some((ray, nearest, id)) = source.next() else { return lane };
+            for axis in 0..3 {
+                self.origin[axis][lane] = ray.origin[axis];
+                self.dir[axis][lane] = ray.dir[axis];
+            }
+            (self.t[lane], self.prim[lane], self.id[lane]) = (nearest.t, nearest.prim, id);
+        }
+        LANES
+    }
+
+    /// [`Shear::new`], `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
+    #[inline(always)]
+    fn prepare<S: Simd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &impl Source) {
+        let mut origin = three!(|axis| s.load(&self.origin[axis]));
+        let mut dir = three!(|axis| s.load(&self.dir[axis]));
+        if let Some(map) = source.own_from_world() {
+            [origin, dir] = to_own_space(s, map, &origin, &dir);
+            for axis in 0..3 {
+                s.store(origin[axis], &mut self.origin[axis]);
+                s.store(dir[axis], &mut self.dir[axis]);
+            }
+        }
+        let (along_x, along_y) = longest_axis(s, &dir);
+        let kz = s.select_u(along_x, s.splat_u(0), s.select_u(along_y, s.splat_u(1), s.splat_u(2)));
+        let [dx, dy, dz] = dir;
+        let longest = s.select(along_x, dx, s.select(along_y, dy, dz));
+        let first = s.select(along_x, dy, s.select(along_y, dz, dx));
+        let second = s.select(along_x, dz, s.select(along_y, dx, dy));
+        let one = s.splat(1.0);
+        let sz = s.div(one, longest);
+        s.store_u(kz, &mut self.kz);
+        s.store(s.div(first, longest), &mut self.sx);
+        s.store(s.div(second, longest), &mut self.sy);
+        s.store(sz, &mut self.sz);
+        let slack = s.mul(s.splat(WIDEN * extent), s.abs(sz));
+        s.store(slack, &mut self.slack);
+        let (mut from, mut until) = (s.splat(0.0), s.load(&self.t));
+        for axis in 0..3 {
+            let inv = s.div(one, dir[axis]);
+            let (lo, hi) = (s.mul(inv, s.splat(1.0 - WIDEN)), s.mul(inv, s.splat(1.0 + WIDEN)));
+            s.store(lo, &mut self.inv_lo[axis]);
+            s.store(hi, &mut self.inv_hi[axis]);
+            let (min, max) = (s.splat(bounds.min[axis]), s.splat(bounds.max[axis]));
+            let down = s.negative(dir[axis]);
+            let (entry, exit) = (s.select(down, max, min), s.select(down, min, max));
+            // NaN, a ray inside a face, loses against either number.
+            from = s.max(s.sub(s.mul(s.sub(entry, origin[axis]), lo), slack), from);
+            until = s.min(s.add(s.mul(s.sub(exit, origin[axis]), hi), slack), until);
+        }
+        s.store(from, &mut self.from);
+        s.store(until, &mut self.until);
+        self.waiting = s.le(from, until);
+    }
+
+    #[inline(always)]
+    pub fn descent(&self, lane: usize) -> DescentRay {
+        let [x, y, z] = &self.origin;
+        let [lx, ly, lz] = &self.inv_lo;
+        let [hx, hy, hz] = &self.inv_hi;
+        let origin = [x[lane], y[lane], z[lane]];
+        DescentRay::new(origin, [lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]], self.slack[lane])
+    }
+
+    #[inline(always)]
+    pub fn leaf<R: LeafRay>(&self, lane: usize) -> R {
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.dir);
+        let origin = Vec3::new(ox[lane], oy[lane], oz[lane]);
+        let dir = Vec3::new(dx[lane], dy[lane], dz[lane]);
+        let kz = self.kz[lane] as usize % 3;
+        let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+        let shear = Shear { kz, kx, ky, sx: self.sx[lane], sy: self.sy[lane], sz: self.sz[lane] };
+        R::new(&Ray { origin, dir, t_max: self.t[lane] }, &shear)
+    }
+
+    #[inline(always)]
+    pub fn nearest(&self, lane: usize) -> Nearest {
+        Nearest { prim: self.prim[lane], ..Nearest::before(self.t[lane]) }
+    }
+
+    #[inline(always)]
+    pub fn id(&self, lane: usize) -> u32 {
+        self.id[lane]
+    }
+
+    /// First and last `t` inside the bounds.
+    #[inline(always)]
+    pub fn within(&self, lane: usize) -> (f32, f32) {
+        (self.from[lane], self.until[lane])
+    }
+}

@@ -1,0 +1,215 @@
+//! The tests of `geometry`, sixteen at a time: one shape against sixteen rays, or one ray against sixteen triangles.
+//!
+//! Every operation is that of the scalar test, in its order, so the bits are the same.
+
+use super::simd::{LANES, Mask, Simd};
+use crate::geometry::{TINY_EDGE, tiny_edges};
+use glam::Affine3A;
+
+/// Vertices in the ray's sheared frame: across, across, along.
+pub(super) type Sheared<S> = [<S as firstlight_simd::Simd>::F; 3];
+
+/// Lanes that hit, with their `t`, `u`, `v`; other lanes hold anything.
+pub(super) struct LaneHits<S: Simd> {
+    pub mask: Mask,
+    pub t: S::F,
+    pub u: S::F,
+    pub v: S::F,
+}
+
+impl<S: Simd> LaneHits<S> {
+    #[inline(always)]
+    pub fn none(s: S) -> Self {
+        let zero = s.splat(0.0);
+        Self { mask: 0, t: zero, u: zero, v: zero }
+    }
+}
+
+/// Lanes whose direction is longest along x, and those along y; all others along z. On ties the first axis, as in `geometry::Shear`.
+#[inline(always)]
+pub(super) fn longest_axis<S: Simd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask) {
+    let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
+    let along_x = s.le(y, x) & s.le(z, x);
+    (along_x, !along_x & s.le(z, y))
+}
+
+/// Shears a vertex that is given along the ray's own axes.
+///
+/// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.
+#[inline(always)]
+pub(super) fn shear<S: Simd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::F, sy: S::F) -> Sheared<S> {
+    let (x, y) = (s.sub(vertex[0], origin[0]), s.sub(vertex[1], origin[1]));
+    let z = s.sub(vertex[2], origin[2]);
+    [s.sub(x, s.mul(sx, z)), s.sub(y, s.mul(sy, z)), z]
+}
+
+/// Lanes whose three numbers do not have both signs among them. False for NaN.
+#[inline(always)]
+pub(super) fn same_sign<S: Simd>(s: S, a: S::F, b: S::F, c: S::F) -> Mask {
+    let zero = s.splat(0.0);
+    s.le(zero, s.min(a, s.min(b, c))) | s.le(s.max(a, s.max(b, c)), zero)
+}
+
+/// The plain cross product in the plane, whose sign is never wrong but may be lost.
+#[inline(always)]
+pub(super) fn plain<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
+    s.sub(s.mul(p[0], q[1]), s.mul(p[1], q[0]))
+}
+
+#[inline(always)]
+fn exact<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
+    let cd = s.mul(p[1], q[0]);
+    let rounding = s.neg_mul_add(p[1], q[0], cd);
+    s.add(s.mul_sub(p[0], q[1], cd), rounding)
+}
+
+/// Lanes that may hit, by the plain edge functions.
+#[inline(always)]
+pub(super) fn may_hit<S: Simd>(s: S, a: &Sheared<S>, b: &Sheared<S>, c: &Sheared<S>) -> Mask {
+    same_sign(s, plain(s, c, b), plain(s, a, c), plain(s, b, a))
+}
+
+/// The rest of the triangle test, for lanes that may hit.
+#[inline(always)]
+pub(super) fn resolve<S: Simd>(
+    s: S,
+    mut mask: Mask,
+    a: &Sheared<S>,
+    b: &Sheared<S>,
+    c: &Sheared<S>,
+    sz: S::F,
+) -> LaneHits<S> {
+    let mut edges = [exact(s, c, b), exact(s, a, c), exact(s, b, a)];
+    let smallest = s.min(s.abs(edges[0]), s.min(s.abs(edges[1]), s.abs(edges[2])));
+    let tiny = mask & s.lt(smallest, s.splat(TINY_EDGE));
+    if tiny != 0 {
+        mask &= resolve_tiny(s, tiny, &mut edges, [a, b, c]);
+    }
+    let [e0, e1, e2] = edges;
+    mask &= same_sign(s, e0, e1, e2);
+    let inv = s.div(s.splat(1.0), s.add(s.add(e0, e1), e2));
+    let (w, u, v) = (s.mul(e0, inv), s.mul(e1, inv), s.mul(e2, inv));
+    let depth = s.add(s.add(s.mul(w, a[2]), s.mul(u, b[2])), s.mul(v, c[2]));
+    LaneHits { mask, t: s.mul(depth, sz), u, v }
+}
+
+/// Two triangles that share the diagonal `a c`, the first one first (`geometry::intersect_quad`).
+///
+/// - `corners`: `a`, `b`, `c`, `d` around the quad.
+#[inline(always)]
+pub(super) fn quad_hits<S: Simd>(s: S, lanes: Mask, [a, b, c, d]: [&Sheared<S>; 4], sz: S::F) -> LaneHits<S> {
+    let diagonal = plain(s, a, c);
+    let back = s.sub(s.splat(0.0), diagonal);
+    let first = lanes & same_sign(s, plain(s, c, b), diagonal, plain(s, b, a));
+    let second = lanes & same_sign(s, plain(s, d, c), plain(s, a, d), back);
+    if first | second == 0 {
+        return LaneHits::none(s);
+    }
+    let one = s.splat(1.0);
+    let (p, q) = (choose(s, first, b, c), choose(s, first, c, d));
+    let mut hits = resolve(s, first | second, a, &p, &q, sz);
+    let sum = s.min(s.add(hits.u, hits.v), one);
+    let (u, v) = (hits.u, hits.v);
+    hits.u = s.select(first, sum, u);
+    hits.v = s.select(first, v, sum);
+    // On the diagonal the plain signs may name the first triangle where only the second is hit.
+    let again = first & second & !hits.mask;
+    if again != 0 {
+        let other = resolve(s, again, a, c, d, sz);
+        hits.mask |= other.mask;
+        hits.t = s.select(again, other.t, hits.t);
+        hits.u = s.select(again, other.u, hits.u);
+        hits.v = s.select(again, s.min(s.add(other.u, other.v), one), hits.v);
+    }
+    hits
+}
+
+#[inline(always)]
+fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
+    [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
+}
+
+/// Where rays meet balls in front of them (`geometry::intersect_sphere`): the near side, from inside the far one.
+///
+/// - `to_center`: from the origin of the ray.
+/// - `inv_dir_squared`: `1 / (dir · dir)`.
+#[inline(always)]
+pub(super) fn sphere_hits<S: Simd>(
+    s: S,
+    lanes: Mask,
+    to_center: &[S::D; 3],
+    radius_squared: S::D,
+    dir: &[S::D; 3],
+    inv_dir_squared: S::D,
+) -> LaneHits<S> {
+    let t_middle = s.mul_d(dot(s, to_center, dir), inv_dir_squared);
+    let perpendicular = [
+        s.sub_d(to_center[0], s.mul_d(dir[0], t_middle)),
+        s.sub_d(to_center[1], s.mul_d(dir[1], t_middle)),
+        s.sub_d(to_center[2], s.mul_d(dir[2], t_middle)),
+    ];
+    let discriminant = s.sub_d(radius_squared, dot(s, &perpendicular, &perpendicular));
+    let mask = lanes & s.le_d(s.splat_d(0.0), discriminant);
+    if mask == 0 {
+        return LaneHits::none(s);
+    }
+    let half_chord = s.sqrt_d(s.mul_d(discriminant, inv_dir_squared));
+    let near = s.narrow(s.sub_d(t_middle, half_chord));
+    let far = s.narrow(s.add_d(t_middle, half_chord));
+    let zero = s.splat(0.0);
+    LaneHits { mask, t: s.select(s.lt(zero, near), near, far), u: zero, v: zero }
+}
+
+#[inline(always)]
+pub(super) fn dot<S: Simd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
+    s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
+}
+
+/// Does the lanes of `tiny` again in `f64`; returns the lanes that are still hit, all others included.
+#[inline(never)]
+fn resolve_tiny<S: Simd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&Sheared<S>; 3]) -> Mask {
+    let mut stored = [[0.0; LANES]; 3];
+    let mut points = [[[0.0; LANES]; 2]; 3];
+    for k in 0..3 {
+        s.store(edges[k], &mut stored[k]);
+        s.store(corners[k][0], &mut points[k][0]);
+        s.store(corners[k][1], &mut points[k][1]);
+    }
+    let mut hit = Mask::MAX;
+    for lane in (0..LANES).filter(|lane| tiny >> lane & 1 != 0) {
+        match tiny_edges(points.map(|[x, y]| [x[lane], y[lane]])) {
+            Some(again) => (0..3).for_each(|k| stored[k][lane] = again[k]),
+            None => hit &= !(1 << lane),
+        }
+    }
+    for k in 0..3 {
+        edges[k] = s.load(&stored[k]);
+    }
+    hit
+}
+
+/// Origins and directions in the space of an object.
+#[inline(always)]
+pub(super) fn to_own_space<S: Simd>(s: S, map: &Affine3A, origin: &[S::F; 3], dir: &[S::F; 3]) -> [[S::F; 3]; 2] {
+    let turned = transform(s, map, origin);
+    let origin = [
+        s.add(turned[0], s.splat(map.translation[0])),
+        s.add(turned[1], s.splat(map.translation[1])),
+        s.add(turned[2], s.splat(map.translation[2])),
+    ];
+    [origin, transform(s, map, dir)]
+}
+
+/// As `scene_tree::transform_vector`, rounding for rounding.
+#[inline(always)]
+fn transform<S: Simd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
+    [transform_row(s, map, 0, v), transform_row(s, map, 1, v), transform_row(s, map, 2, v)]
+}
+
+#[inline(always)]
+fn transform_row<S: Simd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S::F {
+    let x = s.mul(s.splat(map.matrix3.x_axis[row]), v[0]);
+    let y = s.mul(s.splat(map.matrix3.y_axis[row]), v[1]);
+    let z = s.mul(s.splat(map.matrix3.z_axis[row]), v[2]);
+    s.add(s.add(x, y), z)
+}

@@ -1,0 +1,42 @@
+//! Which surface does a ray meet first, and is anything in its way? Asked in batches.
+//!
+//! [`SceneTree`] stands above the objects of a scene; a mesh brings a [`MeshTree`] and a cloud of balls a
+//! [`SphereTree`], each built once in the space of its own and shared by all objects that use it.
+//! Knows nothing of materials or entities: positions go in, hits come out.
+
+mod batch;
+mod block_tree;
+mod blocks;
+mod build;
+mod gate;
+pub mod geometry;
+mod instance_tree;
+mod lanes;
+mod loose;
+mod mesh_packet;
+mod mesh_tree;
+mod nodes;
+mod objects;
+mod ray;
+mod scene_tree;
+mod shared_block;
+mod sieve;
+mod simd;
+mod sphere_tree;
+mod split;
+mod split_lanes;
+mod stats;
+mod stream;
+mod surface;
+mod trace;
+mod wide;
+
+pub use batch::{HitBatch, RayBatch};
+pub use batch::{append, append_bits};
+pub use firstlight_simd::InstructionSet;
+pub use mesh_tree::{BuildPreset, MeshTree};
+pub use scene_tree::{Hit, RayClass, SceneTree, Shape};
+pub use sphere_tree::SphereTree;
+pub use stats::{KdTreeStats, Visits};
+pub use surface::SurfacePoint;
+pub use surface::{INSET, WIDE_ERROR, quad_rim, sphere_error};

@@ -1,0 +1,254 @@
+//! Leaf blocks of half the bytes: triangles that share their vertices.
+//!
+//! The triangles of a leaf are neighbours on a surface, and sixteen of them rarely have more than sixteen vertices.
+//! Each vertex is kept, fetched and sheared once; the corners are looked up in registers. A corner gets the bits that it has in a
+//! [`TriangleBlock`](super::blocks::TriangleBlock), so both find the same hits.
+
+use super::blocks::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay};
+use super::lanes::{LaneHits, may_hit, resolve};
+use super::simd::Simd;
+use glam::Vec3;
+
+/// Up to sixteen triangles over up to sixteen vertices.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct SharedBlock {
+    /// `[axis][vertex]`; 0 where there is none.
+    vertices: [[f32; BLOCK]; 3],
+    /// For each triangle the numbers of its vertices, four bits each. Lanes without a triangle repeat the first one, which
+    /// loses every tie against itself.
+    corners: [u32; BLOCK],
+    prims: Prims,
+}
+const _: () = assert!(size_of::<SharedBlock>() == 320);
+
+/// Bit by bit.
+impl PartialEq for SharedBlock {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |block: &Self| (block.vertices.map(|axis| axis.map(f32::to_bits)), block.corners);
+        self.prims == other.prims && bits(self) == bits(other)
+    }
+}
+
+impl SharedBlock {
+    /// The blocks of a leaf, or none where vertices are shared so little that plain blocks would be fewer.
+    pub fn pack_if_small(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Vec<Self> {
+        let blocks = Self::pack(prims, triangle);
+        if blocks.len() > prims.len().div_ceil(BLOCK) { Vec::new() } else { blocks }
+    }
+
+    /// As many blocks as these primitives need, in their order.
+    fn pack(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Vec<Self> {
+        let mut blocks = Vec::new();
+        let mut table = VertexTable::EMPTY;
+        let mut first = 0;
+        let mut corners = [0; BLOCK];
+        for (i, &prim) in prims.iter().enumerate() {
+            let points = triangle(prim);
+            let mut packed = if i - first < BLOCK { table.add(&points) } else { None };
+            if packed.is_none() {
+                blocks.push(Self::new(&table, &corners[..i - first], &prims[first..i]));
+                (table, first) = (VertexTable::EMPTY, i);
+                packed = table.add(&points);
+            }
+            corners[i - first] = packed.unwrap_or(0);
+        }
+        blocks.push(Self::new(&table, &corners[..prims.len() - first], &prims[first..]));
+        blocks
+    }
+
+    fn new(table: &VertexTable, corners: &[u32], prims: &[u32]) -> Self {
+        let mut all = [corners[0]; BLOCK];
+        all[..corners.len()].copy_from_slice(corners);
+        Self { vertices: table.points.map(|axis| axis.map(f32::from_bits)), corners: all, prims: Prims::new(prims) }
+    }
+
+    #[inline(always)]
+    pub fn corner(&self, lane: usize, corner: usize) -> [f32; 3] {
+        let vertex = (self.corners[lane] >> (4 * corner)) as usize % BLOCK;
+        [self.vertices[0][vertex], self.vertices[1][vertex], self.vertices[2][vertex]]
+    }
+
+    /// What sixteen vertices have, for each of the three corners of sixteen triangles.
+    #[inline(always)]
+    pub fn by_corner<S: Simd>(&self, s: S, of_vertices: S::F) -> [S::F; 3] {
+        let corners = s.load_u(&self.corners);
+        [
+            s.lookup(of_vertices, corners),
+            s.lookup(of_vertices, s.shr_u(corners, 4)),
+            s.lookup(of_vertices, s.shr_u(corners, 8)),
+        ]
+    }
+
+    #[inline(always)]
+    pub fn vertices(&self) -> &[[f32; BLOCK]; 3] {
+        &self.vertices
+    }
+}
+
+/// Vertices so far, by their bits.
+struct VertexTable {
+    /// `[axis][vertex]`.
+    points: [[u32; BLOCK]; 3],
+    len: usize,
+}
+
+impl VertexTable {
+    const EMPTY: Self = Self { points: [[0; BLOCK]; 3], len: 0 };
+
+    /// The packed numbers of three vertices; `None`, and nothing is changed, if there is no room for them.
+    fn add(&mut self, triangle: &[Vec3; 3]) -> Option<u32> {
+        let (len, mut packed) = (self.len, 0);
+        for (corner, point) in triangle.iter().enumerate() {
+            let [x, y, z] = point.to_array().map(f32::to_bits);
+            let [xs, ys, zs] = &self.points;
+            // All at once, which takes fewer steps than stopping at the right one.
+            let same = (0..BLOCK).fold(0u32, |same, i| same | u32::from(xs[i] == x && ys[i] == y && zs[i] == z) << i);
+            let known = same & ((1 << self.len) - 1);
+            let vertex = if known != 0 { known.trailing_zeros() as usize } else { self.len };
+            if vertex == BLOCK {
+                self.len = len;
+                return None;
+            }
+            (self.points[0][vertex], self.points[1][vertex], self.points[2][vertex]) = (x, y, z);
+            self.len = self.len.max(vertex + 1);
+            packed |= (vertex as u32) << (4 * corner);
+        }
+        Some(packed)
+    }
+}
+
+impl LeafBlock for SharedBlock {
+    type Ray = ShearedRay;
+    type Compact = NoBlock<ShearedRay>;
+
+    #[inline(always)]
+    fn prims(&self) -> &Prims {
+        &self.prims
+    }
+
+    fn prims_mut(&mut self) -> &mut Prims {
+        &mut self.prims
+    }
+
+    #[inline(always)]
+    fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
+        let [x, y, z] = ray.shear(s, &block.vertices);
+        let ([ax, bx, cx], [ay, by, cy]) = (block.by_corner(s, x), block.by_corner(s, y));
+        let mask = may_hit(s, &[ax, ay, z], &[bx, by, z], &[cx, cy, z]);
+        if mask == 0 {
+            return LaneHits::none(s);
+        }
+        let [az, bz, cz] = block.by_corner(s, z);
+        resolve(s, mask, &[ax, ay, az], &[bx, by, bz], &[cx, cy, cz], s.splat(ray.sz))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocks::{LeafRay, TriangleBlock};
+    use crate::geometry::{Ray, Shear};
+    use crate::ray::Nearest;
+    use crate::simd::{InstructionSet, dispatch};
+    use glam::vec3;
+    use proptest::prelude::*;
+
+    /// Triangles over few places, some of which differ in the sign of a zero only.
+    fn triangles() -> impl Strategy<Value = Vec<[Vec3; 3]>> {
+        (2usize..60, any::<u64>(), 1usize..70).prop_map(|(n_places, seed, n_triangles)| {
+            let mut state = seed;
+            let mut next = move || {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 33) as u32
+            };
+            let mut number = || [0.0, -0.0, 1.0, next() as f32 / 1e9 - 1.0][next() as usize % 4];
+            let places: Vec<Vec3> = (0..n_places).map(|_| vec3(number(), number(), number())).collect();
+            (0..n_triangles).map(|_| [0; 3].map(|_| places[next() as usize % n_places])).collect()
+        })
+    }
+
+    fn bits(triangle: [Vec3; 3]) -> [[u32; 3]; 3] {
+        triangle.map(|vertex| vertex.to_array().map(f32::to_bits))
+    }
+
+    type Answer = Vec<Option<(u32, [u32; 3])>>;
+
+    #[inline(always)]
+    fn nearest_of<S: Simd, B: LeafBlock<Ray = ShearedRay>>(s: S, blocks: &[B], ray: &Ray) -> Option<(u32, [u32; 3])> {
+        let sheared = ShearedRay::new(ray, &Shear::new(ray.dir));
+        let mut nearest = Nearest::before(f32::INFINITY);
+        for block in blocks {
+            B::test(s, block, &sheared, &mut nearest);
+        }
+        nearest.found.then(|| (nearest.prim, [nearest.t, nearest.u, nearest.v].map(f32::to_bits)))
+    }
+
+    #[inline(always)]
+    fn test_both<S: Simd>(s: S, shared: &[SharedBlock], plain: &[TriangleBlock], rays: &[Ray], out: &mut [Answer; 2]) {
+        for ray in rays {
+            out[0].push(nearest_of(s, shared, ray));
+            out[1].push(nearest_of(s, plain, ray));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(crate::geometry::robust::fixed_cases(400))]
+
+        #[test]
+        fn every_corner_keeps_its_bits_and_its_place(triangles in triangles()) {
+            let prims: Vec<u32> = (0..triangles.len() as u32).map(|prim| 3 * prim + 1).collect();
+            let blocks = SharedBlock::pack(&prims, |prim| triangles[prim as usize / 3]);
+            let mut unpacked = Vec::new();
+            for block in &blocks {
+                for lane in 0..block.prims.len() {
+                    let corner = |corner| Vec3::from_array(block.corner(lane, corner));
+                    unpacked.push((block.prims.get(lane), bits([corner(0), corner(1), corner(2)])));
+                }
+            }
+            let expected: Vec<_> = prims.iter().map(|&prim| (prim, bits(triangles[prim as usize / 3]))).collect();
+            prop_assert_eq!(unpacked, expected);
+            // With all vertices in one block, nothing but the number of triangles ends it.
+            let mut places: Vec<_> = triangles.iter().flat_map(|triangle| bits(*triangle)).collect();
+            places.sort_unstable();
+            places.dedup();
+            if places.len() <= BLOCK {
+                prop_assert_eq!(blocks.len(), prims.len().div_ceil(BLOCK));
+            }
+        }
+
+        #[test]
+        fn hits_are_those_of_plain_blocks(triangles in triangles(), aims in proptest::array::uniform8(-1.0f32..1.0)) {
+            let prims: Vec<u32> = (0..triangles.len() as u32).collect();
+            let triangle = |prim: u32| triangles[prim as usize];
+            let shared = &SharedBlock::pack(&prims, triangle)[..];
+            let plain: Vec<_> = prims.chunks(BLOCK).map(|prims| TriangleBlock::new(prims, triangle)).collect();
+            let plain = &plain[..];
+            // Into the middle of a triangle, or past all of them; some down an axis.
+            let rays: Vec<Ray> = (0..32)
+                .map(|i| {
+                    let origin = vec3(2.0, -1.5, 3.0) * aims[i % 8];
+                    let to = triangles[i % triangles.len()].iter().sum::<Vec3>() / 3.0 - origin;
+                    let dir = if i % 5 == 0 { vec3(0.0, 0.0, to.z) } else { to };
+                    Ray::new(origin, if dir == Vec3::ZERO { Vec3::X } else { dir })
+                })
+                .collect();
+            let rays = &rays[..];
+            for set in InstructionSet::available() {
+                let mut answers: [Answer; 2] = Default::default();
+                let out = &mut answers;
+                dispatch!(set, test_both(shared: &[SharedBlock], plain: &[TriangleBlock], rays: &[Ray], out: &mut [Answer; 2]));
+                prop_assert_eq!(&answers[0], &answers[1], "{:?}", set);
+            }
+        }
+    }
+
+    #[test]
+    fn a_leaf_without_shared_vertices_is_not_packed() {
+        let apart = |prim: u32| [0.0, 1.0, 2.0].map(|x| Vec3::splat(3.0 * prim as f32 + x));
+        let fan = |prim: u32| [Vec3::ZERO, Vec3::splat(prim as f32 + 1.0), Vec3::splat(prim as f32 + 2.0)];
+        let prims: Vec<u32> = (0..14).collect();
+        assert!(SharedBlock::pack_if_small(&prims, apart).is_empty());
+        assert_eq!(SharedBlock::pack_if_small(&prims, fan).len(), 1);
+    }
+}

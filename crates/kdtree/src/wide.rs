@@ -1,0 +1,253 @@
+//! Three levels of the binary tree in one node: eight children and the seven planes between them.
+//!
+//! One visit does what up to seven visits of the binary tree would, without a branch that could be mispredicted:
+//! the plain walk in `nodes` says what must come out.
+
+use super::nodes::{KdNodes, Node};
+
+/// The planes and children of three levels.
+///
+/// Plane 0 is the root's, 1 and 2 those of its lower and upper child, 3 to 6 those below. Child `c` is reached by the bits of `c`, the
+/// highest first, 1 for the upper side. Where the binary tree ends early, the missing planes lie at infinity and
+/// only the lowest of the lanes below has a child.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(super) struct WideNode {
+    pub splits: [f32; 7],
+    /// Three bits a plane.
+    pub axes: u32,
+    /// [`EMPTY`], a wide node, or with [`LEAF`] set the first block of a leaf.
+    pub children: [u32; 8],
+    /// For each octant of directions (bit `a` set: down axis `a`) the children from far to near, three bits each,
+    /// and above these 24 bits, for each level from the root one byte: which children lie on the far side of their plane.
+    pub octants: [u64; 8],
+}
+// Two cache lines.
+const _: () = assert!(size_of::<WideNode>() == 128);
+
+pub(super) const EMPTY: u32 = u32::MAX;
+pub(super) const LEAF: u32 = 1 << 31;
+
+/// Entries that a walk may have on its stack, and room for one full store beyond. An odd number of cache lines, so
+/// that the stacks of many rays do not compete for the same few sets of the cache.
+pub(super) const STACK: usize = 144;
+
+/// What waits to be visited, nearest on top.
+#[repr(C, align(64))]
+pub(super) struct Stack {
+    pub child: [u32; STACK],
+    pub t0: [f32; STACK],
+    pub t1: [f32; STACK],
+}
+
+impl Stack {
+    pub const NEW: Self = Self { child: [0; STACK], t0: [0.0; STACK], t1: [0.0; STACK] };
+}
+
+/// A ray as [`super::simd::Simd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it, twice.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct DescentRay {
+    pub origin: [[f32; 8]; 2],
+    /// Shortened reciprocals of the direction, and lengthened ones with their sign turned: times a distance they are the
+    /// earliest crossing, and the negative of the latest.
+    pub inv: [[f32; 8]; 2],
+    pub slack: f32,
+    pub octant: usize,
+    /// The octant in whose order children are visited.
+    pub order: usize,
+}
+
+impl DescentRay {
+    #[inline(always)]
+    pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], slack: f32) -> Self {
+        let [x, y, z] = origin;
+        let origin = [[x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]; 2];
+        let down = |axis: usize| usize::from(inv_lo[axis].is_sign_negative()) << axis;
+        let inv = [
+            [inv_lo[0], inv_lo[1], inv_lo[2], 0.0, 0.0, 0.0, 0.0, 0.0],
+            [-inv_hi[0], -inv_hi[1], -inv_hi[2], 0.0, 0.0, 0.0, 0.0, 0.0],
+        ];
+        let octant = down(0) | down(1) | down(2);
+        Self { origin, inv, slack, octant, order: octant }
+    }
+
+    /// The same ray, which visits what is farthest first.
+    #[inline(always)]
+    pub fn far_first(self) -> Self {
+        Self { order: self.octant ^ 7, ..self }
+    }
+}
+
+/// All wide nodes over a binary tree, root first.
+pub(super) fn widen(tree: &KdNodes) -> Vec<WideNode> {
+    let mut nodes = Vec::new();
+    if !tree.bounds.is_empty() {
+        // Each wide node consumes three levels and leaves at most seven entries behind; one lies at the bottom.
+        assert!(tree.depth().div_ceil(3) * 7 + 9 < STACK, "a tree too deep for the stack");
+        let mut roots = vec![(0, 0)];
+        nodes.push(None);
+        while let Some((binary, slot)) = roots.pop() {
+            let node = widen_one(tree, binary, |child| {
+                roots.push((child, nodes.len()));
+                nodes.push(None);
+                nodes.len() as u32 - 1
+            });
+            nodes[slot] = Some(node);
+        }
+    }
+    nodes.into_iter().flatten().collect()
+}
+
+fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> WideNode {
+    let mut node = WideNode { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], octants: [0; 8] };
+    // The subtree at each place of a level; `None` below a leaf.
+    let mut level = vec![Some(binary)];
+    let mut plane = 0;
+    for depth in 0..3 {
+        let mut next = Vec::new();
+        for (place, entry) in level.iter().enumerate() {
+            match entry.map(|index| tree.nodes[index as usize].unpack()) {
+                Some(Node::Inner { axis, split, first_child }) => {
+                    node.splits[plane] = split;
+                    node.axes |= (axis as u32) << (3 * plane);
+                    next.extend([Some(first_child), Some(first_child + 1)]);
+                }
+                Some(Node::Leaf { first, count }) => {
+                    if count > 0 {
+                        node.children[place << (3 - depth)] = LEAF | first;
+                    }
+                    next.extend([None; 2]);
+                }
+                None => next.extend([None; 2]),
+            }
+            plane += 1;
+        }
+        level = next;
+    }
+    for (place, entry) in level.into_iter().enumerate() {
+        let Some(index) = entry else { continue };
+        node.children[place] = match tree.nodes[index as usize].unpack() {
+            Node::Leaf { count: 0, .. } => EMPTY,
+            Node::Leaf { first, .. } => LEAF | first,
+            Node::Inner { .. } => make_child(index),
+        };
+    }
+    node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
+    node
+}
+
+/// Order and far sides for one octant.
+///
+/// A child's rank from the near end has a bit for each level, 1 where it is on the far side.
+fn octant_word(axes: u32, octant: usize) -> u64 {
+    let mut word = 0;
+    for child in 0..8u64 {
+        let (mut rank, mut plane) = (0, 0);
+        for depth in 0..3 {
+            let side = child >> (2 - depth) & 1;
+            let down = (octant >> (axes >> (3 * plane) & 7) & 1) as u64;
+            let far = side ^ down;
+            word |= far << (24 + 8 * depth + child);
+            rank = rank << 1 | far;
+            plane = 2 * plane + 1 + side;
+        }
+        word |= child << (3 * (7 - rank));
+    }
+    word
+}
+
+/// The plain version of [`super::simd::Simd::descend`].
+///
+/// Pushes the children that the ray meets within `t0..=t1`, farthest first (of a ray that goes far first: nearest), and returns the new
+/// height.
+#[inline(always)]
+pub(super) fn descend_plain(
+    node: &WideNode,
+    ray: &DescentRay,
+    t0: f32,
+    t1: f32,
+    stack: &mut Stack,
+    mut height: usize,
+) -> usize {
+    let mut order = node.octants[ray.order];
+    for _ in 0..8 {
+        let lane = (order & 7) as usize;
+        order >>= 3;
+        let (mut t0, mut t1) = (t0, t1);
+        let mut plane = 0;
+        for depth in 0..3 {
+            let axis = (node.axes >> (3 * plane) & 7) as usize;
+            let distance = node.splits[plane] - ray.origin[0][axis];
+            let side = lane >> (2 - depth) & 1;
+            // NaN, a ray inside the plane, bounds neither side.
+            if (side == 1) == (ray.octant >> axis & 1 == 1) {
+                t1 = f32::min(t1, ray.slack - distance * ray.inv[1][axis]);
+            } else {
+                t0 = f32::max(t0, distance * ray.inv[0][axis] - ray.slack);
+            }
+            plane = 2 * plane + 1 + side;
+        }
+        (stack.child[height], stack.t0[height], stack.t1[height]) = (node.children[lane], t0, t1);
+        height += usize::from(t0 <= t1 && node.children[lane] != EMPTY);
+    }
+    height
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{InstructionSet, Simd, dispatch};
+
+    #[inline(always)]
+    fn run<S: Simd>(s: S, cases: &[(WideNode, DescentRay, f32, f32)], out: &mut Vec<u64>) {
+        for (node, ray, t0, t1) in cases {
+            let mut stack = Stack::NEW;
+            let height = s.descend(node, ray, *t0, *t1, &mut stack, 3);
+            out.push(height as u64);
+            for i in 3..height {
+                // Adding 0 makes the zeros alike.
+                let bits = |t: f32| (t + 0.0).to_bits();
+                out.extend([stack.child[i], bits(stack.t0[i]), bits(stack.t1[i])].map(u64::from));
+            }
+        }
+    }
+
+    #[test]
+    fn all_instruction_sets_descend_alike() {
+        let mut state = 1u64;
+        let mut next = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as u32
+        };
+        let cases: Vec<_> = (0..20_000)
+            .map(|_| {
+                let mut number = || [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
+                let mut node =
+                    WideNode { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
+                let origin = [number(), number(), number()];
+                let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
+                (0..7).for_each(|plane| node.axes |= (next() % 3) << (3 * plane));
+                if next() % 4 == 0 {
+                    node.splits[2] = f32::INFINITY;
+                }
+                node.children = std::array::from_fn(|c| if next() % 5 == 0 { EMPTY } else { c as u32 * 7 });
+                node.octants = std::array::from_fn(|octant| octant_word(node.axes, octant));
+                let ray = DescentRay::new(origin, dir.map(|d| 0.999 / d), dir.map(|d| 1.001 / d), 1e-6);
+                let ray = if next() % 2 == 0 { ray } else { ray.far_first() };
+                (node, ray, 0.0, if next() % 2 == 0 { f32::INFINITY } else { 1.5 })
+            })
+            .collect();
+        let run_on = |set| {
+            let mut out = Vec::new();
+            let (into, cases) = (&mut out, &cases[..]);
+            dispatch!(set, run(cases: &[(WideNode, DescentRay, f32, f32)], into: &mut Vec<u64>));
+            out
+        };
+        let expected = run_on(InstructionSet::Portable);
+        assert!(expected.len() > 60_000, "too few children met");
+        for set in InstructionSet::available() {
+            assert!(run_on(set) == expected, "{set:?}");
+        }
+    }
+}

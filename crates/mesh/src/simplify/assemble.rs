@@ -1,0 +1,95 @@
+//! What is left of a mesh, put together again.
+
+use super::surface::Wedge;
+use crate::Mesh;
+use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+
+/// Triangles that are left: vertices, the mesh's triangle each was, and wedges if there are any.
+#[derive(Debug, Default)]
+pub(super) struct Remaining {
+    pub triangles: Vec<[u32; 3]>,
+    pub sources: Vec<u32>,
+    pub corner_wedges: Vec<u32>,
+}
+
+/// How the mesh was, as far as its remains need to know.
+#[derive(Debug)]
+pub(super) struct Original<'a> {
+    pub scale: f32,
+    pub center: DVec3,
+    pub slots: &'a [u16],
+    pub has_normals: bool,
+    pub has_uvs: bool,
+}
+
+/// Triangles in the order of the mesh they come from, vertices in the order of their use.
+pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedge], original: &Original) -> Mesh {
+    // Each source is there once, so that a table of all of them is a sort.
+    let sources = remaining.sources.iter().max().map_or(0, |&last| last as usize + 1);
+    let mut place_of = vec![Numbers::NONE; sources];
+    remaining.sources.iter().zip(0..).for_each(|(&source, t)| place_of[source as usize] = t);
+    let order = place_of.into_iter().enumerate().filter(|&(_, t)| t != Numbers::NONE);
+    let mut mesh = Mesh { center: original.center, ..Mesh::default() };
+    mesh.triangles.reserve(remaining.triangles.len());
+    mesh.positions.reserve(remaining.triangles.len() / 2);
+    let unscale = original.scale.recip();
+    let mut numbers = Numbers::new(positions.len(), wedges.len());
+    for (source, t) in order {
+        let t = t as usize;
+        let mut corners = remaining.triangles[t];
+        for (k, corner) in corners.iter_mut().enumerate() {
+            let place = *corner;
+            let wedge = remaining.corner_wedges.get(3 * t + k).map(|&w| (w, wedges[w as usize]));
+            let next = mesh.positions.len() as u32;
+            *corner = numbers.number(place, wedge, next);
+            if *corner == next {
+                mesh.positions.push(positions[place as usize] * unscale);
+                if let Some((_, wedge)) = wedge {
+                    if original.has_normals {
+                        mesh.normals.push(wedge.normal);
+                    }
+                    if original.has_uvs {
+                        mesh.uvs.push(wedge.uv);
+                    }
+                }
+            }
+        }
+        mesh.triangles.push(corners);
+        if let Some(&slot) = original.slots.get(source) {
+            mesh.slots.push(slot);
+        }
+    }
+    mesh
+}
+
+/// New numbers of vertices: one a place, or one a wedge, and wedges that differ only in their slot share one.
+struct Numbers {
+    of: Vec<u32>,
+    by_data: HashMap<(u32, [u32; 5]), u32>,
+}
+
+impl Numbers {
+    const NONE: u32 = u32::MAX;
+
+    fn new(places: usize, wedges: usize) -> Self {
+        Self { of: vec![Self::NONE; if wedges == 0 { places } else { wedges }], by_data: HashMap::new() }
+    }
+
+    fn number(&mut self, place: u32, wedge: Option<(u32, Wedge)>, next: u32) -> u32 {
+        let Some((wedge, data)) = wedge else {
+            let known = &mut self.of[place as usize];
+            if *known == Self::NONE {
+                *known = next;
+            }
+            return *known;
+        };
+        let known = &mut self.of[wedge as usize];
+        if *known == Self::NONE {
+            let [x, y, z] = data.normal.to_array().map(f32::to_bits);
+            let [u, v] = data.uv.to_array().map(f32::to_bits);
+            *known = *self.by_data.entry((place, [x, y, z, u, v])).or_insert(next);
+        }
+        *known
+    }
+}

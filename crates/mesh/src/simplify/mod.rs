@@ -1,0 +1,187 @@
+//! Fewer triangles for almost the same surface.
+//!
+//! Both methods collapse edges one after another, cheapest first, under the same guards: a closed manifold stays
+//! one, borders, texture seams, creases and material edges stay lines, no triangle folds over or loses its area,
+//! normals and texture coordinates travel along. Parts of a mesh that are not manifold are left as they are.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `prepare` | welds the mesh, finds out what each vertex may do, sums its quadrics |
+//! | `surface` | connectivity, guards, the collapse itself |
+//! | `greedy`, `queue`, `quadric` | the quadric method on one thread |
+//! | `parts` | the quadric method on all threads |
+//! | `melax`, `heap` | Melax's method |
+//! | `order`, `assemble` | meshes from the steps taken |
+//!
+//! Start reading at [`simplify`].
+
+mod assemble;
+mod greedy;
+mod heap;
+mod melax;
+mod order;
+mod parts;
+mod prepare;
+mod quadric;
+mod queue;
+mod surface;
+
+pub use order::CollapseOrder;
+
+use super::{Deviation, Mesh};
+use assemble::{Original, Remaining, assemble};
+use greedy::{Limits, Log};
+use prepare::Prepared;
+
+/// What an edge costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Quadric error metric with optimal places (Garland and Heckbert 1997): the most accurate, and parallel.
+    #[default]
+    Quadric,
+    /// Edge length times bend (Melax 1998): vertices stay where they are; on one thread.
+    Melax,
+}
+
+/// How far to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Keep at most this share of the triangles, `(0, 1]`.
+    Ratio(f64),
+    /// Keep at most this many triangles, at least 1.
+    Faces(usize),
+    /// Keep as few triangles as the largest distance between the two surfaces allows, metres, above 0.
+    Error(f64),
+}
+
+/// Why a mesh cannot be simplified as asked.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SimplifyError {
+    #[error("the ratio of triangles to keep must be above 0 and at most 1, not {0}")]
+    Ratio(f64),
+    #[error("at least one triangle must be kept")]
+    NoFaces,
+    #[error("the largest error must be a length above 0, not {0}")]
+    Error(f64),
+    #[error("the mesh has no triangle with three different corners")]
+    Degenerate,
+}
+
+/// Samples for each direction of the measured error.
+const ERROR_SAMPLES: usize = 100_000;
+
+/// Collapses edges until the target is reached or no further collapse is allowed.
+///
+/// The result has normals and texture coordinates if the mesh has them. Without either, vertices at one place are
+/// welded. The same mesh and options give the same bytes with any number of threads.
+pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, SimplifyError> {
+    check_target(target)?;
+    let total = mesh.triangles.len();
+    let faces = match target {
+        Target::Ratio(ratio) => ((total as f64 * ratio) as usize).max(1),
+        Target::Faces(faces) => faces,
+        Target::Error(error) => return within_error(mesh, method, error),
+    };
+    let mut prepared = prepare(mesh, method)?;
+    run(&mut prepared, method, faces, f64::INFINITY, false);
+    Ok(finish(mesh, prepared))
+}
+
+/// Whether the target means anything, whatever the mesh.
+pub fn check_target(target: Target) -> Result<(), SimplifyError> {
+    match target {
+        Target::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => Err(SimplifyError::Ratio(ratio)),
+        Target::Faces(0) => Err(SimplifyError::NoFaces),
+        Target::Error(error) if !(error > 0.0 && error.is_finite()) => Err(SimplifyError::Error(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Records all collapses down to as few triangles as `faces`, for a slider: see [`CollapseOrder::mesh_with`].
+pub fn collapse_order(mesh: &Mesh, method: Method, faces: usize) -> Result<CollapseOrder, SimplifyError> {
+    let start = prepare(mesh, method)?;
+    let mut work = start.clone();
+    let log = run(&mut work, method, faces, f64::INFINITY, true);
+    Ok(CollapseOrder::new(mesh, start, log))
+}
+
+fn prepare(mesh: &Mesh, method: Method) -> Result<Prepared, SimplifyError> {
+    let prepared = Prepared::of(mesh, method == Method::Quadric);
+    if prepared.triangles.is_empty() { Err(SimplifyError::Degenerate) } else { Ok(prepared) }
+}
+
+/// - `error`: metres; what it limits is an estimate, the root of an edge's mean squared distance (quadric) or its
+///   cost (Melax).
+fn run(prepared: &mut Prepared, method: Method, faces: usize, error: f64, keep_log: bool) -> Log {
+    let error = error * f64::from(prepared.scale);
+    match method {
+        Method::Quadric => {
+            parts::simplify(prepared, Limits { faces, cost: f32::INFINITY, mean_square: error * error }, keep_log)
+        }
+        Method::Melax => melax::simplify(prepared, faces, error as f32),
+    }
+}
+
+fn finish(mesh: &Mesh, prepared: Prepared) -> Mesh {
+    let Prepared { triangles, sources, corner_wedges, positions, wedges, scale, .. } = prepared;
+    let original = Original {
+        scale,
+        center: mesh.center,
+        slots: &mesh.slots,
+        has_normals: !mesh.normals.is_empty(),
+        has_uvs: !mesh.uvs.is_empty(),
+    };
+    assemble(&Remaining { triangles, sources, corner_wedges }, &positions, &wedges, &original)
+}
+
+/// Tries limits on the estimate until the measured error obeys; the estimate is a mean, so the first may not.
+fn within_error(mesh: &Mesh, method: Method, error: f64) -> Result<Mesh, SimplifyError> {
+    let start = prepare(mesh, method)?;
+    let (mut best, mut limit) = (mesh.clone(), error);
+    let (mut works, mut fails) = (0.0, f64::INFINITY);
+    for _ in 0..8 {
+        let mut work = start.clone();
+        run(&mut work, method, 1, limit, false);
+        let candidate = finish(mesh, work);
+        let measured = Deviation::between(mesh, &candidate, ERROR_SAMPLES).max();
+        if measured <= error {
+            works = limit;
+            if candidate.triangles.len() < best.triangles.len() {
+                best = candidate;
+            }
+        } else {
+            fails = limit;
+        }
+        // Between a limit that works and one that does not lies the best one; before both are known, aim.
+        limit = match (works, fails) {
+            (0.0, _) => limit * (0.9 * error / measured).min(0.5),
+            (_, f64::INFINITY) => 2.0 * limit,
+            _ => 0.5 * (works + fails),
+        };
+    }
+    Ok(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::procedural::{DisplacedSphere, displaced_sphere};
+
+    #[test]
+    fn many_parts_are_as_accurate_as_one_queue() {
+        let mesh = displaced_sphere(&DisplacedSphere { frequency: 50, ..DisplacedSphere::default() });
+        let rms = |parts: usize| {
+            let mut prepared = Prepared::of(&mesh, true);
+            let limits = Limits { faces: mesh.triangles.len() / 5, cost: f32::INFINITY, mean_square: f64::INFINITY };
+            parts::simplify_in(mesh.triangles.len() / parts, &mut prepared, limits, false);
+            let result = finish(&mesh, prepared);
+            assert!(result.triangles.len() <= limits.faces && result.triangles.len() + 2 > limits.faces);
+            Deviation::between(&mesh, &result, 40_000).rms()
+        };
+        let one = rms(1);
+        for parts in [2, 6, 12] {
+            let many = rms(parts);
+            assert!(many < 1.05 * one, "{parts} parts: {many}, one queue: {one}");
+        }
+    }
+}

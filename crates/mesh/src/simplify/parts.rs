@@ -1,0 +1,327 @@
+//! The quadric simplifier on many threads.
+//!
+//! The mesh is cut into parts along a space-filling curve. Each part is simplified alone, its rim frozen, and all
+//! parts follow one cost threshold that rises until little is left to do. Then what is left is cut anew, elsewhere, so
+//! that the first rims lie inside of parts, and these finish. Parts depend on the mesh alone, so any number of threads
+//! gives the same result.
+
+use super::greedy::{Collapse, Greedy, Limits, Log};
+use super::prepare::Prepared;
+use super::quadric::Quadric;
+use super::surface::{Kind, NONE, Surface, WedgeJoin};
+use firstlight_kdtree::geometry::Aabb;
+use glam::{UVec3, Vec3};
+use rayon::prelude::*;
+
+/// About this many triangles a part: a core works on it within its second-level cache, and few lie at its rim.
+const PART_TRIANGLES: usize = 8_192;
+/// The first cut leaves this share of the work, and all at its rims, to the second, which puts the parts on a level.
+const LEFT_TO_SECOND: usize = 64;
+
+/// Simplifies in place: afterwards `prepared` holds what is left, and vertices keep their numbers.
+pub(super) fn simplify(prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
+    simplify_in(PART_TRIANGLES, prepared, limits, keep_log)
+}
+
+/// With as many triangles a part as the mesh has, this is the plain method with one queue, against which the other is
+/// tested.
+pub(super) fn simplify_in(part_triangles: usize, prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
+    let mut log = Log::default();
+    let mut threshold = None;
+    for cut in [Cut::First, Cut::Second] {
+        let total = prepared.triangles.len();
+        let count = total.div_ceil(part_triangles);
+        if count <= 1 || total <= limits.faces {
+            break;
+        }
+        let mut parts = split(prepared, count, cut);
+        threshold = Some(run_together(&mut parts, limits, total, cut, threshold));
+        log.append(join(prepared, parts, keep_log));
+    }
+    // Small meshes, and what rims have kept from being done.
+    if prepared.triangles.len() > limits.faces {
+        let whole: Vec<u32> = (0..prepared.triangles.len() as u32).collect();
+        let mut part = Part::new(prepared, whole, &prepared.valences(), &mut Numbering::of(prepared));
+        part.greedy.run(limits);
+        log.append(join(prepared, vec![part], keep_log));
+    }
+    log
+}
+
+/// Where rims run, and how far parts go.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cut {
+    First,
+    Second,
+}
+
+/// Some triangles with a numbering of their own.
+struct Part {
+    greedy: Greedy,
+    /// The whole mesh's numbers of triangles, vertices, wedges.
+    triangles: Vec<u32>,
+    vertices: Vec<u32>,
+    wedges: Vec<u32>,
+}
+
+/// A part's numbers of the whole mesh's vertices and wedges, `NONE` elsewhere: memory for one part after another.
+struct Numbering {
+    vertices: Vec<u32>,
+    wedges: Vec<u32>,
+}
+
+impl Numbering {
+    fn of(prepared: &Prepared) -> Self {
+        Self { vertices: vec![NONE; prepared.positions.len()], wedges: vec![NONE; prepared.wedges.len()] }
+    }
+}
+
+impl Part {
+    /// - `valences`: how many triangles of the whole mesh each vertex has.
+    fn new(prepared: &Prepared, triangles: Vec<u32>, valences: &[u32], numbering: &mut Numbering) -> Self {
+        // In the order in which the triangles use them: neighbours lie together in memory.
+        let mut vertices = Vec::with_capacity(triangles.len() * 3 / 4);
+        let numbers = &mut numbering.vertices;
+        let corners: Vec<[u32; 3]> = triangles
+            .iter()
+            .map(|&t| prepared.triangles[t as usize].map(|vertex| number(vertex, numbers, &mut vertices)))
+            .collect();
+        vertices.iter().for_each(|&vertex| numbers[vertex as usize] = NONE);
+        let (mut wedges, mut corner_wedges) = (Vec::new(), Vec::new());
+        if !prepared.corner_wedges.is_empty() {
+            let numbers = &mut numbering.wedges;
+            let all = triangles.iter().flat_map(|&t| &prepared.corner_wedges[3 * t as usize..][..3]);
+            corner_wedges = all.map(|&wedge| number(wedge, numbers, &mut wedges)).collect();
+            wedges.iter().for_each(|&wedge| numbers[wedge as usize] = NONE);
+        }
+        let positions = vertices.iter().map(|&v| prepared.positions[v as usize]).collect();
+        let kinds = vertices.iter().map(|&v| prepared.kinds[v as usize]).collect();
+        let wedge_data = wedges.iter().map(|&w| prepared.wedges[w as usize]).collect();
+        let quadrics: Vec<Quadric> = vertices.iter().map(|&v| prepared.quadrics[v as usize]).collect();
+        let mut surface = Surface::new(&corners, positions, kinds, corner_wedges, wedge_data);
+        // A vertex that has triangles elsewhere is on the rim.
+        for (i, &vertex) in vertices.iter().enumerate() {
+            if surface.valence(i) != valences[vertex as usize] {
+                surface.kinds[i] = Kind::Frozen;
+            }
+        }
+        Self { greedy: Greedy::new(surface, quadrics), triangles, vertices, wedges }
+    }
+}
+
+/// The number of `item` in `items`, which it joins if it is new there.
+#[inline]
+fn number(item: u32, numbers: &mut [u32], items: &mut Vec<u32>) -> u32 {
+    let number = &mut numbers[item as usize];
+    if *number == NONE {
+        *number = items.len() as u32;
+        items.push(item);
+    }
+    *number
+}
+
+fn split(prepared: &Prepared, count: usize, cut: Cut) -> Vec<Part> {
+    let bounds = Aabb::from_points(prepared.positions.iter().copied());
+    let codes: Vec<(u32, u32)> = prepared
+        .triangles
+        .par_iter()
+        .enumerate()
+        .map(|(t, triangle)| {
+            let center = triangle.map(|v| prepared.positions[v as usize]).into_iter().sum::<Vec3>() / 3.0;
+            (morton_code(center, &bounds, cut), t as u32)
+        })
+        .collect();
+    let (order, valences) = rayon::join(|| sorted_by_code(codes), || prepared.valences());
+    order
+        .par_chunks(order.len().div_ceil(count))
+        .with_max_len(1)
+        .map_init(
+            || Numbering::of(prepared),
+            |numbering, chunk| Part::new(prepared, chunk.iter().map(|&(_, t)| t).collect(), &valences, numbering),
+        )
+        .collect()
+}
+
+/// Raises the threshold, and lets every part follow it, until the whole is near the wanted count, or after the second
+/// cut at it. Returns the threshold.
+///
+/// - `threshold`: where to begin; without it at what half of the edges cost.
+fn run_together(parts: &mut [Part], limits: Limits, triangles: usize, cut: Cut, threshold: Option<f32>) -> f32 {
+    let excess = triangles - limits.faces;
+    let done_at = match cut {
+        Cut::First => {
+            // Triangles at rims stay whole for now; the others must not pay for them.
+            let at_rims: usize = parts.iter().map(|part| part.greedy.surface.faces_at(Kind::Frozen)).sum();
+            let share = at_rims as u128 * excess as u128 / triangles as u128;
+            limits.faces + excess / LEFT_TO_SECOND + share as usize
+        }
+        Cut::Second => limits.faces,
+    };
+    let mut total = triangles;
+    let mut threshold = threshold.unwrap_or_else(|| {
+        let mut medians: Vec<f32> = parts.par_iter().with_max_len(1).map(|part| part.greedy.median_cost()).collect();
+        medians.sort_unstable_by(f32::total_cmp);
+        medians[medians.len() / 2].min(limits.cost)
+    });
+    while total > done_at && threshold < limits.cost {
+        let excess = total - limits.faces;
+        // How many parts were stopped by their share, not by the threshold.
+        let stopped: usize = parts
+            .par_iter_mut()
+            .with_max_len(1)
+            .map(|part| {
+                let faces = part.greedy.surface.face_count;
+                // Its share of what is too much: however cheap one part is, the whole cannot fall below the limit.
+                let share = (excess as u128 * faces as u128 / total as u128) as usize;
+                // A step takes two triangles: one less, so that it cannot take more than the share.
+                let least = faces - share.saturating_sub(1);
+                part.greedy.run(Limits { faces: least, cost: threshold, ..limits });
+                usize::from(part.greedy.surface.face_count <= least)
+            })
+            .sum();
+        let now: usize = parts.iter().map(|part| part.greedy.surface.face_count).sum();
+        if now == total && stopped * 2 > parts.len() {
+            // Shares too small to be worth a round.
+            break;
+        }
+        // Parts that cost little come first: only when most have nothing left below it does the threshold rise.
+        if stopped * 2 <= parts.len() {
+            let next = parts.iter_mut().filter_map(|part| part.greedy.next_cost()).min_by(f32::total_cmp);
+            // In a desert of costs larger strides: each round fetches every part's memory anew.
+            let stride = if (total - now) * 16 < excess { 8.0 } else { 2.0 };
+            match next {
+                Some(next) => threshold = (stride * threshold).max(next).min(limits.cost),
+                None => break,
+            }
+        }
+        total = now;
+    }
+    if cut == Cut::Second {
+        finish_one_by_one(parts, limits);
+    }
+    threshold
+}
+
+/// The last few steps, which are fewer than parts to share them, wherever they cost least.
+fn finish_one_by_one(parts: &mut [Part], limits: Limits) {
+    loop {
+        let total: usize = parts.iter().map(|part| part.greedy.surface.face_count).sum();
+        let costs = parts.iter_mut().enumerate().filter_map(|(p, part)| Some((part.greedy.next_cost()?, p)));
+        let cheapest = costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        match cheapest {
+            Some((cost, p)) if total > limits.faces && cost <= limits.cost => {
+                let faces = parts[p].greedy.surface.face_count - 1;
+                // Another part's turn, when this one's next would cost more.
+                parts[p].greedy.run(Limits { faces, cost, ..limits });
+            }
+            _ => break,
+        }
+    }
+}
+
+/// Brings the parts' results back into the whole, and their steps into one order.
+fn join(prepared: &mut Prepared, parts: Vec<Part>, keep_log: bool) -> Log {
+    let left: Vec<(Vec<[u32; 3]>, Vec<u32>, Vec<u32>)> = parts
+        .par_iter()
+        .with_max_len(1)
+        .map(|part| {
+            let surface = &part.greedy.surface;
+            let (mut triangles, mut sources) = (Vec::with_capacity(surface.face_count), Vec::new());
+            let mut corner_wedges = Vec::new();
+            for (t, vertices, wedges) in surface.live_triangles() {
+                triangles.push(vertices.map(|v| part.vertices[v as usize]));
+                sources.push(prepared.sources[part.triangles[t] as usize]);
+                corner_wedges.extend(wedges.into_iter().flatten().map(|w| part.wedges[w as usize]));
+            }
+            (triangles, sources, corner_wedges)
+        })
+        .collect();
+    prepared.triangles.clear();
+    prepared.sources.clear();
+    prepared.corner_wedges.clear();
+    for (triangles, sources, corner_wedges) in left {
+        prepared.triangles.extend(triangles);
+        prepared.sources.extend(sources);
+        prepared.corner_wedges.extend(corner_wedges);
+    }
+    for part in &parts {
+        let surface = &part.greedy.surface;
+        for (i, &vertex) in part.vertices.iter().enumerate() {
+            // What is gone is asked for by nobody, and what is frozen has not changed.
+            if surface.valence(i) > 0 && surface.kinds[i] != Kind::Frozen {
+                prepared.positions[vertex as usize] = surface.positions[i];
+                prepared.quadrics[vertex as usize] = part.greedy.quadrics[i];
+                prepared.kinds[vertex as usize] = surface.kinds[i];
+            }
+        }
+        for (&global, &wedge) in part.wedges.iter().zip(&surface.wedges) {
+            prepared.wedges[global as usize] = wedge;
+        }
+    }
+    if keep_log { merge_logs(parts) } else { Log::default() }
+}
+
+/// Steps by cost; each part's own are in order of cost already, and parts do not touch each other. Of equal cost, as
+/// whole levels of the queue are, parts take turns.
+fn merge_logs(parts: Vec<Part>) -> Log {
+    let mut steps: Vec<(u32, usize, usize, usize, usize)> = Vec::new();
+    for (p, part) in parts.iter().enumerate() {
+        let (mut first_join, mut turn, mut last) = (0, 0, 0.0);
+        for (i, collapse) in part.greedy.log.collapses.iter().enumerate() {
+            turn = if collapse.cost == last { turn + 1 } else { 0 };
+            last = collapse.cost;
+            steps.push((collapse.cost.to_bits(), turn, p, i, first_join));
+            first_join += collapse.joins as usize;
+        }
+    }
+    steps.par_sort_unstable();
+    let mut log = Log::default();
+    for (.., p, i, first_join) in steps {
+        let part = &parts[p];
+        let collapse = part.greedy.log.collapses[i];
+        let name = |v: u32| part.vertices[v as usize];
+        log.collapses.push(Collapse { from: name(collapse.from), to: name(collapse.to), ..collapse });
+        log.joins.extend(part.greedy.log.joins[first_join..first_join + collapse.joins as usize].iter().map(|join| {
+            WedgeJoin { from: part.wedges[join.from as usize], to: part.wedges[join.to as usize], ..*join }
+        }));
+    }
+    log
+}
+
+/// Where a point lies along a curve that fills the box, 21 bits: near points have near numbers, mostly.
+fn morton_code(point: Vec3, bounds: &Aabb, cut: Cut) -> u32 {
+    let size = bounds.size().max_element().max(f32::MIN_POSITIVE);
+    let place = (point - bounds.min) / size;
+    // The curve's longest jumps are where halves and quarters of the box meet: those must not be at the same places.
+    let place = if cut == Cut::First { place } else { 0.7 * place + 0.3 };
+    let cell = (place * 127.0).clamp(Vec3::ZERO, Vec3::splat(127.0)).as_uvec3();
+    let spread = |v: UVec3| {
+        let v = (v | v << 8) & UVec3::splat(0x0000_f00f);
+        let v = (v | v << 4) & UVec3::splat(0x000c_30c3);
+        (v | v << 2) & UVec3::splat(0x0024_9249)
+    };
+    let UVec3 { x, y, z } = spread(cell);
+    x | y << 1 | z << 2
+}
+
+/// By the first number, which has 22 bits at most, and in the old order where it is the same.
+fn sorted_by_code(mut items: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
+    const BITS: u32 = 11;
+    let mut sorted = vec![(0, 0); items.len()];
+    for shift in [0, BITS] {
+        let digit = |code: u32| (code >> shift) as usize & ((1 << BITS) - 1);
+        let mut next = [0_u32; 1 << BITS];
+        items.iter().for_each(|item| next[digit(item.0)] += 1);
+        let mut sum = 0;
+        for count in &mut next {
+            sum += std::mem::replace(count, sum);
+        }
+        for &item in &items {
+            let place = &mut next[digit(item.0)];
+            sorted[*place as usize] = item;
+            *place += 1;
+        }
+        std::mem::swap(&mut items, &mut sorted);
+    }
+    items
+}

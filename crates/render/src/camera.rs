@@ -1,0 +1,243 @@
+//! Thin-lens camera: from a point on the film and a point on the lens to a ray.
+
+use crate::sampling::{polygon_disc, uniform_disc};
+use firstlight_kdtree::geometry::Ray;
+use glam::{Vec2, Vec3};
+use thiserror::Error;
+
+/// A thin-lens camera in the space of the snapshot. The focal *plane* is perpendicular to `forward`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    pub eye: Vec3,
+    /// Unit and mutually perpendicular; `right × up` points at the viewer, against `forward`.
+    pub right: Vec3,
+    pub up: Vec3,
+    pub forward: Vec3,
+    /// Tangent of half the vertical field of view.
+    pub tan_half_vfov: f32,
+    /// Metres; 0 is a pinhole, which samples no lens.
+    pub lens_radius: f32,
+    /// Metres along `forward` from the eye to the focal plane, positive; may be infinite.
+    pub focus_distance: f32,
+    /// Straight edges of the aperture; below 3 it is round.
+    pub blades: u32,
+    /// Radians, counter-clockwise seen from behind the camera.
+    pub blade_rotation: f32,
+}
+
+/// A camera that takes no picture: which field, what it is, and what is allowed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("camera: `{field}` is {value}, but must {allowed}")]
+pub struct CameraError {
+    pub field: &'static str,
+    pub value: String,
+    pub allowed: &'static str,
+}
+
+impl Camera {
+    /// Whether rays through every point of the film and the lens have an origin and a direction.
+    pub fn check(&self) -> Result<(), CameraError> {
+        let wrong = |field, value: &dyn std::fmt::Display, allowed| {
+            let value = value.to_string();
+            Err(CameraError { field, value, allowed })
+        };
+        let Self { eye, right, up, forward, tan_half_vfov, lens_radius, focus_distance, blades: _, blade_rotation } =
+            *self;
+        if !eye.is_finite() {
+            return wrong("eye", &eye, "be finite");
+        }
+        for (field, axis) in [("right", right), ("up", up), ("forward", forward)] {
+            if !((axis.length() - 1.0).abs() <= 1e-3) {
+                return wrong(field, &axis, "be of length 1");
+            }
+        }
+        if !(tan_half_vfov > 0.0 && tan_half_vfov.is_finite()) {
+            return wrong("tan_half_vfov", &tan_half_vfov, "be positive and finite");
+        }
+        if !(lens_radius >= 0.0 && lens_radius.is_finite()) {
+            return wrong("lens_radius", &lens_radius, "be 0 or positive, and finite");
+        }
+        if !(focus_distance > 0.0) {
+            return wrong("focus_distance", &focus_distance, "be positive; infinity is allowed");
+        }
+        if !blade_rotation.is_finite() {
+            return wrong("blade_rotation", &blade_rotation, "be finite");
+        }
+        Ok(())
+    }
+
+    /// The ray through a point of the film, with a unit direction.
+    ///
+    /// - `film`: pixels from the upper left corner; `size`: width and height of the film in pixels.
+    /// - `lens`: two numbers in `[0, 1)`; unused by a pinhole.
+    #[inline]
+    pub fn ray(&self, film: Vec2, size: Vec2, lens: Vec2) -> Ray {
+        let direction = self.film_direction(film, size);
+        if self.lens_radius == 0.0 {
+            return Ray::new(self.eye, direction.normalize());
+        }
+        let offset = self.lens_offset(lens);
+        let offset = offset.x * self.right + offset.y * self.up;
+        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye. Or
+        // the other way round, for a plane so near that the quotient would leave the range of f32.
+        let focus = self.focus_distance;
+        let towards = if focus >= 1.0 { direction - offset / focus } else { direction * focus - offset };
+        Ray::new(self.eye + offset, (towards / towards.abs().max_element()).normalize())
+    }
+
+    /// Nearest and farthest depth, metres along `forward`, at which the circle of confusion is at most one pixel of a
+    /// picture so many pixels high; the farthest may be infinite, and for a pinhole everything is sharp.
+    ///
+    /// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane
+    /// a metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|.
+    pub fn sharp_zone(&self, height: u32) -> (f32, f32) {
+        let pixel = 2.0 * self.tan_half_vfov / height.max(1) as f32;
+        // For a pinhole infinite, and then nothing is subtracted from it.
+        let slack = pixel / (2.0 * self.lens_radius);
+        let focus = self.focus_distance.recip();
+        let far = if focus > slack { (focus - slack).recip() } else { f32::INFINITY };
+        ((focus + slack).recip(), far)
+    }
+
+    /// A point of the lens by its distance from the eye along `right` and `up`, metres.
+    ///
+    /// - `u`: two numbers in `[0, 1)`.
+    #[inline]
+    pub fn lens_offset(&self, u: Vec2) -> Vec2 {
+        let point = if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) };
+        self.lens_radius * point
+    }
+
+    #[inline]
+    pub fn lens_point(&self, offset: Vec2) -> Vec3 {
+        self.eye + (offset.x * self.right + offset.y * self.up)
+    }
+
+    /// Where in the film light ends that comes to a point of the lens, and the cosine of its way with `forward`: the
+    /// inverse of [`Self::ray`]. `None` for light from behind.
+    ///
+    /// - `offset`: the point of the lens; `way`: from there to where the light comes from, any length.
+    #[inline]
+    pub fn film_point(&self, offset: Vec2, way: Vec3, size: Vec2) -> Option<(Vec2, f32)> {
+        let depth = way.dot(self.forward);
+        if depth <= 0.0 {
+            return None;
+        }
+        let ahead = Vec2::new(way.dot(self.right), way.dot(self.up)) / depth + offset / self.focus_distance;
+        let pixels = ahead / self.tan_half_vfov * size.y;
+        Some((0.5 * Vec2::new(size.x + pixels.x, size.y - pixels.y), depth / way.length()))
+    }
+
+    /// From the eye through a point of the film to the plane one metre ahead; not unit.
+    #[inline]
+    pub fn film_direction(&self, film: Vec2, size: Vec2) -> Vec3 {
+        let x = (2.0 * film.x - size.x) / size.y * self.tan_half_vfov;
+        let y = (size.y - 2.0 * film.y) / size.y * self.tan_half_vfov;
+        self.forward + x * self.right + y * self.up
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(lens_radius: f32, focus_distance: f32) -> Camera {
+        Camera {
+            eye: Vec3::new(1.0, 2.0, 3.0),
+            right: Vec3::X,
+            up: Vec3::Y,
+            forward: Vec3::NEG_Z,
+            tan_half_vfov: 0.5,
+            lens_radius,
+            focus_distance,
+            blades: 0,
+            blade_rotation: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_camera_without_rays_is_refused_by_its_field() {
+        let good = camera(0.3, 4.0);
+        assert_eq!(good.check(), Ok(()));
+        assert_eq!(camera(0.0, f32::INFINITY).check(), Ok(()));
+        let (nan, inf) = (f32::NAN, f32::INFINITY);
+        for (bad, field) in [
+            (Camera { eye: Vec3::new(nan, 0.0, 0.0), ..good }, "eye"),
+            (Camera { eye: Vec3::splat(inf), ..good }, "eye"),
+            (Camera { up: Vec3::ZERO, ..good }, "up"),
+            (Camera { right: Vec3::splat(nan), ..good }, "right"),
+            (Camera { forward: Vec3::Z * 2.0, ..good }, "forward"),
+            (Camera { tan_half_vfov: 0.0, ..good }, "tan_half_vfov"),
+            (Camera { tan_half_vfov: -1.0, ..good }, "tan_half_vfov"),
+            (Camera { tan_half_vfov: nan, ..good }, "tan_half_vfov"),
+            (Camera { lens_radius: -0.1, ..good }, "lens_radius"),
+            (Camera { lens_radius: inf, ..good }, "lens_radius"),
+            (Camera { focus_distance: 0.0, ..good }, "focus_distance"),
+            (Camera { focus_distance: nan, ..good }, "focus_distance"),
+            (Camera { blade_rotation: inf, ..good }, "blade_rotation"),
+        ] {
+            assert_eq!(bad.check().unwrap_err().field, field);
+        }
+    }
+
+    #[test]
+    fn corners_of_the_film_span_the_field_of_view() {
+        let size = Vec2::new(200.0, 100.0);
+        let ray = camera(0.0, 1.0).ray(Vec2::ZERO, size, Vec2::ZERO);
+        let expected = Vec3::new(-1.0, 0.5, -1.0).normalize();
+        assert!((ray.dir - expected).length() < 1e-6, "{}", ray.dir);
+    }
+
+    #[test]
+    fn all_points_of_the_lens_meet_in_the_focal_plane() {
+        let camera = camera(0.3, 4.0);
+        let (film, size) = (Vec2::new(20.0, 70.0), Vec2::new(200.0, 100.0));
+        let target = camera.eye + 4.0 * camera.film_direction(film, size);
+        for i in 0..64 {
+            let ray = camera.ray(film, size, Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0);
+            let t = (target - ray.origin).dot(ray.dir);
+            assert!((ray.at(t) - target).length() < 1e-5);
+            assert!((ray.origin - camera.eye).length() <= 0.3 * 1.000_001);
+        }
+    }
+
+    #[test]
+    fn light_goes_back_to_where_the_ray_began() {
+        let size = Vec2::new(200.0, 100.0);
+        for (lens_radius, focus_distance) in [(0.0, 1.0), (0.3, 4.0), (0.3, f32::INFINITY)] {
+            let mut camera = camera(lens_radius, focus_distance);
+            camera.blades = 6;
+            for i in 0..64 {
+                let (lens, film) = (Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0, Vec2::new(3.1 * i as f32, 99.0));
+                let ray = camera.ray(film, size, lens);
+                let offset = camera.lens_offset(lens);
+                assert!((camera.lens_point(offset) - ray.origin).length() < 1e-6);
+                let (found, cos) = camera.film_point(offset, 7.0 * ray.dir, size).unwrap();
+                assert!((found - film).length() < 1e-3, "{found} for {film}");
+                assert!((cos - ray.dir.dot(camera.forward)).abs() < 1e-6);
+                assert_eq!(camera.film_point(offset, -ray.dir, size), None);
+            }
+        }
+    }
+
+    /// `offset / focus` left the range of `f32`, or its square did, and rays had no direction.
+    #[test]
+    fn no_lens_and_no_focus_leave_a_ray_without_direction() {
+        for lens in [1e-30, 1e-3, 1.0, 1e12] {
+            for focus in [f32::MIN_POSITIVE, 1e-30, 1e-20, 1e-3, 1.0, 1e12, f32::MAX, f32::INFINITY] {
+                let ray = camera(lens, focus).ray(Vec2::new(3.0, 90.0), Vec2::new(200.0, 100.0), Vec2::new(0.1, 0.9));
+                assert!((ray.dir.length() - 1.0).abs() < 1e-6, "{lens} {focus}: {}", ray.dir);
+            }
+        }
+    }
+
+    #[test]
+    fn focus_at_infinity_gives_parallel_rays() {
+        let camera = camera(0.3, f32::INFINITY);
+        let (film, size) = (Vec2::new(20.0, 70.0), Vec2::new(200.0, 100.0));
+        let a = camera.ray(film, size, Vec2::new(0.1, 0.9));
+        let b = camera.ray(film, size, Vec2::new(0.9, 0.2));
+        assert_eq!(a.dir, b.dir);
+        assert_ne!(a.origin, b.origin);
+    }
+}

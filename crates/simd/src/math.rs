@@ -1,0 +1,207 @@
+//! Angles, sixteen at a time.
+
+use super::number::{Float, select};
+use super::simd::Simd;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
+
+/// Sine and cosine of angles within ±100, to 2e-7.
+///
+/// The angle is brought to an eighth of a turn by whole quarters; there Taylor's series are cut where the rest falls
+/// below rounding.
+#[inline(always)]
+pub fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
+    // To the nearest quarter, by truncation after a half away from zero.
+    let quarters = (x * (1.0 / FRAC_PI_2) + x.all(0.5).copysign(x)).truncate();
+    let count = quarters.to_float();
+    // π/2 in two parts, of which the first has few enough digits that its product is exact.
+    let r = (x - count * QUARTER_HIGH) - count * QUARTER_LOW;
+    let (sin, cos) = sin_cos_eighth(r);
+    let odd = quarters.has(1);
+    let (a, b) = (select(odd, cos, sin), select(odd, sin, cos));
+    // The sign of the sine flips in the third and fourth quarter, that of the cosine in the second and third.
+    let flip_sin = (quarters & 2).shift_left(30);
+    let flip_cos = ((quarters + 1) & 2).shift_left(30);
+    ((a.to_bits() ^ flip_sin).as_float(), (b.to_bits() ^ flip_cos).as_float())
+}
+
+const QUARTER_HIGH: f32 = 1.570_312_5;
+const QUARTER_LOW: f32 = 4.838_268e-4;
+
+/// As `sampling::warp::sin_cos_eighth`, rounding for rounding.
+#[inline(always)]
+pub fn sin_cos_eighth<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
+    let (x2, one) = (x * x, x.all(1.0));
+    let s = x.all(1.0 / 5040.0) - x2 * (1.0 / 362_880.0);
+    let s = x.all(1.0 / 6.0) - x2 * (x.all(1.0 / 120.0) - x2 * s);
+    let c = x.all(1.0 / 720.0) - x2 * (1.0 / 40_320.0);
+    let c = x.all(0.5) - x2 * (x.all(1.0 / 24.0) - x2 * c);
+    let (sin, cos) = (x * (one - x2 * s), one - x2 * c);
+    (sin, cos)
+}
+
+/// The angle of (x, y), in −π..π; relative error below 4e-7. NaN at the origin.
+///
+/// The quotient is brought below tan(π/8), where a short polynomial does (Moshier's Cephes library, `atanf`).
+#[inline(always)]
+pub fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
+    const TAN_PI_8: f32 = 0.414_213_57;
+    let (ax, ay) = (x.abs(), y.abs());
+    let (short, long) = (ax.min(ay), ax.max(ay));
+    let wide = (long * TAN_PI_8).lt(short);
+    let t = select(wide, short - long, short) / select(wide, short + long, long);
+    let t2 = t * t;
+    let p = ((t2 * 8.053_745e-2 - 1.387_768_6e-1) * t2 + 1.997_771_1e-1) * t2 - 3.333_295e-1;
+    let small = p * t2 * t + t;
+    let angle = select(wide, small + FRAC_PI_4, small);
+    let angle = select(ax.lt(ay), -angle + FRAC_PI_2, angle);
+    let angle = select(x.lt(x.all(0.0)), -angle + PI, angle);
+    angle.copysign(y)
+}
+
+/// `x` to the power of `y`, for `x` in 0..=1 and `y` from 0 on; relative error below 3e-7 (1 + |log₂ xʸ|), and 0 for what is
+/// below 2⁻¹²⁶.
+///
+/// The mantissa is brought to within a factor √2 of 1, where the series of the area tangent is short.
+#[inline(always)]
+pub fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
+    const ONE: u32 = 0x3f80_0000;
+    const SQRT_HALF: u32 = 0x3f35_04f3;
+    let shifted = x.to_bits() + (ONE - SQRT_HALF);
+    let exponent = (shifted.shift_right(23) + 127_u32.wrapping_neg()).to_float();
+    let mantissa = ((shifted & 0x007f_ffff) + SQRT_HALF).as_float();
+    let one = x.all(1.0);
+    let f = mantissa - one;
+    let r = f / (f + 2.0);
+    let r2 = r * r;
+    let series = ((r2 * (1.0 / 9.0) + 1.0 / 7.0) * r2 + 1.0 / 5.0) * r2 + 1.0 / 3.0;
+    let log = (r + r * (r2 * series)) * (2.0 * LOG2_E) + exponent;
+    let log = (log * y).at_least(-200.0);
+    let whole = (log - 0.5).truncate();
+    let part = (log - whole.to_float()) * LN_2;
+    let series = (part * (1.0 / 5040.0) + 1.0 / 720.0) * part + 1.0 / 120.0;
+    let series = ((series * part + 1.0 / 24.0) * part + 1.0 / 6.0) * part + 0.5;
+    let raised = (series * part * part + part + 1.0) * (whole + 127).shift_left(23).as_float();
+    let vanishes = log.lt(one.all(-126.0)) | (x.is_zero() & y.is_positive());
+    select(vanishes, one.all(0.0), raised)
+}
+
+/// The largest whole number that is not above `x`, as `f32::floor` for all finite numbers.
+#[inline(always)]
+pub fn floor<S: Simd>(x: Float<S>) -> Float<S> {
+    let whole = truncated(x);
+    select(x.lt(whole), whole - 1.0, whole)
+}
+
+/// As `f32::trunc` for all finite numbers but for the sign of zero.
+#[inline(always)]
+pub fn truncated<S: Simd>(x: Float<S>) -> Float<S> {
+    // Larger ones have no digits behind the point.
+    let small = x.abs().lt(x.all(8_388_608.0));
+    select(small, select(small, x, x.all(0.0)).truncate().to_float(), x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{InstructionSet, LANES, dispatch};
+
+    #[inline(always)]
+    fn powers<S: Simd>(s: S, a: &[f32; LANES], b: &[f32; LANES], out: &mut [[f32; LANES]; 3]) {
+        let (x, y) = (Float::load(s, a), Float::load(s, b));
+        power(x, y).store(&mut out[0]);
+        floor(y).store(&mut out[1]);
+        truncated(y).store(&mut out[2]);
+    }
+
+    fn powers_by(set: InstructionSet, a: &[f32; LANES], b: &[f32; LANES]) -> [[f32; LANES]; 3] {
+        let mut out = [[0.0; LANES]; 3];
+        let to = &mut out;
+        dispatch!(set, powers(a: &[f32; LANES], b: &[f32; LANES], to: &mut [[f32; LANES]; 3]));
+        out
+    }
+
+    #[test]
+    fn powers_are_as_good_as_promised() {
+        for i in 0..20_000_u32 {
+            let a: [f32; LANES] = std::array::from_fn(|k| match (i + k as u32) % 4 {
+                0 => (i * 16 + k as u32) as f32 / 320_000.0,
+                1 => 1.0 - (i * 16 + k as u32) as f32 / 32_000_000.0,
+                2 => (-((i * 16 + k as u32) as f32) / 40_000.0).exp2(),
+                _ => [0.0, 1.0, 0.5, f32::from_bits(0x3f7f_ffff)][(i % 4) as usize],
+            });
+            let exponents = [0.0, 0.3, 1.0, 5.0, 49.5, 400.0, 1e5];
+            let b: [f32; LANES] = std::array::from_fn(|k| exponents[(i as usize + 3 * k) % exponents.len()]);
+            let out = powers_by(InstructionSet::detect(), &a, &b);
+            if i % 100 == 0 {
+                assert!(InstructionSet::available().into_iter().all(|set| powers_by(set, &a, &b) == out));
+            }
+            for k in 0..LANES {
+                let expected = f64::from(a[k]).powf(f64::from(b[k]));
+                let bound = expected * 3e-7 * (1.0 - expected.log2()) + f64::from(f32::MIN_POSITIVE);
+                let found = f64::from(out[0][k]);
+                assert!(!((found - expected).abs() > bound), "{} to {}: {found} for {expected}", a[k], b[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_those_of_one_lane() {
+        let numbers = [
+            0.0,
+            -0.0,
+            0.5,
+            -0.5,
+            1.0,
+            -1.0,
+            1e7,
+            -1e7,
+            8_388_607.5,
+            -8_388_607.5,
+            3e9,
+            -3e9,
+            1e30,
+            -1e30,
+            1e-30,
+            -1e-30,
+        ];
+        for set in InstructionSet::available() {
+            let out = powers_by(set, &[1.0; LANES], &numbers);
+            assert_eq!(out[1], numbers.map(f32::floor), "{set:?}");
+            assert_eq!(out[2], numbers.map(f32::trunc), "{set:?}");
+        }
+    }
+
+    #[inline(always)]
+    fn both<S: Simd>(s: S, a: &[f32; LANES], b: &[f32; LANES], out: &mut [[f32; LANES]; 3]) {
+        let (x, y) = (Float::load(s, a), Float::load(s, b));
+        let (sin, cos) = sin_cos(x);
+        sin.store(&mut out[0]);
+        cos.store(&mut out[1]);
+        atan2(x, y).store(&mut out[2]);
+    }
+
+    #[test]
+    fn angles_are_as_good_as_promised() {
+        for i in 0..40_000 {
+            let a: [f32; LANES] = std::array::from_fn(|k| ((i * 16 + k) as f32 - 320_000.0) * (100.0 / 320_000.0));
+            let b: [f32; LANES] = std::array::from_fn(|k| ((i * 37 + k * k) % 2001) as f32 * 0.1 - 100.0 + 1e-3);
+            let run = |set| {
+                let mut out = [[0.0; LANES]; 3];
+                let (a, b, to) = (&a, &b, &mut out);
+                dispatch!(set, both(a: &[f32; LANES], b: &[f32; LANES], to: &mut [[f32; LANES]; 3]));
+                out
+            };
+            let out = run(InstructionSet::detect());
+            if i % 100 == 0 {
+                assert!(InstructionSet::available().into_iter().all(|set| run(set) == out));
+            }
+            for k in 0..LANES {
+                let (x, y) = (f64::from(a[k]), f64::from(b[k]));
+                assert!((f64::from(out[0][k]) - x.sin()).abs() < 2e-7, "sin {x}: {}", out[0][k]);
+                assert!((f64::from(out[1][k]) - x.cos()).abs() < 2e-7, "cos {x}: {}", out[1][k]);
+                let angle = x.atan2(y);
+                assert!((f64::from(out[2][k]) - angle).abs() <= 4e-7 * angle.abs(), "{x} {y}: {}", out[2][k]);
+            }
+        }
+    }
+}

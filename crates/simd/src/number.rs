@@ -1,0 +1,261 @@
+//! Sixteen `f32` or `u32` with operators.
+
+use super::simd::{LANES, Mask, Simd};
+use std::ops::{Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, Neg, Sub};
+
+/// Sixteen `f32`.
+#[derive(Clone, Copy)]
+pub struct Float<S: Simd> {
+    pub s: S,
+    pub v: S::F,
+}
+
+/// Sixteen `u32`; sums and products are modulo 2³².
+#[derive(Clone, Copy)]
+pub struct Bits<S: Simd> {
+    pub s: S,
+    pub v: S::U,
+}
+
+/// `a` where the bit is set, else `b`.
+#[inline(always)]
+pub fn select<S: Simd>(mask: Mask, a: Float<S>, b: Float<S>) -> Float<S> {
+    Float { s: a.s, v: a.s.select(mask, a.v, b.v) }
+}
+
+/// A table as [`Float::gather`] reads it fastest: filled up to a multiple of sixteen.
+pub fn padded<T: Copy + Default>(mut table: Vec<T>) -> Vec<T> {
+    table.resize(table.len().next_multiple_of(LANES).max(LANES), T::default());
+    table
+}
+
+impl<S: Simd> Float<S> {
+    #[inline(always)]
+    pub fn splat(s: S, x: f32) -> Self {
+        Self { s, v: s.splat(x) }
+    }
+
+    #[inline(always)]
+    pub fn load(s: S, from: &[f32; LANES]) -> Self {
+        Self { s, v: s.load(from) }
+    }
+
+    #[inline(always)]
+    pub fn store(self, to: &mut [f32; LANES]) {
+        self.s.store(self.v, to);
+    }
+
+    #[inline(always)]
+    pub fn to_array(self) -> [f32; LANES] {
+        let mut array = [0.0; LANES];
+        self.store(&mut array);
+        array
+    }
+
+    /// See [`Simd::gather`].
+    #[inline(always)]
+    pub fn gather(from: &[f32], indices: Bits<S>) -> Self {
+        Self { s: indices.s, v: indices.s.gather(from, indices.v) }
+    }
+
+    /// The same number in all lanes.
+    #[inline(always)]
+    pub fn all(self, x: f32) -> Self {
+        Self::splat(self.s, x)
+    }
+
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Self { s: self.s, v: self.s.sqrt(self.v) }
+    }
+
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self { s: self.s, v: self.s.abs(self.v) }
+    }
+
+    /// The second where either is NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self { s: self.s, v: self.s.min(self.v, other.v) }
+    }
+
+    /// The second where either is NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self { s: self.s, v: self.s.max(self.v, other.v) }
+    }
+
+    /// At least `least`, also where it is NaN.
+    #[inline(always)]
+    pub fn at_least(self, least: f32) -> Self {
+        self.max(self.all(least))
+    }
+
+    #[inline(always)]
+    pub fn at_most(self, most: f32) -> Self {
+        self.min(self.all(most))
+    }
+
+    #[inline(always)]
+    pub fn lt(self, other: Self) -> Mask {
+        self.s.lt(self.v, other.v)
+    }
+
+    #[inline(always)]
+    pub fn le(self, other: Self) -> Mask {
+        self.s.le(self.v, other.v)
+    }
+
+    #[inline(always)]
+    pub fn is_positive(self) -> Mask {
+        self.all(0.0).lt(self)
+    }
+
+    #[inline(always)]
+    pub fn is_negative(self) -> Mask {
+        self.lt(self.all(0.0))
+    }
+
+    #[inline(always)]
+    pub fn is_zero(self) -> Mask {
+        self.s.eq(self.v, self.s.splat(0.0))
+    }
+
+    #[inline(always)]
+    pub fn is_nan(self) -> Mask {
+        !self.s.eq(self.v, self.v)
+    }
+
+    #[inline(always)]
+    pub fn to_bits(self) -> Bits<S> {
+        Bits { s: self.s, v: self.s.to_bits(self.v) }
+    }
+
+    /// Towards zero; within the range of `i32`.
+    #[inline(always)]
+    pub fn truncate(self) -> Bits<S> {
+        Bits { s: self.s, v: self.s.truncate(self.v) }
+    }
+
+    #[inline(always)]
+    pub fn copysign(self, sign: Self) -> Self {
+        let top = Bits::splat(self.s, 1 << 31);
+        (self.abs().to_bits() | (sign.to_bits() & top)).as_float()
+    }
+
+    #[inline(always)]
+    pub fn compress(self, mask: Mask) -> Self {
+        Self { s: self.s, v: self.s.compress(mask, self.v) }
+    }
+}
+
+impl<S: Simd> Bits<S> {
+    #[inline(always)]
+    pub fn splat(s: S, x: u32) -> Self {
+        Self { s, v: s.splat_u(x) }
+    }
+
+    #[inline(always)]
+    pub fn load(s: S, from: &[u32; LANES]) -> Self {
+        Self { s, v: s.load_u(from) }
+    }
+
+    #[inline(always)]
+    pub fn store(self, to: &mut [u32; LANES]) {
+        self.s.store_u(self.v, to);
+    }
+
+    #[inline(always)]
+    pub fn to_array(self) -> [u32; LANES] {
+        let mut array = [0; LANES];
+        self.store(&mut array);
+        array
+    }
+
+    /// See [`Simd::gather`].
+    #[inline(always)]
+    pub fn gather(from: &[u32], indices: Self) -> Self {
+        Self { s: indices.s, v: indices.s.gather_u(from, indices.v) }
+    }
+
+    #[inline(always)]
+    pub fn all(self, x: u32) -> Self {
+        Self::splat(self.s, x)
+    }
+
+    #[inline(always)]
+    pub fn shift_left(self, bits: u32) -> Self {
+        Self { s: self.s, v: self.s.shl_u(self.v, bits) }
+    }
+
+    #[inline(always)]
+    pub fn shift_right(self, bits: u32) -> Self {
+        Self { s: self.s, v: self.s.shr_u(self.v, bits) }
+    }
+
+    #[inline(always)]
+    pub fn equals(self, x: u32) -> Mask {
+        self.s.eq_u(self.v, self.s.splat_u(x))
+    }
+
+    /// Lanes with any of these bits.
+    #[inline(always)]
+    pub fn has(self, bits: u32) -> Mask {
+        !(self & self.all(bits)).equals(0)
+    }
+
+    /// The number that these are the bits of.
+    #[inline(always)]
+    pub fn as_float(self) -> Float<S> {
+        Float { s: self.s, v: self.s.float_of(self.v) }
+    }
+
+    /// The number itself, below 2³¹ and rounded.
+    #[inline(always)]
+    pub fn to_float(self) -> Float<S> {
+        Float { s: self.s, v: self.s.to_f(self.v) }
+    }
+
+    #[inline(always)]
+    pub fn compress(self, mask: Mask) -> Self {
+        Self { s: self.s, v: self.s.compress_u(mask, self.v) }
+    }
+}
+
+macro_rules! operators {
+    ($kind:ident, $plain:ty: $($trait:ident $method:ident $operation:ident),*) => {
+        $(impl<S: Simd> $trait for $kind<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self { s: self.s, v: self.s.$operation(self.v, other.v) }
+            }
+        }
+        impl<S: Simd> $trait<$plain> for $kind<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: $plain) -> Self {
+                self.$method(Self::splat(self.s, other))
+            }
+        })*
+    };
+}
+
+operators!(Float, f32: Add add add, Sub sub sub, Mul mul mul, Div div div);
+operators!(Bits, u32: Add add add_u, Mul mul mul_u, BitAnd bitand and_u, BitOr bitor or_u, BitXor bitxor xor_u);
+
+impl<S: Simd> AddAssign for Float<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<S: Simd> Neg for Float<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        (self.to_bits() ^ (1 << 31)).as_float()
+    }
+}

@@ -1,0 +1,644 @@
+//! Sixteen numbers at a time, in three builds: AVX-512, AVX2 and plain arrays.
+//!
+//! Kernels are generic over [`Simd`], compiled once for each implementation inside a function that enables its
+//! instructions, and [`InstructionSet::detect`] picks one when the program first asks. All operations round like
+//! the scalar ones, nothing is contracted or approximated, so all builds give the same bits; but for the three whose
+//! name ends in `about`, which only help to decide what need not be computed.
+
+use std::sync::OnceLock;
+
+/// How many lanes.
+pub const LANES: usize = 16;
+
+/// One bit a lane.
+pub type Mask = u16;
+
+/// Implementations must be called from functions compiled for their instruction set, or they are slow;
+/// values must not be made unless the processor has it.
+///
+/// Comparisons with NaN are false; `min` and `max` give the second argument if either is NaN.
+pub trait Simd: Copy {
+    /// 16 `f32`.
+    type F: Copy;
+    /// 16 `u32`.
+    type U: Copy;
+    /// 16 `f64`.
+    type D: Copy;
+
+    /// Runs a kernel as a function of its own, compiled once for the instruction set however often it is called for.
+    fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output;
+
+    fn splat(self, x: f32) -> Self::F;
+    fn load(self, from: &[f32; LANES]) -> Self::F;
+    fn store(self, a: Self::F, to: &mut [f32; LANES]);
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    fn abs(self, a: Self::F) -> Self::F;
+    /// `a · b - c`, rounded once.
+    fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `c - a · b`, rounded once.
+    fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `a · b + c`, rounded once or twice, as is quickest: for bounds, since the bits depend on the build.
+    fn mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `c - a · b` in the same way.
+    fn neg_mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// `1 / a` within 2⁻²² of itself, for bounds too. NaN or infinite where `a` is 0 or subnormal.
+    fn reciprocal_about(self, a: Self::F) -> Self::F;
+    /// Lanes whose sign bit is set.
+    fn negative(self, a: Self::F) -> Mask;
+    fn lt(self, a: Self::F, b: Self::F) -> Mask;
+    fn le(self, a: Self::F, b: Self::F) -> Mask;
+    fn eq(self, a: Self::F, b: Self::F) -> Mask;
+    /// `a` where the bit is set, else `b`.
+    fn select(self, mask: Mask, a: Self::F, b: Self::F) -> Self::F;
+    /// The smallest of the lanes with their bit set, which must not be NaN.
+    fn least(self, mask: Mask, a: Self::F) -> f32;
+    /// The axis of a point that each lane asks for.
+    fn pick(self, point: &[f32; 4], axes: Self::U) -> Self::F;
+    /// Entries of the table by the low four bits of the indices.
+    fn lookup(self, table: Self::F, indices: Self::U) -> Self::F;
+
+    fn splat_u(self, x: u32) -> Self::U;
+    fn load_u(self, from: &[u32; LANES]) -> Self::U;
+    fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
+    fn lt_u(self, a: Self::U, b: Self::U) -> Mask;
+    fn select_u(self, mask: Mask, a: Self::U, b: Self::U) -> Self::U;
+
+    fn splat_d(self, x: f64) -> Self::D;
+    fn widen(self, a: Self::F) -> Self::D;
+    fn narrow(self, a: Self::D) -> Self::F;
+    fn add_d(self, a: Self::D, b: Self::D) -> Self::D;
+    fn sub_d(self, a: Self::D, b: Self::D) -> Self::D;
+    fn mul_d(self, a: Self::D, b: Self::D) -> Self::D;
+    fn div_d(self, a: Self::D, b: Self::D) -> Self::D;
+    fn sqrt_d(self, a: Self::D) -> Self::D;
+    fn abs_d(self, a: Self::D) -> Self::D;
+    fn max_d(self, a: Self::D, b: Self::D) -> Self::D;
+    fn le_d(self, a: Self::D, b: Self::D) -> Mask;
+
+    fn sqrt(self, a: Self::F) -> Self::F;
+    /// Towards zero; anything from numbers that no `i32` can hold.
+    fn truncate(self, a: Self::F) -> Self::U;
+    /// Of two's complement.
+    fn to_f(self, a: Self::U) -> Self::F;
+    fn to_bits(self, a: Self::F) -> Self::U;
+    fn float_of(self, a: Self::U) -> Self::F;
+    /// Modulo 2³², as is `mul_u`.
+    fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn mul_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn shl_u(self, a: Self::U, bits: u32) -> Self::U;
+    fn shr_u(self, a: Self::U, bits: u32) -> Self::U;
+    fn eq_u(self, a: Self::U, b: Self::U) -> Mask;
+    /// `from[i]` for each index; indices beyond the end read some number of it. `from` must not be empty. Fastest where
+    /// it has exactly 16 or 32.
+    fn gather(self, from: &[f32], indices: Self::U) -> Self::F;
+    fn gather_u(self, from: &[u32], indices: Self::U) -> Self::U;
+    /// Moves the lanes with their bit set to the front, in order; what follows them is anything.
+    fn compress(self, mask: Mask, a: Self::F) -> Self::F;
+    fn compress_u(self, mask: Mask, a: Self::U) -> Self::U;
+}
+
+/// A function and its arguments, for [`Simd::call`].
+pub trait Kernel<S: Simd> {
+    type Output;
+
+    /// To be `#[inline(always)]`.
+    fn run(self, s: S) -> Self::Output;
+}
+
+/// What the processor can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InstructionSet {
+    Avx512,
+    Avx2,
+    Portable,
+}
+
+static DEFAULT: OnceLock<InstructionSet> = OnceLock::new();
+
+impl InstructionSet {
+    /// What is used unless something else is asked for: the widest set of this processor, or that of [`Self::set_default`].
+    #[inline]
+    pub fn detect() -> Self {
+        *DEFAULT.get_or_init(Self::widest)
+    }
+
+    /// Makes a set the one that [`Self::detect`] gives, for the rest of the process. False if the processor does not have it,
+    /// or if another one is the default already: call it before anything is built or rendered.
+    pub fn set_default(self) -> bool {
+        self.is_available() && *DEFAULT.get_or_init(|| self) == self
+    }
+
+    fn widest() -> Self {
+        static WIDEST: OnceLock<InstructionSet> = OnceLock::new();
+        *WIDEST.get_or_init(|| Self::available()[0])
+    }
+
+    #[inline]
+    pub fn is_available(self) -> bool {
+        self == Self::Portable || self as usize >= Self::widest() as usize
+    }
+
+    /// All that this processor has, widest first; tests run them all.
+    pub fn available() -> Vec<Self> {
+        let mut sets = Vec::new();
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 = is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("popcnt");
+            if avx2
+                && is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512bw")
+            {
+                sets.push(Self::Avx512);
+            }
+            if avx2 {
+                sets.push(Self::Avx2);
+            }
+        }
+        sets.push(Self::Portable);
+        sets
+    }
+}
+
+/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set. Panics if the processor does not have it: any
+/// caller can name one, in `RenderSettings::lanes` too.
+#[macro_export]
+macro_rules! dispatch {
+    ($set:expr, $kernel:ident ( $($name:ident : $kind:ty),* $(,)? )) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+        fn avx512($($name: $kind),*) {
+            // SAFETY: this function has these instructions enabled, and whoever called it has promised that they are there.
+            $kernel(unsafe { $crate::Avx512::new() }, $($name),*)
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+        fn avx2($($name: $kind),*) {
+            // SAFETY: as above.
+            $kernel(unsafe { $crate::Avx2::new() }, $($name),*)
+        }
+        let set: $crate::InstructionSet = $set;
+        assert!(set.is_available(), "this processor does not have {set:?}");
+        match set {
+            // SAFETY: the processor has the set, which was asserted, and with it all that `available` looks for.
+            #[cfg(target_arch = "x86_64")]
+            $crate::InstructionSet::Avx512 => unsafe { avx512($($name),*) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            $crate::InstructionSet::Avx2 => unsafe { avx2($($name),*) },
+            _ => $kernel($crate::Portable, $($name),*),
+        }
+    }};
+}
+
+/// Plain arrays: the reference, and what other processors get.
+#[derive(Clone, Copy)]
+pub struct Portable;
+
+#[inline(always)]
+fn zip<T: Copy, R>(a: [T; LANES], b: [T; LANES], f: impl Fn(T, T) -> R) -> [R; LANES] {
+    std::array::from_fn(|i| f(a[i], b[i]))
+}
+
+#[inline(always)]
+fn bits(test: impl Fn(usize) -> bool) -> Mask {
+    (0..LANES).fold(0, |mask, i| mask | Mask::from(test(i)) << i)
+}
+
+impl Simd for Portable {
+    type F = [f32; LANES];
+    type U = [u32; LANES];
+    type D = [f64; LANES];
+
+    #[inline(never)]
+    fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn splat(self, x: f32) -> Self::F {
+        [x; LANES]
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn load(self, from: &[f32; LANES]) -> Self::F {
+        *from
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn store(self, a: Self::F, to: &mut [f32; LANES]) {
+        *to = a;
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn add(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| a + b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| a - b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| a * b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn div(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| a / b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn min(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn max(self, a: Self::F, b: Self::F) -> Self::F {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn abs(self, a: Self::F) -> Self::F {
+        a.map(f32::abs)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|i| a[i].mul_add(b[i], -c[i]))
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|i| (-a[i]).mul_add(b[i], c[i]))
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|i| a[i] * b[i] + c[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn neg_mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|i| c[i] - a[i] * b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn reciprocal_about(self, a: Self::F) -> Self::F {
+        a.map(f32::recip)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn negative(self, a: Self::F) -> Mask {
+        bits(|i| a[i].is_sign_negative())
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn lt(self, a: Self::F, b: Self::F) -> Mask {
+        bits(|i| a[i] < b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn le(self, a: Self::F, b: Self::F) -> Mask {
+        bits(|i| a[i] <= b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn eq(self, a: Self::F, b: Self::F) -> Mask {
+        bits(|i| a[i] == b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn select(self, mask: Mask, a: Self::F, b: Self::F) -> Self::F {
+        std::array::from_fn(|i| if mask >> i & 1 != 0 { a[i] } else { b[i] })
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn least(self, mask: Mask, a: Self::F) -> f32 {
+        (0..LANES).filter(|i| mask >> i & 1 != 0).fold(f32::INFINITY, |least, i| least.min(a[i]))
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn pick(self, point: &[f32; 4], axes: Self::U) -> Self::F {
+        axes.map(|axis| point[axis as usize & 3])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn lookup(self, table: Self::F, indices: Self::U) -> Self::F {
+        indices.map(|index| table[index as usize % LANES])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn splat_u(self, x: u32) -> Self::U {
+        [x; LANES]
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn load_u(self, from: &[u32; LANES]) -> Self::U {
+        *from
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn store_u(self, a: Self::U, to: &mut [u32; LANES]) {
+        *to = a;
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn lt_u(self, a: Self::U, b: Self::U) -> Mask {
+        bits(|i| a[i] < b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn select_u(self, mask: Mask, a: Self::U, b: Self::U) -> Self::U {
+        std::array::from_fn(|i| if mask >> i & 1 != 0 { a[i] } else { b[i] })
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn splat_d(self, x: f64) -> Self::D {
+        [x; LANES]
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn widen(self, a: Self::F) -> Self::D {
+        a.map(f64::from)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn narrow(self, a: Self::D) -> Self::F {
+        a.map(|a| a as f32)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn add_d(self, a: Self::D, b: Self::D) -> Self::D {
+        zip(a, b, |a, b| a + b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn sub_d(self, a: Self::D, b: Self::D) -> Self::D {
+        zip(a, b, |a, b| a - b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn mul_d(self, a: Self::D, b: Self::D) -> Self::D {
+        zip(a, b, |a, b| a * b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn div_d(self, a: Self::D, b: Self::D) -> Self::D {
+        zip(a, b, |a, b| a / b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn sqrt_d(self, a: Self::D) -> Self::D {
+        a.map(f64::sqrt)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn abs_d(self, a: Self::D) -> Self::D {
+        a.map(f64::abs)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn max_d(self, a: Self::D, b: Self::D) -> Self::D {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn le_d(self, a: Self::D, b: Self::D) -> Mask {
+        bits(|i| a[i] <= b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn sqrt(self, a: Self::F) -> Self::F {
+        a.map(f32::sqrt)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn truncate(self, a: Self::F) -> Self::U {
+        a.map(|a| a as i32 as u32)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn to_f(self, a: Self::U) -> Self::F {
+        a.map(|a| a as i32 as f32)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn to_bits(self, a: Self::F) -> Self::U {
+        a.map(f32::to_bits)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn float_of(self, a: Self::U) -> Self::F {
+        a.map(f32::from_bits)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn add_u(self, a: Self::U, b: Self::U) -> Self::U {
+        zip(a, b, u32::wrapping_add)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn mul_u(self, a: Self::U, b: Self::U) -> Self::U {
+        zip(a, b, u32::wrapping_mul)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn and_u(self, a: Self::U, b: Self::U) -> Self::U {
+        zip(a, b, |a, b| a & b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn or_u(self, a: Self::U, b: Self::U) -> Self::U {
+        zip(a, b, |a, b| a | b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn xor_u(self, a: Self::U, b: Self::U) -> Self::U {
+        zip(a, b, |a, b| a ^ b)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn shl_u(self, a: Self::U, bits: u32) -> Self::U {
+        a.map(|a| a << bits)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn shr_u(self, a: Self::U, bits: u32) -> Self::U {
+        a.map(|a| a >> bits)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn eq_u(self, a: Self::U, b: Self::U) -> Mask {
+        bits(|i| a[i] == b[i])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn gather(self, from: &[f32], indices: Self::U) -> Self::F {
+        let last = last_index(from.len());
+        indices.map(|i| from[i.min(last) as usize])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn gather_u(self, from: &[u32], indices: Self::U) -> Self::U {
+        let last = last_index(from.len());
+        indices.map(|i| from[i.min(last) as usize])
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn compress(self, mask: Mask, a: Self::F) -> Self::F {
+        pack(mask, a)
+    }
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn compress_u(self, mask: Mask, a: Self::U) -> Self::U {
+        pack(mask, a)
+    }
+}
+
+#[inline(always)]
+fn pack<T: Copy>(mask: Mask, a: [T; LANES]) -> [T; LANES] {
+    let (mut packed, mut n) = (a, 0);
+    for (i, &lane) in a.iter().enumerate() {
+        packed[n] = lane;
+        n += usize::from(mask >> i & 1);
+        if n == LANES {
+            break;
+        }
+    }
+    packed
+}
+
+/// Of an array that `gather` may read.
+#[inline(always)]
+fn last_index(len: usize) -> u32 {
+    assert!(len > 0 && len <= i32::MAX as usize, "nothing to gather from, or too much");
+    len as u32 - 1
+}
+
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+#[path = "simd_x86.rs"]
+mod x86;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs every operation on awkward numbers and returns all the bits.
+    #[inline(always)]
+    fn everything<S: Simd>(s: S, out: &mut Vec<u64>) {
+        let numbers = [0.0, -0.0, 1.5, -2.25, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 3.1e-41, 7.7e37, -1e-20];
+        for shift in 0..numbers.len() {
+            let array = |k: usize| std::array::from_fn(|i| numbers[(i * k + shift) % numbers.len()]);
+            let (a, b, c) = (s.load(&array(1)), s.load(&array(3)), s.load(&array(7)));
+            let mut push = |values: S::F| {
+                let mut stored = [0.0; LANES];
+                s.store(values, &mut stored);
+                // The sign and payload of a NaN are nobody's business.
+                out.extend(stored.map(|x| if x.is_nan() { 1 << 40 } else { u64::from(x.to_bits()) }));
+            };
+            for values in [
+                s.add(a, b),
+                s.sub(a, b),
+                s.mul(a, b),
+                s.div(a, b),
+                s.min(a, b),
+                s.max(a, b),
+                s.abs(a),
+                s.mul_sub(a, b, c),
+                s.neg_mul_add(a, b, c),
+                s.select(0x5A3C, a, b),
+                s.pick(&[1.0, 2.0, 3.0, 4.0], s.load_u(&std::array::from_fn(|i| i as u32 % 3))),
+                s.lookup(a, s.load_u(&std::array::from_fn(|i| (i * 11 + shift) as u32 % 16 + 16 * i as u32))),
+                s.splat(numbers[shift]),
+                s.sqrt(a),
+                s.to_f(s.to_bits(a)),
+                s.float_of(s.to_bits(b)),
+                s.gather(&numbers, s.load_u(&std::array::from_fn(|i| i as u32 * 5 % 10))),
+                s.gather(&array(7), s.load_u(&std::array::from_fn(|i| i as u32 * 5 % 16))),
+                s.gather(&[array(7), array(3)].concat(), s.load_u(&std::array::from_fn(|i| i as u32 * 5 % 32))),
+            ] {
+                push(values);
+            }
+            let (x, y) = (s.widen(a), s.widen(b));
+            for wide in [
+                s.add_d(x, y),
+                s.sub_d(x, y),
+                s.mul_d(x, y),
+                s.div_d(x, y),
+                s.sqrt_d(x),
+                s.abs_d(x),
+                s.max_d(x, y),
+                s.splat_d(1.0 / 3.0),
+            ] {
+                push(s.narrow(wide));
+            }
+            let (u, v) = (s.load_u(&array(1).map(f32::to_bits)), s.load_u(&array(3).map(f32::to_bits)));
+            let small = s.mul(s.load(&std::array::from_fn(|i| i as f32 - 7.7)), s.splat(1e5));
+            for values in [
+                s.select_u(0x0FF1, u, s.splat_u(9)),
+                s.truncate(small),
+                s.add_u(u, v),
+                s.mul_u(u, v),
+                s.and_u(u, v),
+                s.or_u(u, v),
+                s.xor_u(u, v),
+                s.shl_u(u, 7),
+                s.shr_u(u, 13),
+                s.gather_u(&[3, 1, 4, 1, 5], s.load_u(&std::array::from_fn(|i| i as u32 % 5))),
+                s.gather_u(&array(7).map(f32::to_bits), s.load_u(&std::array::from_fn(|i| i as u32 * 3 % 16))),
+            ] {
+                let mut stored = [0; LANES];
+                s.store_u(values, &mut stored);
+                out.extend(stored.map(u64::from));
+            }
+            for mask in [0u16, 1, 0x8000, 0x5A3C, 0xFF00, 0x00FF, 0xFFFF, 0x0FF1] {
+                let (mut packed, mut packed_u) = ([0.0; LANES], [0; LANES]);
+                s.store(s.compress(mask, small), &mut packed);
+                s.store_u(s.compress_u(mask, u), &mut packed_u);
+                let n = mask.count_ones() as usize;
+                out.extend(packed[..n].iter().map(|x| u64::from(x.to_bits())));
+                out.extend(packed_u[..n].iter().map(|&x| u64::from(x)));
+            }
+            out.push(u64::from(s.eq_u(u, v)));
+            let masks = [s.negative(a), s.lt(a, b), s.le(a, b), s.eq(a, b), s.lt_u(u, v), s.le_d(x, y)];
+            out.extend(masks.map(u64::from));
+            let numbers_only = s.eq(a, a);
+            out.push(u64::from(s.least(numbers_only, a).to_bits()));
+        }
+    }
+
+    #[test]
+    fn all_instruction_sets_agree_with_plain_arrays() {
+        let run = |set: InstructionSet| {
+            let mut out = Vec::new();
+            let into = &mut out;
+            dispatch!(set, everything(into: &mut Vec<u64>));
+            out
+        };
+        let expected = run(InstructionSet::Portable);
+        for set in InstructionSet::available() {
+            assert_eq!(run(set), expected, "{set:?}");
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! Imports point down: from package to package, from folder to folder, and without cycles between the files of one package.
+//!
+//! Reads the `use` lines outside of tests, and paths that begin with `crate::`; re-exports lead to the file that they stand
+//! for. ARCHITECTURE.md draws the layers.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
+/// of its line; in `src` they may be imported everywhere.
+const LAYERS: [(&str, &[&str]); 14] = [
+    ("crates/simd/src", &[]),
+    ("crates/kdtree/src/geometry", &[]),
+    ("crates/kdtree/src", &["crates/simd/src", "crates/kdtree/src/geometry"]),
+    ("crates/mesh/src", &["crates/kdtree/src/geometry"]),
+    ("crates/render/src/sampling", &["crates/simd/src"]),
+    (
+        "crates/render/src",
+        &[
+            "crates/simd/src",
+            "crates/kdtree/src",
+            "crates/kdtree/src/geometry",
+            "crates/mesh/src",
+            "crates/render/src/sampling",
+        ],
+    ),
+    ("src/printable", &[]),
+    ("src/console", &["src/printable"]),
+    ("src/scene", &["src/printable", "src/console"]),
+    ("src/frame", &["src/printable", "src/console", "src/scene"]),
+    ("src/report", &["src/printable", "src/console", "src/scene", "src/frame"]),
+    ("src/stability", &["src/printable", "src/console", "src/scene", "src/frame"]),
+    ("src/viewer", &["src/printable", "src/console", "src/scene", "src/frame"]),
+    // A program of its own, that sees the rest as the library `firstlight`.
+    ("src/cli", &[]),
+];
+
+/// Files that import each other in a circle, by package: how many are in the largest circle. Anything but a smaller number
+/// is a step back.
+const KNOTS: [(&str, usize); 5] =
+    [("crates/simd/src", 0), ("crates/kdtree/src", 7), ("crates/mesh/src", 0), ("crates/render/src", 50), ("src", 13)];
+
+/// The path of a module below `src`, in its parts.
+type Module = Vec<String>;
+
+struct Import {
+    /// From the root of the package; with what is imported from the module at the end.
+    path: Vec<String>,
+    is_public: bool,
+}
+
+struct Package {
+    files: BTreeMap<Module, PathBuf>,
+    imports: BTreeMap<Module, Vec<Import>>,
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            rust_files(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// `a::{b, c::{d, e as f}}` as `a::b`, `a::c::d` and `a::c::e`.
+fn expand(tree: &str) -> Vec<String> {
+    let Some(open) = tree.find('{') else {
+        return vec![tree.split(" as ").next().unwrap_or_default().trim().to_owned()];
+    };
+    let (mut parts, mut depth) = (vec![String::new()], 0);
+    for c in tree[open + 1..].chars() {
+        match c {
+            '}' if depth == 0 => break,
+            ',' if depth == 0 => {
+                parts.push(String::new());
+                continue;
+            }
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        parts.last_mut().unwrap().push(c);
+    }
+    let prefix = tree[..open].trim();
+    let parts = parts.iter().filter(|part| !part.trim().is_empty());
+    parts.flat_map(|part| expand(&format!("{prefix}{}", part.trim()))).collect()
+}
+
+/// The code of a file without comments and tests, with as many lines.
+fn code_of(text: &str) -> String {
+    let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    text.lines().map(|line| line.split("//").next().unwrap_or_default().to_owned() + "\n").collect()
+}
+
+/// All `use` lines: where, whether they are public, and each path.
+fn use_lines(code: &str) -> Vec<(usize, bool, String)> {
+    let mut found = Vec::new();
+    let mut at = 0;
+    for line in code.split_inclusive('\n') {
+        let start = line.trim_start();
+        let rest = start.strip_prefix("pub").map_or(start, |rest| match rest.strip_prefix('(') {
+            Some(scope) => scope.split_once(')').map_or("", |(_, rest)| rest),
+            None => rest,
+        });
+        if let Some(first) = rest.trim_start().strip_prefix("use ") {
+            let from = at + line.len() - first.len();
+            let body = code[from..].split(';').next().unwrap_or_default();
+            let body = body.split_whitespace().collect::<Vec<_>>().join(" ");
+            let number = code[..at].matches('\n').count() + 1;
+            found.extend(expand(&body).into_iter().map(|path| (number, start.starts_with("pub"), path)));
+        }
+        at += line.len();
+    }
+    found
+}
+
+impl Package {
+    fn read(name: &str) -> Self {
+        let folder = root().join(name);
+        let mut paths = Vec::new();
+        rust_files(&folder, &mut paths);
+        let mut files = BTreeMap::new();
+        for path in paths.into_iter().filter(|path| !path.ends_with("main.rs") && !path.ends_with("tests.rs")) {
+            let below = path.strip_prefix(&folder).unwrap().with_extension("");
+            let mut module: Module = below.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+            if matches!(module.last().map(String::as_str), Some("mod" | "lib")) {
+                module.pop();
+            }
+            files.insert(module, path);
+        }
+        let mut package = Self { files, imports: BTreeMap::new() };
+        for (module, path) in &package.files {
+            let code = code_of(&std::fs::read_to_string(path).unwrap());
+            let imports = use_lines(&code).into_iter().filter_map(|(_, is_public, path)| {
+                let path = package.rooted(module, &path)?;
+                Some(Import { path, is_public })
+            });
+            let imports = imports.collect();
+            package.imports.insert(module.clone(), imports);
+        }
+        package
+    }
+
+    /// A path in `module` from the root of the package, if it stays in the package.
+    fn rooted(&self, module: &Module, path: &str) -> Option<Vec<String>> {
+        let mut parts = path.split("::").map(str::to_owned).peekable();
+        let first = parts.peek()?.clone();
+        let mut base = module.clone();
+        match first.as_str() {
+            "crate" => {
+                base.clear();
+                parts.next();
+            }
+            "super" | "self" => {
+                while let Some("super" | "self") = parts.peek().map(String::as_str) {
+                    if parts.next()? == "super" {
+                        base.pop();
+                    }
+                }
+            }
+            _ => {
+                base.push(first);
+                if !self.files.contains_key(&base) {
+                    return None;
+                }
+                base.pop();
+            }
+        }
+        base.extend(parts);
+        Some(base)
+    }
+
+    /// The file in which what a path leads to is written.
+    fn home(&self, path: &[String]) -> Option<Module> {
+        let depth = (0..=path.len()).rev().find(|&n| self.files.contains_key(&path[..n]))?;
+        let module = path[..depth].to_vec();
+        let exported = path.get(depth).and_then(|name| {
+            let mut imports = self.imports.get(&module)?.iter();
+            imports.find(|import| import.is_public && import.path.last() == Some(name) && import.path != path)
+        });
+        match exported {
+            Some(import) => self.home(&[&import.path, &path[depth + 1..]].concat()),
+            None => Some(module),
+        }
+    }
+
+    /// For each file, those that it imports from.
+    fn arrows(&self) -> BTreeMap<Module, BTreeSet<Module>> {
+        let of = |module: &Module| {
+            let imports = self.imports[module].iter().filter_map(|import| {
+                let home = self.home(&import.path)?;
+                // A folder shows what is in it: that makes nothing depend on it.
+                let shows_its_own = import.is_public && home.starts_with(module);
+                (home != *module && !shows_its_own).then_some(home)
+            });
+            imports.collect()
+        };
+        self.files.keys().map(|module| (module.clone(), of(module))).collect()
+    }
+
+    /// The largest set of files each of which leads to each other one; empty where there is no cycle.
+    fn largest_knot(&self) -> Vec<Module> {
+        let arrows = self.arrows();
+        let reached = |from: &Module| {
+            let (mut found, mut open) = (BTreeSet::new(), vec![from.clone()]);
+            while let Some(module) = open.pop() {
+                open.extend(arrows[&module].iter().filter(|&next| found.insert(next.clone())).cloned());
+            }
+            found
+        };
+        let reached: BTreeMap<&Module, BTreeSet<Module>> = arrows.keys().map(|from| (from, reached(from))).collect();
+        let knot = |module: &Module| -> Vec<Module> {
+            reached[module].iter().filter(|&other| reached[other].contains(module)).cloned().collect()
+        };
+        arrows.keys().map(knot).max_by_key(Vec::len).unwrap_or_default()
+    }
+}
+
+/// The first layer of [`LAYERS`] that holds a place: a folder, or a file of that name.
+fn layer_of(place: &str) -> Option<usize> {
+    let holds =
+        |layer: &str| place.strip_prefix(layer).is_some_and(|rest| rest.is_empty() || rest.starts_with(['/', '.']));
+    let found = LAYERS.iter().enumerate().filter(|(_, (layer, _))| holds(layer));
+    found.max_by_key(|(_, (layer, _))| layer.len()).map(|(i, _)| i)
+}
+
+/// The layer that a path leads to: `crate::scene::…` or `firstlight_kdtree::geometry::…`.
+fn place_of(package: &str, path: &str) -> Option<String> {
+    let (first, rest) = path.split_once("::")?;
+    let package = match first {
+        "crate" => package.to_owned(),
+        other => format!("crates/{}/src", other.strip_prefix("firstlight_")?),
+    };
+    let below = format!("{package}/{}", rest.split("::").next().unwrap_or_default());
+    Some(if layer_of(&below).is_some_and(|i| LAYERS[i].0 == below) { below } else { package })
+}
+
+/// What breaks the rule of [`LAYERS`] in a file.
+fn wrong_arrows(package: &str, file: &str, code: &str) -> Vec<String> {
+    let Some((own, allowed)) = layer_of(file).map(|i| LAYERS[i]) else { return Vec::new() };
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let in_line = code.lines().enumerate().flat_map(|(i, line)| {
+        let starts = line.match_indices("crate::").chain(line.match_indices("firstlight_"));
+        let starts = starts.filter(move |&(at, _)| !line[..at].ends_with(|c| is_name(c) || c == '$'));
+        let path = move |(at, _)| line[at..].split(|c| !is_name(c) && c != ':').next().unwrap_or_default().to_owned();
+        starts.map(move |start| (i + 1, path(start)))
+    });
+    let in_use = use_lines(code).into_iter().map(|(line, _, path)| (line, path));
+    // A path in full or the start of one: `crate::{` leads nowhere yet.
+    let paths: BTreeSet<_> = in_use.chain(in_line).filter(|(_, path)| !path.ends_with("::")).collect();
+    let mut wrong = BTreeSet::new();
+    for (line, path) in paths {
+        let Some(place) = place_of(package, &path) else { continue };
+        // The whole engine is there for the root package, whose `lib.rs` only shows what the folders have.
+        let is_below = own == place || place == "src" || allowed.contains(&place.as_str());
+        let is_engine = package == "src" && place.starts_with("crates/");
+        if !(is_below || is_engine) {
+            let text = code.lines().nth(line - 1).unwrap_or_default().trim();
+            wrong.insert(format!("{file}:{line}: {own} must not import from {place}: {text}"));
+        }
+    }
+    wrong.into_iter().collect()
+}
+
+#[test]
+fn imports_point_down() {
+    let mut wrong = Vec::new();
+    for (package, _) in KNOTS {
+        let mut files = Vec::new();
+        rust_files(&root().join(package), &mut files);
+        for path in files {
+            let file = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
+            wrong.extend(wrong_arrows(package, &file, &code_of(&std::fs::read_to_string(&path).unwrap())));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn knots_are_as_small_as_they_were() {
+    let mut wrong = Vec::new();
+    for (name, known) in KNOTS {
+        let knot = Package::read(name).largest_knot();
+        if knot.len() != known {
+            let names: Vec<String> = knot.iter().map(|module| module.join("/")).collect();
+            wrong.push(format!("{name}: {} files in a knot, not {known}: {}", knot.len(), names.join(" ")));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_wrong_arrow_is_named() {
+    let wrong = wrong_arrows(
+        "src",
+        "src/scene/load.rs",
+        "use std::fmt;\nuse crate::{\n    viewer::App,\n    frame::Film,\n};\n",
+    );
+    assert_eq!(wrong.len(), 2, "{wrong:?}");
+    let one = |package, file, code: &str| wrong_arrows(package, file, code).join("\n");
+    let found = one("src", "src/scene/load.rs", "use std::fmt;\nuse crate::viewer::App;\n");
+    assert_eq!(found, "src/scene/load.rs:2: src/scene must not import from src/viewer: use crate::viewer::App;");
+    let found = one("crates/mesh/src", "crates/mesh/src/weld.rs", "use firstlight_render::Film;");
+    assert!(found.starts_with("crates/mesh/src/weld.rs:1: crates/mesh/src must not import from crates/render/src"));
+    assert!(
+        one("crates/kdtree/src", "crates/kdtree/src/geometry/ray.rs", "use crate::Hit;").contains("must not import")
+    );
+    assert_eq!(one("crates/kdtree/src", "crates/kdtree/src/build.rs", "use crate::geometry::Aabb;"), "");
+    assert_eq!(one("src", "src/viewer/app/mod.rs", "use firstlight_render::Film; use crate::frame::Session;"), "");
+}
