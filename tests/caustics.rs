@@ -3,12 +3,14 @@
 mod common;
 
 use common::*;
-use firstlight::kdtree::Shape;
+use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
+use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, ColorInput, Environment, Film, Material, PixelFilter, RenderSettings, ScalarInput, Snapshot, Techniques,
-    advance,
+    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, RenderSettings, ScalarInput,
+    Shading, Snapshot, Techniques, advance,
 };
-use glam::{DVec3, Vec3};
+use glam::{Affine3A, DVec3, Quat, Vec3};
+use std::sync::Arc;
 
 const GLASS: Material = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
 
@@ -200,4 +202,75 @@ fn any_number_of_threads_and_any_portions_give_the_same_bits() {
     }
     // The estimate sums tile by tile; the picture does not.
     assert!(picture(3, 13, &[5]).0 == reference.0);
+}
+
+/// A box of a material, as a mesh with flat faces.
+fn block(center: Vec3, size: Vec3, material: u32) -> (Shape, Object) {
+    let mesh = Arc::new(procedural::cuboid(DVec3::ONE).flat());
+    let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
+    let extent = tree.bounds().max - tree.bounds().min;
+    let world_from_object = Affine3A::from_scale_rotation_translation(size / extent, Quat::IDENTITY, center);
+    (Shape::Mesh { tree, world_from_object }, Object { mesh: Some(mesh), ..Object::plain(material) })
+}
+
+/// A lamp above a floor, and bodies between them.
+fn bench(bodies: Vec<(Shape, Object)>, ior: f32) -> Snapshot {
+    let mut parts = bodies;
+    parts.push((plane(Vec3::new(0.0, -1.1, 0.0), Vec3::Y), Object::plain(0)));
+    parts.push((quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0), Object::plain(1)));
+    let glass = Material::Glass { ior, absorption: Vec3::ZERO };
+    let materials = vec![diffuse(0.5), emissive(10.0), glass.clone(), glass];
+    let (shapes, objects) = parts.into_iter().unzip();
+    let geometry = Geometry::build(shapes, objects);
+    let shading = Shading::build(&geometry, materials, Vec::new(), Environment::Black);
+    let camera = camera(Vec3::new(2.0, -0.4, 5.0), Vec3::new(0.0, -1.0, 0.0), 25.0);
+    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+}
+
+#[test]
+fn bodies_that_touch_are_as_one() {
+    let v = Vec3::new;
+    let one = block(v(0.0, 0.5, 0.0), v(2.0, 1.0, 2.0), 2);
+    let low = block(v(0.0, 0.25, 0.0), v(2.0, 0.5, 2.0), 2);
+    let cases = [
+        ("a body on another", one.clone(), vec![low.clone(), block(v(0.0, 0.75, 0.0), v(2.0, 0.5, 2.0), 2)]),
+        ("a body on one of another material", one.clone(), vec![low, block(v(0.0, 0.75, 0.0), v(2.0, 0.5, 2.0), 3)]),
+        (
+            "bodies side by side whose walls end elsewhere",
+            one.clone(),
+            vec![
+                block(v(-0.5, 0.5, 0.0), v(1.0, 1.0, 2.0), 3),
+                block(v(0.5, 0.5, -0.7), v(1.0, 1.0, 0.6), 2),
+                block(v(0.5, 0.5, 0.3), v(1.0, 1.0, 1.4), 2),
+            ],
+        ),
+        ("the same body twice", one.clone(), vec![one.clone(), one]),
+        (
+            "the same sphere twice",
+            (sphere(v(0.0, 0.0, 0.0), 0.8), Object::plain(2)),
+            vec![(sphere(v(0.0, 0.0, 0.0), 0.8), Object::plain(2)), (sphere(v(0.0, 0.0, 0.0), 0.8), Object::plain(3))],
+        ),
+    ];
+    for (name, one, many) in cases {
+        let of = |bodies| mean_of_renders(&bench(bodies, 1.5), settings(11, true), (16, 16), 512, 8);
+        let ((truth, truth_error), (mean, error)) = (of(vec![one]), of(many));
+        println!("{name}: {mean:.5} ± {error:.5} for {truth:.5} ± {truth_error:.5}");
+        assert!(error < 0.005 * truth, "{name}: ± {error}");
+        assert!((mean - truth).abs() < 4.0 * error.hypot(truth_error), "{name}: {mean} ± {error} for {truth}");
+    }
+}
+
+#[test]
+fn glass_that_bends_nothing_takes_no_light_where_it_touches_something() {
+    let v = Vec3::new;
+    let standing = block(v(0.0, -0.55, 0.0), v(2.0, 1.1, 2.0), 2);
+    let sheet = (quad(v(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0), Object::plain(2));
+    let (truth, truth_error) = mean_of_renders(&bench(Vec::new(), 1.0), settings(11, true), (16, 16), 512, 8);
+    let cases = [("standing on the floor", vec![standing.clone()]), ("under a sheet", vec![standing, sheet])];
+    for (name, bodies) in cases {
+        let (mean, error) = mean_of_renders(&bench(bodies, 1.0), settings(11, true), (16, 16), 512, 8);
+        println!("{name}: {mean:.5} ± {error:.5} for {truth:.5}");
+        assert!(error < 0.005 * truth, "{name}: ± {error}");
+        assert!((mean - truth).abs() < 4.0 * error.hypot(truth_error), "{name}: {mean} ± {error} for {truth}");
+    }
 }

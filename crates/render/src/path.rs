@@ -140,6 +140,7 @@ impl PathWave {
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.shading.bodies.contacts.settle(scene, &self.paths.rays, &mut self.hits);
             if let Some(record) = &mut self.record {
                 record.see_hits(&self.paths, &self.hits);
             }
@@ -278,7 +279,7 @@ impl PathWave {
             is_told: false,
         };
         let mut sides = (scene.shading.features.glass)
-            .then(|| Sides::new(scene, &mut self.sets, path.media, &hit, material, vertex.front));
+            .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
         if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
             if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
                 self.scatter_told(step, &blend);

@@ -183,6 +183,8 @@ pub(super) struct Sides<'a> {
     /// On the side of the path.
     pub here: MediumId,
     pub boundary: Boundary,
+    /// In the same place, see [`super::medium`].
+    others: Vec<Boundary>,
 }
 
 impl<'a> Sides<'a> {
@@ -191,17 +193,20 @@ impl<'a> Sides<'a> {
         scene: &Snapshot,
         sets: &'a mut MediumSets,
         here: MediumId,
+        ray: &Ray,
         hit: &Hit,
         id: MaterialId,
         front: bool,
     ) -> Self {
-        Self { sets, here, boundary: scene.shading.bodies.boundary(hit.object, hit.prim, id, front) }
+        let bodies = &scene.shading.bodies;
+        let others = bodies.contacts.along_with(scene, bodies, hit, || *ray);
+        Self { sets, here, boundary: bodies.boundary(hit.object, hit.prim, id, front), others }
     }
 
     /// The way through a transparent part of the material; see [`MediumSets::interface`].
     #[inline]
     pub fn interface(&mut self, scene: &Snapshot, leaf: u32) -> Interface {
-        self.sets.interface(scene, self.here, self.boundary, leaf)
+        self.sets.interface(scene, self.here, self.boundary, leaf, &self.others)
     }
 }
 

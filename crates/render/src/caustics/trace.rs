@@ -111,6 +111,7 @@ impl LightWave {
             counts.bounce += self.paths.len() as u64;
             let tree = &pass.scene.geometry.tree;
             tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.shading.bodies.contacts.settle(pass.scene, &self.paths.rays, &mut self.hits);
             self.scatter(pass, n_vertices);
             let arrivals = &mut self.arrivals;
             tree.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
@@ -143,6 +144,7 @@ impl LightWave {
             }
             n_vertices += 1;
             pass.scene.geometry.tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.shading.bodies.contacts.settle(pass.scene, &self.paths.rays, &mut self.hits);
             self.next.start(self.paths.len(), pass.scene.shading.features.glass, false);
             for i in 0..self.paths.len() {
                 let path = LightPath::from(self.paths.get(i));
@@ -282,7 +284,7 @@ fn surface_at(
     let is_blend =
         matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
     let glass = scene.shading.features.glass;
-    let mut sides = glass.then(|| Sides::new(scene, sets, media, hit, material, vertex.front));
+    let mut sides = glass.then(|| Sides::new(scene, sets, media, ray, hit, material, vertex.front));
     let surface = if is_blend {
         Surface::Blend(Box::new(blend_at(scene, material, &vertex, sides.as_mut())?))
     } else {

@@ -5,6 +5,7 @@
 //! Each body has as many rows as its material has transparent parts: a blend of two glasses is, for each path, a body of
 //! the one through which the path came in.
 
+use super::contacts::Contacts;
 use crate::snapshot::Geometry;
 use crate::{Material, MaterialId};
 use firstlight_kdtree::geometry::Ray;
@@ -20,6 +21,7 @@ pub(crate) struct Bodies {
     /// Of each object.
     of_object: Vec<Surface>,
     deepest: u32,
+    pub contacts: Contacts,
 }
 
 /// One transparent part of one body.
@@ -82,7 +84,7 @@ impl Bodies {
         let n_leaves: Vec<u32> = (0..materials.len() as u32).map(|id| leaves_of(materials, id).len() as u32).collect();
         let mut of_object = vec![Surface::Opaque; geometry.objects.len()];
         if n_leaves.iter().all(|&n| n == 0) {
-            return Self { rows: Vec::new(), of_object, deepest: 0 };
+            return Self { rows: Vec::new(), of_object, deepest: 0, contacts: Contacts::default() };
         }
         let mut candidates = candidates(geometry, &n_leaves);
         // Of equally large bodies the later one counts, as if it had been entered last.
@@ -115,12 +117,18 @@ impl Bodies {
             }
         }
         let deepest = deepest(&candidates);
-        Self { rows, of_object, deepest }
+        let is_clear: Vec<bool> = n_leaves.iter().map(|&n| n > 0).collect();
+        Self { rows, of_object, deepest, contacts: Contacts::build(geometry, &is_clear) }
     }
 
     /// How many bodies lie within each other, at most, as far as their boxes tell.
     pub fn deepest(&self) -> u32 {
         self.deepest
+    }
+
+    /// Whether some surface of an object is that of a body.
+    pub fn is_transparent(&self, object: u32) -> bool {
+        !matches!(self.of_object[object as usize], Surface::Opaque)
     }
 
     /// The boundary that a hit is on.

@@ -10,6 +10,7 @@
 //! however they are nested, open or met in the wrong order, makes radiance / n² grow.
 
 mod bodies;
+mod contacts;
 
 use super::Snapshot;
 pub(super) use bodies::{Bodies, Boundary};
@@ -101,11 +102,28 @@ impl MediumSets {
 
     /// The way through a boundary for a path inside of `from`.
     ///
-    /// - `leaf`: which of the transparent parts of the material the path takes, see [`Bodies`].
+    /// - `leaf`: which of the transparent parts of the material the path takes, see [`Bodies`];
+    /// - `others`: in the same place, see [`contacts`].
     #[inline]
-    pub fn interface(&mut self, scene: &Snapshot, from: MediumId, boundary: Boundary, leaf: u32) -> Interface {
+    pub fn interface(
+        &mut self,
+        scene: &Snapshot,
+        from: MediumId,
+        boundary: Boundary,
+        leaf: u32,
+        others: &[Boundary],
+    ) -> Interface {
         let here = self.ior(from);
-        match self.crossed(scene, from, boundary, leaf) {
+        let beyond = if others.is_empty() {
+            self.crossed(scene, from, boundary, leaf)
+        } else {
+            self.crossed_all(
+                scene,
+                from,
+                &[&[(boundary, leaf)], &others.iter().map(|&other| (other, 0)).collect::<Vec<_>>()[..]].concat(),
+            )
+        };
+        match beyond {
             Some(beyond) => {
                 let eta = here / self.ior(beyond);
                 Interface { eta, squeeze: eta, beyond }
@@ -116,6 +134,12 @@ impl MediumSets {
                 Interface { eta, squeeze: 1.0, beyond: from }
             }
         }
+    }
+
+    /// The way through several boundaries in one place, of which none is left that was not entered.
+    fn crossed_all(&mut self, scene: &Snapshot, from: MediumId, boundaries: &[(Boundary, u32)]) -> Option<MediumId> {
+        let of = |front: bool| boundaries.iter().filter(move |(boundary, _)| boundary.front == front);
+        of(true).chain(of(false)).try_fold(from, |at, &(boundary, leaf)| self.crossed(scene, at, boundary, leaf))
     }
 
     /// `None` where a body is left that was not entered.
@@ -196,7 +220,7 @@ mod tests {
     fn pass(sets: &mut MediumSets, scene: &Snapshot, from: MediumId, object: u32, front: bool) -> Interface {
         let material = scene.geometry.objects[object as usize].materials[0];
         let boundary = scene.shading.bodies.boundary(object, 0, material, front);
-        sets.interface(scene, from, boundary, 0)
+        sets.interface(scene, from, boundary, 0, &[])
     }
 
     #[test]
@@ -258,10 +282,10 @@ mod tests {
         sets.start(&scene, &[]);
         for (leaf, ior) in [(0, 1.5), (1, 1.3)] {
             let boundary = |front| scene.shading.bodies.boundary(0, 0, 2, front);
-            let entered = sets.interface(&scene, MediumId::OUTSIDE, boundary(true), leaf).beyond;
+            let entered = sets.interface(&scene, MediumId::OUTSIDE, boundary(true), leaf, &[]).beyond;
             assert_eq!(sets.ior(entered), ior);
             for part in 0..2 {
-                let left = sets.interface(&scene, entered, boundary(false), part);
+                let left = sets.interface(&scene, entered, boundary(false), part, &[]);
                 assert_eq!((left.beyond, left.eta), (MediumId::OUTSIDE, ior), "in by {leaf}, out by {part}");
             }
         }

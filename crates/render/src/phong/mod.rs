@@ -119,6 +119,7 @@ impl PhongWave {
             }
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
             scene.geometry.tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.shading.bodies.contacts.settle(scene, &self.paths.rays, &mut self.hits);
             self.shade(scene, depth, settings, radiance);
             counts.shadow += self.shadows.cast(scene, &mut self.sets, class, radiance);
             counts.bounce += self.next.len() as u64;
@@ -227,7 +228,8 @@ impl PhongWave {
         }
         let step = Step { scene, path: &path, vertex: &vertex, depth };
         let glass = shading.features.glass;
-        let mut sides = glass.then(|| Sides::new(scene, &mut self.sets, path.media, &hit, material, vertex.front));
+        let mut sides =
+            glass.then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
         finish.look_up(scene, material, &vertex, sides.as_mut());
         if finish.is_lit() {
             radiance[slot] += path.throughput * self.light(&step, finish);

@@ -153,6 +153,7 @@ impl Shadows {
             }
             n_rays += self.rays.len() as u64;
             scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
+            scene.shading.bodies.contacts.settle(scene, &self.rays, &mut self.hits);
             self.next_rays.clear();
             self.next_lights.clear();
             for (i, &arriving) in self.lights.iter().enumerate() {
@@ -171,7 +172,7 @@ impl Shadows {
                 let distance = hit.t * ray.dir.length();
                 let unit = Ray { dir: ray.dir.normalize(), ..ray };
                 let vertex = Vertex::new(scene, &unit, &Hit { t: distance, ..hit }, id);
-                let mut sides = Sides::new(scene, sets, arriving.media, &hit, id, vertex.front);
+                let mut sides = Sides::new(scene, sets, arriving.media, &ray, &hit, id, vertex.front);
                 let Some((share, interface)) = straight_through(scene, id, &vertex, &mut sides) else { continue };
                 let mut light = arriving.light * share;
                 if !vertex.front {

@@ -20,8 +20,13 @@ impl<S: Simd> GlassLanes<S> {
         for lane in lanes_of(at.mask) {
             let i = at.indices[lane] as usize;
             let (object, prim, front) = (at.hits.object[i], at.hits.prim[i], front >> lane & 1 != 0);
-            let boundary = at.scene.shading.bodies.boundary(object, prim, at.materials[i], front);
-            let interface = sets.interface(at.scene, media[lane], boundary, 0);
+            let bodies = &at.scene.shading.bodies;
+            let boundary = bodies.boundary(object, prim, at.materials[i], front);
+            let others = match at.hits.get(i) {
+                Some(hit) => bodies.contacts.along_with(at.scene, bodies, &hit, || at.paths.rays.get(i)),
+                None => Vec::new(),
+            };
+            let interface = sets.interface(at.scene, media[lane], boundary, 0, &others);
             (eta[lane], squeeze[lane], beyond[lane]) = (interface.eta, interface.squeeze, interface.beyond);
         }
         Self { eta: Float::load(s, &eta), squeeze: Float::load(s, &squeeze), beyond }
