@@ -6,6 +6,7 @@
 
 use super::bsdf::SMALLEST_ALPHA;
 use super::light::luminance;
+use super::path::ENDLESS_SURVIVAL;
 use super::{ColorInput, Environment, Fresnel, Material, MaterialId, ScalarInput, Shading};
 use glam::Vec3;
 
@@ -25,7 +26,7 @@ pub(super) fn radiance_bound(shading: &Shading) -> Option<f32> {
 /// The bound with the rounding of paths of `depth` segments, and roulette from `endless` on.
 pub(super) fn at_depth(bound: f32, depth: u32, endless: u32) -> f32 {
     let rounding = 1.0 + 2e-6 * (depth as f32 + 8.0);
-    let roulette = 0.95_f32.powi(-(depth.saturating_sub(endless) as i32));
+    let roulette = ENDLESS_SURVIVAL.powi(-(depth.saturating_sub(endless) as i32));
     bound * rounding * roulette
 }
 

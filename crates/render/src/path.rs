@@ -34,6 +34,10 @@ pub(super) fn endless_depth(scene: &Snapshot) -> u32 {
     64 * scene.shading.bodies.deepest().clamp(1, 128)
 }
 
+/// What is kept of such paths at each vertex, at most. Light that escapes from a body at a smaller rate than it is ended by this
+/// comes too rarely to be seen, so it is close to 1.
+pub(super) const ENDLESS_SURVIVAL: f32 = 0.99;
+
 /// Sample dimensions of the camera, and then of each vertex.
 pub(super) const CAMERA_DIMENSIONS: u32 = 2;
 const VERTEX_DIMENSIONS: u32 = 5;
@@ -77,7 +81,7 @@ pub(super) struct Survival {
 impl Survival {
     fn at(depth: u32, scene: &Snapshot, techniques: &Techniques) -> Self {
         let share = match depth {
-            _ if depth >= endless_depth(scene) => Some(0.95),
+            _ if depth >= endless_depth(scene) => Some(ENDLESS_SURVIVAL),
             ROULETTE_DEPTH.. if techniques.roulette => Some(1.0),
             _ => None,
         };

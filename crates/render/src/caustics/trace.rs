@@ -14,7 +14,7 @@ use super::weight::{Bounce, Track, etendue_gain, is_reversible};
 use super::{CausticPass, aim};
 use crate::bsdf::{Blend, BsdfSample, Lobe, Scatter};
 use crate::medium::{Interface, MediumId, MediumSets};
-use crate::path::{DIM_DIRECTION, DIM_LOBE, endless_depth};
+use crate::path::{DIM_DIRECTION, DIM_LOBE, ENDLESS_SURVIVAL, endless_depth};
 use crate::paths::{Path, PathBatch};
 use crate::sampling::{Sampler, hash_u32};
 use crate::surface::{Sides, Vertex, blend_at, lobe_at, material_of};
@@ -263,7 +263,7 @@ fn first_dimension(n_vertices: u32) -> u32 {
 /// The most that roulette keeps of a path behind its vertex number `n_vertices`; `None` while all go on.
 pub(super) fn most_kept(scene: &Snapshot, n_vertices: u32, is_smooth: bool) -> Option<f32> {
     match n_vertices {
-        _ if n_vertices >= endless_depth(scene) => Some(0.95),
+        _ if n_vertices >= endless_depth(scene) => Some(ENDLESS_SURVIVAL),
         _ if !is_smooth => Some(SURVIVAL),
         ROULETTE_DEPTH.. => Some(1.0),
         _ => None,

@@ -18,7 +18,7 @@ mod shadow;
 use super::Snapshot;
 use super::dielectric::{fresnel, refract};
 use super::medium::{Interface, MediumSets};
-use super::path::{CAMERA_DIMENSIONS, endless_depth};
+use super::path::{CAMERA_DIMENSIONS, ENDLESS_SURVIVAL, endless_depth};
 use super::paths::{Path, PathBatch};
 use super::renderer::{RayCounts, RenderSettings};
 use super::surface::{Sides, Vertex, material_of};
@@ -341,7 +341,7 @@ impl PhongWave {
         // Inside glass weights carry 1/n², which the way out gives back: it must not count as loss.
         let ior = self.sets.ior(media);
         let most = weight.abs().max_element() * ior * ior / least_weight(depth);
-        let survival = if depth >= endless_depth(scene) { most.min(0.95) } else { most.min(1.0) };
+        let survival = if depth >= endless_depth(scene) { most.min(ENDLESS_SURVIVAL) } else { most.min(1.0) };
         if survival < 1.0 {
             if path.sampler.single(dimension) >= survival {
                 return;

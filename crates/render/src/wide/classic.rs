@@ -7,7 +7,7 @@
 use super::super::Snapshot;
 use super::super::light::LightLanes;
 use super::super::medium::MediumSets;
-use super::super::path::endless_depth;
+use super::super::path::{ENDLESS_SURVIVAL, endless_depth};
 use super::super::paths::{PathBatch, PathLanes};
 use super::super::phong::{AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, LIGHTS_COUNTED, Shadows, least_weight};
 use super::chunk::{Chunk, iors};
@@ -185,7 +185,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         let mut go_on = mask & wi.dot(place.reach_normal).is_positive();
         let ior = iors(s, scene, sets, go_on, &media);
         let most = throughput.abs().max_element() * (1.0 / least_weight(depth)) * ior * ior;
-        let survival = most.at_most(if depth >= endless_depth(scene) { 0.95 } else { 1.0 });
+        let survival = most.at_most(if depth >= endless_depth(scene) { ENDLESS_SURVIVAL } else { 1.0 });
         let at_stake = go_on & survival.lt(survival.all(1.0));
         if at_stake != 0 {
             go_on &= !at_stake | sampler.single(dimension + DIM_SHINY).lt(survival);
