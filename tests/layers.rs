@@ -38,7 +38,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
 /// Files that import each other in a circle, by package: how many are in the largest circle. Anything but a smaller number
 /// is a step back.
 const KNOTS: [(&str, usize); 5] =
-    [("crates/simd/src", 0), ("crates/kdtree/src", 7), ("crates/mesh/src", 0), ("crates/render/src", 50), ("src", 13)];
+    [("crates/simd/src", 0), ("crates/kdtree/src", 7), ("crates/mesh/src", 0), ("crates/render/src", 49), ("src", 13)];
 
 /// The path of a module below `src`, in its parts.
 type Module = Vec<String>;

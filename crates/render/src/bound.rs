@@ -5,7 +5,7 @@
 //! brightest of the surroundings. One that is tells of a fault, and is counted with its place like one that is not finite.
 
 use super::bsdf::SMALLEST_ALPHA;
-use super::light::luminance;
+use super::color::luminance;
 use super::path::ENDLESS_SURVIVAL;
 use super::{ColorInput, Environment, Fresnel, Material, MaterialId, ScalarInput, Shading};
 use glam::Vec3;

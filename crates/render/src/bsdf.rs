@@ -4,9 +4,9 @@
 //! the surface; `normal` is the shading normal on the side of `wo`. Perfectly specular lobes have no `eval`: only
 //! sampling finds them.
 
+use super::color::luminance;
 use super::dielectric::{fresnel, refract};
 use super::ggx;
-use super::light::luminance;
 use super::material::Fresnel;
 use super::medium::{Interface, MediumId};
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};

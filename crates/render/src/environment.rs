@@ -1,7 +1,7 @@
 //! Light from infinitely far away.
 
 use super::ImageTexture;
-use super::light::luminance;
+use super::color::luminance;
 use crate::sampling::PictureDistribution;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};

@@ -7,6 +7,7 @@ mod bound;
 mod bsdf;
 mod camera;
 mod caustics;
+mod color;
 mod develop;
 mod dielectric;
 mod environment;

@@ -10,6 +10,7 @@ mod wide;
 mod wide_tree;
 mod wide_triangle;
 
+use super::color::luminance;
 use super::{ColorInput, Emission, Geometry, Techniques, Texture};
 use crate::sampling::Sampler;
 use firstlight_kdtree::Shape;
@@ -295,10 +296,4 @@ impl Light {
         let radiance = self.radiance(textures, point.normal, point.uv);
         LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance }
     }
-}
-
-/// Relative luminance of a linear Rec. 709 colour.
-#[inline]
-pub(crate) fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }

@@ -114,32 +114,22 @@ impl MediumSets {
         others: &[Boundary],
     ) -> Interface {
         let here = self.ior(from);
-        let beyond = if others.is_empty() {
-            self.crossed(scene, from, boundary, leaf)
-        } else {
-            self.crossed_all(
-                scene,
-                from,
-                &[&[(boundary, leaf)], &others.iter().map(|&other| (other, 0)).collect::<Vec<_>>()[..]].concat(),
-            )
-        };
+        // Bodies are entered before others are left: what a path goes through on the way has no thickness.
+        let all = || std::iter::once((boundary, leaf)).chain(others.iter().map(|&other| (other, 0)));
+        let mut in_order =
+            all().filter(|(boundary, _)| boundary.front).chain(all().filter(|(boundary, _)| !boundary.front));
+        let beyond = in_order.try_fold(from, |at, (boundary, leaf)| self.crossed(scene, at, boundary, leaf));
         match beyond {
             Some(beyond) => {
                 let eta = here / self.ior(beyond);
                 Interface { eta, squeeze: eta, beyond }
             }
-            // An open surface from behind: it bends light, but the path stays where it was, and so does its radiance.
+            // An open surface from behind, alone or with others: it bends light, but the path stays where it was, and so does its radiance.
             None => {
                 let eta = scene.shading.bodies.ior(boundary, leaf) / here;
                 Interface { eta, squeeze: 1.0, beyond: from }
             }
         }
-    }
-
-    /// The way through several boundaries in one place, of which none is left that was not entered.
-    fn crossed_all(&mut self, scene: &Snapshot, from: MediumId, boundaries: &[(Boundary, u32)]) -> Option<MediumId> {
-        let of = |front: bool| boundaries.iter().filter(move |(boundary, _)| boundary.front == front);
-        of(true).chain(of(false)).try_fold(from, |at, &(boundary, leaf)| self.crossed(scene, at, boundary, leaf))
     }
 
     /// `None` where a body is left that was not entered.
