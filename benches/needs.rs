@@ -6,10 +6,9 @@
 mod common;
 
 use common::{scenes, world_of};
-use firstlight::render::{Features, Film, RenderSettings, Snapshot, advance};
+use firstlight::render::{Features, Film, Prepared, RenderSettings, advance};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::{BUILTIN_SCENES, Extraction, Rendering, SceneInputs};
-use std::sync::Arc;
 
 const ROUNDS: usize = 9;
 const SPP: u32 = 16;
@@ -27,13 +26,13 @@ fn row(name: &str) {
     let (scene, mut world) = world_of(name);
     let settings = world.resource::<Rendering>().0;
     let inputs = SceneInputs::of(&mut world);
-    let [needed, mut everything] = [(), ()].map(|()| Extraction::new(&inputs, &scene.trees).snapshot);
-    let shading = Arc::get_mut(&mut everything.shading).expect("a copy of its own");
-    let own = shading.features;
-    shading.features = Features { glass: true, media: true, textures: true, environment: true, ..own };
+    let needed = Extraction::new(&inputs, &scene.trees).prepared;
+    let own = needed.features();
+    let all = Features { glass: true, media: true, textures: true, environment: true, ..own };
+    let everything = Prepared::with_features((*needed).clone(), all);
     let (mut seconds, mut ratios) = ([vec![], vec![]], vec![]);
     for round in 0..=ROUNDS {
-        let [(a, first), (b, second)] = [&needed, &everything].map(|snapshot| render(snapshot, &settings));
+        let [(a, first), (b, second)] = [&needed, &everything].map(|prepared| render(prepared, &settings));
         assert!(first == second, "{name}: the pictures differ");
         // The first round warms up.
         if round > 0 {
@@ -55,10 +54,10 @@ fn row(name: &str) {
 }
 
 /// CPU seconds and the picture, bit by bit.
-fn render(snapshot: &Snapshot, settings: &RenderSettings) -> (f64, Vec<[u32; 3]>) {
+fn render(prepared: &Prepared, settings: &RenderSettings) -> (f64, Vec<[u32; 3]>) {
     let mut film = Film::new(256, 192);
     let before = cpu_seconds().expect("a system that tells CPU time");
-    advance(snapshot, settings, &mut film, SPP, &|| false);
+    advance(prepared, settings, &mut film, SPP, &|| false);
     let seconds = cpu_seconds().expect("a system that tells CPU time") - before;
     (seconds, film.means().iter().map(|mean| mean.to_array().map(f32::to_bits)).collect())
 }

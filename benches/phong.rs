@@ -6,7 +6,7 @@
 mod common;
 
 use common::{scenes, world_of};
-use firstlight::render::{Film, Integrator, RenderSettings, Snapshot, advance};
+use firstlight::render::{Film, Integrator, Prepared, RenderSettings, advance};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::{Extraction, FilmSize, SceneInputs};
 use std::time::Instant;
@@ -55,14 +55,14 @@ fn main() {
 fn row(name: &str) {
     let (scene, mut world) = world_of(name);
     let size = *world.resource::<FilmSize>();
-    let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
-    frame(&snapshot, size);
+    let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
+    frame(&prepared, size);
     let before = cpu_seconds();
     let mut rays = 0;
     let mut seconds: Vec<f64> = (0..FRAMES)
         .map(|_| {
             let start = Instant::now();
-            rays = frame(&snapshot, size);
+            rays = frame(&prepared, size);
             start.elapsed().as_secs_f64()
         })
         .collect();
@@ -83,10 +83,10 @@ fn row(name: &str) {
 }
 
 /// One sample of every pixel on a new film; how many rays it took.
-fn frame(snapshot: &Snapshot, size: FilmSize) -> u64 {
+fn frame(prepared: &Prepared, size: FilmSize) -> u64 {
     let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
     let mut film = Film::new(size.width, size.height);
-    let report = advance(snapshot, &settings, &mut film, 1, &|| false);
+    let report = advance(prepared, &settings, &mut film, 1, &|| false);
     assert!(report.completed && report.n_bad == 0, "a frame was not finished");
     report.rays.total()
 }

@@ -6,7 +6,7 @@
 
 use bevy_ecs::world::World;
 use firstlight::frame::read_film_file_within;
-use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, RenderSettings, Snapshot, advance};
+use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, Prepared, RenderSettings, advance};
 use firstlight::scene::file::{MeshSourcePart, ObjectPart, SceneFile};
 use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
 use firstlight::scene::{
@@ -104,7 +104,7 @@ pub fn render(bytes: &[u8]) {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     let settings = RenderSettings { max_depth: 8, ..world.resource::<Rendering>().0 };
     let mut film = Film::new(5, 3);
-    let report = advance(&extraction.snapshot, &settings, &mut film, 2, &|| false);
+    let report = advance(&extraction.prepared, &settings, &mut film, 2, &|| false);
     assert!(report.completed && film.means().iter().all(|mean| mean.is_finite()));
 }
 
@@ -142,12 +142,12 @@ fn go_on(mut film: Film) {
     if film.max_spp() - spp > 8 || film.first_sample() > Film::MAX_SAMPLES / 2 {
         return;
     }
-    static SCENE: LazyLock<Snapshot> = LazyLock::new(|| {
+    static SCENE: LazyLock<Prepared> = LazyLock::new(|| {
         let mut world = World::new();
         let source = SceneSource::Builtin("cornell-balls".to_owned());
         let scene = load(&source, &LoadOptions::default()).expect("a scene of the program's own");
         scene.spawn(&mut world);
-        Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot
+        Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared
     });
     let settings = RenderSettings { max_depth: 3, ..RenderSettings::default() };
     if film.width() * film.height() <= 64 {

@@ -6,7 +6,7 @@ use firstlight::frame::{
     Bookmarks, Command as Asked, Session, SessionOptions, SettingsStore, Target, navigation::Rig, read_film_file,
     write_film_file,
 };
-use firstlight::render::{Film, RenderSettings, advance};
+use firstlight::render::{Camera, Film, Prepared, RenderSettings, advance};
 use firstlight::scene::file::{CameraPart, FilmPart, SceneFile};
 use firstlight::scene::shot::NOTE_KEY;
 use firstlight::scene::{
@@ -331,19 +331,18 @@ fn the_library() {
         inputs.camera = inputs.camera.map(|camera| CameraInput { view, projection, lens, ..camera });
         let extraction = Extraction::new(&inputs, &scene.trees);
         assert!(extraction.problems.iter().any(|problem| problem.contains(expected)), "{expected}");
-        extraction.snapshot.camera.check().unwrap();
+        extraction.prepared.camera.check().unwrap();
     }
     // The core takes none of it.
-    let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
+    let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
     let black = RenderSettings { max_depth: 0, ..RenderSettings::default() };
-    let render = |settings: RenderSettings, snapshot: &firstlight::render::Snapshot| {
-        let snapshot = snapshot.clone();
-        std::panic::catch_unwind(move || advance(&snapshot, &settings, &mut Film::new(4, 4), 1, &|| false).completed)
+    let render = |settings: RenderSettings, prepared: &Prepared| {
+        let prepared = prepared.clone();
+        std::panic::catch_unwind(move || advance(&prepared, &settings, &mut Film::new(4, 4), 1, &|| false).completed)
     };
-    assert!(render(RenderSettings::default(), &snapshot).unwrap());
-    assert!(render(black, &snapshot).is_err());
-    let mut blind = snapshot.clone();
-    blind.camera.tan_half_vfov = f32::NAN;
+    assert!(render(RenderSettings::default(), &prepared).unwrap());
+    assert!(render(black, &prepared).is_err());
+    let blind = prepared.with_camera(Camera { tan_half_vfov: f32::NAN, ..prepared.camera });
     assert!(render(RenderSettings::default(), &blind).is_err());
 
     // What a scene file would refuse, no scene file is made of.
@@ -400,7 +399,7 @@ fn numbers_beyond_single_precision() {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     assert!(extraction.problems.is_empty(), "{:?}", extraction.problems);
     let mut film = Film::new(8, 8);
-    let report = advance(&extraction.snapshot, &RenderSettings::default(), &mut film, 4, &|| false);
+    let report = advance(&extraction.prepared, &RenderSettings::default(), &mut film, 4, &|| false);
     assert_eq!(report.n_bad, 0);
     assert!(film.means().iter().all(|mean| mean.is_finite() && mean.min_element() > 0.0), "{:?}", film.means());
 }

@@ -6,8 +6,8 @@ use common::*;
 use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, RenderSettings, ScalarInput,
-    Shading, Snapshot, Techniques, advance,
+    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, Prepared, RenderSettings,
+    ScalarInput, Shading, Snapshot, Techniques, advance,
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ fn settings(seed: u32, caustics: bool) -> RenderSettings {
 }
 
 /// Mean of all pixels and channels over renders with seeds of their own, and its standard error.
-fn mean_of_renders(scene: &Snapshot, settings: RenderSettings, size: (u32, u32), spp: u32, renders: u32) -> (f64, f64) {
+fn mean_of_renders(scene: &Prepared, settings: RenderSettings, size: (u32, u32), spp: u32, renders: u32) -> (f64, f64) {
     let means: Vec<f64> = (0..renders)
         .map(|k| {
             let settings = RenderSettings { seed: settings.seed + k, ..settings };
@@ -43,7 +43,7 @@ fn mean_of_renders(scene: &Snapshot, settings: RenderSettings, size: (u32, u32),
 }
 
 /// A room with a lamp, a floor and something smooth.
-fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Snapshot {
+fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Prepared {
     let mut shapes = vec![
         (plane(Vec3::ZERO, Vec3::Y), 0),
         (quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 3.0), 0),
@@ -89,7 +89,7 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
         ),
     ];
     for (name, scene) in &cases {
-        assert!(scene.shading.features.caustics);
+        assert!(scene.features().caustics);
         let (expected, error) = mean_of_renders(scene, settings(100, false), (24, 18), 1024, 10);
         let (found, other) = mean_of_renders(scene, settings(1, true), (24, 18), 128, 10);
         println!("{name}: {found:.5} ± {other:.5} for {expected:.5} ± {error:.5}");
@@ -167,7 +167,7 @@ fn scenes_without_smooth_surfaces_or_lamps_take_no_notice() {
     let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::Y * 0.5, 0.5), 1)];
     let dark = scene(shapes, vec![diffuse(0.6), GLASS], Environment::Constant(Vec3::ONE), eye());
     for scene in [matte, dark] {
-        assert!(!scene.shading.features.caustics);
+        assert!(!scene.features().caustics);
         let (with, report) = render(&scene, &settings(1, true), 24, 18, 8);
         let (without, plain) = render(&scene, &settings(1, false), 24, 18, 8);
         assert_eq!((with.means(), report.rays), (without.means(), plain.rays));
@@ -214,7 +214,7 @@ fn block(center: Vec3, size: Vec3, material: u32) -> (Shape, Object) {
 }
 
 /// A lamp above a floor, and bodies between them.
-fn bench(bodies: Vec<(Shape, Object)>, ior: f32) -> Snapshot {
+fn bench(bodies: Vec<(Shape, Object)>, ior: f32) -> Prepared {
     let mut parts = bodies;
     parts.push((plane(Vec3::new(0.0, -1.1, 0.0), Vec3::Y), Object::plain(0)));
     parts.push((quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0), Object::plain(1)));
@@ -222,9 +222,9 @@ fn bench(bodies: Vec<(Shape, Object)>, ior: f32) -> Snapshot {
     let materials = vec![diffuse(0.5), emissive(10.0), glass.clone(), glass];
     let (shapes, objects) = parts.into_iter().unzip();
     let geometry = Geometry::build(shapes, objects);
-    let shading = Shading::build(&geometry, materials, Vec::new(), Environment::Black);
+    let shading = Shading::new(materials, Vec::new(), Environment::Black);
     let camera = camera(Vec3::new(2.0, -0.4, 5.0), Vec3::new(0.0, -1.0, 0.0), 25.0);
-    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+    Prepared::new(Snapshot::new(geometry, shading, camera))
 }
 
 #[test]

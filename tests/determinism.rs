@@ -4,12 +4,12 @@ mod common;
 
 use common::*;
 use firstlight::render::{
-    ColorInput, Environment, Film, Fresnel, Integrator, Material, RenderSettings, ScalarInput, Snapshot, advance,
+    ColorInput, Environment, Film, Fresnel, Integrator, Material, Prepared, RenderSettings, ScalarInput, advance,
 };
 use glam::Vec3;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
-fn busy_scene() -> Snapshot {
+fn busy_scene() -> Prepared {
     let mut camera = camera(Vec3::new(0.0, 1.5, 5.0), Vec3::new(0.0, 0.5, 0.0), 40.0);
     camera.lens_radius = 0.05;
     camera.focus_distance = 5.0;
@@ -64,7 +64,7 @@ fn any_number_of_threads_and_any_tile_size_give_the_same_bits() {
     }
 }
 
-fn any_tiles_give_the_same_bits(scene: &Snapshot, settings: RenderSettings) {
+fn any_tiles_give_the_same_bits(scene: &Prepared, settings: RenderSettings) {
     let picture = |threads, tile_size| {
         with_threads(threads, || {
             let mut film = Film::with_tile_size(75, 50, tile_size);
@@ -90,7 +90,7 @@ fn portions_and_interruptions_change_nothing() {
     }
 }
 
-fn portions_change_nothing(scene: &Snapshot, settings: RenderSettings) {
+fn portions_change_nothing(scene: &Prepared, settings: RenderSettings) {
     let mut whole = Film::new(75, 50);
     advance(scene, &settings, &mut whole, 6, &|| false);
     let mut portions = Film::new(75, 50);

@@ -6,7 +6,7 @@ use assert_cmd::Command;
 use common::*;
 use firstlight::frame::{Command as Ask, Explaining, Session, SessionOptions, Target};
 use firstlight::render::{
-    Environment, Film, FoundBy, Integrator, LightSource, Place, RenderSettings, Snapshot, advance, explain,
+    Environment, Film, FoundBy, Integrator, LightSource, Place, Prepared, RenderSettings, advance, explain,
     light_from_lamps, replay_sample,
 };
 use firstlight::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
@@ -16,12 +16,12 @@ use std::time::{Duration, Instant};
 const NEVER: fn() -> bool = || false;
 
 /// A built-in scene as the renderer sees it.
-fn builtin(name: &str) -> (Snapshot, RenderSettings) {
+fn builtin(name: &str) -> (Prepared, RenderSettings) {
     let scene = load(&SceneSource::Builtin(name.to_owned()), &LoadOptions::default()).unwrap();
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
-    (extraction.snapshot, world.resource::<Rendering>().0)
+    (extraction.prepared, world.resource::<Rendering>().0)
 }
 
 #[test]

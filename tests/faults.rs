@@ -178,7 +178,7 @@ fn one_thread_and_sixty_four_render_the_same_bits() {
             let mut film = Film::new(70, 50);
             let target = Target { spp: Some(2), ..Target::default() };
             let settings = world.resource::<Rendering>().0;
-            render_offline(&extraction.snapshot, &settings, &mut film, target, |_| true);
+            render_offline(&extraction.prepared, &settings, &mut film, target, |_| true);
             film.means()
         })
     };

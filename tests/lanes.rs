@@ -7,8 +7,8 @@ use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTre
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
     BadSample, ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object,
-    PixelFilter, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap, advance,
-    replay_sample,
+    PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap,
+    advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -38,7 +38,7 @@ fn cloud(to: Vec3) -> Shape {
 }
 
 /// A room with a thing of each material, of each shape, under `lights`.
-fn room(lights: Vec<(Shape, Option<Arc<Mesh>>)>, environment: Environment, air: Vec3) -> Snapshot {
+fn room(lights: Vec<(Shape, Option<Arc<Mesh>>)>, environment: Environment, air: Vec3) -> Prepared {
     room_with(lights, false, environment, air)
 }
 
@@ -48,7 +48,7 @@ fn room_with(
     as_points: bool,
     environment: Environment,
     air: Vec3,
-) -> Snapshot {
+) -> Prepared {
     let plain = |shape: Shape, material: u32| ((shape, None), material);
     let smooth = procedural::icosphere(3).with_vertex_normals();
     let mut unwrapped = procedural::icosphere(2).flat();
@@ -115,13 +115,13 @@ fn room_with(
         texture(TexturePattern::Checker { a: Vec3::splat(0.7), b: Vec3::new(0.1, 0.3, 0.5) }, 9.0),
         texture(TexturePattern::Image { image, wrap: Wrap::Repeat, smooth: false }, 0.7),
     ];
-    let shading = Shading::build(&geometry, materials, textures, environment).with_air(air);
+    let shading = Shading { air, ..Shading::new(materials, textures, environment) };
     let mut camera = camera(Vec3::new(0.2, 1.6, 5.0), Vec3::new(0.0, 0.6, 0.0), 42.0);
     (camera.lens_radius, camera.focus_distance) = (0.03, 5.0);
-    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+    Prepared::new(Snapshot::new(geometry, shading, camera))
 }
 
-fn rooms() -> Vec<(&'static str, Snapshot)> {
+fn rooms() -> Vec<(&'static str, Prepared)> {
     let ball = || (sphere(Vec3::new(1.5, 2.5, 1.0), 0.4), None);
     let lamp = || (quad(Vec3::new(-1.0, 3.0, -0.5), Vec3::X * 1.2, Vec3::Z * 0.9), None);
     let slanted = || (quad(Vec3::new(-2.5, 1.0, 1.0), Vec3::new(0.1, 0.6, 0.1), Vec3::new(0.2, 0.1, 0.8)), None);

@@ -5,8 +5,8 @@ mod common;
 use common::{camera, diffuse, emissive, picture_mean, plane, quad, render, scene, sphere};
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, RenderSettings,
-    ScalarInput, Shading, Snapshot, advance,
+    ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, Prepared,
+    RenderSettings, ScalarInput, Shading, Snapshot, advance,
 };
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -33,7 +33,7 @@ fn phong(diffuse: f32, specular: f32, transparency: f32) -> Material {
 }
 
 /// Like [`scene`], with all glowing spheres as point lights.
-fn point_lit(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, eye: Vec3, look_at: Vec3) -> Snapshot {
+fn point_lit(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, eye: Vec3, look_at: Vec3) -> Prepared {
     let is_light = |shape: &Shape, m: u32| {
         matches!(shape, Shape::Sphere { .. }) && matches!(materials[m as usize], Material::Emissive { .. })
     };
@@ -45,8 +45,8 @@ fn point_lit(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, eye: Vec3, loo
         })
         .unzip();
     let geometry = Geometry::build(shapes, objects);
-    let shading = Shading::build(&geometry, materials, Vec::new(), Environment::Black);
-    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera: camera(eye, look_at, 1e-3) }
+    let shading = Shading::new(materials, Vec::new(), Environment::Black);
+    Prepared::new(Snapshot::new(geometry, shading, camera(eye, look_at, 1e-3)))
 }
 
 /// A ball of radiant intensity 1 in every direction.
@@ -230,12 +230,15 @@ fn polished_metal_shows_a_large_lamp_without_speckles() {
     assert!((one / expected - 1.0).abs() < 0.02, "{one} ± {error} for {expected}");
 }
 
+fn in_air(scene: Prepared, air: Vec3) -> Prepared {
+    scene.with_shading(Arc::new(Shading { air, ..(*scene.shading).clone() }))
+}
+
 #[test]
 fn air_absorbs_by_distance_in_both_models() {
     let shapes = vec![(quad(Vec3::new(-50.0, -50.0, -5.0), Vec3::X * 100.0, Vec3::Y * 100.0), 0)];
-    let mut scene = scene(shapes, vec![emissive(2.0)], Environment::Black, camera(Vec3::ZERO, Vec3::NEG_Z, 1e-3));
-    let plain = Arc::try_unwrap(scene.shading).unwrap();
-    scene.shading = Arc::new(plain.with_air(Vec3::new(0.0, 0.03, 0.3)));
+    let view = camera(Vec3::ZERO, Vec3::NEG_Z, 1e-3);
+    let scene = in_air(scene(shapes, vec![emissive(2.0)], Environment::Black, view), Vec3::new(0.0, 0.03, 0.3));
     for integrator in [Integrator::Path, Integrator::Phong] {
         let (film, _) = render(&scene, &RenderSettings { integrator, ..*PHONG }, 1, 1, 1);
         let expected = 2.0 * Vec3::new(1.0, (-0.15_f32).exp(), (-1.5_f32).exp());
@@ -248,10 +251,7 @@ fn air_dims_lights_alike_in_both_models() {
     let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::new(0.0, 5.0, 0.0), 1.0), 1)];
     let build = |material| {
         let view = camera(Vec3::new(0.0, 2.0, 3.0), Vec3::ZERO, 1e-3);
-        let mut scene = scene(shapes.clone(), vec![material, emissive(9.0)], Environment::Black, view);
-        let plain = Arc::try_unwrap(scene.shading).unwrap();
-        scene.shading = Arc::new(plain.with_air(Vec3::splat(0.1)));
-        scene
+        in_air(scene(shapes.clone(), vec![material, emissive(9.0)], Environment::Black, view), Vec3::splat(0.1))
     };
     let (classic, _) = render(&build(matte(0.5)), &PHONG, 4, 4, 256);
     let (truth, _) =

@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use common::*;
 use firstlight::frame::{Command as Ask, Session, SessionOptions, StopAt, Target, read_film_file};
 use firstlight::kdtree::Shape;
-use firstlight::render::{Environment, Film, Material, Region, RenderSettings, Snapshot, advance, advance_region};
+use firstlight::render::{Environment, Film, Material, Prepared, Region, RenderSettings, advance, advance_region};
 use firstlight::scene::SceneSource;
 use glam::{UVec2, Vec3};
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 const NEVER: fn() -> bool = || false;
 
 /// A lamp over a floor; with `glass`, caustics on it.
-fn room(glass: bool) -> Snapshot {
+fn room(glass: bool) -> Prepared {
     let lamp: Shape = quad(Vec3::new(-0.3, 2.6, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
     let ball = (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), if glass { 2 } else { 0 });
     let materials = vec![diffuse(0.6), emissive(20.0), Material::Glass { ior: 1.5, absorption: Vec3::ZERO }];

@@ -6,14 +6,14 @@ mod common;
 use common::*;
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    ColorInput, Display, Environment, Fresnel, Material, RenderSettings, ScalarInput, Snapshot, Techniques,
+    ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,
 };
 use firstlight::report::{Key, Ladder, Limits, LinearPicture, ReferenceStore, climb};
 use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
 /// A room with lights of every shape, one much brighter than the others, matte, glossy and mirroring things.
-fn room() -> Snapshot {
+fn room() -> Prepared {
     let metal = Material::Metal {
         alpha: ScalarInput::Constant(0.2),
         reflectance: ColorInput::Constant(Vec3::splat(0.8)),
@@ -41,12 +41,12 @@ fn room() -> Snapshot {
 }
 
 /// Mean of the picture over independent renders, and its standard error.
-fn mean_of_renders(snapshot: &Snapshot, techniques: Techniques) -> (f64, f64) {
+fn mean_of_renders(prepared: &Prepared, techniques: Techniques) -> (f64, f64) {
     let n = 8;
     let means: Vec<f64> = (0..n)
         .map(|seed| {
             let settings = RenderSettings { seed: 100 + seed, techniques, ..RenderSettings::default() };
-            picture_mean(&render(snapshot, &settings, 24, 16, 64).0).0
+            picture_mean(&render(prepared, &settings, 24, 16, 64).0).0
         })
         .collect();
     let mean = means.iter().sum::<f64>() / f64::from(n);
@@ -237,15 +237,15 @@ fn estimated_error_is_the_true_error_where_no_rare_light_rules() {
         let scene = load(&source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
-        let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
+        let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
         let settings = world.resource::<Rendering>().0;
-        let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 8192).0;
+        let truth = render(&prepared, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 8192).0;
         let truth = LinearPicture::of(&truth);
         // Sums of squares, estimated and true, a step.
         let mut sums = [(0.0, 0.0); 8];
         for seed in 0..6 {
             let settings = RenderSettings { seed, ..settings };
-            let rungs = climb(&snapshot, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| (), &|| false);
+            let rungs = climb(&prepared, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| (), &|| false);
             let ladder = Ladder::measure(&rungs, &truth, &Display::default());
             for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
                 sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));
@@ -269,16 +269,16 @@ fn the_interval_holds_the_true_error_from_few_samples_on() {
         let scene = load(&SceneSource::Builtin(name.to_owned()), &LoadOptions::default()).unwrap();
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
-        let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
+        let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
         let settings = world.resource::<Rendering>().0;
-        let truth = render(&snapshot, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 2048).0;
+        let truth = render(&prepared, &RenderSettings { seed: 1000, ..settings }, size.0, size.1, 2048).0;
         let truth = LinearPicture::of(&truth);
         let mut held = [0; 4];
         let mut widths = [0.0; 4];
         for seed in 0..seeds {
             let settings = RenderSettings { seed, ..settings };
             let limits = Limits { spp: 32, seconds: None };
-            let rungs = climb(&snapshot, &settings, size, limits, &mut |_| (), &|| false);
+            let rungs = climb(&prepared, &settings, size, limits, &mut |_| (), &|| false);
             let ladder = Ladder::measure(&rungs, &truth, &Display::default());
             for step in ladder.steps.iter().filter(|step| step.spp >= 4) {
                 let (k, told) = (step.spp.ilog2() as usize - 2, step.estimate.unwrap());

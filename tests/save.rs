@@ -60,7 +60,7 @@ fn picture(world: &mut World, scene: &LoadedScene) -> Vec<Vec3> {
     let extraction = Extraction::new(&SceneInputs::of(world), &scene.trees);
     let mut film = Film::new(24, 16);
     let target = Target { spp: Some(2), ..Target::default() };
-    render_offline(&extraction.snapshot, &world.resource::<Rendering>().0, &mut film, target, |_| true);
+    render_offline(&extraction.prepared, &world.resource::<Rendering>().0, &mut film, target, |_| true);
     film.means()
 }
 

@@ -70,8 +70,8 @@ fn everything_that_a_file_can_say_reaches_the_renderer() {
     let folder = tempfile::tempdir().unwrap();
     let scene = write_scene(folder.path(), EVERYTHING);
     let (mut world, extraction) = extract(&scene);
-    let snapshot = &extraction.snapshot;
-    let shapes = snapshot.geometry.tree.shapes();
+    let prepared = &extraction.prepared;
+    let shapes = prepared.geometry.tree.shapes();
     assert_eq!(shapes.len(), 9, "eight objects and a bulb");
 
     // Scaled about its own space's origin, turned a quarter about Y, then moved.
@@ -80,21 +80,21 @@ fn everything_that_a_file_can_say_reaches_the_renderer() {
     let kdtree::Shape::Plane { point, normal } = shapes[1] else { panic!("{:?}", shapes[1]) };
     assert_eq!((point, normal), (Vec3::NEG_Y, Vec3::Y));
     let kdtree::Shape::Mesh { world_from_object, .. } = &shapes[4] else { panic!("{:?}", shapes[4]) };
-    let tent = snapshot.geometry.objects[4].mesh.as_ref().unwrap();
+    let tent = prepared.geometry.objects[4].mesh.as_ref().unwrap();
     assert!(tent.normals.is_empty(), "flat");
     let corner = world_from_object.transform_point3(tent.positions[tent.triangles[0][1] as usize]);
     assert_eq!(corner, Vec3::new(5.0, 6.0, 6.0), "(1, 0, 0) by the matrix");
-    let torus = snapshot.geometry.objects[5].mesh.as_ref().unwrap();
+    let torus = prepared.geometry.objects[5].mesh.as_ref().unwrap();
     assert_eq!(torus.triangles.len(), 192 * 64 * 2 / 4, "a quarter is kept");
     assert_eq!(torus.normals.len(), torus.positions.len(), "smooth");
     let kdtree::Shape::Spheres { tree, world_from_object } = &shapes[6] else { panic!("{:?}", shapes[6]) };
     let (center, radius) = tree.sphere(1);
     assert_eq!((world_from_object.transform_point3(center), radius), (Vec3::new(3.0, 0.0, 0.0), 0.5));
 
-    let material = |object: usize| &snapshot.shading.materials[snapshot.geometry.objects[object].materials[0] as usize];
+    let material = |object: usize| &prepared.shading.materials[prepared.geometry.objects[object].materials[0] as usize];
     assert!(matches!(material(0), Material::Glass { ior: 1.4, absorption } if *absorption == Vec3::new(2.0, 1.0, 3.0)));
     let Material::Diffuse { albedo: ColorInput::Texture(tiles) } = material(1) else { panic!("{:?}", material(1)) };
-    let tiles = &snapshot.shading.textures[*tiles as usize];
+    let tiles = &prepared.shading.textures[*tiles as usize];
     assert!(matches!(tiles.pattern, TexturePattern::Checker { a, .. } if a == Vec3::splat(0.9)));
     // Turned by 90 degrees, then four squares along u and two along v.
     assert!((tiles.uv_matrix * Vec2::X).abs_diff_eq(Vec2::new(0.0, 2.0), 1e-6));
@@ -104,7 +104,7 @@ fn everything_that_a_file_can_say_reaches_the_renderer() {
     let Material::Emissive { radiance: ColorInput::Constant(radiance) } = material(8) else { panic!() };
     assert!((*radiance * std::f32::consts::PI * 0.25).abs_diff_eq(Vec3::new(3.0, 2.0, 1.0), 1e-6));
 
-    let Environment::Image { image, scale, rotation } = &snapshot.shading.environment else { panic!() };
+    let Environment::Image { image, scale, rotation } = &prepared.shading.environment else { panic!() };
     assert_eq!((image.width, image.height, *scale), (4, 2, Vec3::new(2.0, 1.0, 0.5)));
     assert!((rotation - 90_f32.to_radians()).abs() < 1e-6);
     assert_eq!((world.resource::<FilmSize>().width, world.resource::<FilmSize>().height), (320, 200));
@@ -131,7 +131,7 @@ fn spawning_again_replaces_the_scene_and_keeps_its_order() {
     scene.spawn(&mut world);
     assert_eq!(world.entities().count_spawned(), n_entities);
     let again = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
-    let outline = |extraction: &Extraction| format!("{:?}", extraction.snapshot.shading.materials);
+    let outline = |extraction: &Extraction| format!("{:?}", extraction.prepared.shading.materials);
     assert_eq!(outline(&first), outline(&again));
 }
 
@@ -143,6 +143,6 @@ fn unused_materials_and_textures_cost_nothing() {
         objects: [sphere(radius: 1, material: "used")])"#;
     let folder = tempfile::tempdir().unwrap();
     let (_, extraction) = extract(&write_scene(folder.path(), text));
-    let shading = &extraction.snapshot.shading;
-    assert_eq!((shading.materials.len(), shading.textures.len(), shading.features.glass), (1, 0, false));
+    let shading = &extraction.prepared.shading;
+    assert_eq!((shading.materials.len(), shading.textures.len(), extraction.prepared.features().glass), (1, 0, false));
 }

@@ -203,7 +203,7 @@ fn the_window_and_the_command_line_render_the_same_bits() {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     let mut film = Film::new(48, 48);
     let settings = world.resource::<Rendering>().0;
-    render_offline(&extraction.snapshot, &settings, &mut film, spp(8), |_| true);
+    render_offline(&extraction.prepared, &settings, &mut film, spp(8), |_| true);
     assert_eq!(shown.means(), film.means());
 
     // Away and back again: the same view, the same bits.
@@ -304,7 +304,7 @@ fn a_hasty_tree_gives_way_to_a_better_one_and_no_sample_is_lost() {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &best.trees);
     let mut film = Film::new(64, 48);
     let settings = world.resource::<Rendering>().0;
-    render_offline(&extraction.snapshot, &settings, &mut film, spp(24), |_| true);
+    render_offline(&extraction.prepared, &settings, &mut film, spp(24), |_| true);
     assert_eq!(driver.session.film_snapshot().unwrap().means(), film.means(), "the hits are the same");
     // What has its better tree keeps it.
     driver.session.send(Command::Orbit { yaw_deg: 3.0, pitch_deg: 0.0 });
@@ -405,7 +405,7 @@ fn a_million_metres_away_is_the_same_picture() {
         scene.spawn(&mut world);
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
         let mut film = Film::new(24, 24);
-        render_offline(&extraction.snapshot, &Default::default(), &mut film, spp(4), |_| true);
+        render_offline(&extraction.prepared, &Default::default(), &mut film, spp(4), |_| true);
         (extraction.origin, film.means())
     };
     let (here, there) = (means("here.ron", 0.0), means("there.ron", 2.0_f64.powi(22)));

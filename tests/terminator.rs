@@ -12,7 +12,7 @@ use firstlight::geometry::{Ray, robust::offset_ray_origin};
 use firstlight::kdtree::{BuildPreset, MeshTree, SceneTree, Shape};
 use firstlight::mesh::Mesh;
 use firstlight::mesh::procedural::icosphere;
-use firstlight::render::{Environment, Geometry, Integrator, Object, RenderSettings, Shading, Snapshot};
+use firstlight::render::{Environment, Geometry, Integrator, Object, Prepared, RenderSettings, Shading, Snapshot};
 use glam::{Affine3A, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -49,10 +49,10 @@ fn rendered(shape: Shape, mesh: Option<Arc<Mesh>>) -> Vec<f32> {
         absorption: Vec3::ZERO,
     };
     let materials = vec![paint, emissive(intensity() / (PI * LIGHT_RADIUS * LIGHT_RADIUS))];
-    let shading = Shading::build(&geometry, materials, Vec::new(), Environment::Black);
-    let snapshot = Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera: eye() };
+    let shading = Shading::new(materials, Vec::new(), Environment::Black);
+    let prepared = Prepared::new(Snapshot::new(geometry, shading, eye()));
     let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
-    render(&snapshot, &settings, SIDE, SIDE, 1).0.means().iter().map(|light| light.x).collect()
+    render(&prepared, &settings, SIDE, SIDE, 1).0.means().iter().map(|light| light.x).collect()
 }
 
 fn eye() -> firstlight::render::Camera {

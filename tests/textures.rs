@@ -48,7 +48,7 @@ fn middle_with(dir: &Path, objects: &str, eye: &str, look_at: &str, settings: &R
     scene.spawn(&mut world);
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     assert!(extraction.problems.is_empty(), "{:?}", extraction.problems);
-    render(&extraction.snapshot, settings, 1, 1, spp).0.mean(0, 0)
+    render(&extraction.prepared, settings, 1, 1, spp).0.mean(0, 0)
 }
 
 /// Red, green above; blue, white below; a green photo; a bright HDR picture; a model with a material of its own.

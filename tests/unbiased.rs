@@ -6,7 +6,7 @@
 //! Point lights are made larger first: plain paths that a mirror sends their way would hit the small balls that they are
 //! so seldom that a mean of thousands of samples lacks their light, a hundredth of some of the scenes.
 
-use firstlight::render::{Film, Integrator, RenderSettings, Snapshot, Techniques, advance};
+use firstlight::render::{Film, Integrator, Prepared, RenderSettings, Techniques, advance};
 use firstlight::scene::{Extraction, LoadOptions, PointLight, Rendering, SceneInputs, SceneSource, load};
 use rayon::prelude::*;
 use std::path::Path;
@@ -47,19 +47,19 @@ impl Estimate {
     }
 }
 
-fn snapshot(name: &str) -> (Snapshot, RenderSettings) {
+fn prepared(name: &str) -> (Prepared, RenderSettings) {
     let scene = load(&SceneSource::Builtin(name.to_owned()), &LoadOptions::default()).unwrap();
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     for mut light in world.query::<&mut PointLight>().iter_mut(&mut world) {
         light.radius = 1.5;
     }
-    let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
-    (snapshot, RenderSettings { integrator: Integrator::Path, ..world.resource::<Rendering>().0 })
+    let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
+    (prepared, RenderSettings { integrator: Integrator::Path, ..world.resource::<Rendering>().0 })
 }
 
 /// Mean of the channels of every pixel, of each render.
-fn renders(scene: &Snapshot, settings: RenderSettings, first_seed: u32, spp: u32) -> Vec<Vec<f64>> {
+fn renders(scene: &Prepared, settings: RenderSettings, first_seed: u32, spp: u32) -> Vec<Vec<f64>> {
     (0..RENDERS)
         .into_par_iter()
         .map(|render| {
@@ -89,9 +89,9 @@ fn all_techniques_together_have_the_mean_of_the_plain_ones() {
     assert!(names.len() >= 15);
     println!("{:<20} {:>8} {:>8} {:>8} {:>8} {:>8}", "scene", "error", "t", "mean t²", "|t| > 4", "largest");
     for name in &names {
-        let (scene, settings) = snapshot(name);
+        let (scene, settings) = prepared(name);
         // Plain paths find gathered light so seldom that in few samples most pixels lack some of it, and do not know.
-        let [n_all, n_plain] = if scene.shading.features.caustics { [32, 256] } else { [8, 32] };
+        let [n_all, n_plain] = if scene.features().caustics { [32, 256] } else { [8, 32] };
         let all = RenderSettings { techniques: Techniques::ALL, ..settings };
         let all = estimates(&renders(&scene, all, 1000, n_all));
         let plain = estimates(&renders(&scene, RenderSettings { techniques: PLAIN, ..settings }, 2000, n_plain));

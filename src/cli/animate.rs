@@ -1,9 +1,10 @@
 //! `firstlight render --turntable N` and `--bookmarks 1,2,3 --frames N`: numbered pictures of a camera that moves.
 
-use super::Failure;
 use super::console::remark;
+use super::failure::Failure;
+use super::job::Job;
 use super::progress::Progress;
-use super::render::{Job, RenderArgs};
+use super::render_args::RenderArgs;
 use super::stop::Stop;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{SettingsStore, along, turntable};

@@ -1,6 +1,6 @@
 //! What commands say: results on standard output, remarks on standard error. Neither can bring a command down.
 
-use super::Failure;
+use super::failure::Failure;
 pub use firstlight::console::{Bar, Message, lines, remark};
 
 /// Prints a part of a command's result.

@@ -1,7 +1,9 @@
 //! `firstlight explain SCENE --pixel X,Y`: why a pixel looks as it does, without a window.
 
+use super::args::SceneArgs;
 use super::console::{print, remark};
-use super::{Failure, SceneArgs, parse_size};
+use super::failure::Failure;
+use super::number::parse_size;
 use clap::Args;
 use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
 use firstlight::printable;
@@ -50,9 +52,9 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     // The classic model has no paths; what light there is does not depend on how it is drawn.
     let settings =
         RenderSettings { integrator: Integrator::Path, seed: args.seed.unwrap_or(of_scene.seed), ..of_scene };
-    let snapshot = &extraction.snapshot;
-    let explanation = explain(snapshot, &settings, size, args.pixel, 0..args.spp).expect("path tracing has paths");
-    let from_lamps = light_from_lamps(snapshot, &settings, size, args.pixel, 0..args.spp, &|| false);
+    let prepared = &extraction.prepared;
+    let explanation = explain(prepared, &settings, size, args.pixel, 0..args.spp).expect("path tracing has paths");
+    let from_lamps = light_from_lamps(prepared, &settings, size, args.pixel, 0..args.spp, &|| false);
     let story = PixelStory::new(&explanation, from_lamps, &SnapshotNames::of(&extraction, &inputs));
     if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
 }

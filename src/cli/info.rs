@@ -1,7 +1,8 @@
 //! `firstlight info SCENE`: what is in it, what it uses, what is not modelled, memory.
 
+use super::args::SceneArgs;
 use super::console::{print, remark};
-use super::{Failure, SceneArgs};
+use super::failure::Failure;
 use clap::Args;
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
@@ -83,7 +84,7 @@ impl Told<'_> {
                 _ => {}
             }
         }
-        let shading = &extraction.snapshot.shading;
+        let shading = &extraction.prepared.shading;
         row("materials", counts(self.materials()));
         row("textures", shading.textures.len().to_string());
         let emitters = counted(self.emitters(), "emissive object", "emissive objects");
@@ -105,7 +106,7 @@ impl Told<'_> {
     /// One line for machines.
     fn json(&self) -> serde_json::Value {
         let Self { scene, inputs, extraction, film, .. } = self;
-        let shading = &extraction.snapshot.shading;
+        let shading = &extraction.prepared.shading;
         let parts: Vec<_> = (inputs.objects.iter())
             .filter_map(|object| match &object.shape {
                 Shape::Mesh(mesh) => {
@@ -151,7 +152,7 @@ impl Told<'_> {
     }
 
     fn materials(&self) -> BTreeMap<&'static str, usize> {
-        counts(self.extraction.snapshot.shading.materials.iter().map(kind_of_material))
+        counts(self.extraction.prepared.shading.materials.iter().map(kind_of_material))
     }
 
     fn emitters(&self) -> usize {
@@ -233,15 +234,15 @@ const FEATURES: [&str; 8] =
     ["lens", "textures", "glass", "light sampling", "environment light", "caustics", "blends", "rough metal"];
 
 fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
-    let shading = &extraction.snapshot.shading;
+    let (shading, features) = (&extraction.prepared.shading, extraction.prepared.features());
     let has = |kind: &str| shading.materials.iter().any(|material| kind_of_material(material) == kind);
     [
         lens.enabled && lens.radius > 0.0,
         !shading.textures.is_empty(),
-        shading.features.glass,
-        shading.features.light_sampling,
-        shading.features.environment,
-        shading.features.caustics,
+        features.glass,
+        features.light_sampling,
+        features.environment,
+        features.caustics,
         has("blend"),
         has("metal"),
     ]

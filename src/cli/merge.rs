@@ -1,7 +1,8 @@
 //! `firstlight merge A.exr B.exr -o C.exr`: films of the same picture with different samples, added up.
 
+use super::args::OverwriteArgs;
 use super::console::{print, remark};
-use super::{Failure, OverwriteArgs};
+use super::failure::Failure;
 use clap::Args;
 use firstlight::frame::{FilmFile, PictureFormat, Print, check_replaced_film, read_film_file, write_film_into};
 use firstlight::scene::Shot;

@@ -4,13 +4,17 @@
 //! A command is obedient by construction: it runs where it can be left behind (see `stop`).
 
 mod animate;
+mod args;
 mod console;
 mod explain;
+mod failure;
 mod info;
+mod job;
 mod merge;
 mod number;
 mod progress;
 mod render;
+mod render_args;
 mod report;
 mod save;
 mod show;
@@ -20,19 +24,13 @@ mod stop;
 mod trees;
 mod waiting;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand, ValueEnum};
 use console::{lines, remark};
+use failure::Failure;
 use firstlight::console::LogWriter;
 use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
-use firstlight::render::{Integrator, PixelFilter};
-use firstlight::scene::whole_file::Replace;
-use firstlight::scene::{
-    BUILTIN_SCENES, Files, FilesError, LoadOptions, LoadedScene, SceneError, SceneSource, UpAxis, load,
-};
-use number::{parse_positive, parse_size};
-use std::ffi::OsString;
-use std::path::Path;
+use firstlight::scene::BUILTIN_SCENES;
 use std::process::ExitCode;
 use stop::Stop;
 
@@ -72,7 +70,7 @@ impl SimdArg {
 #[derive(Subcommand)]
 enum Command {
     /// Render a scene to a picture, without a window.
-    Render(render::RenderArgs),
+    Render(render_args::RenderArgs),
     /// Measure speed against error: how fast scenes get right, and what each technique is worth.
     Report(report::ReportArgs),
     /// Add up films of one picture that have different samples.
@@ -101,145 +99,6 @@ impl Command {
             Self::Explain(args) => explain::run(args),
             Self::Simplify(args) => simplify::run(args, stop),
         }
-    }
-}
-
-/// What to open, and how.
-#[derive(Args, Clone, Debug)]
-struct SceneArgs {
-    /// A built-in scene, a scene file (.ron), a model (.obj), or a picture (.png, .exr) that this program made.
-    #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
-    scene: OsString,
-    /// Which axis of a model points up; guessed from how it would stand when not given.
-    #[arg(long, value_enum)]
-    up: Option<UpArg>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum UpArg {
-    Y,
-    Z,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum IntegratorArg {
-    /// Unbiased path tracing.
-    Path,
-    /// The classic local model with shadows, mirrors and glass.
-    Phong,
-}
-
-impl From<IntegratorArg> for Integrator {
-    fn from(arg: IntegratorArg) -> Self {
-        match arg {
-            IntegratorArg::Path => Self::Path,
-            IntegratorArg::Phong => Self::Phong,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FilterArg {
-    Box,
-    Tent,
-    Gaussian,
-    BlackmanHarris,
-    Mitchell,
-}
-
-impl From<FilterArg> for PixelFilter {
-    fn from(arg: FilterArg) -> Self {
-        match arg {
-            FilterArg::Box => Self::Box,
-            FilterArg::Tent => Self::Tent,
-            FilterArg::Gaussian => Self::Gaussian,
-            FilterArg::BlackmanHarris => Self::BlackmanHarris,
-            FilterArg::Mitchell => Self::Mitchell,
-        }
-    }
-}
-
-impl SceneArgs {
-    fn up(&self) -> Option<UpAxis> {
-        self.up.map(|up| match up {
-            UpArg::Y => UpAxis::Y,
-            UpArg::Z => UpAxis::Z,
-        })
-    }
-
-    /// Loads the scene, or says why it cannot be had; `files` learns what is read for it, and refuses when one of
-    /// the outputs that it knows is among that.
-    fn load(
-        &self,
-        aspect: Option<f64>,
-        files: &mut Files,
-        progress: &(dyn Fn(&str) + Sync),
-    ) -> Result<LoadedScene, Failure> {
-        let source = self.source()?;
-        if let Some(path) = source.path() {
-            files.read(path)?;
-        }
-        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), ..LoadOptions::default() };
-        let scene = load(&source, &options).map_err(Failure::from)?;
-        files.read_all(scene.files())?;
-        for warning in &scene.warnings {
-            remark(format_args!("warning: {warning}"));
-        }
-        Ok(scene)
-    }
-
-    /// What the word on the command line means.
-    fn source(&self) -> Result<SceneSource, Failure> {
-        SceneSource::parse(&self.scene).map_err(|error| {
-            // A word that is neither a scene nor a file is a slip of the pen; a file may be wanting or unfit.
-            let is_name = Path::new(&self.scene).extension().is_none() && !Path::new(&self.scene).exists();
-            if is_name { Failure::Usage(error.to_string()) } else { Failure::Failed(error.to_string()) }
-        })
-    }
-}
-
-/// Why a command did not do its work; a message of one line, but for [`Failure::Problems`].
-enum Failure {
-    /// The command itself cannot be right.
-    Usage(String),
-    Failed(String),
-    /// It failed for several reasons; each is a message of its own.
-    Problems(Vec<String>),
-    /// Somebody pressed Ctrl+C; says what was saved.
-    Stopped(String),
-}
-
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Self::Problems(error.problems.iter().map(ToString::to_string).collect())
-    }
-}
-
-impl From<FilesError> for Failure {
-    fn from(error: FilesError) -> Self {
-        match error {
-            FilesError::Collision(message) => Self::Usage(message),
-            FilesError::Unwritable(message) => Self::Failed(message),
-        }
-    }
-}
-
-/// What outputs may take the place of.
-#[derive(Args, Clone, Copy, Debug, Default)]
-struct OverwriteArgs {
-    /// Let an output take the place of a film, whose samples are lost then.
-    #[arg(long)]
-    overwrite: bool,
-}
-
-impl OverwriteArgs {
-    fn replace(self) -> Replace {
-        if self.overwrite { Replace::Anything } else { Replace::AllButFilms }
-    }
-
-    /// The files of a command that writes.
-    fn files(self) -> Files {
-        Files::new(self.replace())
     }
 }
 

@@ -1,10 +1,12 @@
 //! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
 
+use super::args::{OverwriteArgs, SceneArgs};
 use super::console::{Bar, lines, print, remark};
+use super::failure::Failure;
+use super::number::{parse_positive, parse_size};
 use super::stop::Stop;
-use super::{Failure, OverwriteArgs, SceneArgs, parse_positive, parse_size};
 use clap::Args;
-use firstlight::render::{Purpose, RenderSettings, Room, Snapshot, Techniques};
+use firstlight::render::{Prepared, Purpose, RenderSettings, Room, Techniques};
 use firstlight::report::{
     Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv,
     foreign_share, page, summary_text,
@@ -148,7 +150,7 @@ fn measure_all(
     let mut scenes = Vec::new();
     for name in names {
         let scene = SceneArgs { scene: name.clone(), up: None };
-        scenes.push(Prepared::new(args, &scene.load(None, files, &|_| ())?, given)?);
+        scenes.push(ReportScene::new(args, &scene.load(None, files, &|_| ())?, given)?);
     }
     let limits =
         Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
@@ -185,7 +187,7 @@ fn duration(seconds: f64) -> String {
 }
 
 /// A scene, ready to be rendered.
-struct Prepared {
+struct ReportScene {
     title: String,
     inputs: SceneInputs,
     trees: Trees,
@@ -195,7 +197,7 @@ struct Prepared {
     key: Key,
 }
 
-impl Prepared {
+impl ReportScene {
     fn new(args: &ReportArgs, scene: &LoadedScene, given: Option<&Reference>) -> Result<Self, Failure> {
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
@@ -216,7 +218,7 @@ impl Prepared {
             (_, Some(size)) | (Some(size), None) => size,
             (None, None) => modest(width, height),
         };
-        let from_lamps = extraction.snapshot.shading.features.caustics;
+        let from_lamps = extraction.prepared.features().caustics;
         let room = Room::for_film(size.0, size.1, from_lamps, &[Purpose::Exr]);
         drop(room.map_err(|error| Failure::Failed(error.to_string()))?);
         let settings = RenderSettings { seed: args.seed, ..world.resource::<Rendering>().0 };
@@ -292,8 +294,8 @@ impl Prepared {
 
     /// A new one each time: what a render finds out about a scene and keeps (where caustics come from) must be found out,
     /// and paid for, by each.
-    fn snapshot(&self) -> Snapshot {
-        Extraction::new(&self.inputs, &self.trees).snapshot
+    fn prepared(&self) -> Prepared {
+        Extraction::new(&self.inputs, &self.trees).prepared
     }
 
     fn climb(
@@ -306,7 +308,7 @@ impl Prepared {
     ) -> Vec<Rung> {
         let settings = RenderSettings { techniques, ..self.settings };
         let mut tell = progress.task(format!("{}, {what}", self.title), Progress::LADDER, self.size);
-        climb(&self.snapshot(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
+        climb(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
 
     /// One that was kept, or a new one; `None` when somebody stops it before it is good for anything.
@@ -321,7 +323,7 @@ impl Prepared {
             return Some(kept);
         }
         let asked = || stop.is_asked();
-        let made = store.make(&self.key, &self.snapshot(), &self.settings, spp, &mut tell, &asked);
+        let made = store.make(&self.key, &self.prepared(), &self.settings, spp, &mut tell, &asked);
         let least = last.spp.saturating_mul(LEAST_REFERENCE_FACTOR);
         match made {
             Some((reference, trouble)) if reference.made.is_some_and(|made| made.spp >= least) => {
@@ -352,7 +354,7 @@ impl Progress {
     const LADDER: f64 = 1.0;
     const REFERENCE: f64 = REFERENCE_FACTOR as f64;
 
-    fn new(scenes: &[Prepared], ablation: bool, given: bool) -> Self {
+    fn new(scenes: &[ReportScene], ablation: bool, given: bool) -> Self {
         let ladders = 1 + if ablation { Techniques::ablations().len() } else { 0 };
         let weight = Self::LADDER * ladders as f64 + if given { 0.0 } else { Self::REFERENCE };
         let pixels: f64 = scenes.iter().map(|scene| f64::from(scene.size.0) * f64::from(scene.size.1)).sum();

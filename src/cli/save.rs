@@ -1,7 +1,8 @@
 //! `firstlight save SCENE -o out.ron`: a model, a built-in scene or what a picture shows, as a scene file.
 
+use super::args::{OverwriteArgs, SceneArgs};
 use super::console::remark;
-use super::{Failure, OverwriteArgs, SceneArgs};
+use super::failure::Failure;
 use clap::Args;
 use firstlight::scene::save_scene;
 use std::path::PathBuf;

@@ -1,9 +1,11 @@
 //! `firstlight [SCENE|MODEL]`: a window, or a picture where there is no display.
 
+use super::args::{OverwriteArgs, SceneArgs};
 use super::console::remark;
-use super::render::{self, RenderArgs};
+use super::failure::Failure;
+use super::render;
+use super::render_args::RenderArgs;
 use super::stop::Stop;
-use super::{Failure, OverwriteArgs, SceneArgs};
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
@@ -16,7 +18,7 @@ pub struct ShowArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Size of the window, or of the picture where there is no display.
-    #[arg(long, value_name = "WxH", value_parser = super::parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = super::number::parse_size)]
     size: Option<(u32, u32)>,
     /// Worker threads; one for each processor when not given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]

@@ -1,10 +1,11 @@
 //! `firstlight simplify IN.obj -o OUT.obj`: fewer triangles, with the error measured.
 
+use super::args::OverwriteArgs;
 use super::console::{print, remark};
+use super::failure::Failure;
 use super::number::{parse_error, parse_faces, parse_ratio};
 use super::stop::Stop;
 use super::waiting::Waiting;
-use super::{Failure, OverwriteArgs};
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Faults, Topology};

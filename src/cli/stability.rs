@@ -1,7 +1,7 @@
 //! `firstlight stability`: the hard cases, counted, as a table or for machines. Fails if there is a finding.
 
-use super::Failure;
 use super::console::{Bar, lines, print};
+use super::failure::Failure;
 use clap::Args;
 use firstlight::report::cpu_seconds;
 use firstlight::stability::{CASES, Case, Tally, Worst};

@@ -5,7 +5,7 @@
 //! So nothing that a command calls has to ask whether to go on before there is something to save: not the parsers of other
 //! people, which cannot.
 
-use super::Failure;
+use super::failure::Failure;
 use firstlight::console::clear_line;
 use firstlight::scene::whole_file;
 use std::panic::resume_unwind;

@@ -1,7 +1,7 @@
 //! `firstlight info --tree SCENE|MODEL`: what each way to split each mesh costs to build and to trace.
 
-use super::Failure;
 use super::console::{lines, print, remark};
+use super::failure::Failure;
 use firstlight::kdtree::{self, BuildPreset};
 use firstlight::mesh::Mesh;
 use firstlight::printable;
@@ -42,7 +42,7 @@ fn meshes(inputs: &SceneInputs, extraction: &Extraction) -> Vec<(String, Arc<Mes
     let objects: HashMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
     let mut known = HashSet::new();
     let mut found: Vec<(String, Arc<Mesh>, Affine3A)> = Vec::new();
-    for (entity, shape) in extraction.entities.iter().zip(extraction.snapshot.geometry.tree.shapes()) {
+    for (entity, shape) in extraction.entities.iter().zip(extraction.prepared.geometry.tree.shapes()) {
         let kdtree::Shape::Mesh { world_from_object, .. } = shape else { continue };
         let Some(object) = objects.get(entity) else { continue };
         let Shape::Mesh(mesh) = &object.shape else { continue };

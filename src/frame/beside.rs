@@ -1,7 +1,7 @@
 //! Work beside the picture: reading scenes and building trees on threads of their own, while the old picture stays.
 
 use super::Waker;
-use super::remesh::{ForWhom, Remade, Remake};
+use super::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
 use crate::scene::file::TexturePart;
 use crate::scene::{

@@ -4,7 +4,7 @@
 //! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
 //! so the same list of commands always leads to the same picture.
 
-use super::navigation::Rig;
+use super::rig::Rig;
 use super::{Bookmarks, Edit, Target};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::scene::{BadValue, Lens, Projection, View, check_film_size};

@@ -2,8 +2,8 @@
 //!
 //! The story stays until another is asked for, so that one can fly around its paths.
 
+use super::resources::{Clock, Renderer, Shown};
 use super::status::{MessageKind, Status};
-use super::systems::{Clock, Renderer, Shown};
 use super::worker::{Answer, Question};
 use crate::render::{Explanation, FoundBy, Integrator, LightSource, Place};
 use crate::scene::{Extraction, SceneInputs};

@@ -270,7 +270,7 @@ mod tests {
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
         let mut film = Film::new(3, 2);
         let target = Target { spp: Some(spp), ..Target::default() };
-        render_offline(&extraction.snapshot, &RenderSettings::default(), &mut film, target, |_| true);
+        render_offline(&extraction.prepared, &RenderSettings::default(), &mut film, target, |_| true);
         let samples = ShotSamples { first: 0, spp, uneven: false };
         let draft = ShotDraft::of(&mut world, Some(&loaded));
         let note = draft.note(Path::new("a.exr"), (3, 2), samples, crate::render::Display::default().into());

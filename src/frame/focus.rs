@@ -1,8 +1,8 @@
 //! What is sharp: the zone of a lens, and a focal plane that stays with what was focused on.
 
 use super::navigation::focus_at;
+use super::resources::{PictureSize, Shown};
 use super::selection::pick_along;
-use super::systems::{PictureSize, Shown};
 use crate::scene::{Lens, Ordinal, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;

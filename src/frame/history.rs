@@ -7,7 +7,7 @@
 //!
 //! States share what is equal between them, entity by entity, and meshes and pictures are shared anyway.
 
-use super::navigation::Rig;
+use super::rig::Rig;
 use super::selection::Selection;
 use crate::render::{Display, RenderSettings};
 use crate::scene::{

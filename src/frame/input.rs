@@ -1,14 +1,16 @@
 //! Carries out what a person asks for: commands become changes of components and resources.
 
+use super::around::Around;
 use super::edit::EditQueue;
 use super::explain::Explaining;
 use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
+use super::resources::{
+    Brush, Clock, Hidden, Looking, MAX_THREADS, Paused, PictureSize, Renderer, Shown, StopAt, Threads,
+};
 use super::saving::Saving;
 use super::selection::{Picked, Selection, pick};
-use super::session::MAX_THREADS;
 use super::status::{MessageKind, Status};
-use super::systems::{Around, Brush, Clock, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads};
 use super::views::{Bookmarks, ViewTrail};
 use super::{Command, beside::Beside};
 use crate::render::ToneCurve;

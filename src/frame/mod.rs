@@ -12,6 +12,7 @@
 //!
 //! A [`Session`] holds all of it. The workers follow a [`Scheduler`] that knows no threads and no clock.
 
+mod around;
 mod beside;
 mod camera_path;
 mod command;
@@ -28,8 +29,12 @@ mod picture_file;
 mod recording;
 mod recovery;
 mod reload;
+mod remake;
 mod remesh;
+mod replay;
 mod reset;
+mod resources;
+mod rig;
 mod saving;
 mod scheduler;
 mod selection;
@@ -42,6 +47,7 @@ mod waits;
 mod watch;
 mod worker;
 
+pub use around::Around;
 pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
@@ -53,17 +59,19 @@ pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_z
 pub use history::History;
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
 pub use picture_file::{PictureFormat, Print, write_errors, write_film};
-pub use recording::{ReplayOptions, Replayed, check_recordable, replay};
+pub use recording::check_recordable;
 pub use recovery::{LeftBehind, Recovery};
-pub use remesh::{MeshMeasure, wanted_mesh};
+pub use remake::MeshMeasure;
+pub use remesh::wanted_mesh;
+pub use replay::{ReplayOptions, Replayed, replay};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
+pub use resources::{Brush, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, StopAt, Threads};
 pub use saving::SavedAs;
 pub use scheduler::{Scheduler, Step, StepReport};
 pub use selection::{OwnBox, Picked, Projector, Selection, pick};
 pub use session::{Session, SessionOptions, Stage};
 pub use settings::{SceneBookmarks, Settings, SettingsStore};
 pub use status::{Message, MessageKind, Picture, Status};
-pub use systems::{Around, Brush, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, StopAt, Threads};
 pub use views::{Bookmarks, ViewTrail};
 pub use waits::Waits;
 pub use worker::{Look, Waker};

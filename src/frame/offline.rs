@@ -1,6 +1,6 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
-use crate::render::{BadSample, ErrorEstimate, Film, RayCounts, Region, RenderSettings, Snapshot, advance_region};
+use crate::render::{BadSample, ErrorEstimate, Film, Prepared, RayCounts, Region, RenderSettings, advance_region};
 use crate::scene::BadValue;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -69,31 +69,31 @@ pub struct OfflineReport {
 ///
 /// Given a time, at least one sample a pixel is taken, and the film may end with a part of a pass.
 pub fn render_offline(
-    snapshot: &Snapshot,
+    prepared: &Prepared,
     settings: &RenderSettings,
     film: &mut Film,
     target: Target,
     progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
-    render_offline_until(snapshot, settings, film, target, &|| false, progress)
+    render_offline_until(prepared, settings, film, target, &|| false, progress)
 }
 
 /// The same, ended within milliseconds by `stop`, which is asked often and by all workers; the film then may have a
 /// part of a pass, and even pixels without a sample.
 pub fn render_offline_until(
-    snapshot: &Snapshot,
+    prepared: &Prepared,
     settings: &RenderSettings,
     film: &mut Film,
     target: Target,
     stop: &(dyn Fn() -> bool + Sync),
     progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
-    render_region_until(snapshot, settings, film, None, target, stop, progress)
+    render_region_until(prepared, settings, film, None, target, stop, progress)
 }
 
 /// The same for a region of the film, or all of it; samples, error and target are those of the region.
 pub fn render_region_until(
-    snapshot: &Snapshot,
+    prepared: &Prepared,
     settings: &RenderSettings,
     film: &mut Film,
     region: Option<&Region>,
@@ -115,7 +115,7 @@ pub fn render_region_until(
         let late = || stop() || (before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline));
         let at_most = before.saturating_add(step).min(goal);
         let next = target.error.map_or(at_most, |error| first_worth_a_look(film, region, error, at_most));
-        let pass = advance_region(snapshot, settings, film, region, next, &late);
+        let pass = advance_region(prepared, settings, film, region, next, &late);
         report.rays += pass.rays;
         report.n_bad += pass.n_bad;
         report.bad.extend(pass.bad.into_iter().take(16_usize.saturating_sub(report.bad.len())));
@@ -158,17 +158,17 @@ mod tests {
         let scene = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
-        let snapshot = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).snapshot;
+        let prepared = Extraction::new(&SceneInputs::of(&mut world), &scene.trees).prepared;
         let settings = world.resource::<Rendering>().0;
         for goal in [0.3, 0.2, 0.12] {
             let mut film = Film::new(24, 24);
-            render_offline(&snapshot, &settings, &mut film, Target { error: Some(goal), ..Target::default() }, |_| {
+            render_offline(&prepared, &settings, &mut film, Target { error: Some(goal), ..Target::default() }, |_| {
                 true
             });
             let mut slow = Film::new(24, 24);
             while slow.error_estimate().is_none_or(|error| error.relative > goal) {
                 let next = slow.spp() + 1;
-                advance(&snapshot, &settings, &mut slow, next, &|| false);
+                advance(&prepared, &settings, &mut slow, next, &|| false);
             }
             assert_eq!(film.spp(), slow.spp(), "to {goal}");
         }

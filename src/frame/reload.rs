@@ -4,9 +4,10 @@
 
 use super::Waker;
 use super::input::ModelUp;
+use super::resources::{Clock, CurrentScene, Renderer, Shown};
 use super::saving::SavedAs;
 use super::status::{MessageKind, Status};
-use super::systems::{Clock, CurrentScene, Renderer, Shown, adopt};
+use super::systems::adopt;
 use super::watch::Watch;
 use crate::scene::{
     Description, Developing, LoadOptions, LoadedScene, Rendering, SceneContent, SceneError, SceneInputs, SceneSource,

@@ -5,56 +5,14 @@
 
 use super::beside::Beside;
 use super::history::History;
+use super::remake::{ForWhom, Remade, Remake};
+use super::resources::{Clock, CurrentScene, Renderer};
 use super::selection::Selection;
 use super::status::{MessageKind, Status};
-use super::systems::{Clock, CurrentScene, Renderer};
-use crate::mesh::{Deviation, Mesh};
 use crate::scene::file::{MeshShadingPart, MeshSourcePart};
-use crate::scene::{Linear, MaterialSlots, MeshBase, MeshOrigin, Placement, SceneError, Shape};
-use bevy_ecs::prelude::{Component, Entity, World};
+use crate::scene::{Linear, MaterialSlots, MeshOrigin, Placement, Shape};
+use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
-use std::path::PathBuf;
-use std::sync::Arc;
-
-/// How far a simplified mesh is from the whole one.
-#[derive(Component, Clone, Copy, Debug, PartialEq)]
-pub struct MeshMeasure {
-    pub whole_faces: usize,
-    pub faces: usize,
-    /// Between the two surfaces; `None` for the whole one.
-    pub deviation: Option<Deviation>,
-}
-
-/// Points for each direction of the measured distance: its mean to about a hundredth.
-const SAMPLES: usize = 20_000;
-
-/// What is to be made.
-#[derive(Clone, Debug)]
-pub struct Remake {
-    pub for_whom: ForWhom,
-    pub source: MeshSourcePart,
-    pub shading: MeshShadingPart,
-    pub ratio: f64,
-    /// The state of the history that it was asked for in.
-    pub revision: u64,
-    folder: PathBuf,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ForWhom {
-    Object(Entity),
-    /// A new object, to stand here, as large as this, metres.
-    NewObject {
-        place: DVec3,
-        size: f64,
-    },
-}
-
-/// What came of it.
-pub struct Remade {
-    pub job: Remake,
-    pub result: Result<(Arc<Mesh>, MeshMeasure), SceneError>,
-}
 
 /// Begins to make an object's mesh anew. An earlier one of the same object that is not done yet is forgotten.
 pub fn start(world: &mut World, entity: Entity, shading: MeshShadingPart, ratio: f64) -> Result<(), String> {
@@ -81,35 +39,6 @@ fn run(world: &mut World, for_whom: ForWhom, source: MeshSourcePart, shading: Me
     let job = Remake { for_whom, source, shading, ratio, revision, folder };
     let pool = world.resource::<Renderer>().0.pool();
     world.resource::<Beside>().remake(job, pool);
-}
-
-impl Remake {
-    /// Does it; `base` is what the last one was made from, and then what this one was.
-    pub fn run(&self, base: &mut Option<MeshBase>) -> Result<(Arc<Mesh>, MeshMeasure), SceneError> {
-        let simplify = (self.ratio < 1.0).then_some(self.ratio);
-        let known = base.take().filter(|base| base.serves(&self.source, self.shading, simplify, &self.folder));
-        let whole = match known {
-            Some(base) => base,
-            None => MeshBase::read(&self.source, self.shading, simplify, &self.folder)?,
-        };
-        let mesh = whole.finish(self.shading, simplify);
-        let measured = mesh.map(|mesh| {
-            let deviation = simplify.map(|_| Deviation::between(whole.mesh(), &mesh, SAMPLES));
-            let (whole_faces, faces) = (whole.mesh().triangles.len(), mesh.triangles.len());
-            (Arc::new(mesh), MeshMeasure { whole_faces, faces, deviation })
-        });
-        *base = Some(whole);
-        measured
-    }
-
-    /// For people.
-    pub fn title(&self) -> String {
-        let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = &self.source;
-        match self.for_whom {
-            ForWhom::Object(_) => format!("simplifying {name}"),
-            ForWhom::NewObject { .. } => format!("reading {name}"),
-        }
-    }
 }
 
 /// How the mesh of an object is to be shaded and what share of its faces is to be kept, also while that is still being made; `None`

@@ -3,8 +3,8 @@
 use super::Waker;
 use super::beside::Beside;
 use super::history::{Content, History};
+use super::resources::{Clock, CurrentScene};
 use super::status::{MessageKind, Status};
-use super::systems::{Clock, CurrentScene};
 use crate::scene::{Description, Fingerprint, SavedScene, SceneContent};
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! What is selected, and what lies under the mouse.
 
-use super::navigation::Rig;
-use super::systems::Shown;
+use super::resources::Shown;
+use super::rig::Rig;
 use crate::geometry::Ray;
 use crate::render::Camera;
 use crate::scene::{Extraction, Placement, PointLight, Projection, View};
@@ -44,7 +44,7 @@ pub struct Picked {
 
 /// What lies at this place of the picture (0..1 from the upper left), through the middle of the lens.
 pub fn pick(scene: &Extraction, x: f64, y: f64, aspect: f64) -> Option<Picked> {
-    hit(scene, &scene.snapshot.camera, x, y, aspect)
+    hit(scene, &scene.prepared.camera, x, y, aspect)
 }
 
 /// The same for a camera that the scene has not been told of yet.
@@ -62,14 +62,14 @@ pub fn pick_along(
         up: view.up.as_vec3(),
         forward: view.forward.as_vec3(),
         tan_half_vfov: projection.tan_half_vfov() as f32,
-        ..scene.snapshot.camera
+        ..scene.prepared.camera
     };
     hit(scene, &camera, x, y, aspect)
 }
 
 fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Picked> {
     let dir = direction(camera, x, y, aspect)?;
-    let hit = scene.snapshot.geometry.tree.closest_hit(&Ray::new(camera.eye, dir))?;
+    let hit = scene.prepared.geometry.tree.closest_hit(&Ray::new(camera.eye, dir))?;
     let depth = f64::from(hit.t * dir.dot(camera.forward));
     let point = scene.origin + (camera.eye + hit.t * dir).as_dvec3();
     let entity = *scene.entities.get(hit.object as usize)?;

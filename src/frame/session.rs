@@ -1,5 +1,6 @@
 //! One scene, its picture, and everything between: what a window or a script holds on to.
 
+use super::around::Around;
 use super::beside::Beside;
 use super::edit::{EditQueue, edit_scene};
 use super::explain::{Explaining, explain_pixel};
@@ -9,17 +10,18 @@ use super::input::{CommandQueue, ModelUp, input};
 use super::navigation::{Rig, Turning};
 use super::recording::{Recorder, record};
 use super::reload::{HotReload, reload};
+use super::resources::{
+    Adopted, Brush, Clock, CurrentScene, Found, Hidden, Looking, MAX_THREADS, Paused, PictureSize, Renderer, Shown,
+    StopAt, Threads,
+};
 use super::saving::{SavedAs, Saving, save};
 use super::selection::{OwnBox, Selection};
 use super::status::{Picture, Status};
-use super::systems::{
-    Adopted, Around, Brush, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt,
-    Threads, accumulate, adopt, develop, edit, present, rebuild, reset,
-};
+use super::systems::{accumulate, adopt, develop, edit, present, rebuild, reset};
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, Target, Waits};
-use crate::render::{Film, RenderSettings, Snapshot};
+use crate::render::{Film, Prepared, RenderSettings};
 use crate::scene::{
     Description, Developing, Extent, Inventory, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis,
     check_film_size,
@@ -68,9 +70,6 @@ pub enum Stage {
     /// Finished pictures are fetched.
     Present,
 }
-
-/// Worker threads at most.
-pub(super) const MAX_THREADS: usize = 1024;
 
 #[derive(ScheduleLabel, Clone, Debug, PartialEq, Eq, Hash)]
 struct Frame;
@@ -235,7 +234,7 @@ impl Session {
     }
 
     /// What the workers render now, and how.
-    pub fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
+    pub fn rendered(&self) -> Option<(Prepared, RenderSettings)> {
         self.world.resource::<Shown>().rendered()
     }
 

@@ -1,6 +1,6 @@
 //! What a session has to show: the picture, and how it is getting on.
 
-use super::navigation::Rig;
+use super::rig::Rig;
 use crate::printable;
 use crate::render::{BadSample, Display, Inspection, Integrator, Legend, RayCounts, Region};
 use bevy_ecs::prelude::Resource;

@@ -1,156 +1,28 @@
 //! The systems of a frame, in the order in which they run. Each says what it reads and what it writes.
 
+use super::around::Around;
 use super::beside::{Beside, Finished};
 use super::focus::Focus;
 use super::history::History;
-use super::navigation::Surroundings;
+use super::navigation;
 use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
+use super::resources::{
+    Adopted, Brush, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads,
+};
 use super::saving::SavedAs;
 use super::status::{MessageKind, Picture, Status};
 use super::views::ViewTrail;
-use super::worker::{Job, Look, Orders, Worker};
-use super::{Target, navigation};
-use crate::render::{Display, Integrator, RenderSettings, Snapshot};
+use super::worker::{Job, Orders};
+use crate::render::RenderSettings;
 use crate::scene::{
-    CameraInput, Developing, Extent, ExtentCache, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal,
-    Placement, PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
+    CameraInput, Developing, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal, Placement, PointLight,
+    Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
 };
 use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, Resource, World};
+use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
 use bevy_ecs::system::SystemParam;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The time of this frame, on the clock of whoever runs it.
-#[derive(Resource, Clone, Copy, Debug, Default)]
-pub struct Clock(pub Duration);
-
-/// The size of the picture, pixels. Without pixels (a minimised window) the last film is kept and rendering rests.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PictureSize {
-    pub width: u32,
-    pub height: u32,
-}
-
-impl PictureSize {
-    pub fn is_empty(self) -> bool {
-        self.width == 0 || self.height == 0
-    }
-
-    /// Width over height; 1 without pixels.
-    pub fn aspect(self) -> f64 {
-        if self.is_empty() { 1.0 } else { f64::from(self.width) / f64::from(self.height) }
-    }
-}
-
-/// When the picture is good enough.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
-pub struct StopAt(pub Target);
-
-/// Worker threads; 0 is one a processor.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Threads(pub usize);
-
-/// Rendering rests, and all samples are kept.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Paused(pub bool);
-
-/// Nobody can see the picture: rendering rests, whatever else is asked for.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hidden(pub bool);
-
-/// What is shown in place of the picture, and over it; no sample depends on this.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Looking(pub Look);
-
-/// The part of the picture that gets all samples, in fractions of it: left, top, right, bottom.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
-pub struct Brush(pub Option<[f64; 4]>);
-
-/// The far end of the pipe.
-#[derive(Resource)]
-pub struct Renderer(pub Worker);
-
-/// What the scene is, seen by who moves through it.
-#[derive(Resource, Clone, Debug)]
-pub struct Around {
-    pub extent: Extent,
-    /// Corners of the boxes of the things that made it, for framing.
-    pub corners: Vec<glam::DVec3>,
-    pub home: navigation::Rig,
-    pub turning: navigation::Turning,
-    /// Metres to what is flown towards.
-    pub pace: Option<f64>,
-}
-
-impl Around {
-    pub fn surroundings(&self, aspect: f64) -> Surroundings {
-        let Extent { center, radius } = self.extent;
-        Surroundings { center, radius, home: self.home, aspect, turning: self.turning, pace: self.pace }
-    }
-}
-
-/// The scene that is open, for saving and reopening.
-#[derive(Resource, Clone)]
-pub struct CurrentScene(pub Arc<LoadedScene>);
-
-/// How many scenes have taken their place so far.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Adopted(pub u64);
-
-/// What the workers have been given, to compare with.
-#[derive(Resource, Default)]
-pub struct Shown {
-    pub inputs: SceneInputs,
-    pub extraction: Option<Extraction>,
-    pub trees: Trees,
-    pub(super) extents: ExtentCache,
-    look: Look,
-    settings: RenderSettings,
-    display: Display,
-    size: Option<PictureSize>,
-    target: Option<Target>,
-    threads: Option<usize>,
-    paused: bool,
-    region: Option<[f64; 4]>,
-    /// The world has changes that wait for a tree.
-    waiting: bool,
-    /// Better trees of what is shown are there.
-    better_trees: bool,
-    /// Meshes whose better trees are being built, by address.
-    improving: Vec<Shape>,
-    /// Drop all samples at the next frame, for this reason.
-    pub(super) restart: Option<&'static str>,
-    /// A scene has taken its place, for this reason.
-    pub(super) adopted: Option<String>,
-    generation: u64,
-    /// Grows when anything but the camera has been touched.
-    revision: u64,
-}
-
-impl Shown {
-    /// Of the picture that is rendered now.
-    pub(super) fn generation(&self) -> u64 {
-        self.generation
-    }
-
-    /// Grows whenever lists of what is in the scene may have become wrong; a camera that moves makes none wrong.
-    pub fn revision(&self) -> u64 {
-        self.revision
-    }
-
-    pub(super) fn rendered(&self) -> Option<(Snapshot, RenderSettings)> {
-        Some((self.extraction.as_ref()?.snapshot.clone(), self.settings))
-    }
-
-    pub(super) fn integrator(&self) -> Integrator {
-        self.settings.integrator
-    }
-}
-
-/// What this frame found to be different.
-#[derive(Resource, Default)]
-pub struct Found(pub Changes);
 
 /// Whether any component that the picture depends on was touched, came or went since the last frame.
 #[derive(SystemParam)]
@@ -346,7 +218,7 @@ pub fn rebuild(
         // The same hits, sooner: no sample is lost, and no restart is told. After a restart it comes with the job.
         extraction.take_trees(trees);
         if !changes.restarts() {
-            renderer.0.set_snapshot(*generation, extraction.snapshot.clone());
+            renderer.0.set_prepared(*generation, extraction.prepared.clone());
         }
     }
     improve_trees(&mut shown, &beside, &renderer);
@@ -449,7 +321,7 @@ pub fn accumulate(
     {
         orders.job = Some(Job {
             generation: shown.generation,
-            snapshot: extraction.snapshot.clone(),
+            prepared: extraction.prepared.clone(),
             settings: shown.settings,
             width,
             height,

@@ -1,6 +1,6 @@
 //! Views to come back to: bookmarks, and the places where the camera rested.
 
-use super::navigation::Rig;
+use super::rig::Rig;
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

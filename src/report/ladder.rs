@@ -2,7 +2,7 @@
 
 use super::curve::{Seconds, seconds_at, seconds_to, slope};
 use super::{Distance, LinearPicture};
-use crate::render::{Display, ErrorEstimate, Film, RayCounts, RenderSettings, Snapshot, advance};
+use crate::render::{Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance};
 use std::time::{Duration, Instant};
 
 /// Where a ladder ends: at the last power of two that both allow, but never before the first step.
@@ -53,7 +53,7 @@ impl Spent {
 ///
 /// When `stop` says so, the step in hand is given up, and those before it are the answer: none, perhaps.
 pub fn climb(
-    snapshot: &Snapshot,
+    prepared: &Prepared,
     settings: &RenderSettings,
     (width, height): (u32, u32),
     limits: Limits,
@@ -71,7 +71,7 @@ pub fn climb(
             let goal = film.spp().saturating_add(pace.spp()).min(spp);
             let (start, cpu_start) = (Instant::now(), cpu_seconds());
             let before = film.spp();
-            rays += advance(snapshot, settings, &mut film, goal, stop).rays;
+            rays += advance(prepared, settings, &mut film, goal, stop).rays;
             if stop() && film.spp() < goal {
                 return rungs;
             }

@@ -5,7 +5,7 @@
 
 use super::LinearPicture;
 use crate::frame::write_film;
-use crate::render::{Display, Film, RenderSettings, Snapshot, advance};
+use crate::render::{Display, Film, Prepared, RenderSettings, advance};
 use crate::scene::whole_file::write_whole;
 use crate::scene::{FileKind, Fingerprint, InputFile};
 use serde::{Deserialize, Serialize};
@@ -86,7 +86,7 @@ impl ReferenceStore {
     pub fn make(
         &self,
         key: &Key,
-        snapshot: &Snapshot,
+        prepared: &Prepared,
         settings: &RenderSettings,
         spp: u32,
         progress: &mut dyn FnMut(f64),
@@ -98,7 +98,7 @@ impl ReferenceStore {
         let mut slice = 4;
         while film.spp() < spp {
             let (start, goal) = (Instant::now(), film.spp().saturating_add(slice).min(spp));
-            advance(snapshot, &settings, &mut film, goal, stop);
+            advance(prepared, &settings, &mut film, goal, stop);
             if stop() && film.spp() < goal {
                 break;
             }

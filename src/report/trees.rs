@@ -13,7 +13,7 @@ use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{BuildPreset, KdTreeStats, MeshTree, SceneTree, Shape, Visits};
 use crate::mesh::Mesh;
 use crate::render::{
-    Camera, ColorInput, Environment, Film, Geometry, Integrator, Material, Object, RayCounts, RenderSettings,
+    Camera, ColorInput, Environment, Film, Geometry, Integrator, Material, Object, Prepared, RayCounts, RenderSettings,
     ScalarInput, Shading, Snapshot, Texture, TexturePattern, advance,
 };
 use crate::sampling::{Sampler, cosine_hemisphere, uniform_disc};
@@ -136,8 +136,8 @@ impl TreeTable {
             let stage = Stage::new(&tree, mesh, world_from_mesh);
             let mut view_seconds = [0.0; VIEWS];
             for (view, seconds) in view_seconds.iter_mut().enumerate() {
-                let snapshot = stage.seen_from(view);
-                let (side, rays, least) = timed_view(&snapshot);
+                let prepared = stage.seen_from(view);
+                let (side, rays, least) = timed_view(&prepared);
                 *seconds = least;
                 if view == 0 && side > sharpest {
                     (table.rays, sharpest) = (rays, side);
@@ -173,7 +173,7 @@ fn least_seconds<T>(mut work: impl FnMut() -> T) -> (T, f64) {
 }
 
 /// Pixels along a side of what was traced, and the rays and the least seconds of a whole picture.
-fn timed_view(snapshot: &Snapshot) -> (u32, RayCounts, f64) {
+fn timed_view(prepared: &Prepared) -> (u32, RayCounts, f64) {
     /// Whole pictures, a sixteenth of their pixels, and a first guess at what those take.
     const SIDES: [u32; 3] = [SIDE, SIDE / 4, SIDE / 16];
     let whole = |side: u32| f64::from(SIDE * SIDE) / f64::from(side * side);
@@ -182,7 +182,7 @@ fn timed_view(snapshot: &Snapshot) -> (u32, RayCounts, f64) {
         if next > side && seconds / whole(next) > LONGEST_VIEW {
             break;
         }
-        let (counted, least) = least_seconds(|| picture(snapshot, next).1);
+        let (counted, least) = least_seconds(|| picture(prepared, next).1);
         (side, seconds) = (next, least * whole(next));
         let scaled = |count: u64| (count as f64 * whole(next)).round() as u64;
         rays = RayCounts {
@@ -195,16 +195,16 @@ fn timed_view(snapshot: &Snapshot) -> (u32, RayCounts, f64) {
 }
 
 /// One sample a pixel in the classic light model.
-fn picture(snapshot: &Snapshot, side: u32) -> (Film, RayCounts) {
+fn picture(prepared: &Prepared, side: u32) -> (Film, RayCounts) {
     let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
     let mut film = Film::new(side, side);
-    let report = advance(snapshot, &settings, &mut film, 1, &|| false);
+    let report = advance(prepared, &settings, &mut film, 1, &|| false);
     (film, report.rays)
 }
 
 /// The model, the floor, the lights.
 struct Stage {
-    snapshot: Snapshot,
+    prepared: Prepared,
     center: Vec3,
     /// Longest side of the model.
     size: f32,
@@ -245,14 +245,13 @@ impl Stage {
             phong(ColorInput::Texture(0), 0.4),
             Material::Emissive { radiance: ColorInput::Constant(Vec3::splat(radiance)) },
         ];
-        let shading = Shading::build(&geometry, materials, vec![squares], Environment::Black);
-        let (geometry, shading) = (Arc::new(geometry), Arc::new(shading));
-        let camera = camera(center, size, 0);
-        Self { snapshot: Snapshot { geometry, shading, camera }, center, size }
+        let shading = Shading::new(materials, vec![squares], Environment::Black);
+        let prepared = Prepared::new(Snapshot::new(geometry, shading, camera(center, size, 0)));
+        Self { prepared, center, size }
     }
 
-    fn seen_from(&self, view: usize) -> Snapshot {
-        Snapshot { camera: camera(self.center, self.size, view), ..self.snapshot.clone() }
+    fn seen_from(&self, view: usize) -> Prepared {
+        self.prepared.with_camera(camera(self.center, self.size, view))
     }
 }
 
@@ -309,7 +308,7 @@ impl SampleRays {
         let camera: Vec<Ray> = (0..SAMPLES)
             .map(|i| {
                 let film = Sampler::new(1, 0, 0, i).pair(0) * SIDE as f32;
-                let ray = stage.snapshot.camera.ray(film, Vec2::splat(SIDE as f32), Vec2::ZERO);
+                let ray = stage.prepared.camera.ray(film, Vec2::splat(SIDE as f32), Vec2::ZERO);
                 let origin = mesh_from_world.transform_point3(ray.origin);
                 Ray::new(origin, mesh_from_world.transform_vector3(ray.dir).normalize())
             })

@@ -3,51 +3,14 @@
 //!
 //! Start reading at [`CameraPart::components`], [`FilmSize::try_new`] and [`BadValue`].
 
+use super::bad_value::BadValue;
+use super::camera::camera;
 use super::components::FilmSize;
 use super::file::{CameraPart, DisplayPart, SceneFile};
-use super::spawn::camera;
+use super::units::{LEAST_SINE, lens_radius_of};
 use super::view::{Lens, Projection, View, unit_direction};
 use crate::render::{Film, RenderSettings};
 use glam::DVec3;
-use std::fmt;
-use thiserror::Error;
-
-/// A value that nothing is made from: which field, what it is, and what is allowed.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum BadValue {
-    #[error("`{field}` is {value}, but must {allowed}")]
-    OutOfRange { field: &'static str, value: String, allowed: String },
-    /// Values that do not go together.
-    #[error("{problem}")]
-    Unfit { field: &'static str, problem: String },
-}
-
-impl BadValue {
-    fn out_of_range(field: &'static str, value: impl fmt::Display, allowed: impl Into<String>) -> Self {
-        Self::OutOfRange { field, value: value.to_string(), allowed: allowed.into() }
-    }
-
-    fn unfit(field: &'static str, problem: impl Into<String>) -> Self {
-        Self::Unfit { field, problem: problem.into() }
-    }
-
-    /// As scene files call it; `camera` where the camera as a whole says too little.
-    pub fn field(&self) -> &'static str {
-        match self {
-            Self::OutOfRange { field, .. } | Self::Unfit { field, .. } => field,
-        }
-    }
-}
-
-impl From<BadValue> for String {
-    fn from(bad: BadValue) -> Self {
-        bad.to_string()
-    }
-}
-
-/// Two directions are parallel if the sine of the angle between them is less: below the root of the machine precision,
-/// less than half of the digits of their cross product mean anything.
-pub const LEAST_SINE: f64 = 1.5e-8;
 
 /// Degrees. Below this, all rays of a picture are one and the same in `f32`.
 pub const LEAST_VFOV_DEG: f64 = 1e-6;
@@ -192,18 +155,6 @@ impl CameraPart {
     }
 }
 
-/// Half the diameter of a lens, metres, for a film 24 mm high, which sees `vfov_deg` through a focal length of
-/// 12 mm / tan(vfov / 2).
-pub(crate) fn lens_radius_of(vfov_deg: f64, f_stop: f64) -> f64 {
-    let focal_length = 0.012 / (0.5 * vfov_deg).to_radians().tan();
-    0.5 * focal_length / f_stop
-}
-
-/// Degrees as `f32` radians. Whole turns are taken out first, which is exact, so that any finite angle means something.
-pub(crate) fn radians(angle_deg: f64) -> f32 {
-    (angle_deg % 360.0).to_radians() as f32
-}
-
 fn check_angle(field: &'static str, angle_deg: f64) -> Result<(), BadValue> {
     let good = angle_deg.is_finite();
     if good { Ok(()) } else { Err(BadValue::out_of_range(field, number(angle_deg), "be a finite number of degrees")) }
@@ -318,6 +269,7 @@ pub fn check_film_size(width: u32, height: u32) -> Result<(), BadValue> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::units::radians;
 
     fn good() -> CameraPart {
         CameraPart::looking_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO)

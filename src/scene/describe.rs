@@ -5,7 +5,7 @@
 //! beside it; many balls that were made by a program are listed one by one; surfaces without a material get a grey
 //! one. Comments and the spelling of a file that was read are not kept.
 
-use super::bounds::radians;
+use super::camera::camera;
 use super::components::{
     Amount, Balls, Developing, FilmSize, Material, MeshOrigin, Ordinal, Paint, Rendering, SceneEnvironment, Shape,
     SurfaceTexture,
@@ -15,11 +15,11 @@ use super::file::{
     Named, ObjectPart, RadiiPart, Rgb, SceneFile, TexturePart, TransformPart,
 };
 use super::inputs::SceneInputs;
-use super::load::LoadedScene;
+use super::loaded::LoadedScene;
 use super::meshes::LoadedMesh;
 use super::placement::Placement;
 use super::relative::path_to_text;
-use super::spawn::camera;
+use super::units::radians;
 use super::view::{Lens, Projection, View};
 use crate::mesh::Mesh;
 use crate::render::{Environment, Fresnel};

@@ -7,7 +7,7 @@ use super::file::{
     TexturePart,
 };
 use super::inputs::SceneInputs;
-use super::load::LoadedScene;
+use super::loaded::LoadedScene;
 use crate::mesh::Mesh;
 use crate::render::{Environment, ImageTexture, TexturePattern};
 use bevy_ecs::prelude::World;

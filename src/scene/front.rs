@@ -5,7 +5,7 @@
 //! in front of the middle of its skin, and the tail, the back and a shell are behind. What has no head stays as its
 //! file has it.
 
-use super::load::UpAxis;
+use super::source::UpAxis;
 use crate::mesh::Mesh;
 use glam::DVec3;
 

@@ -1,6 +1,6 @@
 //! What the picture depends on, copied out of the world in a fixed order.
 
-use super::bounds::BadValue;
+use super::bad_value::BadValue;
 use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};

@@ -3,44 +3,23 @@
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::components::{Balls, Shape};
 use super::error::{Problem, SceneError, suggestion};
-use super::extract::Trees;
 use super::file::{
     EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, ball_grid, locate,
 };
 use super::input_file::{FileKind, InputFile};
+use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::picture::read_picture;
 use super::relative::{path_to_text, text_to_path};
 use super::shot::Shot;
 use super::showcase;
-use super::stamp::{Stamp, stamp};
-use crate::render::ImageTexture;
+use super::source::{SceneSource, UpAxis};
+use super::stamp::stamp;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-
-/// What to open.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SceneSource {
-    /// One of [`BUILTIN_SCENES`].
-    Builtin(String),
-    /// A scene file (RON).
-    Scene(PathBuf),
-    /// A model (OBJ), to be framed.
-    Model(PathBuf),
-    /// A picture that was made by this program (PNG, EXR), for the scene that it shows, as it shows it.
-    Picture(PathBuf),
-}
-
-/// Which axis of a model points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UpAxis {
-    Y,
-    Z,
-}
 
 /// How to load.
 #[derive(Clone, Copy, Default)]
@@ -49,7 +28,7 @@ pub struct LoadOptions<'a> {
     pub up: Option<UpAxis>,
     /// Width over height of the picture that a model is framed for; 16:9 when not given.
     pub aspect: Option<f64>,
-    /// Large meshes get trees that are built in a hurry ([`Trees::hasty`]), for a first picture.
+    /// Large meshes get trees that are built in a hurry ([`super::trees::Trees::hasty`]), for a first picture.
     pub hasty: bool,
     /// What was read before: of it is taken what has not changed on disk.
     pub known: Option<&'a LoadedScene>,
@@ -61,80 +40,6 @@ impl LoadOptions<'_> {
     fn say(&self, text: &str) {
         if let Some(progress) = self.progress {
             progress(text);
-        }
-    }
-}
-
-/// A scene with everything it needs, ready to be spawned into a world.
-#[derive(Clone, Debug)]
-pub struct LoadedScene {
-    pub source: SceneSource,
-    pub file: SceneFile,
-    /// What the paths in `file` count from.
-    pub folder: PathBuf,
-    /// One an object of `file`, `None` for what is not a mesh.
-    pub(super) meshes: Vec<Option<LoadedMesh>>,
-    /// One an object of `file`, `None` for what is not a cloud.
-    pub(super) balls: Vec<Option<Arc<Balls>>>,
-    /// By the path in `file`.
-    pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
-    /// Where they lie, and what they were when they were read.
-    picture_files: HashMap<String, (PathBuf, Stamp)>,
-    pub trees: Trees,
-    pub warnings: Vec<String>,
-    /// Which axis of a model was asked to point up.
-    pub up: Option<UpAxis>,
-    /// What the picture said that this was opened by.
-    pub shot: Option<Shot>,
-    /// Reading and parsing.
-    pub load_seconds: f64,
-    /// Building trees.
-    pub build_seconds: f64,
-}
-
-impl SceneSource {
-    /// What a word on the command line means: a built-in name, unless a file of that name exists.
-    ///
-    /// # Errors
-    /// When it is neither a built-in scene nor a file that can be opened here.
-    pub fn parse(word: impl AsRef<OsStr>) -> Result<Self, SceneError> {
-        let path = Path::new(word.as_ref());
-        let word = &*word.as_ref().to_string_lossy();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if !path.is_file() && builtin_text(word).is_some() {
-            return Ok(Self::Builtin(word.to_owned()));
-        }
-        match extension.as_deref() {
-            Some("ron") => Ok(Self::Scene(path.to_path_buf())),
-            Some("obj") => Ok(Self::Model(path.to_path_buf())),
-            Some("png" | "exr") => Ok(Self::Picture(path.to_path_buf())),
-            _ if path.is_dir() => Err(SceneError::in_file(
-                path,
-                "is a folder: name a scene (.ron), a model (.obj) or a picture (.png, .exr)",
-            )),
-            _ if path.exists() => {
-                Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)"))
-            }
-            _ => {
-                let hint = suggestion(word, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
-                Err(SceneError::in_file(path, format!("neither a file nor a built-in scene{hint}")))
-            }
-        }
-    }
-
-    /// The file that is opened, if it is one.
-    pub fn path(&self) -> Option<&Path> {
-        match self {
-            Self::Builtin(_) => None,
-            Self::Scene(path) | Self::Model(path) | Self::Picture(path) => Some(path),
-        }
-    }
-
-    /// What messages and titles call it.
-    pub fn title(&self) -> String {
-        match self {
-            Self::Builtin(name) => name.clone(),
-            Self::Scene(path) | Self::Model(path) | Self::Picture(path) => path.display().to_string(),
         }
     }
 }
@@ -309,24 +214,6 @@ fn resolve(
 }
 
 impl LoadedScene {
-    fn empty(source: &SceneSource, file: SceneFile, folder: PathBuf) -> Self {
-        Self {
-            source: source.clone(),
-            file,
-            folder,
-            meshes: Vec::new(),
-            balls: Vec::new(),
-            pictures: HashMap::new(),
-            picture_files: HashMap::new(),
-            trees: Trees::default(),
-            warnings: Vec::new(),
-            up: None,
-            shot: None,
-            load_seconds: 0.0,
-            build_seconds: 0.0,
-        }
-    }
-
     fn add_picture(&mut self, name: &str, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
         if self.pictures.contains_key(name) {
             return Ok(());
@@ -348,14 +235,6 @@ impl LoadedScene {
         self.warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
         self.pictures.insert(name.to_owned(), Arc::new(picture));
         Ok(())
-    }
-
-    /// Meshes of objects that say nothing of materials and so take those of the mesh's file.
-    fn meshes_with_own_materials(&self) -> impl Iterator<Item = &LoadedMesh> {
-        let objects = self.file.objects.iter().zip(&self.meshes);
-        objects
-            .filter(|(object, _)| object.material().is_none() && object.slot_materials().is_none())
-            .filter_map(|(_, mesh)| mesh.as_ref())
     }
 
     /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.

@@ -2,10 +2,12 @@
 //! that the renderer works on.
 //!
 //! The way of a scene: text or OBJ → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`] (entities)
-//! → [`Extraction`] (a [`crate::render::Snapshot`] about an origin near the camera).
+//! → [`Extraction`] (a [`crate::render::Prepared`] about an origin near the camera).
 
+mod bad_value;
 pub(crate) mod bounds;
 mod builtin;
+mod camera;
 mod components;
 mod describe;
 mod error;
@@ -19,6 +21,7 @@ mod inputs;
 mod inventory;
 pub(crate) mod limits;
 mod load;
+mod loaded;
 mod meshes;
 pub mod obj;
 mod outputs;
@@ -27,14 +30,19 @@ mod placement;
 mod relative;
 mod save;
 pub mod shot;
+mod shot_draft;
 mod showcase;
+mod source;
 mod spawn;
 mod stamp;
+mod trees;
+pub(crate) mod units;
 mod upright;
 mod view;
 pub mod whole_file;
 
-pub use bounds::{BadValue, check_film_size, check_max_depth, check_stops};
+pub use bad_value::BadValue;
+pub use bounds::{check_film_size, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use components::{
     Amount, Balls, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
@@ -43,13 +51,14 @@ pub use components::{
 pub use describe::{Description, camera_part};
 pub use error::{Problem, SceneError, suggestion};
 pub use extent::{Extent, ExtentCache};
-pub use extract::{Extraction, Part, Trees, origin_for};
+pub use extract::{Extraction, Part, origin_for};
 pub use fingerprint::{Fingerprint, SceneContent};
 pub use input_file::{FileKind, InputFile, ReadError, plain_io};
 pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
 pub use inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
 pub use limits::Limits;
-pub use load::{LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+pub use load::{LoadOptions, load};
+pub use loaded::LoadedScene;
 pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase};
 pub use outputs::{Files, FilesError};
 pub(crate) use picture::{decode_picture, picture_reader};
@@ -57,7 +66,10 @@ pub use picture::{read_picture, read_picture_within};
 pub use placement::{Linear, Placement};
 pub use relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
 pub use save::{SavedScene, save_scene};
-pub use shot::{Shot, ShotDraft, ShotSamples, ShotScene};
+pub use shot::{Shot, ShotSamples, ShotScene};
+pub use shot_draft::ShotDraft;
+pub use source::{SceneSource, UpAxis};
 pub(crate) use spawn::texture_of;
 pub use stamp::{Stamp, stamp};
+pub use trees::Trees;
 pub use view::{Lens, Projection, View, ViewError};

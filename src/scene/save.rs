@@ -3,7 +3,7 @@
 use super::describe::Description;
 use super::file::{EnvironmentPart, MeshSourcePart, ObjectPart, SceneFile, TexturePart};
 use super::input_file::{FileKind, InputFile};
-use super::load::LoadedScene;
+use super::loaded::LoadedScene;
 use super::obj::{NewObj, ObjExtras, save_new_obj};
 use super::relative::{absolute, path_to_text, relative_path, text_to_path};
 use super::whole_file::write_whole;

@@ -6,20 +6,18 @@
 //! a scene with changes that were never saved is written into the note as a whole.
 
 use super::bounds::{check_film_size, check_max_depth};
-use super::describe::Description;
+use super::camera::camera;
 use super::file::{CameraPart, DisplayPart, FilmPart, IntegratorPart, SceneFile};
-use super::load::{LoadedScene, SceneSource, UpAxis};
+use super::input_file::{FileKind, InputFile, ReadError};
+use super::limits::Limits;
 use super::relative::{absolute, relative_path, text_to_path};
-use super::spawn::camera;
-use super::{FileKind, Fingerprint, InputFile, Limits, ReadError, SceneContent};
+use super::source::{SceneSource, UpAxis};
 use crate::render::Film;
-use bevy_ecs::prelude::World;
 use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
-use std::sync::OnceLock;
 
 /// The name of the note in a picture: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
@@ -28,7 +26,7 @@ pub const NOTE_KEY: &str = "firstlight";
 pub const FILM_KEY: &str = "firstlight.film";
 
 /// A newer program that writes something else counts this up.
-const FORMAT: u32 = 1;
+pub(super) const FORMAT: u32 = 1;
 
 /// What is in a picture's note.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,99 +70,6 @@ pub enum ShotScene {
     },
     /// Nothing that was opened: see `text`.
     None,
-}
-
-/// All that a note needs of a world; made at once, finished later, when the film is there.
-#[derive(Clone, Debug)]
-pub struct ShotDraft {
-    source: Option<SceneSource>,
-    up: Option<UpAxis>,
-    description: Description,
-    content: SceneContent,
-    /// The scene as it was opened.
-    loaded: Option<LoadedScene>,
-    seed: u32,
-    prints: OnceLock<Prints>,
-}
-
-/// What takes a look at everything in the scene: some seconds where a million objects are.
-#[derive(Clone, Copy, Debug)]
-struct Prints {
-    content: Fingerprint,
-    /// The scene is another than the one that was opened, and can be said in words.
-    has_changed: bool,
-}
-
-impl ShotDraft {
-    /// Of what `world` shows; `loaded` is the scene that was opened into it.
-    pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
-        let description = Description::of(world, loaded);
-        let seed = world.get_resource::<super::Rendering>().map_or(0, |rendering| rendering.0.seed);
-        Self {
-            source: loaded.map(|loaded| loaded.source.clone()),
-            up: loaded.and_then(|loaded| loaded.up),
-            content: SceneContent::of(world, &description),
-            loaded: loaded.cloned(),
-            description,
-            seed,
-            prints: OnceLock::new(),
-        }
-    }
-
-    /// Does now what takes long about [`note`](Self::note).
-    pub fn prepare(&self) {
-        self.prints();
-    }
-
-    /// The same, for a draft of the same scene seen from elsewhere.
-    pub fn prepared_as(mut self, other: &Self) -> Self {
-        self.prints = other.prints.clone();
-        self
-    }
-
-    /// The note of a picture that will lie at `path`, of a film of this size and so many samples.
-    pub fn note(&self, path: &Path, size: (u32, u32), samples: ShotSamples, display: DisplayPart) -> String {
-        let folder = absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
-        let relative = |path: &Path| relative_path(&folder, path);
-        let scene = match &self.source {
-            Some(SceneSource::Builtin(name)) => ShotScene::Builtin(name.clone()),
-            Some(SceneSource::Scene(path)) => ShotScene::Scene(relative(path)),
-            Some(SceneSource::Model(path)) => {
-                let up = self.up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' });
-                ShotScene::Model { path: relative(path), up }
-            }
-            Some(SceneSource::Picture(_)) | None => ShotScene::None,
-        };
-        let file = &self.description.file;
-        let Prints { content, has_changed } = self.prints();
-        let shot = Shot {
-            format: FORMAT,
-            program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
-            scene,
-            fingerprint: content.to_string(),
-            camera: file.camera.clone(),
-            film: FilmPart { width: size.0, height: size.1, filter: file.film.filter },
-            integrator: file.integrator,
-            max_depth: file.max_depth,
-            display,
-            seed: self.seed,
-            first_sample: samples.first,
-            spp: samples.spp,
-            uneven: samples.uneven,
-            text: has_changed.then(|| file.to_ron()),
-        };
-        shot.to_note()
-    }
-}
-
-impl ShotDraft {
-    fn prints(&self) -> Prints {
-        *self.prints.get_or_init(|| {
-            let content = self.content.fingerprint();
-            let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
-            Prints { content, has_changed: opened != Some(content) && self.description.loose_meshes.is_empty() }
-        })
-    }
 }
 
 /// Which samples are in a picture.

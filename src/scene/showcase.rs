@@ -5,8 +5,8 @@ use super::file::{
     Named, ObjectPart, Paint, Rgb, SceneFile, TransformPart,
 };
 use super::front::faces_away;
-use super::load::UpAxis;
 use super::meshes::LoadedMesh;
+use super::source::UpAxis;
 use super::upright::guess_up;
 use crate::mesh::Mesh;
 use glam::{DVec3, Vec3};

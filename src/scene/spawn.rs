@@ -1,14 +1,15 @@
 //! From a loaded scene to entities.
 
-use super::bounds::{lens_radius_of, radians};
+use super::camera::{camera, unit};
 use super::components::{
     Amount, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
     SceneEnvironment, Shape, SurfaceTexture,
 };
-use super::file::{self, CameraPart, EnvironmentPart, LightPart, MaterialPart, ObjectPart, TexturePart};
-use super::load::LoadedScene;
+use super::file::{self, EnvironmentPart, LightPart, MaterialPart, ObjectPart, TexturePart};
+use super::loaded::LoadedScene;
 use super::placement::Placement;
-use super::view::{Lens, Projection, View, unit_direction};
+use super::units::radians;
+use super::view::View;
 use crate::render::{Display, Environment, ImageTexture, RenderSettings, Texture, TexturePattern};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
@@ -216,53 +217,6 @@ pub(super) fn material(
         }
         MaterialPart::Emissive { radiance } => Material::Emissive { radiance: paint(radiance) },
     }
-}
-
-/// The camera that a scene file describes; [`CameraPart::components`] is the same with all checks.
-pub fn camera(part: &CameraPart) -> (View, Projection, Lens) {
-    // Of a length that can be squared.
-    let wanted = if part.up.length_squared().is_normal() { part.up } else { along(part.up) };
-    let level = |forward: DVec3| wanted.reject_from_normalized(forward).normalize();
-    let view = match (part.forward, part.look_at) {
-        // A saved view comes back to the last bit: nothing is normalised that is unit and square already.
-        (Some(forward), _) => {
-            let forward = unit(forward);
-            let square = is_unit(part.up) && forward.dot(part.up).abs() <= ROUNDING;
-            let up = if square { part.up } else { level(forward) };
-            View { eye: part.eye, forward, up, pivot_distance: part.pivot_distance.unwrap_or(1.0) }
-        }
-        (None, look_at) => {
-            let offset = look_at.unwrap_or(part.eye + DVec3::NEG_Z) - part.eye;
-            let forward = along(offset);
-            View { eye: part.eye, forward, up: level(forward), pivot_distance: offset.length() }
-        }
-    };
-    let radius = part.f_stop.map(|stop| lens_radius_of(part.vfov, stop)).or(part.lens_radius).unwrap_or(0.0);
-    let lens = Lens {
-        radius,
-        focus_distance: part.focus_distance.unwrap_or(view.pivot_distance),
-        enabled: part.depth_of_field.unwrap_or(radius > 0.0),
-        blades: part.blades,
-        blade_rotation_deg: part.blade_rotation,
-    };
-    (view, Projection { vfov_deg: part.vfov }, lens)
-}
-
-/// What rounding leaves of a length of 1 or a right angle.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
-
-fn is_unit(vector: DVec3) -> bool {
-    (vector.length_squared() - 1.0).abs() <= ROUNDING
-}
-
-/// Of length 1; one that is so already keeps its bits.
-fn unit(vector: DVec3) -> DVec3 {
-    if is_unit(vector) { vector } else { along(vector) }
-}
-
-/// Of length 1; NaN for what has no direction, as `normalize` has it.
-fn along(vector: DVec3) -> DVec3 {
-    unit_direction(vector).unwrap_or(DVec3::NAN)
 }
 
 fn as_vec2(value: DVec2) -> Vec2 {

@@ -1,6 +1,6 @@
 //! Which way is up in a model whose file does not say? The way in which it would stand.
 
-use super::load::UpAxis;
+use super::source::UpAxis;
 use crate::mesh::Mesh;
 use glam::{DVec2, DVec3};
 

@@ -4,7 +4,7 @@
 //! (metres, right-handed, Y up) and f64, so that a camera far from the origin moves as smoothly as one at it.
 //! How a person moves a view is in `frame::navigation`; what the renderer makes of it is `render::Camera`.
 
-use super::bounds::LEAST_SINE;
+use super::units::LEAST_SINE;
 use bevy_ecs::prelude::Component;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

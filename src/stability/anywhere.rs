@@ -5,7 +5,7 @@ use super::stage::{tell, towards};
 use super::tally::{Energy, Tally};
 use crate::kdtree::Hit;
 use crate::mesh::procedural;
-use crate::render::{Film, RenderSettings, Snapshot, advance};
+use crate::render::{Film, Prepared, RenderSettings, advance};
 use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
 use bevy_ecs::world::World;
 use glam::{DVec3, dvec3};
@@ -59,7 +59,7 @@ fn scene_text(scale: f64, shift: DVec3) -> String {
 }
 
 /// Writes the files, loads the first one, and makes a snapshot of it.
-fn snapshot(files: &[(&str, String)]) -> Result<Snapshot, String> {
+fn prepared(files: &[(&str, String)]) -> Result<Prepared, String> {
     let folder = tempfile::tempdir().map_err(|error| format!("a folder for scenes cannot be made: {error}"))?;
     for (name, text) in files {
         std::fs::write(folder.path().join(name), text).map_err(|error| format!("{name}: {error}"))?;
@@ -71,7 +71,7 @@ fn snapshot(files: &[(&str, String)]) -> Result<Snapshot, String> {
     let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
     match extraction.problems.first() {
         Some(problem) => Err(problem.to_string()),
-        None => Ok(extraction.snapshot),
+        None => Ok(extraction.prepared),
     }
 }
 
@@ -89,7 +89,7 @@ const SIDE: u32 = 32;
 const BLOCK: u32 = 4;
 
 /// Means of all blocks under each seed.
-fn blocks(scene: &Snapshot, first_seed: u32, spp: u32) -> (Vec<Vec<f64>>, u64) {
+fn blocks(scene: &Prepared, first_seed: u32, spp: u32) -> (Vec<Vec<f64>>, u64) {
     let mut n_bad = 0;
     let of_seed = |seed: u32| {
         let mut film = Film::new(SIDE, SIDE);
@@ -141,7 +141,7 @@ pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     ];
     let samples = u64::from(SEEDS * SIDE * SIDE) * (places.len() as u64 + 1);
     let spp = (n / samples).clamp(32, 4096) as u32;
-    let here = match snapshot(&[("scene.ron", scene_text(1.0, DVec3::ZERO))]) {
+    let here = match prepared(&[("scene.ron", scene_text(1.0, DVec3::ZERO))]) {
         Ok(scene) => scene,
         Err(message) => return failed(message),
     };
@@ -150,7 +150,7 @@ pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     tick(per_place);
     let mut tally = Tally { rays: per_place, non_finite: n_bad, ..Tally::default() };
     for (i, (scale, shift)) in places.into_iter().enumerate() {
-        let scene = match snapshot(&[("scene.ron", scene_text(scale, shift))]) {
+        let scene = match prepared(&[("scene.ron", scene_text(scale, shift))]) {
             Ok(scene) => scene,
             Err(message) => return tally.merged(failed(message)),
         };
@@ -195,7 +195,7 @@ pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
               objects: [mesh(source: obj(\"stone.obj\"), material: \"m\")])",
             eye.x, eye.y, eye.z, shift.x, shift.y, shift.z
         );
-        snapshot(&[("scene.ron", scene), ("stone.obj", survey(shift))])
+        prepared(&[("scene.ron", scene), ("stone.obj", survey(shift))])
     };
     let (here, there) = match (load_at(DVec3::ZERO), load_at(shift)) {
         (Ok(here), Ok(there)) => (here, there),
@@ -207,7 +207,7 @@ pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         // Relative to the eye, which the origin of a snapshot may be a little away from.
         let center = glam::vec3(0.0, 0.0, -90.0);
         let (from, to) = (center + random.point() * 10.0, center + random.direction() * 100.0);
-        let trace = |scene: &Snapshot| -> (crate::geometry::Ray, Option<Hit>) {
+        let trace = |scene: &Prepared| -> (crate::geometry::Ray, Option<Hit>) {
             let ray = towards(scene.camera.eye + from, scene.camera.eye + to);
             (ray, scene.geometry.tree.closest_hit(&ray))
         };

@@ -4,7 +4,7 @@
 //! breaks: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at every
 //! level, both integrators, with and without SIMD. [`random`] has scenes that nobody thought of.
 
-use super::light::{Picture, camera, diffuse, grey, snapshot};
+use super::light::{Picture, camera, diffuse, grey, prepared};
 use super::random::Random;
 use crate::kdtree::{BuildPreset, MeshTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
@@ -81,7 +81,7 @@ fn furnace(
     };
     Picture {
         name: name + way,
-        scene: snapshot(shapes, objects, materials, Environment::Constant(Vec3::ONE), view),
+        scene: prepared(shapes, objects, materials, Environment::Constant(Vec3::ONE), view),
         settings,
         width: 16,
         height: 16,

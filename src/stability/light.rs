@@ -4,16 +4,15 @@ use super::replay::{Replay, Told};
 use super::tally::{Energy, Tally};
 use crate::kdtree::Shape;
 use crate::render::{
-    BadSample, Camera, ColorInput, Environment, Film, Fresnel, Geometry, Material, Object, RenderSettings, ScalarInput,
-    Shading, Snapshot, advance, replay_sample,
+    BadSample, Camera, ColorInput, Environment, Film, Fresnel, Geometry, Material, Object, Prepared, RenderSettings,
+    ScalarInput, Shading, Snapshot, advance, replay_sample,
 };
 use glam::{UVec2, Vec3, vec3};
-use std::sync::Arc;
 
 /// One small scene with a known picture.
 pub struct Picture {
     pub name: String,
-    pub scene: Snapshot,
+    pub scene: Prepared,
     pub settings: RenderSettings,
     pub width: u32,
     pub height: u32,
@@ -85,21 +84,21 @@ pub fn camera(eye: Vec3, look_at: Vec3, vfov_deg: f32) -> Camera {
     }
 }
 
-fn plain(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, environment: Environment, camera: Camera) -> Snapshot {
+fn plain(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, environment: Environment, camera: Camera) -> Prepared {
     let (shapes, objects) = shapes.into_iter().map(|(shape, material)| (shape, Object::plain(material))).unzip();
-    snapshot(shapes, objects, materials, environment, camera)
+    prepared(shapes, objects, materials, environment, camera)
 }
 
-pub fn snapshot(
+pub fn prepared(
     shapes: Vec<Shape>,
     objects: Vec<Object>,
     materials: Vec<Material>,
     environment: Environment,
     camera: Camera,
-) -> Snapshot {
+) -> Prepared {
     let geometry = Geometry::build(shapes, objects);
-    let shading = Shading::build(&geometry, materials, Vec::new(), environment);
-    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+    let shading = Shading::new(materials, Vec::new(), environment);
+    Prepared::new(Snapshot::new(geometry, shading, camera))
 }
 
 pub fn grey(value: f32) -> ColorInput {
@@ -185,7 +184,7 @@ pub fn glass() -> Vec<Picture> {
     let mut inside = furnace("inside a ball of glass", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1.5)], 1e-3);
     // Total reflection keeps some paths for longer than roulette lets them live.
     inside.every_pixel = false;
-    inside.scene.camera = camera(vec3(0.666_66, 0.0, 0.0), vec3(0.7, 1.0, 0.0), 150.0);
+    inside.scene = inside.scene.with_camera(camera(vec3(0.666_66, 0.0, 0.0), vec3(0.7, 1.0, 0.0), 150.0));
     inside.expected = 2.25;
     pictures.push(inside);
     pictures

@@ -1,7 +1,7 @@
 //! Saves pictures on threads of their own, so that the window goes on.
 
 use crate::frame::{PictureFormat, Print, Target, Waker, render_offline_until};
-use crate::render::{Display, Film, RenderSettings, Snapshot};
+use crate::render::{Display, Film, Prepared, RenderSettings};
 use crate::scene::file::check_film_size;
 use crate::scene::{ShotDraft, ShotSamples};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub struct Kept {
 
 /// A picture to be rendered for itself.
 pub struct Larger {
-    pub snapshot: Snapshot,
+    pub prepared: Prepared,
     pub settings: RenderSettings,
     pub size: (u32, u32),
     /// Samples of each pixel.
@@ -78,7 +78,7 @@ impl Saver {
     ) {
         let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
         self.spawn(move || {
-            let Larger { snapshot, settings, size, spp, threads } = larger;
+            let Larger { prepared, settings, size, spp, threads } = larger;
             let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
             check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
             // Threads of its own: those of the window belong to what is seen, and must not wait for this.
@@ -86,7 +86,7 @@ impl Saver {
             let pool = pool.map_err(|error| failed(&format!("no threads can be started: {error}")))?;
             let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(&error))?;
             let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
-            pool.install(|| render_offline_until(&snapshot, &settings, &mut film, target, &stop, |_| true));
+            pool.install(|| render_offline_until(&prepared, &settings, &mut film, target, &stop, |_| true));
             if film.spp() == 0 {
                 return Err(failed(&"the window was closed before each of its pixels had a sample"));
             }

@@ -3,11 +3,10 @@
 
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PassReport, RenderSettings, Shading, Snapshot,
-    advance,
+    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PassReport, Prepared, RenderSettings, Shading,
+    Snapshot, advance,
 };
 use glam::Vec3;
-use std::sync::Arc;
 
 pub fn diffuse(albedo: f32) -> Material {
     Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(albedo)) }
@@ -52,14 +51,14 @@ pub fn scene(
     materials: Vec<Material>,
     environment: Environment,
     camera: Camera,
-) -> Snapshot {
+) -> Prepared {
     let (shapes, objects) = shapes.into_iter().map(|(shape, m)| (shape, Object::plain(m))).unzip();
     let geometry = Geometry::build(shapes, objects);
-    let shading = Shading::build(&geometry, materials, Vec::new(), environment);
-    Snapshot { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
+    let shading = Shading::new(materials, Vec::new(), environment);
+    Prepared::new(Snapshot::new(geometry, shading, camera))
 }
 
-pub fn render(scene: &Snapshot, settings: &RenderSettings, width: u32, height: u32, spp: u32) -> (Film, PassReport) {
+pub fn render(scene: &Prepared, settings: &RenderSettings, width: u32, height: u32, spp: u32) -> (Film, PassReport) {
     let mut film = Film::new(width, height);
     let report = advance(scene, settings, &mut film, spp, &|| false);
     assert!(report.completed && film.spp() == spp);

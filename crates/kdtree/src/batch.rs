@@ -1,6 +1,6 @@
 //! Rays and hits as structures of arrays: what a wave of the integrator hands to the kernel and gets back.
 
-use super::Hit;
+use super::shape::Hit;
 use crate::geometry::Ray;
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
 use glam::Vec3;

@@ -1,9 +1,10 @@
 //! Kd-tree over primitives of one kind: the binary nodes, the wide ones, and the leaf blocks below both.
 
-use super::blocks::{BLOCK, LeafBlock, Prims};
-use super::build::{BuildConfig, LeafMaker, Primitives, build};
+use super::build::{LeafMaker, build};
+use super::leaf::{BLOCK, LeafBlock, Prims};
 use super::nodes::{KdNode, KdNodes};
 use super::ray::Nearest;
+use super::reference::{BuildConfig, Primitives};
 use super::simd::Simd;
 use super::wide::{LEAF, WideNode, widen};
 

@@ -1,126 +1,11 @@
 //! What leaves are made of: sixteen primitives side by side, tested by one ray at a time.
 
-use super::lanes::{LaneHits, may_hit, quad_hits, resolve, shear, sphere_hits};
-use super::ray::Nearest;
+use super::lanes::{LaneHits, may_hit, quad_hits, resolve, sphere_hits};
+use super::leaf::{BLOCK, LeafBlock, LeafRay, NoBlock, Prims, ShearedRay};
 use super::shared_block::SharedBlock;
-use super::simd::{LANES, Mask, Simd};
+use super::simd::{Mask, Simd};
 use crate::geometry::{Ray, Shear};
 use glam::Vec3;
-use std::convert::Infallible;
-use std::marker::PhantomData;
-
-/// Primitives in a leaf block: what one AVX-512 instruction tests.
-pub(super) const BLOCK: usize = LANES;
-
-/// What the test of a leaf wants to know of a ray, made once for all leaves.
-pub(super) trait LeafRay: Copy + Send {
-    const IDLE: Self;
-
-    fn new(ray: &Ray, shear: &Shear) -> Self;
-}
-
-/// Up to sixteen primitives of one kind.
-pub(super) trait LeafBlock: Sized + Send {
-    type Ray: LeafRay;
-
-    /// A smaller form for leaves whose primitives have much in common.
-    type Compact: LeafBlock<Ray = Self::Ray>;
-
-    fn prims(&self) -> &Prims;
-
-    fn prims_mut(&mut self) -> &mut Prims;
-
-    /// All lanes that the ray meets, whatever the sign of `t`.
-    fn hits<S: Simd>(s: S, block: &Self, ray: &Self::Ray) -> LaneHits<S>;
-
-    /// Offers the nearest hit.
-    #[inline(always)]
-    fn test<S: Simd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
-        let hits = Self::hits(s, block, ray);
-        let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
-        if valid == 0 {
-            return;
-        }
-        let t = s.least(valid, hits.t);
-        // Primitives ascend within a block: the first lane is the lowest of those at the same `t`.
-        let lane = (valid & s.eq(hits.t, s.splat(t))).trailing_zeros() as usize % BLOCK;
-        let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
-        s.store(hits.u, &mut u);
-        s.store(hits.v, &mut v);
-        nearest.offer(t, u[lane], v[lane], block.prims().get(lane));
-    }
-}
-
-/// The numbers of a block's primitives, ascending; lanes without one come last.
-///
-/// The highest bit of the first says that the leaf goes on in the next block.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Prims([u32; BLOCK]);
-
-const FOLLOWED: u32 = 1 << 31;
-
-/// Primitives that blocks can tell apart.
-pub(super) const MAX_PRIMS: usize = FOLLOWED as usize;
-
-impl Prims {
-    pub fn new(prims: &[u32]) -> Self {
-        let mut all = [u32::MAX; BLOCK];
-        all[..prims.len()].copy_from_slice(prims);
-        Self(all)
-    }
-
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> u32 {
-        self.0[lane] & !FOLLOWED
-    }
-
-    /// Whether the leaf goes on in the next block.
-    #[inline(always)]
-    pub fn is_followed(&self) -> bool {
-        self.0[0] & FOLLOWED != 0
-    }
-
-    pub fn set_followed(&mut self) {
-        self.0[0] |= FOLLOWED;
-    }
-
-    /// The lanes that hold a primitive.
-    #[inline(always)]
-    pub fn lanes<S: Simd>(&self, s: S) -> Mask {
-        s.lt_u(s.load_u(&self.0), s.splat_u(u32::MAX))
-    }
-
-    /// How many lanes hold a primitive.
-    pub fn len(&self) -> usize {
-        self.0.iter().filter(|&&prim| prim != u32::MAX).count()
-    }
-
-    pub fn iter(&self) -> impl Iterator<Item = u32> {
-        (0..self.len()).map(|lane| self.get(lane))
-    }
-}
-
-/// For primitives that have nothing in common: there is none.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct NoBlock<R>(Infallible, PhantomData<R>);
-
-impl<R: LeafRay> LeafBlock for NoBlock<R> {
-    type Ray = R;
-    type Compact = Self;
-
-    fn prims(&self) -> &Prims {
-        match self.0 {}
-    }
-
-    fn prims_mut(&mut self) -> &mut Prims {
-        match self.0 {}
-    }
-
-    #[inline(always)]
-    fn hits<S: Simd>(_: S, block: &Self, _: &R) -> LaneHits<S> {
-        match block.0 {}
-    }
-}
 
 /// `points[k][axis][lane]`; lanes without a primitive hold NaN, which no comparison lets through.
 type Points<const N: usize> = [[[f32; BLOCK]; 3]; N];
@@ -155,39 +40,6 @@ impl PartialEq for TriangleBlock {
 impl TriangleBlock {
     pub fn new(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Self {
         Self { vertices: gather(prims, triangle), prims: Prims::new(prims) }
-    }
-}
-
-/// A ray in the sheared frame of the watertight test.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ShearedRay {
-    /// Axes across, across and along.
-    pub axes: [usize; 3],
-    /// The origin along these.
-    pub origin: [f32; 3],
-    pub sx: f32,
-    pub sy: f32,
-    pub sz: f32,
-}
-
-impl LeafRay for ShearedRay {
-    const IDLE: Self = Self { axes: [0, 1, 2], origin: [0.0; 3], sx: 0.0, sy: 0.0, sz: 0.0 };
-
-    #[inline(always)]
-    fn new(ray: &Ray, shear: &Shear) -> Self {
-        let axes = [shear.kx, shear.ky, shear.kz];
-        Self { axes, origin: axes.map(|k| ray.origin[k]), sx: shear.sx, sy: shear.sy, sz: shear.sz }
-    }
-}
-
-impl ShearedRay {
-    /// Brings sixteen points into the frame.
-    #[inline(always)]
-    pub fn shear<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
-        let [kx, ky, kz] = self.axes;
-        let origin = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
-        let point = [s.load(&points[kx]), s.load(&points[ky]), s.load(&points[kz])];
-        shear(s, point, origin, s.splat(self.sx), s.splat(self.sy))
     }
 }
 

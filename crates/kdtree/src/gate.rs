@@ -2,17 +2,28 @@
 //!
 //! One by one it takes five divisions and branches on directions, which nothing foretells.
 
-use super::blocks::LeafRay;
 use super::lanes::{longest_axis, to_own_space};
+use super::leaf::LeafRay;
 use super::ray::{Nearest, WIDEN};
 use super::simd::{LANES, Mask, Simd};
-use super::stream::Source;
 use super::wide::DescentRay;
 use crate::geometry::{Aabb, Ray, Shear};
 use firstlight_simd::three;
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 type Lanes = [f32; LANES];
+
+/// Where the stream gets its rays, and leaves what they hit.
+pub(super) trait Source {
+    /// No fewer than the rays that are left.
+    fn left(&self) -> usize;
+    /// The next ray, what it hit before, and a number that `finish` gets back.
+    fn next(&mut self) -> Option<(Ray, Nearest, u32)>;
+    /// From the space of the rays to the tree's own; `None` if they are the same.
+    fn own_from_world(&self) -> Option<&Affine3A>;
+    /// For rays that met the tree's bounds; `nearest.found` says whether it has something nearer.
+    fn finish(&mut self, ray: u32, nearest: &Nearest);
+}
 
 /// Sixteen rays in the tree's own space.
 #[repr(C, align(64))]

@@ -1,9 +1,10 @@
 //! The objects with a tree of their own, when they are many: a tree over their boxes.
 
-use super::build::{BuildConfig, LeafMaker, Primitives, build};
+use super::build::{LeafMaker, build};
 use super::mesh_tree::BuildPreset;
 use super::nodes::KdNodes;
 use super::ray::TreeRay;
+use super::reference::{BuildConfig, Primitives};
 use crate::geometry::{Aabb, Ray, Shear};
 use glam::Vec3;
 

@@ -1,10 +1,12 @@
 //! The simple objects of a scene that are too many to be tested one after the other: a tree for each kind.
 
 use super::block_tree::BlockTree;
-use super::blocks::{BLOCK, LeafBlock, QuadBlock, SphereBlock, TriangleBlock};
-use super::build::{Primitives, clip_triangle};
+use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
+use super::build::clip_triangle;
+use super::leaf::{BLOCK, LeafBlock};
 use super::mesh_tree::BuildPreset;
-use super::scene_tree::Shape;
+use super::reference::Primitives;
+use super::shape::Shape;
 use super::shared_block::SharedBlock;
 use super::sphere_tree::clip_ball;
 use crate::geometry::{Aabb, quad_corners};

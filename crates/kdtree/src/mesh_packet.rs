@@ -5,8 +5,9 @@
 //! traced in groups.
 
 use super::block_tree::{BlockTree, Leaf};
-use super::blocks::{BLOCK, LeafBlock, PreciseRay, ShearedRay, SphereBlock, TriangleBlock};
+use super::blocks::{PreciseRay, SphereBlock, TriangleBlock};
 use super::lanes::{LaneHits, longest_axis, may_hit, resolve, shear, sphere_hits};
+use super::leaf::{BLOCK, LeafBlock, ShearedRay};
 use super::nodes::{MAX_DEPTH, Node};
 use super::objects::WideFrame;
 use super::ray::{Nearest, WIDEN};

@@ -1,11 +1,13 @@
 //! Kd-tree over the triangles of one mesh, in the mesh's own space.
 
 use super::block_tree::BlockTree;
-use super::blocks::{BLOCK, MAX_PRIMS, TriangleBlock};
-use super::build::{BuildConfig, Primitives, clip_triangle};
+use super::blocks::TriangleBlock;
+use super::build::clip_triangle;
+use super::leaf::{BLOCK, MAX_PRIMS};
 use super::ray::{Nearest, TreeRay};
+use super::reference::{BuildConfig, Primitives};
 use super::shared_block::SharedBlock;
-use super::stats::Visits;
+use super::visits::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
 use glam::Vec3;
 

@@ -6,14 +6,14 @@
 use super::batch::{HitBatch, RayBatch};
 use super::lanes::{LaneHits, Sheared, dot, longest_axis, may_hit, quad_hits, resolve, shear, sphere_hits};
 use super::loose::MAX_SIMPLE;
-use super::scene_tree::Shape;
+use super::shape::Shape;
 use super::sieve::{SieveRays, SievedQuad};
 use super::simd::{LANES, Mask, Simd};
 use super::sphere_tree::SphereTree;
 use crate::geometry::quad_corners;
 use glam::Vec3;
 
-/// A point that [`Simd::pick`] can take axes from.
+/// A point that `Simd` can take axes from.
 type Point = [f32; 4];
 
 fn point(p: Vec3) -> Point {

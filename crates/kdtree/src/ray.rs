@@ -7,7 +7,7 @@
 //! - the test moves a vertex at depth `z` sideways by at most `5u (|sx| z + |x|)`, `x` its distance from the ray;
 //! - depth `z` is at most that of the crossing plus the extent of the tree: the first term moves the crossing by
 //!   `5u z`, which the widening covers more than three times;
-//! - the second concerns clipped references only, and the builder pads those (`build::clip_padding`);
+//! - the second concerns clipped references only, and the builder pads those (`reference::clip_padding`);
 //! - the `t` of a hit is the depth of a point of the moved triangle within `8u z`.
 //!
 //! So the cell in which a triangle is hit is visited as long as its widened entry is not beyond the best hit, and every

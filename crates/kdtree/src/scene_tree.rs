@@ -1,69 +1,18 @@
 //! The upper level: all objects of a scene.
 
+use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
-use super::blocks::LeafBlock;
 use super::instance_tree::Recent;
+use super::leaf::LeafBlock;
 use super::ray::{Nearest, TreeRay};
+use super::shape::{Hit, RayClass, Shape, object_bounds};
 use super::simd::InstructionSet;
-use super::sphere_tree::{WideRay, ball_bounds};
-use super::surface::Instance;
+use super::sphere_tree::WideRay;
+use super::surface::{Instance, PlacedShapes, SurfacePoint};
 use super::trace::{Instances, TopLevel};
-use super::{HitBatch, MeshTree, RayBatch, SphereTree, Visits};
+use super::visits::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
-use glam::{Affine3A, DAffine3, Vec3};
 use rayon::prelude::*;
-use std::sync::Arc;
-
-/// The geometry of one object, in the space of the snapshot unless said otherwise.
-#[derive(Clone, Debug)]
-pub enum Shape {
-    Sphere {
-        center: Vec3,
-        radius: f32,
-    },
-    /// Infinite; `normal` is unit.
-    Plane {
-        point: Vec3,
-        normal: Vec3,
-    },
-    /// A parallelogram; its front looks along `edge_u × edge_v`.
-    Quad {
-        corner: Vec3,
-        edge_u: Vec3,
-        edge_v: Vec3,
-    },
-    Triangle {
-        vertices: [Vec3; 3],
-    },
-    Mesh {
-        tree: Arc<MeshTree>,
-        world_from_object: Affine3A,
-    },
-    /// `world_from_object` rotates, moves and scales evenly.
-    Spheres {
-        tree: Arc<SphereTree>,
-        world_from_object: Affine3A,
-    },
-}
-
-/// What the caller knows of a batch: it picks the traversal, never the answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RayClass {
-    /// Neighbours in the batch run side by side: camera rays and their shadow rays, in tile order.
-    Coherent,
-    /// Everything else.
-    Incoherent,
-}
-
-/// One hit; fields as in [`HitBatch`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    pub t: f32,
-    pub u: f32,
-    pub v: f32,
-    pub prim: u32,
-    pub object: u32,
-}
 
 /// Which surface does a ray meet first?
 ///
@@ -71,57 +20,9 @@ pub struct Hit {
 /// preset of the trees below answers with the same bits.
 #[derive(Debug, Default)]
 pub struct SceneTree {
-    shapes: Vec<Shape>,
-    pub(super) instances: Vec<Instance>,
+    objects: PlacedShapes,
     bounds: Aabb,
     top: TopLevel,
-}
-
-/// Inverted in `f64`: the result is as good as `f32` can hold.
-pub(super) fn inverse(matrix: &Affine3A) -> Affine3A {
-    let wide = DAffine3::from_mat3_translation(matrix.matrix3.as_dmat3(), matrix.translation.as_dvec3()).inverse();
-    Affine3A::from_mat3_translation(wide.matrix3.as_mat3(), wide.translation.as_vec3())
-}
-
-/// In an order of roundings that every instruction set repeats.
-#[inline]
-pub(super) fn transform_vector(map: &Affine3A, v: Vec3) -> Vec3 {
-    let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(Vec3::from);
-    (x * v.x + y * v.y) + z * v.z
-}
-
-#[inline]
-pub(super) fn transform_point(map: &Affine3A, p: Vec3) -> Vec3 {
-    transform_vector(map, p) + Vec3::from(map.translation)
-}
-
-/// The box around an object in the world, wide enough for the rounding of rays that are moved into its own space.
-/// Empty for planes and for objects without any surface.
-pub(super) fn object_bounds(shape: &Shape) -> Aabb {
-    let placed = |bounds: Aabb, map: &Affine3A| {
-        if bounds.is_empty() {
-            return bounds;
-        }
-        let corners = (0..8).map(|i| {
-            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-            transform_point(map, Vec3::new(pick(0), pick(1), pick(2)))
-        });
-        let around = Aabb::from_points(corners);
-        // The map back may stretch errors by the condition of the matrix.
-        let back = inverse(map);
-        let condition = max_row_sum(map) * max_row_sum(&back);
-        let largest = around.min.abs().max(around.max.abs()).max_element() + map.translation.abs().max_element();
-        let slack = super::ray::WIDEN * condition * largest;
-        Aabb { min: around.min - slack, max: around.max + slack }
-    };
-    match shape {
-        Shape::Plane { .. } => Aabb::EMPTY,
-        Shape::Sphere { center, radius } => ball_bounds(*center, *radius),
-        Shape::Quad { corner, edge_u, edge_v } => Aabb::from_points(quad_corners(*corner, *edge_u, *edge_v)),
-        Shape::Triangle { vertices } => Aabb::from_points(*vertices),
-        Shape::Mesh { tree, world_from_object } => placed(tree.bounds(), world_from_object),
-        Shape::Spheres { tree, world_from_object } => placed(tree.bounds(), world_from_object),
-    }
 }
 
 /// In parallel where there are many: to ask other threads takes longer than to work out a few.
@@ -133,11 +34,6 @@ fn of_each<T: Send>(shapes: &[Shape], work_out: impl Fn(&Shape) -> T + Send + Sy
     shapes.par_iter().with_min_len(SIDE_BY_SIDE).map(work_out).collect()
 }
 
-fn max_row_sum(map: &Affine3A) -> f32 {
-    let m = map.matrix3;
-    (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element()
-}
-
 impl SceneTree {
     /// Object `i` of all later hits is `shapes[i]`.
     pub fn build(shapes: Vec<Shape>) -> Self {
@@ -145,11 +41,22 @@ impl SceneTree {
         let boxes = of_each(&shapes, object_bounds);
         let bounds = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
         let top = TopLevel::new(&shapes, &boxes);
-        Self { shapes, instances, bounds, top }
+        Self { objects: PlacedShapes { shapes, instances }, bounds, top }
     }
 
     pub fn shapes(&self) -> &[Shape] {
-        &self.shapes
+        &self.objects.shapes
+    }
+
+    /// The maps of an object, by its number.
+    pub fn instance(&self, object: usize) -> &Instance {
+        &self.objects.instances[object]
+    }
+
+    /// The point of a hit that this tree gave for this ray.
+    #[inline]
+    pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        self.objects.surface_point(ray, hit)
     }
 
     /// The box around all finite objects; empty if there are none.
@@ -175,7 +82,7 @@ impl SceneTree {
     pub fn closest_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         assert!(set.is_available(), "this processor does not have {set:?}");
         hits.resize(rays.len());
-        self.top.closest_hits(set, self, rays, class, hits);
+        self.top.closest_hits(set, &self.objects, rays, class, hits);
     }
 
     /// As [`Self::closest_hits_with`].
@@ -183,7 +90,7 @@ impl SceneTree {
     pub fn any_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
         assert!(set.is_available(), "this processor does not have {set:?}");
         occluded.resize(rays.len(), false);
-        self.top.any_hits(set, self, rays, class, occluded);
+        self.top.any_hits(set, &self.objects, rays, class, occluded);
     }
 
     /// One ray, for the mouse.
@@ -200,7 +107,7 @@ impl SceneTree {
     pub fn closest_hit_naive(&self, ray: &Ray) -> Option<Hit> {
         let scene_ray = SceneRay::new(ray);
         let mut best = None;
-        for object in 0..self.shapes.len() as u32 {
+        for object in 0..self.objects.shapes.len() as u32 {
             self.offer_object(object, &scene_ray, &mut best, Effort::Naive);
         }
         best
@@ -219,9 +126,9 @@ impl SceneTree {
         self.walk_loose(loose.quads.as_ref(), &scene_ray, &mut best, Effort::Closest);
         self.walk_loose(loose.triangles.as_ref(), &scene_ray, &mut best, Effort::Closest);
         let mut offer = |object: u32, best: &mut Option<Hit>| {
-            if let Shape::Mesh { tree, .. } = &self.shapes[object as usize] {
+            if let Shape::Mesh { tree, .. } = &self.objects.shapes[object as usize] {
                 let t_max = best.map_or(ray.t_max, |hit| hit.t);
-                let own = tree.count_visits(&Ray { t_max, ..self.instances[object as usize].ray(ray) });
+                let own = tree.count_visits(&Ray { t_max, ..self.objects.instances[object as usize].ray(ray) });
                 visits.inner += own.inner;
                 visits.leaves += own.leaves;
                 visits.blocks += own.blocks;
@@ -302,7 +209,7 @@ impl SceneTree {
         if best.is_some_and(|hit| object < hit.object) {
             nearest.prim = u32::MAX;
         }
-        match &self.shapes[object as usize] {
+        match &self.objects.shapes[object as usize] {
             Shape::Sphere { center, radius } => ray.wide.offer_sphere(*center, *radius, 0, &mut nearest),
             Shape::Plane { point, normal } => {
                 nearest.offer(intersect_plane(ray.wide.origin, ray.wide.dir, *point, *normal), 0.0, 0.0, 0);
@@ -319,7 +226,7 @@ impl SceneTree {
                 }
             }
             Shape::Mesh { tree, .. } => {
-                let ray = self.instances[object as usize].ray(&ray.ray);
+                let ray = self.objects.instances[object as usize].ray(&ray.ray);
                 let shear = Shear::new(ray.dir);
                 match effort {
                     Effort::Naive => tree.offer_hits_naive(&ray, &shear, &mut nearest),
@@ -327,7 +234,7 @@ impl SceneTree {
                 }
             }
             Shape::Spheres { tree, .. } => {
-                let ray = self.instances[object as usize].ray(&ray.ray);
+                let ray = self.objects.instances[object as usize].ray(&ray.ray);
                 match effort {
                     Effort::Naive => tree.offer_hits_naive(&ray, &mut nearest),
                     _ => tree.offer_hits(&ray, &Shear::new(ray.dir), &mut nearest, effort == Effort::Any),

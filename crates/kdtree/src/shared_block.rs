@@ -4,8 +4,8 @@
 //! Each vertex is kept, fetched and sheared once; the corners are looked up in registers. A corner gets the bits that it has in a
 //! [`TriangleBlock`](super::blocks::TriangleBlock), so both find the same hits.
 
-use super::blocks::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay};
 use super::lanes::{LaneHits, may_hit, resolve};
+use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay};
 use super::simd::Simd;
 use glam::Vec3;
 
@@ -147,8 +147,9 @@ impl LeafBlock for SharedBlock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blocks::{LeafRay, TriangleBlock};
+    use crate::blocks::TriangleBlock;
     use crate::geometry::{Ray, Shear};
+    use crate::leaf::LeafRay;
     use crate::ray::Nearest;
     use crate::simd::{InstructionSet, dispatch};
     use glam::vec3;

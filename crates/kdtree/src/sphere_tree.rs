@@ -1,10 +1,11 @@
 //! Kd-tree over many balls that share one material, in the space of their object.
 
 use super::block_tree::BlockTree;
-use super::blocks::{BLOCK, LeafBlock, MAX_PRIMS, SphereBlock};
-use super::build::Primitives;
+use super::blocks::SphereBlock;
+use super::leaf::{BLOCK, LeafBlock, MAX_PRIMS};
 use super::mesh_tree::BuildPreset;
 use super::ray::{Nearest, TreeRay};
+use super::reference::Primitives;
 use crate::geometry::{Aabb, Ray, Shear, intersect_sphere};
 use glam::{DVec3, Vec3};
 

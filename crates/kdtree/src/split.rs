@@ -2,7 +2,7 @@
 //!
 //! Plain, for processors without wide registers, and the reference for `split_lanes`, which must find the same splits.
 
-use super::build::{BuildConfig, Reference};
+use super::reference::{BuildConfig, Reference};
 use crate::geometry::Aabb;
 use glam::Vec3;
 

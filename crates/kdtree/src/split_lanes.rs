@@ -1,9 +1,9 @@
-//! [`split::find_split`](super::split::find_split) sixteen numbers at a time: two references are binned, or one candidate compared with sixteen
+//! [`split::find_split`] sixteen numbers at a time: two references are binned, or one candidate compared with sixteen
 //! references, at once; then sixteen candidates are weighed.
 //!
 //! Every operation is that of the plain version, in its order, and so is the choice among equals: the split has the same bits.
 
-use super::build::{BuildConfig, Reference};
+use super::reference::{BuildConfig, Reference};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
 use super::split::{self, EMPTY_CUT, MAX_BINS, MAX_FACES, Split};
 use crate::geometry::Aabb;

@@ -1,7 +1,7 @@
 //! What a tree looks like: counts for reports, and the invariants that tests rely on.
 
 use super::MeshTree;
-use super::blocks::BLOCK;
+use super::leaf::BLOCK;
 use super::mesh_tree::BLOCK_COST;
 use super::nodes::{KdNodes, Node};
 use crate::geometry::Aabb;
@@ -25,15 +25,6 @@ pub struct KdTreeStats {
     pub expected_inner_visits: f64,
     pub expected_leaf_visits: f64,
     pub expected_block_tests: f64,
-}
-
-/// What one ray looked at in one tree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Visits {
-    pub inner: usize,
-    /// Leaves with something in them.
-    pub leaves: usize,
-    pub blocks: usize,
 }
 
 impl KdTreeStats {

@@ -7,28 +7,15 @@
 //! Start reading at [`run`].
 
 use super::block_tree::BlockTree;
-use super::blocks::{LeafBlock, LeafRay, PreciseRay, ShearedRay};
-use super::gate::Gate;
+use super::blocks::PreciseRay;
+use super::gate::{Gate, Source};
+use super::leaf::{LeafBlock, LeafRay, ShearedRay};
 use super::ray::Nearest;
 use super::simd::Simd;
 use super::wide::{DescentRay, LEAF, Stack};
-use crate::geometry::Ray;
-use glam::Affine3A;
 
 /// Rays in flight. Half as many bring 5 % less speed on bounces, twice as many 9 %.
 const SLOTS: usize = 64;
-
-/// Where the stream gets its rays, and leaves what they hit.
-pub(super) trait Source {
-    /// No fewer than the rays that are left.
-    fn left(&self) -> usize;
-    /// The next ray, what it hit before, and a number that `finish` gets back.
-    fn next(&mut self) -> Option<(Ray, Nearest, u32)>;
-    /// From the space of the rays to the tree's own; `None` if they are the same.
-    fn own_from_world(&self) -> Option<&Affine3A>;
-    /// For rays that met the tree's bounds; `nearest.found` says whether it has something nearer.
-    fn finish(&mut self, ray: u32, nearest: &Nearest);
-}
 
 #[derive(Clone, Copy)]
 pub(super) struct Slot<R> {
@@ -246,8 +233,10 @@ impl<R: LeafRay> Slot<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Ray;
     use crate::{BuildPreset, MeshTree};
     use firstlight_simd::Portable;
+    use glam::Affine3A;
     use glam::Vec3;
     use std::panic::{AssertUnwindSafe, catch_unwind};
 

@@ -11,9 +11,9 @@
 //! At the rim of a triangle that is not all: the neighbour is as uncertain as the triangle itself, so a ray that starts
 //! where the two meet may start behind it and get away. Points are kept clear of the rim by as much ([`INSET`]).
 //!
-//! Start reading at [`SceneTree::surface_point`].
+//! Start reading at [`PlacedShapes::surface_point`].
 
-use super::scene_tree::{Hit, SceneTree, Shape, transform_point, transform_vector};
+use super::shape::{Hit, Shape, inverse, transform_point, transform_vector};
 use crate::geometry::robust::{UNIT_ROUNDOFF, gamma};
 use crate::geometry::{Aabb, Ray, quad_corners};
 use glam::{Affine3A, Mat3A, Vec2, Vec3};
@@ -55,7 +55,7 @@ impl Instance {
             Shape::Mesh { world_from_object, .. } | Shape::Spheres { world_from_object, .. } => *world_from_object,
             _ => Affine3A::IDENTITY,
         };
-        let object_from_world = super::scene_tree::inverse(&world_from_object);
+        let object_from_world = inverse(&world_from_object);
         let abs = |m: Mat3A| Mat3A::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
         let row_sum = |m: Mat3A| (m.x_axis + m.y_axis + m.z_axis).max_element();
         let (there, back) = (abs(world_from_object.matrix3), abs(object_from_world.matrix3));
@@ -117,17 +117,19 @@ struct LocalPoint {
     normal: Vec3,
 }
 
-impl SceneTree {
-    /// The maps of an object, by its number.
-    pub fn instance(&self, object: usize) -> &Instance {
-        &self.instances[object]
-    }
+/// All objects of a scene, and how they are placed; the two lists run in parallel.
+#[derive(Debug, Default)]
+pub(super) struct PlacedShapes {
+    pub shapes: Vec<Shape>,
+    pub instances: Vec<Instance>,
+}
 
+impl PlacedShapes {
     /// The point of a hit that this tree gave for this ray.
     #[inline]
     pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let uv = Vec2::new(hit.u, hit.v);
-        match &self.shapes()[hit.object as usize] {
+        match &self.shapes[hit.object as usize] {
             Shape::Triangle { vertices } => {
                 let local = triangle_point(vertices, hit.u, hit.v, 1.0, 0.0);
                 SurfacePoint {

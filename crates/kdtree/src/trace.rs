@@ -8,16 +8,17 @@
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
 use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
+use super::gate::Source;
 use super::instance_tree::{Entry, InstanceTree, Recent};
 use super::lanes::to_own_space;
 use super::loose::LooseTrees;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
 use super::objects::{Packet, SimpleObjects};
 use super::ray::Nearest;
-use super::scene_tree::{RayClass, SceneTree, Shape};
+use super::shape::{RayClass, Shape};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
-use super::stream::{self, Flight, Source};
-use super::surface::Instance;
+use super::stream::{self, Flight};
+use super::surface::{Instance, PlacedShapes};
 use crate::geometry::{Aabb, Ray};
 use glam::Affine3A;
 use std::cell::RefCell;
@@ -77,7 +78,7 @@ impl TopLevel {
     pub fn closest_hits(
         &self,
         set: InstructionSet,
-        scene: &SceneTree,
+        scene: &PlacedShapes,
         rays: &RayBatch,
         class: RayClass,
         hits: &mut HitBatch,
@@ -88,7 +89,7 @@ impl TopLevel {
     pub fn any_hits(
         &self,
         set: InstructionSet,
-        scene: &SceneTree,
+        scene: &PlacedShapes,
         rays: &RayBatch,
         class: RayClass,
         occluded: &mut [bool],
@@ -115,7 +116,7 @@ trait Answers {
     /// What a packet found for the rays from `first` on.
     fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize);
 
-    /// [`packets`] by the instructions of `set`.
+    /// Packets by the instructions of `set`.
     fn packets(&mut self, set: InstructionSet, packets: &Packets);
 
     /// [`stream`] by the instructions of `set`.
@@ -184,7 +185,7 @@ impl Answers for [bool] {
 fn trace<A: Answers + ?Sized>(
     set: InstructionSet,
     top: &TopLevel,
-    scene: &SceneTree,
+    scene: &PlacedShapes,
     rays: &RayBatch,
     class: RayClass,
     answers: &mut A,
@@ -207,7 +208,7 @@ thread_local! {
 fn trace_in<A: Answers + ?Sized>(
     Room { flight, rounds, all }: &mut Room,
     set: InstructionSet,
-    (top, scene): (&TopLevel, &SceneTree),
+    (top, scene): (&TopLevel, &PlacedShapes),
     (rays, class): (&RayBatch, RayClass),
     answers: &mut A,
 ) {
@@ -215,7 +216,7 @@ fn trace_in<A: Answers + ?Sized>(
         Instances::Few(few) => (&few[..], CHUNK),
         Instances::Many(_) => (&[][..], LARGE_CHUNK),
     };
-    let goes_in_packets = |object: &u32| match &scene.shapes()[*object as usize] {
+    let goes_in_packets = |object: &u32| match &scene.shapes[*object as usize] {
         Shape::Mesh { .. } => class == RayClass::Coherent,
         Shape::Spheres { tree, .. } => class == RayClass::Coherent || tree.len() <= MAX_BALLS,
         _ => false,
@@ -248,8 +249,8 @@ fn trace_in<A: Answers + ?Sized>(
 }
 
 /// `None` for an object without a tree.
-fn tree_of(scene: &SceneTree, object: u32) -> Option<StreamTree<'_>> {
-    match &scene.shapes()[object as usize] {
+fn tree_of(scene: &PlacedShapes, object: u32) -> Option<StreamTree<'_>> {
+    match &scene.shapes[object as usize] {
         Shape::Mesh { tree, .. } => Some(StreamTree::Triangles(&tree.tree)),
         Shape::Spheres { tree, .. } => Some(StreamTree::Spheres(&tree.tree)),
         _ => None,
@@ -261,7 +262,7 @@ struct Packets<'a> {
     simple: &'a SimpleObjects,
     /// Meshes and small clouds of balls.
     instances: &'a [u32],
-    scene: &'a SceneTree,
+    scene: &'a PlacedShapes,
     rays: &'a RayBatch,
     /// Rays in a row.
     queue: &'a [u32],
@@ -286,7 +287,7 @@ fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &
         packet.test_objects::<ANY>(s, packets.simple);
         for &object in packets.instances {
             let instance = &packets.scene.instances[object as usize];
-            match &packets.scene.shapes()[object as usize] {
+            match &packets.scene.shapes[object as usize] {
                 Shape::Mesh { tree, .. } => {
                     trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
                 }
@@ -462,7 +463,7 @@ impl Rounds {
         &mut self,
         set: InstructionSet,
         tree: &InstanceTree,
-        scene: &SceneTree,
+        scene: &PlacedShapes,
         rays: &RayBatch,
         answers: &mut A,
         queue: &[u32],

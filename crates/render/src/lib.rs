@@ -1,58 +1,38 @@
 //! From a read-only snapshot of the scene to light on the film. Knows no entities, files or windows.
 //!
-//! Start reading at [`Snapshot`] (what is rendered), [`advance`] (how) and [`Film`] (where it goes).
+//! Start reading at [`Snapshot`] and [`Prepared`] (what is rendered), [`advance`] (how) and [`Film`] (where it goes). The
+//! folders are layers, each of which imports from those before it alone.
 
-mod ambient;
-mod bound;
-mod bsdf;
-mod camera;
-mod caustics;
-mod color;
-mod develop;
-mod dielectric;
-mod environment;
-mod estimate;
-mod exact_sum;
-mod explain;
+mod core;
+mod driver;
 mod film;
-mod film_record;
-mod filter;
-mod ggx;
-mod inspect;
-mod light;
-mod material;
-mod medium;
-mod path;
-mod paths;
-mod phong;
-mod region;
-mod renderer;
-mod room;
+mod integrators;
+mod prepare;
 pub mod sampling;
-mod snapshot;
-mod surface;
-mod techniques;
-mod texture;
-mod wide;
+mod shading;
+#[cfg(test)]
+mod test_scene;
 
-pub use camera::{Camera, CameraError};
-pub use develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
-pub use environment::Environment;
-pub use estimate::ErrorEstimate;
-pub use explain::{
-    Asked, Contribution, Explanation, FoundBy, LightSource, PathVertex, Place, TracedPath, explain, light_from_lamps,
+pub use crate::core::camera::{Camera, CameraError};
+pub use crate::core::counts::RayCounts;
+pub use crate::core::environment::Environment;
+pub use crate::core::filter::PixelFilter;
+pub use crate::core::material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
+pub use crate::core::settings::{Integrator, RenderSettings, SettingsError};
+pub use crate::core::snapshot::{Geometry, Object, Shading, Snapshot};
+pub use crate::core::techniques::Techniques;
+pub use crate::core::texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};
+pub use driver::explain::{Contribution, Explanation, explain, light_from_lamps};
+pub use driver::inspect::{
+    Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };
-pub use film::Film;
-pub use film_record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
-pub use filter::PixelFilter;
-pub use inspect::{Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone};
-pub use light::LightTable;
-pub use material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
-pub use region::Region;
-pub use renderer::{
-    BadSample, Integrator, PassReport, RayCounts, RenderSettings, SettingsError, advance, advance_region, replay_sample,
-};
-pub use room::{NoRoom, Purpose, Room};
-pub use snapshot::{Features, Geometry, Object, Shading, Snapshot};
-pub use techniques::Techniques;
-pub use texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};
+pub use driver::renderer::{BadSample, PassReport, advance, advance_region, replay_sample};
+pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
+pub use film::estimate::ErrorEstimate;
+pub use film::record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
+pub use film::region::Region;
+pub use film::room::{NoRoom, Purpose, Room};
+pub use film::tiles::Film;
+pub use integrators::record::{Asked, FoundBy, LightSource, PathVertex, Place, TracedPath};
+pub use prepare::light::LightTable;
+pub use prepare::{Features, Prepared};

@@ -19,7 +19,7 @@ pub fn select_vector<S: Simd>(mask: Mask, a: Vector<S>, b: Vector<S>) -> Vector<
     Vector { x: select(mask, a.x, b.x), y: select(mask, a.y, b.y), z: select(mask, a.z, b.z) }
 }
 
-/// The axes across a unit normal; see [`crate::geometry::Frame::around`].
+/// The axes across a unit normal; see `Frame::around` of `firstlight_kdtree::geometry`.
 #[inline(always)]
 pub fn frame_around<S: Simd>(normal: Vector<S>) -> [Vector<S>; 3] {
     let Vector { x, y, z } = normal;

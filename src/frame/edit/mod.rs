@@ -16,21 +16,23 @@
 mod add;
 mod place;
 mod property;
+mod set;
 mod sky;
 mod spot;
 mod texture;
 
 pub use add::NewThing;
 pub(super) use add::{clay, spawn};
-pub use property::{MaterialKind, Property, paint_of};
+pub use property::{MaterialKind, Property};
+pub use set::paint_of;
 pub use sky::strength as sky_strength;
 pub(super) use texture::take as take_picture;
 pub use texture::textures;
 
 use super::history::History;
+use super::resources::{Clock, PictureSize, Shown};
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
-use super::systems::{Clock, PictureSize, Shown};
 use crate::scene::file::{MeshShadingPart, TexturePart};
 use crate::scene::{MaterialSlots, users_of};
 use bevy_ecs::name::Name;
@@ -203,8 +205,8 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             }
             place::displace(world, |center| place::Change::Scale { center, factors });
         }
-        Edit::Set { id, property, value } => property::set(world, Entity::try_from_bits(id), property, value)?,
-        Edit::SetKind { id, kind } => property::set_kind(world, existing(world, id)?, kind)?,
+        Edit::Set { id, property, value } => set::set(world, Entity::try_from_bits(id), property, value)?,
+        Edit::SetKind { id, kind } => set::set_kind(world, existing(world, id)?, kind)?,
         Edit::SetTexture { id, name } => texture::set_texture(world, existing(world, id)?, &name)?,
         Edit::Paint { id, part } => texture::paint(world, existing(world, id)?, part)?,
         Edit::Assign { id, material } => {

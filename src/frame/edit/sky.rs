@@ -1,10 +1,10 @@
 //! The sky: its colours, how strong they are together, and how its picture is turned.
 
-use super::Property;
+use super::property::Property;
 use crate::render::Environment;
 use crate::scene::SceneEnvironment;
-use crate::scene::bounds::radians;
 use crate::scene::file::{EnvironmentPart, Rgb};
+use crate::scene::units::radians;
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
 

@@ -4,8 +4,8 @@
 //! towards the eye; from each, the thing falls onto what is below it, and stays where it touches nothing else. What is
 //! in its way is found by rays, which know what a box does not: that a room is empty inside.
 
+use crate::frame::resources::{PictureSize, Shown};
 use crate::frame::selection::pick;
-use crate::frame::systems::{PictureSize, Shown};
 use crate::geometry::Ray;
 use crate::scene::{Extraction, View};
 use bevy_ecs::prelude::World;
@@ -101,5 +101,5 @@ fn directions() -> impl Iterator<Item = DVec3> {
 /// From a place of the world along a unit direction to what is there, metres.
 fn distance(scene: &Extraction, from: DVec3, direction: DVec3) -> Option<f64> {
     let ray = Ray::new((from - scene.origin).as_vec3(), direction.as_vec3());
-    scene.snapshot.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))
+    scene.prepared.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))
 }

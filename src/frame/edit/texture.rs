@@ -1,9 +1,9 @@
 //! Textures in the place of a material's colour: those that the scene has, a new checker, a picture from a file.
 
-use super::property::{paint_mut, paint_of, set_if_different};
+use super::set::{paint_mut, paint_of, set_if_different};
 use crate::frame::beside::Beside;
+use crate::frame::resources::{Clock, CurrentScene};
 use crate::frame::status::{MessageKind, Status};
-use crate::frame::systems::{Clock, CurrentScene};
 use crate::render::{ImageTexture, TexturePattern};
 use crate::scene::file::TexturePart;
 use crate::scene::{Material, Paint, SurfaceTexture, texture_of};

@@ -13,38 +13,11 @@ mod moves;
 pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth_of_field};
 pub use moves::{VERTICAL, dolly, fly, frame_points, level, orbit, pan, roll, turn, zoom};
 
-use super::Command;
-use crate::scene::{BadValue, Lens, Projection, View};
+pub use super::rig::{Rig, Turning};
+
+use super::command::Command;
+use crate::scene::View;
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
-
-/// All that a person steers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Rig {
-    pub view: View,
-    pub projection: Projection,
-    pub lens: Lens,
-}
-
-impl Rig {
-    /// # Errors
-    /// When no picture can be taken with it.
-    pub fn check(&self) -> Result<(), BadValue> {
-        self.view.check()?;
-        self.projection.check()?;
-        self.lens.check()
-    }
-}
-
-/// What turning keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Turning {
-    /// Yaw is about the vertical and the horizon keeps its lean.
-    #[default]
-    Turntable,
-    /// Yaw and pitch are about the picture's own axes, without limits.
-    Free,
-}
 
 /// What the amounts of a command are measured by.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 //! Two ways of turning: on a turntable, where the horizon keeps its lean and the view stops short of straight up and
 //! down, and freely about the picture's own axes.
 
-use super::Turning;
+use crate::frame::rig::Turning;
 use crate::scene::{Projection, View};
 use glam::{DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;

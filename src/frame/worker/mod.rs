@@ -10,9 +10,10 @@
 mod idle;
 mod show;
 mod thread;
+mod views;
 
 use super::{Picture, Target, Waits};
-use crate::render::{BadSample, Display, Explanation, Film, Inspection, RayCounts, Region, RenderSettings, Snapshot};
+use crate::render::{BadSample, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings};
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -36,7 +37,7 @@ pub type Waker = Arc<dyn Fn() + Send + Sync>;
 #[derive(Clone)]
 pub struct Job {
     pub generation: u64,
-    pub snapshot: Snapshot,
+    pub prepared: Prepared,
     pub settings: RenderSettings,
     pub width: u32,
     pub height: u32,
@@ -142,7 +143,7 @@ struct Inbox {
     /// When the first job that has not been taken over was posted, if the thread was at work then.
     posted: Option<Instant>,
     /// Of the job of this generation: gives the same samples.
-    snapshot: Option<(u64, Snapshot)>,
+    prepared: Option<(u64, Prepared)>,
     display: Option<Display>,
     look: Option<Look>,
     question: Option<(Question, Sender<Answer>)>,
@@ -222,8 +223,8 @@ impl Worker {
     }
 
     /// Keeps all samples: the snapshot of the job of this generation that gives the same ones, sooner.
-    pub fn set_snapshot(&self, generation: u64, snapshot: Snapshot) {
-        self.post(|inbox| inbox.snapshot = Some((generation, snapshot)));
+    pub fn set_prepared(&self, generation: u64, prepared: Prepared) {
+        self.post(|inbox| inbox.prepared = Some((generation, prepared)));
     }
 
     /// Keeps all samples.

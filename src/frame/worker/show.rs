@@ -1,20 +1,12 @@
 //! From the film to what is seen: developed or inspected, as large as the window, with what lies over it.
 
 use super::thread::Loop;
+use super::views::ViewKey;
 use super::{Stats, lock};
 use crate::render::{Inspected, Inspection, depths, develop, inspect, tint_sharp_zone};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
-
-/// What was made last and may do again.
-#[derive(Default)]
-pub struct Views {
-    /// The view of the scene, and what for.
-    inspected: Option<(ViewKey, Inspected)>,
-    /// Depths of the film's pixels, and what for.
-    depths: Option<(ViewKey, Vec<f32>)>,
-}
 
 impl Loop<'_> {
     /// Develops the film and hands it over, unless the last picture still waits to be taken and will do for now.
@@ -59,19 +51,19 @@ impl Loop<'_> {
             let known = self.views.inspected.take().filter(|(of, _)| *of == key && !key.inspection.is_of_film());
             let view = known
                 .map(|(_, view)| view)
-                .or_else(|| pool.install(|| inspect(key.inspection, &job.snapshot, &job.settings, film, &stop)));
+                .or_else(|| pool.install(|| inspect(key.inspection, &job.prepared, &job.settings, film, &stop)));
             let Some(view) = view else { return };
             enlarge(&view, width, height, &mut picture.rgba);
             legend = view.legend;
             self.views.inspected = Some((key, view));
         }
-        if self.look.sharp_zone && job.snapshot.camera.lens_radius > 0.0 {
+        if self.look.sharp_zone && job.prepared.camera.lens_radius > 0.0 {
             let key = ViewKey { inspection: Inspection::Depth, ..key };
             let known = self.views.depths.take().filter(|(of, _)| *of == key).map(|(_, depths)| depths);
-            let Some(depths) = known.or_else(|| pool.install(|| depths(&job.snapshot, key.size, &stop))) else {
+            let Some(depths) = known.or_else(|| pool.install(|| depths(&job.prepared, key.size, &stop))) else {
                 return;
             };
-            let camera = &job.snapshot.camera;
+            let camera = &job.prepared.camera;
             let zone = camera.sharp_zone(height);
             let size = UVec2::new(width, height);
             pool.install(|| tint_sharp_zone(&mut picture.rgba, size, &depths, key.size, zone, camera.focus_distance));
@@ -90,14 +82,6 @@ impl Loop<'_> {
         self.redraw = false;
         self.wake();
     }
-}
-
-/// What a view of the scene was made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ViewKey {
-    generation: u64,
-    inspection: Inspection,
-    size: UVec2,
 }
 
 /// Without mixing: colours that stand for numbers have no mean.

@@ -1,7 +1,7 @@
 //! The far end: takes over what has arrived, does the scheduler's next step, hands over, and sleeps.
 
 use super::idle::IdleFilms;
-use super::show::Views;
+use super::views::Views;
 use super::{Answer, BESIDE, Job, Look, Question, Shared, Stats, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{Scheduler, Step, StepReport};
 use crate::frame::{Picture, Target};
@@ -154,10 +154,10 @@ impl<'a> Loop<'a> {
             self.scheduler_sees_region();
             self.redraw = true;
         }
-        if let (Some((generation, snapshot)), Some(job)) = (inbox.snapshot, &mut self.job)
+        if let (Some((generation, prepared)), Some(job)) = (inbox.prepared, &mut self.job)
             && generation == job.generation
         {
-            job.snapshot = snapshot;
+            job.prepared = prepared;
             // How many nodes a ray visits is another number now.
             self.views = Views::default();
             self.redraw |= !self.look.inspection.is_of_film();
@@ -201,7 +201,7 @@ impl<'a> Loop<'a> {
         let samples = first..first.saturating_add(question.n_samples);
         let pool = lock(&self.shared.pool).clone();
         let result = catch_unwind(AssertUnwindSafe(|| {
-            pool.install(|| explain(&job.snapshot, &job.settings, size, pixel, samples))
+            pool.install(|| explain(&job.prepared, &job.settings, size, pixel, samples))
         }));
         let sender = self.question.take().map(|(_, sender)| sender);
         match (result, sender) {
@@ -271,7 +271,7 @@ impl<'a> Loop<'a> {
         let interrupt = &self.shared.interrupt;
         let stop = || interrupt.load(Ordering::Relaxed) || at_most.is_some_and(|limit| start.elapsed() >= limit);
         let result = catch_unwind(AssertUnwindSafe(|| {
-            pool.install(|| advance_region(&job.snapshot, &job.settings, film, region.as_ref(), target_spp, &stop))
+            pool.install(|| advance_region(&job.prepared, &job.settings, film, region.as_ref(), target_spp, &stop))
         }));
         let seconds = start.elapsed().as_secs_f64();
         tracing::trace!("rendered for {:.1} ms at 1/{divider}", seconds * 1e3);

@@ -211,10 +211,10 @@ impl App {
         let spp = status.spp.max(1);
         let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
         if self.panel.scale > 1
-            && let Some((snapshot, settings)) = self.session.rendered()
+            && let Some((prepared, settings)) = self.session.rendered()
         {
             let size = (size.0.saturating_mul(self.panel.scale), size.1.saturating_mul(self.panel.scale));
-            let larger = Larger { snapshot, settings, size, spp, threads: self.session.status().threads };
+            let larger = Larger { prepared, settings, size, spp, threads: self.session.status().threads };
             let news = format!("rendering {} × {} at {spp} spp beside the window", size.0, size.1);
             self.toasts.add(Tone::News, news, Instant::now());
             self.saver.save_larger(larger, draft, display, &scene, format);

@@ -2,79 +2,16 @@
 //! the next start when it could not ask.
 
 use super::{App, short_name};
-use crate::frame::{Command, LeftBehind, Recovery, Waker};
+use crate::frame::Command;
 use crate::viewer::question::{Answer, Question};
 use crate::viewer::saver::new_scene_file;
 use crate::viewer::toasts::Tone;
-use std::collections::VecDeque;
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
 /// Edits are kept so long after the last of them: not in the middle of a drag.
 const KEPT_AFTER: Duration = Duration::from_secs(2);
-
-pub(super) struct Leaving {
-    /// Somebody wants to close the window.
-    pub wanted: bool,
-    /// What is being asked.
-    pub question: Option<Question>,
-    /// What a button of it said.
-    pub answer: Option<Answer>,
-    /// What is done once the scene is saved: another is opened, or the window closes.
-    saving: Option<Option<Command>>,
-    /// Closed without saving, as the person wants it.
-    discarded: bool,
-    recovery: Recovery,
-    /// Still to be asked about.
-    left_behind: VecDeque<LeftBehind>,
-    /// Edits that were seen, that are to be kept, and that have been kept, by the session's count.
-    seen: u64,
-    keep_at: Option<Instant>,
-    restored: Receiver<Result<PathBuf, String>>,
-    sender: Sender<Result<PathBuf, String>>,
-    waker: Waker,
-}
-
-impl Leaving {
-    pub fn new(recovery: Recovery, waker: Waker) -> Self {
-        let (sender, restored) = channel();
-        let left_behind = recovery.left_behind().into();
-        Self {
-            wanted: false,
-            question: None,
-            answer: None,
-            saving: None,
-            discarded: false,
-            recovery,
-            left_behind,
-            seen: 0,
-            keep_at: None,
-            restored,
-            sender,
-            waker,
-        }
-    }
-
-    /// When edits are to be kept.
-    pub fn wake_at(&self) -> Option<Instant> {
-        self.keep_at
-    }
-
-    /// Takes back what was left behind, on a thread of its own.
-    fn restore(&self, left: LeftBehind, path: PathBuf) -> Result<(), String> {
-        let (sender, waker) = (self.sender.clone(), self.waker.clone());
-        let work = move || {
-            // The window may be gone, and then it is offered again.
-            let _ = sender.send(left.restore(&path).map(|()| path));
-            waker();
-        };
-        let spawned = std::thread::Builder::new().name("restore".to_owned()).spawn(work);
-        spawned.map(drop).map_err(|error| format!("nothing can be restored: no thread can be started: {error}"))
-    }
-}
 
 impl App {
     /// Follows what is edited and saved, asks what is to be asked, and closes the window when nothing keeps it.

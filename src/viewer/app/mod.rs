@@ -18,6 +18,7 @@ mod act;
 mod draw;
 mod events;
 mod leave;
+mod leaving;
 mod memory;
 
 use super::brush::Brush;
@@ -37,7 +38,7 @@ use crate::frame::{
 };
 use crate::render::Inspection;
 use crate::scene::{SceneSource, UpAxis};
-use leave::Leaving;
+use leaving::Leaving;
 use memory::Memory;
 use serde_json::json;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

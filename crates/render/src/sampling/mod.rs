@@ -5,11 +5,13 @@
 mod alias;
 mod distribution;
 mod hash;
+pub(crate) mod offset_lanes;
 mod sobol;
 mod sobol_lanes;
 mod spherical_quad;
 mod spherical_triangle;
 mod warp;
+pub(crate) mod warp_lanes;
 
 pub use alias::AliasTable;
 pub use distribution::PictureDistribution;

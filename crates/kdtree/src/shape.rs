@@ -1,0 +1,111 @@
+//! Shapes as they are given, and what rays ask of them.
+
+use super::mesh_tree::MeshTree;
+use super::ray::WIDEN;
+use super::sphere_tree::{SphereTree, ball_bounds};
+use crate::geometry::{Aabb, quad_corners};
+use glam::{Affine3A, DAffine3, Vec3};
+use std::sync::Arc;
+
+/// The geometry of one object, in the space of the snapshot unless said otherwise.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    Sphere {
+        center: Vec3,
+        radius: f32,
+    },
+    /// Infinite; `normal` is unit.
+    Plane {
+        point: Vec3,
+        normal: Vec3,
+    },
+    /// A parallelogram; its front looks along `edge_u × edge_v`.
+    Quad {
+        corner: Vec3,
+        edge_u: Vec3,
+        edge_v: Vec3,
+    },
+    Triangle {
+        vertices: [Vec3; 3],
+    },
+    Mesh {
+        tree: Arc<MeshTree>,
+        world_from_object: Affine3A,
+    },
+    /// `world_from_object` rotates, moves and scales evenly.
+    Spheres {
+        tree: Arc<SphereTree>,
+        world_from_object: Affine3A,
+    },
+}
+
+/// What the caller knows of a batch: it picks the traversal, never the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayClass {
+    /// Neighbours in the batch run side by side: camera rays and their shadow rays, in tile order.
+    Coherent,
+    /// Everything else.
+    Incoherent,
+}
+
+/// One hit; fields as in [`super::batch::HitBatch`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    pub t: f32,
+    pub u: f32,
+    pub v: f32,
+    pub prim: u32,
+    pub object: u32,
+}
+
+/// Inverted in `f64`: the result is as good as `f32` can hold.
+pub(super) fn inverse(matrix: &Affine3A) -> Affine3A {
+    let wide = DAffine3::from_mat3_translation(matrix.matrix3.as_dmat3(), matrix.translation.as_dvec3()).inverse();
+    Affine3A::from_mat3_translation(wide.matrix3.as_mat3(), wide.translation.as_vec3())
+}
+
+/// In an order of roundings that every instruction set repeats.
+#[inline]
+pub(super) fn transform_vector(map: &Affine3A, v: Vec3) -> Vec3 {
+    let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(Vec3::from);
+    (x * v.x + y * v.y) + z * v.z
+}
+
+#[inline]
+pub(super) fn transform_point(map: &Affine3A, p: Vec3) -> Vec3 {
+    transform_vector(map, p) + Vec3::from(map.translation)
+}
+
+/// The box around an object in the world, wide enough for the rounding of rays that are moved into its own space.
+/// Empty for planes and for objects without any surface.
+pub(super) fn object_bounds(shape: &Shape) -> Aabb {
+    let placed = |bounds: Aabb, map: &Affine3A| {
+        if bounds.is_empty() {
+            return bounds;
+        }
+        let corners = (0..8).map(|i| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            transform_point(map, Vec3::new(pick(0), pick(1), pick(2)))
+        });
+        let around = Aabb::from_points(corners);
+        // The map back may stretch errors by the condition of the matrix.
+        let back = inverse(map);
+        let condition = max_row_sum(map) * max_row_sum(&back);
+        let largest = around.min.abs().max(around.max.abs()).max_element() + map.translation.abs().max_element();
+        let slack = WIDEN * condition * largest;
+        Aabb { min: around.min - slack, max: around.max + slack }
+    };
+    match shape {
+        Shape::Plane { .. } => Aabb::EMPTY,
+        Shape::Sphere { center, radius } => ball_bounds(*center, *radius),
+        Shape::Quad { corner, edge_u, edge_v } => Aabb::from_points(quad_corners(*corner, *edge_u, *edge_v)),
+        Shape::Triangle { vertices } => Aabb::from_points(*vertices),
+        Shape::Mesh { tree, world_from_object } => placed(tree.bounds(), world_from_object),
+        Shape::Spheres { tree, world_from_object } => placed(tree.bounds(), world_from_object),
+    }
+}
+
+fn max_row_sum(map: &Affine3A) -> f32 {
+    let m = map.matrix3;
+    (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element()
+}

@@ -1,0 +1,10 @@
+//! What one ray costs, counted.
+
+/// What one ray looked at in one tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Visits {
+    pub inner: usize,
+    /// Leaves with something in them.
+    pub leaves: usize,
+    pub blocks: usize,
+}

@@ -1,0 +1,60 @@
+//! What decides the samples of a picture besides the scene.
+
+use crate::core::filter::PixelFilter;
+use crate::core::techniques::Techniques;
+use firstlight_kdtree::InstructionSet;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The light model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Integrator {
+    /// The truth: unbiased path tracing.
+    #[default]
+    Path,
+    /// The classic local model with shadows and recursive mirrors and glass.
+    Phong,
+}
+
+/// What decides the samples of a picture besides the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RenderSettings {
+    pub integrator: Integrator,
+    /// Longest path in segments; 1 shows emitters alone. `u32::MAX` is unbounded.
+    pub max_depth: u32,
+    pub seed: u32,
+    pub filter: PixelFilter,
+    pub techniques: Techniques,
+    /// With which instructions sixteen paths are shaded at a time; `None` shades one after the other, which is what
+    /// tests compare with. All sets give the same bits.
+    #[doc(hidden)]
+    pub lanes: Option<InstructionSet>,
+}
+
+/// Settings that no picture comes of.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum SettingsError {
+    #[error("a path of 0 segments sees nothing: use at least 1 for `max_depth`, or leave it out for no limit")]
+    NoDepth,
+}
+
+impl RenderSettings {
+    /// Whether a picture comes of them.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        if self.max_depth == 0 { Err(SettingsError::NoDepth) } else { Ok(()) }
+    }
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        let (filter, techniques) = (PixelFilter::Box, Techniques::default());
+        Self {
+            integrator: Integrator::Path,
+            max_depth: u32::MAX,
+            seed: 0,
+            filter,
+            techniques,
+            lanes: Some(InstructionSet::detect()),
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Why a pixel looks as it does: some of its samples traced again, with all that they find written down.
+//!
+//! The very same waves are traced as for the picture, with the same numbers ([`crate::integrators::record::Record`] only looks on), so what is
+//! told here is what the film got, bit for bit: light by light and bounce by bounce, in parts that add up to the whole.
+//! Start reading at [`explain`].
+
+use crate::core::settings::{Integrator, RenderSettings};
+use crate::driver::renderer::trace_recorded;
+use crate::film::exact_sum::ExactSum;
+use crate::film::light_layer::LightLayer;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::pilot::prepare_guide;
+use crate::integrators::record::{FoundBy, LightSource, Place, TracedPath};
+use crate::prepare::prepared::Prepared;
+use glam::{DVec3, UVec2};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A part of a pixel's light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contribution {
+    pub source: LightSource,
+    /// Surfaces between the light and the eye; 0 is the light itself.
+    pub bounces: u32,
+    pub found_by: FoundBy,
+    /// Of the mean, W·m⁻²·sr⁻¹.
+    pub radiance: DVec3,
+}
+
+/// See [`explain`].
+#[derive(Clone, Debug)]
+pub struct Explanation {
+    pub pixel: UVec2,
+    pub film_size: UVec2,
+    pub samples: Range<u32>,
+    /// One a sample, in order.
+    pub paths: Vec<TracedPath>,
+}
+
+/// Traces samples of a pixel as the picture does. `None` for the classic model, which has no paths.
+///
+/// Light that paths from the lamps bring ([`light_from_lamps`]) is not among it: those belong to no pixel.
+pub fn explain(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    film_size: UVec2,
+    pixel: UVec2,
+    samples: Range<u32>,
+) -> Option<Explanation> {
+    debug_assert!(pixel.cmplt(film_size).all(), "{pixel} of {film_size}");
+    if settings.integrator != Integrator::Path || samples.is_empty() {
+        return None;
+    }
+    let paths = trace_recorded(snapshot, settings, film_size, pixel, samples.clone());
+    Some(Explanation { pixel, film_size, samples, paths })
+}
+
+impl Explanation {
+    /// Samples that are not finite, which the film leaves out.
+    pub fn n_bad(&self) -> usize {
+        self.paths.iter().filter(|path| !path.radiance.is_finite()).count()
+    }
+
+    fn good(&self) -> impl Iterator<Item = &TracedPath> {
+        self.paths.iter().filter(|path| path.radiance.is_finite())
+    }
+
+    /// What a film has of these samples, paths from the lamps aside; W·m⁻²·sr⁻¹.
+    pub fn mean(&self) -> DVec3 {
+        let mut sum = ExactSum::default();
+        self.good().for_each(|path| sum.add(path.radiance));
+        sum.sum / self.good().count().max(1) as f64
+    }
+
+    /// Standard deviation of [`Self::mean`] a channel, if samples were independent; even ones are better.
+    pub fn deviation(&self) -> DVec3 {
+        let (n, mean) = (self.good().count() as f64, self.mean());
+        let squares: DVec3 = self.good().map(|path| (path.radiance.as_dvec3() - mean).powf(2.0)).sum();
+        if n > 1.0 { (squares / (n * (n - 1.0))).map(f64::sqrt) } else { DVec3::INFINITY }
+    }
+
+    /// The parts of [`Self::mean`], by source, bounces and how they were found; what brought nothing is left out.
+    pub fn contributions(&self) -> Vec<Contribution> {
+        let mut sums: BTreeMap<(LightSource, u32, FoundBy), DVec3> = BTreeMap::new();
+        for path in self.good() {
+            for (vertex, bounces) in path.vertices.iter().zip(0..) {
+                let source = match vertex.place {
+                    Place::Surface { object, .. } => LightSource::Object(object),
+                    Place::Sky { .. } => LightSource::Sky,
+                };
+                *sums.entry((source, bounces, FoundBy::Itself)).or_default() += vertex.radiance;
+                if let Some(asked) = &vertex.asked {
+                    *sums.entry((asked.source, bounces + 1, FoundBy::Asking)).or_default() += asked.radiance;
+                }
+            }
+        }
+        let n = self.good().count().max(1) as f64;
+        sums.into_iter()
+            .filter(|(_, sum)| *sum != DVec3::ZERO)
+            .map(|((source, bounces, found_by), sum)| Contribution { source, bounces, found_by, radiance: sum / n })
+            .collect()
+    }
+}
+
+/// What paths from the lamps bring into a pixel, the mean over these samples of the whole picture; W·m⁻²·sr⁻¹.
+///
+/// They may fall anywhere, so all of them are traced. `None` when `stop` said so.
+pub fn light_from_lamps(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    film_size: UVec2,
+    pixel: UVec2,
+    samples: Range<u32>,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<DVec3> {
+    let Some(pass) = CausticPass::of(snapshot, settings, film_size, &snapshot.camera_media()) else {
+        return Some(DVec3::ZERO);
+    };
+    let mut layer = LightLayer::new(film_size, samples.start);
+    let completed = prepare_guide(&pass, stop) && layer.advance(&pass, samples.len() as u32, stop).completed;
+    completed.then(|| layer.mean((pixel.y * film_size.x + pixel.x) as usize))
+}

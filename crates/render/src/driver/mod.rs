@@ -1,0 +1,5 @@
+//! Passes over a film, and questions about a picture.
+
+pub(crate) mod explain;
+pub(crate) mod inspect;
+pub(crate) mod renderer;

@@ -1,0 +1,409 @@
+//! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
+
+use crate::core::counts::RayCounts;
+use crate::core::filter::FilterSampler;
+use crate::core::settings::{Integrator, RenderSettings};
+use crate::core::techniques::Techniques;
+use crate::film::region::Region;
+use crate::film::tiles::{Film, FilmTile};
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::pilot::prepare_guide;
+use crate::integrators::path::{CameraPath, PathWave};
+use crate::integrators::phong::PhongWave;
+use crate::integrators::record::{Record, TracedPath};
+use crate::integrators::simd::camera::{Lens, Pixels};
+use crate::integrators::survival::{at_depth, endless_depth};
+use crate::prepare::prepared::Prepared;
+use crate::sampling::Sampler;
+use crate::shading::paths::PathBatch;
+use firstlight_kdtree::geometry::Ray;
+use glam::{UVec2, Vec2, Vec3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A sample that cannot be right; replay it with the same scene, seed and settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BadSample {
+    pub x: u32,
+    pub y: u32,
+    pub sample: u32,
+}
+
+/// What a call of [`advance`] did.
+#[derive(Clone, Debug, Default)]
+pub struct PassReport {
+    /// False when it was stopped before every tile reached the target.
+    pub completed: bool,
+    pub rays: RayCounts,
+    /// How many samples were left out because they were not finite.
+    pub n_bad: u64,
+    /// The first few of them.
+    pub bad: Vec<BadSample>,
+    /// How many samples are brighter than anything in the scene can be: a fault of the program.
+    pub n_above: u64,
+    /// The first few of them.
+    pub above: Vec<BadSample>,
+}
+
+/// Takes samples until every pixel has `target_spp` of them, or until `stop` says so.
+///
+/// Tiles are spread over the current rayon pool. `stop` is asked often, from all workers; what a wave had not
+/// finished is dropped, never half kept.
+///
+/// # Panics
+/// When [`RenderSettings::check`] or [`Camera::check`](crate::core::camera::Camera::check) refuses what it is given: the picture would be
+/// black, and its error estimate nothing.
+pub fn advance(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    film: &mut Film,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> PassReport {
+    advance_region(snapshot, settings, film, None, target_spp, stop)
+}
+
+/// The same for the tiles of a region alone. Light from the lamps falls where it falls, so the others may get more of it.
+pub fn advance_region(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    film: &mut Film,
+    region: Option<&Region>,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> PassReport {
+    settings.check().unwrap_or_else(|error| panic!("{error}"));
+    snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
+    let size = UVec2::new(film.width(), film.height());
+    let pass = Pass::new(snapshot, settings, size);
+    let Some(caustics) = &pass.caustics else {
+        return advance_tiles(&pass, film, region, target_spp, stop);
+    };
+    if !prepare_guide(caustics, stop) || stop() {
+        return PassReport::default();
+    }
+    film.want_light();
+    let mut total = PassReport { completed: true, ..PassReport::default() };
+    // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
+    while total.completed && film.spp_in(region) < target_spp {
+        let next = (film.spp_in(region) + 1).checked_next_power_of_two();
+        let goal = next.unwrap_or(u32::MAX).min(target_spp);
+        let mut layer = film.light.take().expect("made above");
+        let (tiles, light) =
+            rayon::join(|| advance_tiles(&pass, film, region, goal, stop), || layer.advance(caustics, goal, stop));
+        film.light = Some(layer);
+        total.completed = tiles.completed && light.completed;
+        total.add(tiles);
+        total.rays += light.rays;
+        total.n_bad += light.n_bad;
+        if total.completed {
+            film.record_convergence(|tile| tile.spp == goal);
+        }
+    }
+    total
+}
+
+fn advance_tiles(
+    pass: &Pass,
+    film: &mut Film,
+    region: Option<&Region>,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> PassReport {
+    // One after the other, for whoever is free: divided beforehand, the half with the model in it would be waited for.
+    let mut reports: Vec<(usize, PassReport)> = film
+        .tiles
+        .iter_mut()
+        .enumerate()
+        .filter(|(_, tile)| region.is_none_or(|region| tile.lies_in(region)))
+        .par_bridge()
+        .map_init(Wave::default, |wave, (i, tile)| (i, advance_tile(pass, tile, target_spp, stop, wave)))
+        .collect();
+    reports.sort_unstable_by_key(|(i, _)| *i);
+    let mut total = PassReport { completed: true, ..PassReport::default() };
+    for (_, report) in reports {
+        total.completed &= report.completed;
+        total.add(report);
+    }
+    total
+}
+
+impl PassReport {
+    /// Rays and samples that cannot be right of another.
+    fn add(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.n_bad += other.n_bad;
+        self.bad.extend(other.bad.into_iter().take(MAX_LISTED_BAD - self.bad.len()));
+        self.n_above += other.n_above;
+        self.above.extend(other.above.into_iter().take(MAX_LISTED_BAD - self.above.len()));
+    }
+}
+
+/// How many bad samples a report names.
+const MAX_LISTED_BAD: usize = 16;
+
+/// Paths in flight at once: enough to keep the kernel busy, few enough for their state to stay in the cache.
+const WAVE_SIZE: usize = 4096;
+
+/// Scratch memory of one worker.
+#[derive(Default)]
+struct Wave {
+    path: PathWave,
+    phong: PhongWave,
+    pixels: Pixels,
+    /// Of the tile whose pixels these are.
+    origin: UVec2,
+    size: UVec2,
+    radiance: Vec<Vec3>,
+}
+
+impl Wave {
+    fn of_pixel(pixel: UVec2) -> Self {
+        Self { pixels: Pixels { x: vec![pixel.x], y: vec![pixel.y], local: vec![0] }, ..Self::default() }
+    }
+
+    /// Takes the pixels of a tile; those of one that is as large as the last only have to be moved.
+    fn take_tile(&mut self, origin: UVec2, size: UVec2) {
+        if size != self.size || self.pixels.local.is_empty() {
+            self.pixels = pixels_in_blocks(origin, size);
+        } else {
+            let (x, y) = (origin.x.wrapping_sub(self.origin.x), origin.y.wrapping_sub(self.origin.y));
+            self.pixels.x.iter_mut().for_each(|pixel| *pixel = pixel.wrapping_add(x));
+            self.pixels.y.iter_mut().for_each(|pixel| *pixel = pixel.wrapping_add(y));
+        }
+        (self.origin, self.size) = (origin, size);
+    }
+
+    /// Takes one sample of each of the pixels for each number in `samples`, and adds what they see to `radiance`: those
+    /// of one sample follow each other, `stride` apart from those of the next.
+    fn trace(
+        &mut self,
+        pass: &Pass,
+        samples: Range<u32>,
+        stride: u32,
+        radiance: &mut [Vec3],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<RayCounts> {
+        let Self { path, phong, pixels, .. } = self;
+        let pixels = &*pixels;
+        let slot = |sample: u32| (sample - samples.start) * stride;
+        let camera_paths = samples.clone().flat_map(|sample| {
+            (0..pixels.local.len()).map(move |i| {
+                let (ray, sampler, weight) = pass.camera_ray(UVec2::new(pixels.x[i], pixels.y[i]), sample);
+                CameraPath { ray, sampler, slot: slot(sample) + pixels.local[i], weight }
+            })
+        });
+        let lens = pass.lens();
+        let start = |paths: &mut PathBatch| {
+            if let Some(set) = pass.settings.lanes
+                && lens.is_plain()
+            {
+                for sample in samples.clone() {
+                    lens.start_paths(set, pixels, sample, slot(sample), paths);
+                }
+            } else {
+                camera_paths.for_each(|camera| paths.push(&{ camera.ray }, &camera.into()));
+            }
+        };
+        match pass.settings.integrator {
+            Integrator::Phong => phong.trace(pass.snapshot, pass.settings, &pass.camera_media, start, radiance, stop),
+            Integrator::Path => {
+                let caustics = pass.caustics.as_ref();
+                path.begin_in(pass.snapshot, &pass.camera_media);
+                path.trace(pass.snapshot, pass.settings, caustics, start, radiance, stop)
+            }
+        }
+    }
+}
+
+/// What all tiles share.
+struct Pass<'a> {
+    snapshot: &'a Prepared,
+    settings: &'a RenderSettings,
+    caustics: Option<CausticPass<'a>>,
+    camera_media: Vec<u32>,
+    filter: FilterSampler,
+    size: UVec2,
+    /// Of samples, see [`crate::prepare::bound`].
+    bound: Option<f32>,
+    /// Depth from which on all paths are ended by chance.
+    endless: u32,
+}
+
+impl FilmTile {
+    fn sample_at(&self, local: u32, sample: u32) -> BadSample {
+        let pixel = self.origin + UVec2::new(local % self.size.x, local / self.size.x);
+        BadSample { x: pixel.x, y: pixel.y, sample }
+    }
+}
+
+fn advance_tile(
+    pass: &Pass,
+    tile: &mut FilmTile,
+    target_spp: u32,
+    stop: &(dyn Fn() -> bool + Sync),
+    wave: &mut Wave,
+) -> PassReport {
+    let mut report = PassReport { completed: true, ..PassReport::default() };
+    // Rather than begin what would be dropped: with some hundred tiles left, their first rays alone take milliseconds.
+    if tile.spp < target_spp && stop() {
+        report.completed = false;
+        return report;
+    }
+    let n_pixels = tile.n_pixels();
+    wave.take_tile(tile.origin, tile.size);
+    let mut radiance = std::mem::take(&mut wave.radiance);
+    while tile.spp < target_spp {
+        let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
+        radiance.clear();
+        radiance.resize(n_samples * n_pixels, Vec3::ZERO);
+        let first = tile.next_sample();
+        let samples = first..first + n_samples as u32;
+        let Some(rays) = wave.trace(pass, samples, n_pixels as u32, &mut radiance, stop) else {
+            report.completed = false;
+            break;
+        };
+        report.rays += rays;
+        if let Some(bound) = pass.bound {
+            let bound = at_depth(bound, wave.path.depth, pass.endless);
+            let above = |light: &Vec3| light.is_finite() && light.abs().max_element() > bound;
+            for slot in (0..radiance.len()).filter(|&slot| above(&radiance[slot])) {
+                report.n_above += 1;
+                if report.above.len() < MAX_LISTED_BAD {
+                    report.above.push(tile.sample_at((slot % n_pixels) as u32, first + (slot / n_pixels) as u32));
+                }
+            }
+        }
+        let n_bad_before = tile.bad.len();
+        for (s, sample) in radiance.chunks_exact(n_pixels).enumerate() {
+            tile.add_sample(first + s as u32, sample.iter().copied());
+            if pass.caustics.is_none() {
+                tile.record_convergence(None);
+            }
+        }
+        let new_bad = &tile.bad[n_bad_before..];
+        report.n_bad += new_bad.len() as u64;
+        let room = MAX_LISTED_BAD - report.bad.len();
+        report.bad.extend(new_bad.iter().take(room).map(|&(local, sample)| tile.sample_at(local, sample)));
+    }
+    wave.radiance = radiance;
+    report
+}
+
+/// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film, but for that of paths from
+/// the lamps, which belong to no pixel.
+pub fn replay_sample(snapshot: &Prepared, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
+    let pass = Pass::new(snapshot, settings, film_size);
+    if let Some(caustics) = &pass.caustics {
+        prepare_guide(caustics, &|| false);
+    }
+    let mut radiance = [Vec3::ZERO];
+    let mut wave = Wave::of_pixel(UVec2::new(at.x, at.y));
+    wave.trace(&pass, at.sample..at.sample + 1, 1, &mut radiance, &|| false);
+    radiance[0]
+}
+
+/// Traces samples of one pixel as [`advance`] does, and writes down what their paths find.
+pub(crate) fn trace_recorded(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    film_size: UVec2,
+    pixel: UVec2,
+    samples: Range<u32>,
+) -> Vec<TracedPath> {
+    let pass = Pass::new(snapshot, settings, film_size);
+    if let Some(caustics) = &pass.caustics {
+        prepare_guide(caustics, &|| false);
+    }
+    let mut wave = Wave::of_pixel(pixel);
+    let mut paths = Vec::with_capacity(samples.len());
+    for first in samples.clone().step_by(WAVE_SIZE) {
+        let part = first..samples.end.min(first.saturating_add(WAVE_SIZE as u32));
+        let mut radiance = vec![Vec3::ZERO; part.len()];
+        wave.path.record = Some(Box::new(Record::new(part.clone())));
+        wave.trace(&pass, part, 1, &mut radiance, &|| false);
+        let record = wave.path.record.take().expect("it only looks on");
+        paths.extend(record.finish(&radiance));
+    }
+    paths
+}
+
+/// Bounces of the first sample of each pixel, the mean over blocks of 4 × 4; `None` when `stop` said so.
+pub(crate) fn mean_bounces(
+    snapshot: &Prepared,
+    settings: &RenderSettings,
+    size: UVec2,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<f32>> {
+    const SIDE: u32 = 4;
+    // Paths from the eye alone; light from the lamps has no pixel to begin with.
+    let pass = Pass { caustics: None, ..Pass::new(snapshot, settings, size) };
+    let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
+    let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
+        .into_par_iter()
+        .map_init(Wave::default, |wave, block| {
+            let first = UVec2::new(block % blocks.x, block / blocks.x) * SIDE;
+            let end = (first + SIDE).min(size);
+            wave.pixels = Pixels::default();
+            for (y, x) in (first.y..end.y).flat_map(|y| (first.x..end.x).map(move |x| (y, x))) {
+                wave.pixels.x.push(x);
+                wave.pixels.y.push(y);
+                wave.pixels.local.push(0);
+            }
+            let rays = wave.trace(&pass, 0..1, 1, &mut [Vec3::ZERO], stop)?;
+            Some(rays.bounce as f32 / rays.camera.max(1) as f32)
+        })
+        .collect();
+    let means = means?;
+    let block_of = |i: u32| i % size.x / SIDE + i / size.x / SIDE * blocks.x;
+    Some((0..size.x * size.y).map(|i| means[block_of(i) as usize]).collect())
+}
+
+impl<'a> Pass<'a> {
+    fn new(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2) -> Self {
+        let camera_media = snapshot.camera_media();
+        let caustics = CausticPass::of(snapshot, settings, size, &camera_media);
+        let filter = FilterSampler::new(settings.filter);
+        let bound = (snapshot.tables.radiance_bound)
+            .filter(|_| settings.integrator == Integrator::Path)
+            .map(|bound| bound * filter.scale() * snapshot.tables.bodies.environment_scale(&camera_media));
+        let endless = endless_depth(snapshot);
+        Self { snapshot, settings, caustics, camera_media, filter, size, bound, endless }
+    }
+
+    fn lens(&self) -> Lens<'_> {
+        let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
+        Lens { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
+    }
+
+    /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
+    #[inline]
+    fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
+        let Techniques { even_samples, .. } = self.settings.techniques;
+        let new_sampler = if even_samples { Sampler::of_pixel } else { Sampler::independent };
+        let sampler = new_sampler(self.settings.seed, pixel.x, pixel.y, sample);
+        let (offset, weight) = self.filter.sample(sampler.pair(0));
+        let film = pixel.as_vec2() + offset;
+        let camera = &self.snapshot.camera;
+        let lens = if camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
+        (camera.ray(film, self.size.as_vec2(), lens), sampler, weight)
+    }
+}
+
+/// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.
+fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
+    const SIDE: u32 = 4;
+    let mut pixels = Pixels::default();
+    for top in (0..size.y).step_by(SIDE as usize) {
+        for left in (0..size.x).step_by(SIDE as usize) {
+            for y in top..size.y.min(top + SIDE) {
+                for x in left..size.x.min(left + SIDE) {
+                    pixels.x.push(origin.x + x);
+                    pixels.y.push(origin.y + y);
+                    pixels.local.push(y * size.x + x);
+                }
+            }
+        }
+    }
+    pixels
+}

@@ -1,0 +1,138 @@
+//! Where light from the lamps is summed up: over the whole picture, because it may fall into any pixel.
+//!
+//! Each sample of the picture has its own paths, in batches that are traced by any worker. Sums do not depend on their order, so neither
+//! threads nor portions change them, and layers of different samples add up like films do.
+
+use crate::core::counts::RayCounts;
+use crate::film::exact_sum::ExactSum;
+use crate::integrators::caustics::arrivals::Splat;
+use crate::integrators::caustics::batches::Batches;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::trace::LightWave;
+use glam::{DVec3, UVec2};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Sums over all paths from lamps so far.
+#[derive(Clone, Debug)]
+pub(crate) struct LightLayer {
+    /// Row by row from the top.
+    pub sums: Vec<ExactSum>,
+    batches: Batches,
+    /// Numbers of the batches that were traced, ascending, with gaps between the ranges; new ones lengthen the last.
+    pub done: Vec<Range<u64>>,
+    /// Samples of the whole picture that are complete.
+    pub spp: u32,
+}
+
+/// What [`LightLayer::advance`] did.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LayerReport {
+    pub completed: bool,
+    pub rays: RayCounts,
+    /// How many splats were not finite and were left out.
+    pub n_bad: u64,
+}
+
+impl LightLayer {
+    /// - `first_sample`: number of the sample to begin with.
+    pub fn new(size: UVec2, first_sample: u32) -> Self {
+        Self::in_memory(Vec::new(), size, first_sample)
+    }
+
+    /// The same with `sums`, whatever they are, as its memory.
+    pub fn in_memory(mut sums: Vec<ExactSum>, size: UVec2, first_sample: u32) -> Self {
+        let n_pixels = (size.x * size.y) as usize;
+        sums.truncate(n_pixels);
+        sums.par_iter_mut().for_each(|sum| *sum = ExactSum::default());
+        // By all threads, for new memory is slow when it is first touched.
+        sums.par_extend(rayon::iter::repeat_n(ExactSum::default(), n_pixels - sums.len()));
+        let batches = Batches::of_film(sums.len());
+        let first = batches.of_sample(first_sample);
+        Self { sums, batches, done: std::iter::once(first..first).collect(), spp: 0 }
+    }
+
+    /// Samples of the picture that some of the paths belong to, more than are complete when it was stopped.
+    pub fn begun(&self) -> u32 {
+        self.n_done().div_ceil(u64::from(self.batches.per_sample)) as u32
+    }
+
+    /// Samples of the picture whose paths are all there; what [`Self::spp`] should be.
+    pub fn complete(&self) -> u32 {
+        (self.n_done() / u64::from(self.batches.per_sample)) as u32
+    }
+
+    /// How many batches the samples below `sample` have.
+    pub fn batches_before(&self, sample: u32) -> u64 {
+        self.batches.of_sample(sample)
+    }
+
+    fn n_done(&self) -> u64 {
+        self.done.iter().map(|range| range.end - range.start).sum()
+    }
+
+    /// Mean over the paths so far.
+    pub fn mean(&self, pixel: usize) -> DVec3 {
+        match self.n_done() {
+            0 => DVec3::ZERO,
+            n => self.sums[pixel].sum / (n as f64 * f64::from(self.batches.size)),
+        }
+    }
+
+    /// Adds the paths of a layer of the same picture that has none of these.
+    pub fn merge(&mut self, other: &Self) {
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
+        let last = self.done.last().map_or(0, |range| range.end);
+        let mut done: Vec<Range<u64>> = self.done.iter().chain(&other.done).cloned().collect();
+        done.retain(|range| !range.is_empty());
+        done.sort_by_key(|range| range.start);
+        self.done = done.into_iter().fold(Vec::new(), |mut joined: Vec<Range<u64>>, range| {
+            match joined.last_mut() {
+                Some(last) if last.end == range.start => last.end = range.end,
+                _ => joined.push(range),
+            }
+            joined
+        });
+        if self.done.is_empty() {
+            self.done.push(last..last);
+        }
+        self.spp = self.complete();
+    }
+
+    /// Traces paths until they are enough for `target_spp` samples of the picture, or until `stop` says so; what a
+    /// batch had not finished is dropped.
+    pub fn advance(&mut self, pass: &CausticPass, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> LayerReport {
+        let mut report = LayerReport { completed: true, ..LayerReport::default() };
+        let size = self.batches.size;
+        let mut left = self.batches.of_sample(target_spp).saturating_sub(self.n_done());
+        let mut next = self.done.last().map_or(0, |range| range.end);
+        // Enough at once to keep all workers busy, few enough for a stop to lose little.
+        let at_once = 4 * rayon::current_num_threads() as u64;
+        'all: while left > 0 {
+            let traced: Vec<Option<(Vec<Splat>, RayCounts)>> = (next..next + left.min(at_once))
+                .into_par_iter()
+                .map_init(LightWave::default, |wave, batch| wave.trace(pass, batch * u64::from(size), size, stop))
+                .collect();
+            for batch in traced {
+                let Some((splats, rays)) = batch else {
+                    report.completed = false;
+                    break 'all;
+                };
+                for Splat { pixel, light } in splats {
+                    if light.is_finite() {
+                        self.sums[pixel as usize].add(light);
+                    } else {
+                        report.n_bad += 1;
+                    }
+                }
+                report.rays += rays;
+                (next, left) = (next + 1, left - 1);
+            }
+        }
+        if let Some(last) = self.done.last_mut() {
+            last.end = next;
+        }
+        self.spp = self.complete();
+        report
+    }
+}

@@ -1,0 +1,10 @@
+//! Where light is summed up, how far it is from the truth, and how it becomes a picture.
+
+pub(crate) mod develop;
+pub(crate) mod estimate;
+pub(crate) mod exact_sum;
+pub(crate) mod light_layer;
+pub(crate) mod record;
+pub(crate) mod region;
+pub(crate) mod room;
+pub(crate) mod tiles;

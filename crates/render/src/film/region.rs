@@ -1,0 +1,25 @@
+//! A part of the picture that gets all samples for a while.
+//!
+//! Only whole tiles are advanced, each by its own sample numbers, so a region changes no sample anywhere: it decides
+//! which ones are taken, and since that does not depend on what they find, every mean stays unbiased.
+
+use glam::UVec2;
+
+/// A rectangle of whole tiles of a film, pixels; `end` is excluded. Not empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    pub start: UVec2,
+    pub end: UVec2,
+}
+
+impl Region {
+    pub fn n_pixels(&self) -> u64 {
+        let size = self.end - self.start;
+        u64::from(size.x) * u64::from(size.y)
+    }
+
+    pub fn contains(&self, x: u32, y: u32) -> bool {
+        let at = UVec2::new(x, y);
+        at.cmpge(self.start).all() && at.cmplt(self.end).all()
+    }
+}

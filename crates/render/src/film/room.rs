@@ -1,0 +1,111 @@
+//! Memory for pictures, asked for before it is needed: a picture that is too large is an error with its size, not the
+//! end of the process.
+
+use crate::film::exact_sum::ExactSum;
+use glam::DVec3;
+
+/// A picture that there is no memory for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a picture of {width} x {height} would take {} of memory, and that much cannot be had: make it smaller", size(*.bytes))]
+pub struct NoRoom {
+    /// Pixels.
+    pub width: u32,
+    pub height: u32,
+    pub bytes: u64,
+}
+
+/// Memory that is kept free until it is dropped. Nothing is written to it, so that it takes no time.
+#[derive(Debug)]
+pub struct Room {
+    _memory: Vec<u8>,
+}
+
+/// What a picture is wanted for, besides its pixels on the film: bytes of a pixel on the way to the disk, and there
+/// packed at its worst, in a list that doubles as it grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Four bytes developed, and three packed twice.
+    Png,
+    /// Three numbers, as rows and as channels, and packed.
+    Exr,
+    /// All numbers of the film, as planes and as two channels each, and packed.
+    FilmFile,
+}
+
+impl Purpose {
+    fn bytes_a_pixel(self) -> u64 {
+        match self {
+            Self::Png => 4 + 4 * 3,
+            Self::Exr => 12 + 12 + 2 * 12,
+            Self::FilmFile => 8 * 15 + 12 + 12 + 3 * (4 * 33),
+        }
+    }
+}
+
+/// Memory that a pixel of a film takes: its sums, and its mean at the last power of two.
+pub(crate) const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
+
+/// And for light from the lamps, where there is such light.
+pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>();
+
+/// For what a large picture takes besides, such as the workers' memory: an eighth, and no more than this.
+const MOST_BESIDES: u64 = 32 << 20;
+
+impl Room {
+    /// Keeps memory free for writing or reading files, one after the other.
+    pub fn for_files(width: u32, height: u32, purposes: &[Purpose]) -> Result<Self, NoRoom> {
+        Self::of(width, height, most(purposes))
+    }
+
+    /// Keeps as much memory free as a film takes, and then for what it is wanted for.
+    ///
+    /// - `from_lamps`: there will be light from the lamps on it.
+    pub fn for_film(width: u32, height: u32, from_lamps: bool, purposes: &[Purpose]) -> Result<Self, NoRoom> {
+        let film = BYTES_A_PIXEL + size_of::<f32>() + if from_lamps { LIGHT_BYTES_A_PIXEL } else { 0 };
+        Self::of(width, height, film as u64 + most(purposes))
+    }
+
+    fn of(width: u32, height: u32, bytes_a_pixel: u64) -> Result<Self, NoRoom> {
+        let bytes = (u64::from(width) * u64::from(height)).saturating_mul(bytes_a_pixel);
+        let mut memory = Vec::new();
+        let besides = (bytes / 8).min(MOST_BESIDES);
+        match usize::try_from(bytes.saturating_add(besides)).map(|bytes| memory.try_reserve_exact(bytes)) {
+            Ok(Ok(())) => Ok(Self { _memory: memory }),
+            _ => Err(NoRoom { width, height, bytes }),
+        }
+    }
+}
+
+fn most(purposes: &[Purpose]) -> u64 {
+    purposes.iter().map(|purpose| purpose.bytes_a_pixel()).max().unwrap_or(0)
+}
+
+/// Bytes, for people.
+fn size(bytes: u64) -> String {
+    let mib = bytes as f64 / f64::from(1 << 20);
+    if mib < 1024.0 { format!("{mib:.0} MiB") } else { format!("{:.1} GiB", mib / 1024.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::tiles::Film;
+
+    #[test]
+    fn what_cannot_be_had_is_refused_with_its_size() {
+        let error = Room::for_film(u32::MAX, u32::MAX, true, &[Purpose::FilmFile]).unwrap_err();
+        assert_eq!((error.width, error.height), (u32::MAX, u32::MAX));
+        assert!(error.to_string().contains("GiB"), "{error}");
+        assert!(Room::for_film(64, 64, true, &[Purpose::Png, Purpose::Exr]).is_ok());
+        assert_eq!((size(3 << 20), size(3 << 30)), ("3 MiB".to_owned(), "3.0 GiB".to_owned()));
+    }
+
+    #[test]
+    fn a_film_refuses_what_there_is_no_memory_for() {
+        // More than any address space has, in tiles of which each is small.
+        let error = Film::try_new(1 << 31, 1 << 31).unwrap_err();
+        assert_eq!((error.width, error.height), (1 << 31, 1 << 31));
+        let film = Film::try_new(70, 40).unwrap();
+        assert_eq!((film.width(), film.height(), film.means()), (70, 40, Film::new(70, 40).means()));
+    }
+}

@@ -1,0 +1,32 @@
+//! How many paths from the lamps a picture gets, and how they are divided.
+
+/// Paths from the lamps for each path from the eye: they cost less, and all of them carry light that the others hardly
+/// find.
+const LIGHT_PATHS_PER_PIXEL: f64 = 0.25;
+
+/// Paths in a batch, at most.
+const MAX_BATCH: u32 = 4096;
+
+/// How the paths of one sample of the whole picture are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Batches {
+    pub per_sample: u32,
+    /// Paths in each.
+    pub size: u32,
+}
+
+impl Batches {
+    pub fn of_film(n_pixels: usize) -> Self {
+        let n_paths = (n_pixels as f64 * LIGHT_PATHS_PER_PIXEL).ceil();
+        let per_sample = (n_paths / f64::from(MAX_BATCH)).ceil();
+        Self { per_sample: per_sample as u32, size: (n_paths / per_sample).ceil() as u32 }
+    }
+
+    pub fn paths_per_sample(&self) -> f64 {
+        f64::from(self.per_sample) * f64::from(self.size)
+    }
+
+    pub fn of_sample(&self, sample: u32) -> u64 {
+        u64::from(sample) * u64::from(self.per_sample)
+    }
+}

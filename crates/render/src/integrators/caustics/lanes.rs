@@ -1,0 +1,288 @@
+//! Paths from the lamps, sixteen at a time; [`crate::integrators::caustics::trace`] has the same for one.
+//!
+//! Matte and rough surfaces are known where the true normal shades, for there the eye and the lamp see the same surface;
+//! mirrors and glass are known everywhere.
+
+use crate::core::camera::Camera;
+use crate::integrators::caustics::arrivals::Arrivals;
+use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::simd::shade::{knows, scatters};
+use crate::prepare::casters::NO_CASTER;
+use crate::prepare::material_table::COATED;
+use crate::prepare::surface_table::SurfaceTable;
+use crate::sampling::SamplerLanes;
+use crate::sampling::warp_lanes::uniform_disc;
+use crate::shading::interface::MediumId;
+use crate::shading::medium::MediumSets;
+use crate::shading::paths::{PathBatch, PathLanes};
+use crate::shading::simd::chunk::Chunk;
+use crate::shading::simd::hints::HintLanes;
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
+use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::scatter::{eval, sample, surface_of};
+use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
+use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
+use glam::{Vec2, Vec3};
+
+/// Hits of one kind of material, and where their light and their paths go on.
+pub(crate) struct Group<'a> {
+    pub pass: &'a CausticPass<'a>,
+    /// Up to and with these.
+    pub n_vertices: u32,
+    /// The first sample dimension of the vertices.
+    pub dimension: u32,
+    pub paths: &'a PathBatch,
+    pub hits: &'a HitBatch,
+    /// Of each hit.
+    pub materials: &'a [u32],
+    /// Which of them.
+    pub order: &'a [u32],
+    pub next: &'a mut PathBatch,
+    pub arrivals: &'a mut Arrivals,
+    pub sets: &'a mut MediumSets,
+    /// What the camera is inside of.
+    pub camera: MediumId,
+}
+
+/// Whether [`scatter`] knows what to do with a hit on a material of a kind.
+pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
+    knows(kind) && (!scatters(kind) || surfaces.is_shaded_as_it_is(hit.object))
+}
+
+/// Joins the vertices to the lens, and lets the paths go on.
+pub(crate) fn scatter(set: InstructionSet, kind: usize, group: Group) {
+    match kind {
+        DIFFUSE => dispatch!(set, scatter_diffuse(group: Group)),
+        MIRROR => dispatch!(set, scatter_mirror(group: Group)),
+        GLASS => dispatch!(set, scatter_glass(group: Group)),
+        METAL => dispatch!(set, scatter_metal(group: Group)),
+        _ => dispatch!(set, scatter_coated(group: Group)),
+    }
+}
+
+#[inline(always)]
+fn scatter_diffuse<S: Simd>(s: S, group: Group) {
+    scatter_kind::<S, DIFFUSE>(s, group);
+}
+
+#[inline(always)]
+fn scatter_mirror<S: Simd>(s: S, group: Group) {
+    scatter_kind::<S, MIRROR>(s, group);
+}
+
+#[inline(always)]
+fn scatter_glass<S: Simd>(s: S, group: Group) {
+    scatter_kind::<S, GLASS>(s, group);
+}
+
+#[inline(always)]
+fn scatter_metal<S: Simd>(s: S, group: Group) {
+    scatter_kind::<S, METAL>(s, group);
+}
+
+#[inline(always)]
+fn scatter_coated<S: Simd>(s: S, group: Group) {
+    scatter_kind::<S, COATED>(s, group);
+}
+
+#[inline(always)]
+fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
+    let Group { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals, sets, camera } = group;
+    let scene = pass.scene;
+    for some in order.chunks(LANES) {
+        let chunk = Chunk::of(some);
+        let Chunk { indices, mask } = chunk;
+        let index = Bits::load(s, &indices);
+        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = Place::of(s, &at);
+        let media = chunk.media(scene, paths);
+        let mut throughput = Vector::gather(&paths.throughput, index);
+        if scene.tables.features.media {
+            let distance = Float::gather(&hits.t, index);
+            throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
+        }
+        let (ratio, sampler) = (Float::gather(&paths.pdf, index), paths.sampler_lanes(index));
+        let step = Step { pass, at: &at, place: &place, media: &media, throughput, ratio, sampler, dimension };
+        if scatters(KIND) && n_vertices > 1 {
+            step.join::<KIND>(s, sets, camera, arrivals);
+        }
+        if pass.goes_on(n_vertices) {
+            step.go_on::<KIND>(s, sets, n_vertices, next);
+        }
+    }
+}
+
+/// One vertex of each of sixteen paths.
+struct Step<'a, S: Simd> {
+    pass: &'a CausticPass<'a>,
+    at: &'a At<'a, S>,
+    /// As seen from the lamp's side.
+    place: &'a Place<S>,
+    media: &'a [MediumId; LANES],
+    throughput: Vector<S>,
+    ratio: Float<S>,
+    sampler: SamplerLanes<S>,
+    dimension: u32,
+}
+
+impl<S: Simd> Step<'_, S> {
+    /// Shadow rays to points of the lens, where in the film they end and the light that they bring.
+    #[inline(always)]
+    fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut Arrivals) {
+        let &Self { pass, at, place, media, throughput, ratio, .. } = self;
+        let scene = pass.scene;
+        let Camera { eye, right, up, forward, tan_half_vfov, focus_distance, .. } = scene.camera;
+        let mut open = at.mask;
+        if scene.tables.features.glass {
+            lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane] != camera) << lane));
+        }
+        let [x, y] = self.lens_offsets(s, &scene.camera);
+        let (right, up) = (Vector::splat(s, right), Vector::splat(s, up));
+        let lens = Vector::splat(s, eye) + (right * x + up * y);
+        // The film point as `Camera::film_point` finds it.
+        let way = place.position - lens;
+        let depth = way.dot(Vector::splat(s, forward));
+        open &= depth.is_positive();
+        let scale = pass.size.y / tan_half_vfov;
+        let across = way.dot(right) / depth + x / x.all(focus_distance);
+        let above = way.dot(up) / depth + y / y.all(focus_distance);
+        let film_x = (across * scale + pass.size.x) * 0.5;
+        let film_y = (above * -scale + pass.size.y) * 0.5;
+        let least = depth.all(0.5 - pass.filter.radius());
+        let rim = pass.filter.radius() - 0.5;
+        open &= least.le(film_x) & film_x.lt(depth.all(pass.size.x + rim));
+        open &= least.le(film_y) & film_y.lt(depth.all(pass.size.y + rim));
+        if open == 0 {
+            return;
+        }
+        let distance2 = way.length_squared();
+        let distance = distance2.sqrt();
+        let cos_lens = depth / distance;
+        let seen = Place { wo: way * (depth.all(-1.0) / distance), ..*place };
+        let (cos_o, cos_i) = (seen.wo.dot(place.geometric_normal), place.wo.dot(place.geometric_normal));
+        let surface = surface_of::<S, KIND>(s, at, &seen, sets, media);
+        let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
+        open &= surface.smooth & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
+        let importance = distance2 * (cos_lens * cos_lens * cos_lens);
+        let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
+        let weight = lamp_weight(pass, ratio);
+        let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
+        open &= !light.is_zero();
+        if open == 0 {
+            return;
+        }
+        let light = if scene.tables.features.media {
+            light.times(transmittance(s, sets, open, media, distance))
+        } else {
+            light
+        };
+        let start = place.leaving();
+        arrivals.append(open, [start, lens - start], [film_x, film_y], light);
+    }
+
+    /// Along the axes of the film, metres.
+    #[inline(always)]
+    fn lens_offsets(&self, s: S, camera: &Camera) -> [Float<S>; 2] {
+        let zero = Float::splat(s, 0.0);
+        if camera.lens_radius <= 0.0 {
+            return [zero, zero];
+        }
+        let u = self.sampler.pair(self.dimension + DIM_LENS);
+        if camera.blades < 3 {
+            let [x, y] = uniform_disc(u);
+            return [x * camera.lens_radius, y * camera.lens_radius];
+        }
+        let (mut xs, mut ys) = (u[0].to_array(), u[1].to_array());
+        for (x, y) in xs.iter_mut().zip(&mut ys) {
+            [*x, *y] = camera.lens_offset(Vec2::new(*x, *y)).to_array();
+        }
+        [Float::load(s, &xs), Float::load(s, &ys)]
+    }
+
+    /// Chooses how the paths go on, and whether.
+    #[inline(always)]
+    fn go_on<const KIND: usize>(&self, s: S, sets: &mut MediumSets, n_vertices: u32, next: &mut PathBatch) {
+        let &Self { at, place, ref sampler, dimension, .. } = self;
+        let normal = place.geometric_normal;
+        let surface = surface_of::<S, KIND>(s, at, place, sets, self.media);
+        let bounce = sample::<S, KIND>(at, &surface, place, &HintLanes::NONE, sampler, dimension);
+        let (along, wi) = (bounce.wi.dot(normal), bounce.wi);
+        let smooth = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
+        let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();
+        let mut go_on = at.mask & bounce.go_on;
+        go_on &= (bounce.transmitted & along.is_negative()) | (!bounce.transmitted & reached);
+        // A path that scatters before anything smooth is left to the eye's side.
+        if n_vertices == 1 {
+            go_on &= smooth;
+        }
+        let mut media = *self.media;
+        if let Some(glass) = &surface.glass
+            && KIND == GLASS
+        {
+            for lane in lanes_of(go_on & bounce.transmitted) {
+                media[lane] = glass.beyond[lane];
+                // A path from the other end could not do the same.
+                go_on &= !(Mask::from(media[lane] == self.media[lane]) << lane);
+            }
+        }
+        let (cos_i, cos_o) = (place.wo.dot(normal), along.abs());
+        // What a perfectly smooth surface does to the étendue; 1 where the true normal shades.
+        let gain = ((cos_i * place.normal.dot(wi)) / (along * place.normal.dot(place.wo))).abs();
+        // Radiance is squeezed on its way into glass, flux is not.
+        let white = Vector::splat(s, Vec3::ONE);
+        let mut factor = if KIND == GLASS { white } else { bounce.weight } * gain;
+        let mut ratio = self.ratio / gain;
+        if scatters(KIND) && n_vertices > 1 {
+            let seen = Place { wo: wi, ..*place };
+            let surface = surface_of::<S, KIND>(s, at, &seen, sets, self.media);
+            let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
+            go_on &= smooth | (pdf.is_positive() & cos_i.is_positive());
+            factor = select_vector(smooth, factor, value * (cos_o / (cos_i * bounce.pdf)));
+            ratio = select(smooth, ratio, self.ratio * bounce.pdf * cos_i / (cos_o * pdf));
+        }
+        let mut throughput = self.throughput.times(factor);
+        let mut at_stake = 0;
+        let (one, mut most) = (ratio.all(1.0), ratio.all(1.0));
+        for (kept, lanes) in
+            [(most_kept(at.scene, n_vertices, true), smooth), (most_kept(at.scene, n_vertices, false), !smooth)]
+        {
+            if let Some(kept) = kept {
+                most = select(lanes, one.all(kept), most);
+                at_stake |= go_on & lanes;
+            }
+        }
+        let survival = factor.abs().max_element().min(most);
+        at_stake &= survival.lt(one);
+        if at_stake != 0 {
+            let survives = sampler.single(dimension + DIM_ROULETTE).lt(survival);
+            go_on &= !at_stake | survives;
+            throughput = throughput * select(at_stake, one / survival, one);
+        }
+        go_on &= !throughput.is_zero();
+        if go_on == 0 {
+            return;
+        }
+        let mut origin = place.leaving();
+        if KIND == GLASS {
+            origin = select_vector(bounce.transmitted, place.passing(), origin);
+        }
+        let slot = Bits::splat(s, NO_CASTER);
+        let (position, normal) = (place.position, place.normal);
+        let path = PathLanes { throughput, pdf: ratio, position, normal, sampler: *sampler, slot };
+        next.append(go_on, origin, wi, &path);
+        if let Some(next_media) = &mut next.media {
+            next_media.extend(lanes_of(go_on).map(|lane| media[lane]));
+        }
+    }
+}
+
+/// See [`CausticPass::lamp_weight`].
+#[inline(always)]
+fn lamp_weight<S: Simd>(pass: &CausticPass, ratio: Float<S>) -> Float<S> {
+    let one = ratio.all(1.0);
+    if pass.techniques.mis {
+        return one - one / (ratio * ratio + 1.0);
+    }
+    select(ratio.is_positive(), one, ratio.all(0.0))
+}

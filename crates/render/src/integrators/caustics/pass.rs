@@ -1,0 +1,79 @@
+//! What of a picture paths from the lamps, and paths that are weighed against them, need to know.
+
+use crate::core::camera::Camera;
+use crate::core::filter::PixelFilter;
+use crate::core::settings::{Integrator, RenderSettings};
+use crate::core::techniques::Techniques;
+use crate::integrators::caustics::batches::Batches;
+use crate::prepare::casters::CasterTable;
+use crate::prepare::guide::{Guide, Hints};
+use crate::prepare::prepared::Prepared;
+use crate::shading::track::Track;
+use firstlight_simd::InstructionSet;
+use glam::{UVec2, Vec2, Vec3};
+
+/// What tracing from the lamps and weighting against it need to know of a picture.
+pub(crate) struct CausticPass<'a> {
+    pub scene: &'a Prepared,
+    pub casters: &'a CasterTable,
+    pub techniques: Techniques,
+    pub max_depth: u32,
+    pub seed: u32,
+    /// `None` for one path at a time.
+    pub lanes: Option<InstructionSet>,
+    pub size: Vec2,
+    pub filter: PixelFilter,
+    /// The integral of the filter along one axis.
+    pub filter_norm: f64,
+    /// Paths from the lamps a sample of the whole picture.
+    pub paths_per_sample: f64,
+    /// Of a pixel, on the plane one metre ahead of the eye; square metres.
+    pub pixel_area: f32,
+    /// See [`crate::prepare::bodies::Bodies::around`].
+    pub camera_media: Vec<u32>,
+}
+
+impl<'a> CausticPass<'a> {
+    /// `None` where there is nothing to gain.
+    pub fn of(scene: &'a Prepared, settings: &RenderSettings, size: UVec2, camera_media: &[u32]) -> Option<Self> {
+        let casters = scene.tables.casters.as_ref()?;
+        // Lamp, mirror, matte, eye: three segments.
+        let traces_paths = settings.integrator == Integrator::Path;
+        if !traces_paths || !settings.techniques.caustics || settings.max_depth < 3 {
+            return None;
+        }
+        let Camera { tan_half_vfov, .. } = scene.camera;
+        let pixel = 2.0 * tan_half_vfov / size.y as f32;
+        Some(Self {
+            scene,
+            casters,
+            techniques: settings.techniques,
+            max_depth: settings.max_depth,
+            seed: settings.seed,
+            lanes: settings.lanes,
+            size: size.as_vec2(),
+            filter: settings.filter,
+            filter_norm: settings.filter.integral(),
+            paths_per_sample: Batches::of_film((size.x * size.y) as usize).paths_per_sample(),
+            pixel_area: pixel * pixel,
+            camera_media: camera_media.to_vec(),
+        })
+    }
+}
+
+impl CausticPass<'_> {
+    /// `None` while it is not prepared, and where it knows nothing.
+    #[inline]
+    pub fn guide(&self) -> Option<&Guide> {
+        self.casters.guide.get().filter(|guide| !guide.is_empty())
+    }
+
+    /// Hints for a vertex, where paths from lamps are of no use to the path so far.
+    ///
+    /// - `n_vertices`: up to and with this one.
+    #[inline]
+    pub fn hints(&self, track: &Track, n_vertices: u32, position: Vec3) -> Option<Hints<'_>> {
+        let needs_them = n_vertices > 1 && track.is_lost();
+        needs_them.then(|| self.guide()?.at(position)).flatten()
+    }
+}

@@ -1,0 +1,474 @@
+//! Paths from the lamps, a wave at a time, joined to the lens wherever they meet something that scatters.
+//!
+//! The twin of [`crate::integrators::path`], with light and eye in each other's place. Where shading normals differ from true
+//! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the eye's view is the
+//! one that counts, so surfaces are always looked at from the eye's side here. Hits on what has no shading normals of its
+//! own are taken sixteen at a time ([`crate::integrators::caustics::lanes`]).
+
+use crate::core::counts::RayCounts;
+use crate::core::filter::PixelFilter;
+use crate::core::material::{Material, MaterialId};
+use crate::integrators::caustics::arrivals::{Arrivals, Splat};
+use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, VERTEX_DIMENSIONS, most_kept};
+use crate::integrators::caustics::lanes;
+use crate::integrators::caustics::lanes::Group;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::weight::{Bounce, etendue_gain, is_reversible};
+use crate::integrators::simd::sort::{KINDS, SortedHits};
+use crate::prepare::casters;
+use crate::prepare::casters::LINE_DIMENSIONS;
+use crate::prepare::guide::Trace;
+use crate::sampling::{Sampler, hash_u32};
+use crate::shading::bsdf::{Blend, BsdfSample, Lobe, Scatter};
+use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
+use crate::shading::interface::{Interface, MediumId};
+use crate::shading::medium::MediumSets;
+use crate::shading::paths::{Path, PathBatch};
+use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at, material_of};
+use crate::shading::track::Track;
+use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
+use glam::{Vec2, Vec3};
+
+/// Share of the scouts that glass reflects: more than of the light, so that faint reflections become known as well.
+const SCOUTED_REFLECTION: f32 = 0.25;
+
+/// The state of one path between two vertices.
+#[derive(Clone, Copy)]
+struct LightPath {
+    /// Flux over density.
+    throughput: Vec3,
+    /// Density over that of the same path from the eye, up to the vertex to come; see [`crate::integrators::caustics::weight`].
+    ratio: f32,
+    sampler: Sampler,
+    /// To be hit first; no caster any more after that.
+    aimed_at: u32,
+    media: MediumId,
+}
+
+/// Paths from the lamps are kept like those from the eye, of which they need less: the density is the ratio, and the
+/// slot is what they are aimed at.
+impl From<LightPath> for Path {
+    fn from(LightPath { throughput, ratio, sampler, aimed_at, media }: LightPath) -> Self {
+        let (position, normal) = (Vec3::ZERO, Vec3::ZERO);
+        Self { throughput, pdf: ratio, position, normal, sampler, slot: aimed_at, media, track: Track::default() }
+    }
+}
+
+impl From<Path> for LightPath {
+    fn from(Path { throughput, pdf, sampler, slot, media, .. }: Path) -> Self {
+        Self { throughput, ratio: pdf, sampler, aimed_at: slot, media }
+    }
+}
+
+/// Scratch memory of one worker.
+#[derive(Default)]
+pub(crate) struct LightWave {
+    paths: PathBatch,
+    next: PathBatch,
+    hits: HitBatch,
+    sorted: SortedHits,
+    /// Of the hits of one kind, those that are shaded sixteen at a time, and the others.
+    together: Vec<u32>,
+    apart: Vec<u32>,
+    arrivals: Arrivals,
+    sets: MediumSets,
+    /// What the camera is inside of.
+    camera: MediumId,
+}
+
+/// One of the two kinds of scattering of a surface.
+enum Surface {
+    Lobe(Lobe),
+    Blend(Box<Blend>),
+}
+
+impl LightWave {
+    /// Follows paths `first` to `first + n`; `None` when `stop` said so.
+    pub fn trace(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<(Vec<Splat>, RayCounts)> {
+        let mut splats = Vec::new();
+        let mut counts = RayCounts::default();
+        self.start(pass, first, n);
+        let mut n_vertices = 0;
+        while !self.paths.is_empty() {
+            if stop() {
+                return None;
+            }
+            n_vertices += 1;
+            counts.bounce += self.paths.len() as u64;
+            let tree = &pass.scene.geometry.tree;
+            tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.settle(&self.paths.rays, &mut self.hits);
+            self.scatter(pass, n_vertices);
+            let arrivals = &mut self.arrivals;
+            tree.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
+            counts.shadow += arrivals.rays.len() as u64;
+            for i in 0..arrivals.rays.len() {
+                if !arrivals.occluded[i] {
+                    let (film, light) = arrivals.get(i);
+                    pass.spread(film, light, &mut splats);
+                }
+            }
+            std::mem::swap(&mut self.paths, &mut self.next);
+        }
+        Some((splats, counts))
+    }
+
+    /// Follows paths to where they first scatter, for [`crate::prepare::guide`].
+    pub fn explore(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<Trace>> {
+        let mut traces = Vec::new();
+        self.start(pass, first, n);
+        let mut n_vertices = 0;
+        while !self.paths.is_empty() {
+            if stop() {
+                return None;
+            }
+            n_vertices += 1;
+            pass.scene.geometry.tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.settle(&self.paths.rays, &mut self.hits);
+            self.next.start(self.paths.len(), pass.scene.tables.features.glass, false);
+            for i in 0..self.paths.len() {
+                let path = LightPath::from(self.paths.get(i));
+                let Some(hit) = self.hits.get(i) else { continue };
+                if n_vertices == 1 && pass.casters.of_hit(&hit) != path.aimed_at {
+                    continue;
+                }
+                let ray = self.paths.rays.get(i);
+                let found = surface_at(pass, &mut self.sets, &ray, &hit, path.media);
+                let Some((vertex, material, surface)) = found else { continue };
+                if n_vertices > 1 && surface.is_smooth() {
+                    traces.push(Trace { at: vertex.position, from: ray.origin });
+                }
+                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
+                if let Some((ray, path, true)) = step.go_on(&surface) {
+                    self.next.push(&ray, &path.into());
+                }
+            }
+            std::mem::swap(&mut self.paths, &mut self.next);
+        }
+        Some(traces)
+    }
+
+    fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
+        self.paths.start(n as usize, pass.scene.tables.features.glass, false);
+        self.camera = self.sets.start(pass.scene, &pass.camera_media);
+        let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
+        // One sequence for all paths: its stream is none of any pixel's.
+        let seed = hash_u32(pass.seed ^ 0x6c61_6d70);
+        for i in first..first + u64::from(n) {
+            // A sequence has 2³² points.
+            let sampler = new_sampler(seed, u32::MAX, u32::MAX - (i >> 32) as u32, i as u32);
+            let Some(line) = pass.casters.sample(&pass.scene.tables.lights, &pass.scene.shading.textures, &sampler)
+            else {
+                continue;
+            };
+            let throughput = line.radiance / line.density;
+            if throughput == Vec3::ZERO {
+                continue;
+            }
+            let (ratio, media) = (line.density, MediumId::OUTSIDE);
+            let path = LightPath { throughput, ratio, sampler, aimed_at: line.caster, media };
+            self.paths.push(&line.ray, &path.into());
+        }
+    }
+
+    /// - `n_vertices`: up to and with the ones that were hit now.
+    fn scatter(&mut self, pass: &CausticPass, n_vertices: u32) {
+        let scene = pass.scene;
+        let (surfaces, kinds) = (&scene.surfaces, &scene.tables.materials.kinds);
+        self.next.start(self.paths.len(), scene.tables.features.glass, false);
+        self.arrivals.start(self.paths.len());
+        let set = pass.lanes.unwrap_or(InstructionSet::Portable);
+        self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
+        // Those behind the misses.
+        for kind in 0..KINDS - 1 {
+            self.together.clear();
+            self.apart.clear();
+            for &i in self.sorted.of_kind(kind + 1) {
+                let Some(hit) = self.hits.get(i as usize) else { continue };
+                if n_vertices == 1 && pass.casters.of_hit(&hit) != self.paths.slot[i as usize] {
+                    continue;
+                }
+                let has_lanes = pass.lanes.is_some() && lanes::know(kind, surfaces, &hit);
+                if has_lanes { &mut self.together } else { &mut self.apart }.push(i);
+            }
+            if !self.together.is_empty() {
+                let group = Group {
+                    pass,
+                    n_vertices,
+                    dimension: first_dimension(n_vertices),
+                    paths: &self.paths,
+                    hits: &self.hits,
+                    materials: &self.sorted.materials,
+                    order: &self.together,
+                    next: &mut self.next,
+                    arrivals: &mut self.arrivals,
+                    sets: &mut self.sets,
+                    camera: self.camera,
+                };
+                lanes::scatter(set, kind, group);
+            }
+            for k in 0..self.apart.len() {
+                self.scatter_one(pass, n_vertices, self.apart[k] as usize);
+            }
+        }
+    }
+
+    fn scatter_one(&mut self, pass: &CausticPass, n_vertices: u32, i: usize) {
+        let scene = pass.scene;
+        let mut path = LightPath::from(self.paths.get(i));
+        let Some(hit) = self.hits.get(i) else { return };
+        if scene.tables.features.media {
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
+        }
+        let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, path.media);
+        let Some((vertex, material, surface)) = found else { return };
+        let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
+        if n_vertices > 1
+            && surface.is_smooth()
+            && path.media == self.camera
+            && let Some((ray, film, light)) = step.join(&surface, &self.sets)
+        {
+            self.arrivals.push(&ray, film, light);
+        }
+        if pass.goes_on(n_vertices)
+            && let Some((ray, path, _)) = step.go_on(&surface)
+        {
+            self.next.push(&ray, &path.into());
+        }
+    }
+}
+
+/// The first sample dimension of the vertex that is number `n_vertices`.
+fn first_dimension(n_vertices: u32) -> u32 {
+    LINE_DIMENSIONS + (n_vertices - 1) * VERTEX_DIMENSIONS
+}
+
+/// `None` where the surface is black.
+fn surface_at(
+    pass: &CausticPass,
+    sets: &mut MediumSets,
+    ray: &Ray,
+    hit: &Hit,
+    media: MediumId,
+) -> Option<(Vertex, MaterialId, Surface)> {
+    let scene = pass.scene;
+    let material = material_of(scene, hit);
+    let vertex = Vertex::new(scene, ray, hit, material);
+    let is_blend =
+        matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
+    let glass = scene.tables.features.glass;
+    let mut sides = glass.then(|| Sides::new(scene, sets, media, ray, hit, material, vertex.front));
+    let surface = if is_blend {
+        Surface::Blend(Box::new(blend_at(scene, material, &vertex, sides.as_mut())?))
+    } else {
+        Surface::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?)
+    };
+    Some((vertex, material, surface))
+}
+
+/// One vertex of one path.
+struct Step<'a> {
+    pass: &'a CausticPass<'a>,
+    path: &'a LightPath,
+    /// As seen from the lamp's side.
+    vertex: &'a Vertex,
+    hit: &'a Hit,
+    material: MaterialId,
+    n_vertices: u32,
+    /// Of [`LightWave::explore`], whose paths carry nothing.
+    is_scout: bool,
+}
+
+impl Step<'_> {
+    fn dimension(&self) -> u32 {
+        first_dimension(self.n_vertices)
+    }
+
+    /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
+    fn join(&self, surface: &Surface, sets: &MediumSets) -> Option<(Ray, Vec2, Vec3)> {
+        let &Self { pass, path, .. } = self;
+        let (scene, camera) = (pass.scene, &pass.scene.camera);
+        let lens = if camera.lens_radius > 0.0 {
+            camera.lens_offset(path.sampler.pair(self.dimension() + DIM_LENS))
+        } else {
+            Vec2::ZERO
+        };
+        let origin = camera.lens_point(lens);
+        let (film, cos_lens) = camera.film_point(lens, self.vertex.position - origin, pass.size)?;
+        if !pass.reaches_film(film) {
+            return None;
+        }
+        let to_lamp = self.vertex.wo;
+        let way = origin - self.vertex.position;
+        let distance2 = way.length_squared();
+        let vertex = self.vertex.seen_along(way / distance2.sqrt());
+        // Lamp and eye on the same side of the true surface.
+        if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || !vertex.is_reached_from(to_lamp) {
+            return None;
+        }
+        let (value, pdf) = surface.eval(vertex.wo, to_lamp, vertex.normal);
+        if pdf <= 0.0 {
+            return None;
+        }
+        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), to_lamp.dot(vertex.geometric_normal));
+        if cos_o <= 0.0 || cos_i <= 0.0 {
+            return None;
+        }
+        let weight = pass.lamp_weight(path.ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
+        let importance = cos_o / (distance2 * cos_lens.powi(3) * pass.pixel_area);
+        let mut light = path.throughput * value * (weight * importance / cos_i);
+        if light == Vec3::ZERO {
+            return None;
+        }
+        if scene.tables.features.media {
+            light *= sets.transmittance(path.media, distance2.sqrt());
+        }
+        let start = vertex.leaving(vertex.wo);
+        Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
+    }
+
+    /// Chooses how the path goes on, and whether; and tells whether it does so off something perfectly smooth.
+    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath, bool)> {
+        let &Self { pass, vertex, material, n_vertices, .. } = self;
+        let scene = pass.scene;
+        let mut path = *self.path;
+        let (sampler, dimension) = (path.sampler, self.dimension());
+        let u_lobe = || {
+            let u = sampler.single(dimension + DIM_LOBE);
+            match scene.shading.materials[material as usize] {
+                // Reflected or not, whatever the shares of the light.
+                Material::Glass { .. } if self.is_scout => f32::from(u >= SCOUTED_REFLECTION) * 1.0f32.next_down(),
+                _ => u,
+            }
+        };
+        let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
+        let is_smooth = sample.pdf.is_infinite();
+        // A path that scatters before anything smooth is left to the eye's side.
+        if n_vertices == 1 && !is_smooth {
+            return None;
+        }
+        let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
+        if if sample.through.is_some() { !beyond } else { !vertex.is_reached_from(sample.wi) } {
+            return None;
+        }
+        let before = path.media;
+        if let Some(through) = sample.through {
+            path.media = through.beyond;
+        }
+        let bounce = Bounce {
+            vertex,
+            hit: self.hit,
+            eye: None,
+            wi: sample.wi,
+            pdf: sample.pdf,
+            transmitted: sample.through.is_some(),
+            blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+            before,
+            after: path.media,
+        };
+        if !is_reversible(&bounce) {
+            return None;
+        }
+        let factor = if is_smooth {
+            let gain = etendue_gain(vertex, vertex.wo, sample.wi);
+            path.ratio /= gain;
+            // Radiance is squeezed on its way into glass, flux is not.
+            let squeeze = sample.through.map_or(1.0, |Interface { squeeze, .. }| squeeze);
+            sample.weight * (gain / (squeeze * squeeze))
+        } else {
+            let seen = vertex.seen_along(sample.wi);
+            let (value, pdf) = surface.eval(sample.wi, vertex.wo, seen.normal);
+            let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal), vertex.wo.dot(vertex.geometric_normal));
+            if pdf <= 0.0 || cos_i <= 0.0 || !seen.is_reached_from(vertex.wo) {
+                return None;
+            }
+            path.ratio *= sample.pdf * cos_i / (cos_o * pdf);
+            value * (cos_o / (cos_i * sample.pdf))
+        };
+        let survival = most_kept(scene, n_vertices, is_smooth).map_or(1.0, |most| factor.abs().max_element().min(most));
+        path.throughput *= factor;
+        if survival < 1.0 {
+            if sampler.single(dimension + DIM_ROULETTE) >= survival {
+                return None;
+            }
+            path.throughput /= survival;
+        }
+        if path.throughput == Vec3::ZERO {
+            return None;
+        }
+        path.aimed_at = casters::NO_CASTER;
+        let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        Some((Ray::new(origin, sample.wi), path, is_smooth))
+    }
+}
+
+impl Surface {
+    fn is_smooth(&self) -> bool {
+        match self {
+            Self::Lobe(lobe) => lobe.is_smooth(),
+            Self::Blend(blend) => blend.is_smooth(),
+        }
+    }
+
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        match self {
+            Self::Lobe(lobe) => lobe.eval(wo, wi, normal),
+            Self::Blend(blend) => blend.eval(wo, wi, normal),
+        }
+    }
+
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        match self {
+            Self::Lobe(lobe) => lobe.sample(wo, normal, u_lobe, u),
+            Self::Blend(blend) => blend.sample(wo, normal, u_lobe, u),
+        }
+    }
+}
+
+impl CausticPass<'_> {
+    /// Whether paths may have more than these vertices: one more, and the way to the eye, are two more segments.
+    pub(crate) fn goes_on(&self, n_vertices: u32) -> bool {
+        n_vertices + 2 <= self.max_depth
+    }
+
+    /// Whether any pixel takes notice of a point of the film.
+    fn reaches_film(&self, film: Vec2) -> bool {
+        let radius = self.filter.radius();
+        film.cmpge(Vec2::splat(0.5 - radius)).all() && film.cmplt(self.size + (radius - 0.5)).all()
+    }
+
+    /// Gives light to all pixels whose filter reaches a point of the film.
+    fn spread(&self, film: Vec2, light: Vec3, splats: &mut Vec<Splat>) {
+        let radius = self.filter.radius();
+        let low = (film - radius + 0.5).floor().max(Vec2::ZERO);
+        let high = (film + radius - 0.5).floor().min(self.size - 1.0);
+        let (low, high) = (low.as_uvec2(), high.as_ivec2());
+        let weight = |pixel: u32, at: f32| match self.filter {
+            // Its rim counts on one side, so that no point of the film is lost between two pixels.
+            PixelFilter::Box => 1.0,
+            _ => self.filter.weight(f64::from(at) - f64::from(pixel) - 0.5) / self.filter_norm,
+        };
+        for y in low.y as i32..=high.y {
+            let weight_y = weight(y as u32, film.y);
+            for x in low.x as i32..=high.x {
+                let weight = (weight(x as u32, film.x) * weight_y) as f32;
+                if weight != 0.0 {
+                    splats.push(Splat { pixel: y as u32 * self.size.x as u32 + x as u32, light: weight * light });
+                }
+            }
+        }
+    }
+}

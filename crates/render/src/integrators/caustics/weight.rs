@@ -1,0 +1,133 @@
+//! What a path from the eye must remember so that light found by it can be weighed against a path from a lamp.
+//!
+//! Let a path have vertices x₁ … xₖ from the eye to the lamp point y. Per unit of film, solid angle and étendue, the
+//! ratio of the densities of the two ways to find it is a product of one factor a vertex:
+//!
+//! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area);
+//! - another vertex that scatters: p_lamp · cos θᵢ / (cos θₒ · p_eye), p_lamp and p_eye being its densities towards
+//!   the eye's side (o) and the lamp's side (i);
+//! - a perfectly smooth one: 1, because étendue is kept by mirrors and lenses; or the ratio of the cosines with the true
+//!   and with the shading normal, where these differ, as étendue is kept about the shading normal (Veach 1997,
+//!   section 5.3);
+//! - the lamp: the density per étendue with which the line from y was chosen, times paths from the lamps.
+//!
+//! All cosines but those inside of densities are with the true normal. The factor n² of the medium that the camera is in
+//! is left out: the light of a path that counts lies outside of all glass. Roulette is left out on both sides, which makes the weights no less valid.
+
+use crate::integrators::caustics::pass::CausticPass;
+use crate::prepare::casters::NO_CASTER;
+use crate::shading::interface::MediumId;
+use crate::shading::surface::Vertex;
+use crate::shading::track::Track;
+use firstlight_kdtree::Hit;
+use glam::Vec3;
+
+/// How a path from the eye goes on at a vertex.
+pub(crate) struct Bounce<'a> {
+    pub vertex: &'a Vertex,
+    pub hit: &'a Hit,
+    /// Of the camera ray, if this is its hit.
+    pub eye: Option<Vec3>,
+    pub wi: Vec3,
+    /// Per steradian; infinite if perfectly smooth.
+    pub pdf: f32,
+    pub transmitted: bool,
+    /// The surface is a blend, of which the part is not known.
+    pub blended: bool,
+    pub before: MediumId,
+    pub after: MediumId,
+}
+
+impl CausticPass<'_> {
+    /// - `reverse_pdf`: density with which the vertex, reached from `wi`, would have scattered towards `wo`.
+    #[inline]
+    pub fn follow(&self, track: Track, bounce: &Bounce, reverse_pdf: impl FnOnce() -> f32) -> Track {
+        let Bounce { vertex, wi, .. } = *bounce;
+        let is_smooth = bounce.pdf.is_infinite();
+        if track.ratio.is_nan() && bounce.eye.is_none() || !is_reversible(bounce) {
+            return Track { gain: track.gain, ..Track::default() };
+        }
+        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), wi.dot(vertex.geometric_normal).abs());
+        match (bounce.eye, is_smooth) {
+            (Some(_), true) => Track::default(),
+            (Some(eye), false) => {
+                let cos_lens = -vertex.wo.dot(self.scene.camera.forward);
+                let ratio = self.join_ratio(vertex.position.distance_squared(eye), cos_lens, cos_o, cos_i, bounce.pdf);
+                Track { ratio, caster: NO_CASTER, ..track }
+            }
+            (None, false) => {
+                let ratio = track.ratio * reverse_pdf() * cos_i / (cos_o * bounce.pdf);
+                Track { ratio, caster: NO_CASTER, ..track }
+            }
+            (None, true) => {
+                let ratio = track.ratio / etendue_gain(vertex, wi, vertex.wo);
+                Track { ratio, caster: self.casters.of_hit(bounce.hit), ..track }
+            }
+        }
+    }
+
+    /// The caster that a hit lies on, [`NO_CASTER`] if none.
+    #[inline]
+    pub fn caster_of(&self, hit: &Hit) -> u32 {
+        self.casters.of_hit(hit)
+    }
+
+    /// The factor of the vertex that is joined to the lens, and of the number of paths.
+    #[inline]
+    pub(crate) fn join_ratio(&self, distance2: f32, cos_lens: f32, cos_o: f32, cos_i: f32, pdf: f32) -> f32 {
+        self.density_scale() * distance2 * cos_lens.powi(3) * cos_i / (cos_o * pdf)
+    }
+
+    /// Of paths from the lamps that are joined to a pixel.
+    #[inline]
+    pub fn density_scale(&self) -> f32 {
+        self.paths_per_sample as f32 * self.pixel_area
+    }
+
+    /// Weight of light that a path from the eye finds on a lamp; `None` if paths from lamps do not matter here.
+    #[inline]
+    pub fn eye_weight(&self, track: &Track, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
+        if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
+            return None;
+        }
+        let light = self.scene.tables.lights.light_of(hit.object, hit.prim)?;
+        let cos = vertex.wo.dot(vertex.geometric_normal);
+        let density = self.casters.density(&self.scene.tables.lights, light, track.caster, vertex.position, cos);
+        Some(self.weight_against(track.ratio * density))
+    }
+
+    /// Of the way whose competitor has `ratio` times its density.
+    #[inline]
+    fn weight_against(&self, ratio: f32) -> f32 {
+        if self.techniques.mis { 1.0 / (1.0 + ratio * ratio) } else { f32::from(!(ratio > 0.0)) }
+    }
+
+    /// Weight of a path from the lamp that has `ratio` times the density of the one from the eye.
+    #[inline]
+    pub(crate) fn lamp_weight(&self, ratio: f32) -> f32 {
+        1.0 - self.weight_against(ratio)
+    }
+}
+
+/// Whether a path from the other end could do the same.
+///
+/// Reflection must be seen from the front of the true surface on both ends, and glass that is left must have been
+/// entered: an eye or a lamp inside of glass does not know that it is.
+#[inline]
+pub(crate) fn is_reversible(bounce: &Bounce) -> bool {
+    if bounce.transmitted {
+        !bounce.blended && bounce.before != bounce.after
+    } else {
+        bounce.wi.dot(bounce.vertex.geometric_normal) > 0.0
+    }
+}
+
+/// What a perfectly smooth vertex does to the étendue of light that comes from `wi` and goes to `wo`.
+#[inline]
+pub(crate) fn etendue_gain(vertex: &Vertex, wi: Vec3, wo: Vec3) -> f32 {
+    if vertex.normal == vertex.geometric_normal {
+        return 1.0;
+    }
+    let (shading, geometric) = (vertex.normal, vertex.geometric_normal);
+    ((geometric.dot(wo) * shading.dot(wi)) / (geometric.dot(wi) * shading.dot(wo))).abs()
+}

@@ -1,0 +1,8 @@
+//! From camera rays to light: waves of paths over [`crate::shading`].
+
+pub(crate) mod caustics;
+pub(crate) mod path;
+pub(crate) mod phong;
+pub(crate) mod record;
+pub(crate) mod simd;
+pub(crate) mod survival;

@@ -1,0 +1,393 @@
+//! Unbiased path tracing, a wave of paths at a time.
+//!
+//! All paths of a wave are at the same depth: one batch of rays goes to the kernel, the hits are shaded, one batch of
+//! shadow rays follows, and what survives is the next batch. Light is collected by next-event estimation and by
+//! bounces, combined with the power heuristic (Veach 1997, chapter 9); smooth skies are left to bounces alone, which
+//! find them as well as anything could. Paths end by Russian roulette, never by a limit unless one is asked for.
+//! Materials of one lobe are shaded sixteen hits at a time (`simd/`); what is here shades all others, and whatever is
+//! asked of it as the reference. Start reading at [`PathWave::trace`].
+
+use crate::core::counts::RayCounts;
+use crate::core::material::{Material, MaterialId};
+use crate::core::settings::RenderSettings;
+use crate::core::techniques::Techniques;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::weight::Bounce;
+use crate::integrators::record::Record;
+use crate::integrators::simd::shade::Group;
+use crate::integrators::simd::sort::{KINDS, SortedHits};
+use crate::integrators::simd::{emitters, misses, shade};
+use crate::integrators::survival::{ROULETTE_GRACE, Survival};
+use crate::prepare::prepared::Prepared;
+use crate::sampling::Sampler;
+use crate::shading::bsdf::Scatter;
+use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension};
+use crate::shading::guided::Guided;
+use crate::shading::interface::MediumId;
+use crate::shading::lights::{choose_light_point, emitter_weight, environment_light, light_weight};
+use crate::shading::medium::MediumSets;
+use crate::shading::paths::{Path, PathBatch, ShadowBatch};
+use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at};
+use crate::shading::track::Track;
+use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
+use glam::Vec3;
+
+impl From<CameraPath> for Path {
+    fn from(CameraPath { ray, sampler, slot, weight }: CameraPath) -> Self {
+        Self {
+            throughput: Vec3::splat(weight),
+            pdf: f32::INFINITY,
+            position: ray.origin,
+            normal: ray.dir,
+            sampler,
+            slot,
+            media: MediumId::OUTSIDE,
+            track: Track::default(),
+        }
+    }
+}
+
+/// A camera ray and where its light goes.
+pub(crate) struct CameraPath {
+    pub ray: Ray,
+    pub sampler: Sampler,
+    pub slot: u32,
+    /// Of what it finds, see [`crate::core::filter`].
+    pub weight: f32,
+}
+
+/// Scratch memory of one worker: cleared between waves, never given back.
+#[derive(Default)]
+pub(crate) struct PathWave {
+    paths: PathBatch,
+    next: PathBatch,
+    hits: HitBatch,
+    sorted: SortedHits,
+    shadows: ShadowBatch,
+    sets: MediumSets,
+    camera: MediumId,
+    /// Segments of the longest path of the last wave.
+    pub depth: u32,
+    /// Looks on, when somebody wants to know.
+    pub record: Option<Box<Record>>,
+}
+
+/// Of hits, see [`SortedHits::of_kind`]; the others are one more than [`Material::kind`].
+const MISSES: usize = 0;
+const EMITTERS: usize = 1;
+
+impl PathWave {
+    /// Before the paths of a picture: they begin in these media, see [`crate::prepare::bodies::Bodies::around`].
+    pub fn begin_in(&mut self, scene: &Prepared, camera_media: &[u32]) {
+        self.camera = self.sets.start(scene, camera_media);
+    }
+
+    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// slot.
+    ///
+    /// `None` when `stop` said so; what is in `radiance` then is of no use.
+    pub fn trace(
+        &mut self,
+        scene: &Prepared,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        start: impl FnOnce(&mut PathBatch),
+        radiance: &mut [Vec3],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<RayCounts> {
+        self.paths.start(radiance.len(), scene.tables.features.glass, caustics.is_some());
+        start(&mut self.paths);
+        self.paths.begin_in(self.camera);
+        let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
+        let tree = &scene.geometry.tree;
+        for depth in 1..=settings.max_depth {
+            if self.paths.is_empty() {
+                break;
+            }
+            if stop() {
+                return None;
+            }
+            self.depth = depth;
+            // Camera rays run side by side, and so do the shadow rays of what they hit.
+            let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
+            tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.settle(&self.paths.rays, &mut self.hits);
+            if let Some(record) = &mut self.record {
+                record.see_hits(&self.paths, &self.hits);
+            }
+            self.shade(scene, depth, settings, caustics, radiance);
+            if let Some(record) = &mut self.record {
+                record.see_shaded(&self.paths, radiance);
+            }
+            self.shadows.settle(radiance, |rays, occluded| tree.any_hits(rays, class, occluded));
+            if let Some(record) = &mut self.record {
+                record.see_settled(scene, &self.shadows, radiance);
+            }
+            counts.shadow += self.shadows.rays.len() as u64;
+            counts.bounce += self.next.len() as u64;
+            std::mem::swap(&mut self.paths, &mut self.next);
+        }
+        Some(counts)
+    }
+
+    fn shade(
+        &mut self,
+        scene: &Prepared,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        radiance: &mut [Vec3],
+    ) {
+        self.next.start(self.paths.len(), scene.tables.features.glass, caustics.is_some());
+        self.shadows.start(self.paths.len());
+        let set = settings.lanes.unwrap_or(InstructionSet::Portable);
+        let kinds = &scene.tables.materials.kinds;
+        self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
+        let is_last = depth == settings.max_depth;
+        let emitters_have_lanes = scene.tables.lights.has_lanes()
+            && !scene.tables.materials.textured_emission
+            && scene.tables.environment_sampler.is_none();
+        for kind in 0..KINDS {
+            let order = self.sorted.of_kind(kind);
+            if order.is_empty() {
+                continue;
+            }
+            let group = Group {
+                scene,
+                techniques: &settings.techniques,
+                caustics,
+                depth,
+                dimension: first_dimension(depth),
+                survival: Survival::at(depth, scene, &settings.techniques),
+                paths: &self.paths,
+                hits: &self.hits,
+                materials: &self.sorted.materials,
+                order,
+                next: &mut self.next,
+                shadows: &mut self.shadows,
+                sets: &mut self.sets,
+            };
+            match (settings.lanes, kind) {
+                (Some(set), MISSES) if scene.tables.environment_sampler.is_none() => {
+                    misses::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
+                }
+                (_, MISSES) => self.shade_misses(scene, &settings.techniques, radiance),
+                (Some(set), EMITTERS) if emitters_have_lanes => emitters::shade_emitters(set, group, radiance),
+                // What emits no light and is the end of its path adds nothing.
+                (Some(_), _) if shade::knows(kind - 1) && is_last => {}
+                (Some(set), _) if shade::knows(kind - 1) => shade::shade(set, kind - 1, group),
+                _ => {
+                    for k in 0..order.len() {
+                        let i = self.sorted.of_kind(kind)[k] as usize;
+                        self.shade_one(scene, depth, settings, caustics, i, radiance);
+                    }
+                }
+            }
+        }
+    }
+
+    fn shade_misses(&mut self, scene: &Prepared, techniques: &Techniques, radiance: &mut [Vec3]) {
+        if !scene.tables.features.environment {
+            return;
+        }
+        let always = scene.tables.environment_sampler.is_none();
+        for &i in self.sorted.of_kind(MISSES) {
+            let i = i as usize;
+            let dir = self.paths.rays.get(i).dir;
+            let mut throughput = self.paths.throughput_of(i);
+            if scene.tables.features.glass {
+                throughput *= self.sets.environment_scale(self.paths.media_of(i));
+            }
+            if always {
+                // Bounces alone find it.
+                radiance[self.paths.slot[i] as usize] += throughput * scene.shading.environment.radiance(dir);
+                continue;
+            }
+            let path = self.paths.get(i);
+            radiance[path.slot as usize] += throughput * environment_light(scene, techniques, &path, dir);
+        }
+    }
+
+    /// Shades one hit: the light that it emits, a light sample and a bounce.
+    fn shade_one(
+        &mut self,
+        scene: &Prepared,
+        depth: u32,
+        settings: &RenderSettings,
+        caustics: Option<&CausticPass>,
+        i: usize,
+        radiance: &mut [Vec3],
+    ) {
+        let techniques = &settings.techniques;
+        let mut path = self.paths.get(i);
+        let ray = self.paths.rays.get(i);
+        let Some(hit) = self.hits.get(i) else { return };
+        if scene.tables.features.media {
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
+        }
+        let material = self.sorted.materials[i];
+        let vertex = Vertex::new(scene, &ray, &hit, material);
+        if let Some(emission) = scene.tables.emission[material as usize]
+            && vertex.front
+        {
+            let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, path.media, &hit, &vertex));
+            let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+            let weight = emission.scale * weight;
+            radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
+        }
+        if depth == settings.max_depth {
+            return;
+        }
+        let step = Step {
+            scene,
+            techniques,
+            path: &path,
+            vertex: &vertex,
+            hit: &hit,
+            material,
+            depth,
+            caustics,
+            is_told: false,
+        };
+        let mut sides = (scene.tables.features.glass)
+            .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
+        if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
+            if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
+                self.scatter_told(step, &blend);
+            }
+        } else if let Some(lobe) = lobe_at(scene, material, &vertex, sides.as_mut()) {
+            self.scatter_told(step, &lobe);
+        }
+    }
+
+    /// With hints, where there are any, of where gathered light comes from.
+    #[inline]
+    fn scatter_told(&mut self, step: Step, bsdf: &impl Scatter) {
+        let Step { path, vertex, depth, .. } = step;
+        let hints = step.caustics.filter(|_| bsdf.is_smooth());
+        match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
+            Some(hints) => self.scatter(Step { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
+            None => self.scatter(step, bsdf),
+        }
+    }
+
+    #[inline]
+    fn scatter(&mut self, step: Step, bsdf: &impl Scatter) {
+        if step.scene.tables.features.light_sampling && step.techniques.light_sampling && bsdf.is_smooth() {
+            self.sample_light(&step, bsdf);
+        }
+        self.bounce(&step, bsdf);
+    }
+
+    /// Next-event estimation: one point on one light, and a shadow ray to it.
+    #[inline]
+    fn sample_light(&mut self, step: &Step, bsdf: &impl Scatter) {
+        let &Step { scene, techniques, path, vertex, .. } = step;
+        let (sampler, dimension) = (&path.sampler, step.dimension());
+        let tables = &*scene.tables;
+        let found = choose_light_point(scene, techniques, vertex.position, vertex.normal, sampler, dimension);
+        let Some((target, sample)) = found else { return };
+        let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
+        if pdf <= 0.0 || !vertex.is_reached_from(sample.wi) {
+            return;
+        }
+        let weight = light_weight(techniques, sample.pdf, pdf) / sample.pdf;
+        let mut light = path.throughput * value * sample.radiance * weight;
+        if light == Vec3::ZERO {
+            return;
+        }
+        if tables.features.glass && target.is_none() {
+            light *= self.sets.environment_scale(path.media);
+        }
+        if tables.features.media
+            && let Some(target) = target
+        {
+            light *= self.sets.transmittance(path.media, vertex.position.distance(target));
+        }
+        let origin = vertex.leaving(sample.wi);
+        let shadow_ray = match target {
+            // The direction spans the way to the light's own bounded point, where the ray ends: t = 1, excluded.
+            Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
+            None => Ray::new(origin, sample.wi),
+        };
+        self.shadows.push(&shadow_ray, path.slot, light);
+    }
+
+    /// Chooses how the path goes on, and whether.
+    #[inline]
+    fn bounce(&mut self, step: &Step, bsdf: &impl Scatter) {
+        let &Step { scene, techniques, vertex, material, depth, .. } = step;
+        let mut path = *step.path;
+        let (sampler, dimension) = (path.sampler, step.dimension());
+        let u = sampler.pair(dimension + DIM_DIRECTION);
+        let u_lobe = || sampler.single(dimension + DIM_LOBE);
+        let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
+        // The true surface decides which side a direction leads to.
+        let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
+        if if sample.through.is_some() { !beyond } else { !vertex.is_reached_from(sample.wi) } {
+            return;
+        }
+        path.throughput *= sample.weight;
+        if let Some(through) = sample.through {
+            path.media = through.beyond;
+        }
+        if let Some(pass) = step.caustics {
+            let bounce = Bounce {
+                vertex,
+                hit: step.hit,
+                eye: (depth == 1).then_some(path.position),
+                wi: sample.wi,
+                pdf: sample.pdf,
+                transmitted: sample.through.is_some(),
+                blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+                before: step.path.media,
+                after: path.media,
+            };
+            let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
+            path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+        }
+        if let Some(most_kept) = Survival::at(depth, scene, techniques).share {
+            // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
+            let ior = if scene.tables.features.glass { self.sets.ior(path.media) } else { 1.0 };
+            let most = ROULETTE_GRACE * path.throughput.abs().max_element() * ior * ior * path.track.gain;
+            let survival = most.min(most_kept);
+            if survival < 1.0 {
+                if sampler.single(dimension + DIM_ROULETTE) >= survival {
+                    return;
+                }
+                path.throughput /= survival;
+            }
+        }
+        if path.throughput == Vec3::ZERO {
+            return;
+        }
+        path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
+        path.position = vertex.position;
+        path.normal = vertex.normal;
+        let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
+        self.next.push(&Ray::new(origin, sample.wi), &path);
+    }
+}
+
+/// One vertex of one path.
+struct Step<'a> {
+    scene: &'a Prepared,
+    techniques: &'a Techniques,
+    path: &'a Path,
+    vertex: &'a Vertex,
+    hit: &'a Hit,
+    material: MaterialId,
+    /// Segments so far.
+    depth: u32,
+    caustics: Option<&'a CausticPass<'a>>,
+    /// Some directions are chosen by hints.
+    is_told: bool,
+}
+
+impl Step<'_> {
+    /// The first sample dimension of this vertex.
+    fn dimension(&self) -> u32 {
+        first_dimension(self.depth)
+    }
+}

@@ -1,0 +1,196 @@
+//! What the classic model makes of a material: a matte part, highlights, mirrors and panes.
+
+use crate::core::material::{Material, MaterialId, SMALLEST_ALPHA};
+use crate::integrators::phong::lobe::lobe_pdf;
+use crate::prepare::prepared::Prepared;
+use crate::shading::bsdf::MAX_LOBES;
+use crate::shading::dielectric::fresnel;
+use crate::shading::interface::Interface;
+use crate::shading::lights::power_heuristic;
+use crate::shading::surface::{Sides, Vertex};
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
+
+/// A surface at a point, all inputs looked up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Finish {
+    /// Share of the ambient light that comes back.
+    pub ambient: Vec3,
+    /// Lambert's albedo.
+    pub diffuse: Vec3,
+    shiny: [Shiny; MAX_LOBES],
+    n_shiny: usize,
+}
+
+/// A part that sends rays of its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Shiny {
+    /// A mirror that shows lights as they are.
+    Mirror { tint: Vec3 },
+    /// Lights as highlights, (n + 1) / 2π · cosⁿ about the mirrored direction, which sum up to `tint`; all else
+    /// mirrored, within the same lobe if it is `rough`, else sharply (Whitted 1980). Rough ones find lights both ways.
+    Gloss { tint: Vec3, exponent: f32, rough: bool },
+    /// A smooth interface.
+    Pane { share: f32, interface: Interface },
+}
+
+impl Finish {
+    /// Black.
+    pub fn new() -> Self {
+        let nothing = Shiny::Mirror { tint: Vec3::ZERO };
+        Self { ambient: Vec3::ZERO, diffuse: Vec3::ZERO, shiny: [nothing; MAX_LOBES], n_shiny: 0 }
+    }
+
+    /// Becomes what a material is at a vertex. One finish for many vertices: to make a new one takes longer than this.
+    pub fn look_up(&mut self, scene: &Prepared, id: MaterialId, vertex: &Vertex, mut sides: Option<&mut Sides>) {
+        (self.ambient, self.diffuse, self.n_shiny) = (Vec3::ZERO, Vec3::ZERO, 0);
+        self.add(scene, id, vertex, &mut sides, &mut 0, 1.0);
+    }
+
+    /// - `n_leaves`: transparent parts so far, of whatever weight: they are counted as [`crate::prepare::bodies::Bodies`]
+    ///   does.
+    fn add(
+        &mut self,
+        scene: &Prepared,
+        id: MaterialId,
+        vertex: &Vertex,
+        sides: &mut Option<&mut Sides>,
+        n_leaves: &mut u32,
+        weight: f32,
+    ) {
+        let uv = vertex.uv;
+        let material = &scene.shading.materials[id as usize];
+        let leaf = *n_leaves;
+        *n_leaves += u32::from(material.is_clear());
+        let mut pane = |share: f32| {
+            let sides = sides.as_mut().expect("a scene with glass has media");
+            Shiny::Pane { share, interface: sides.interface(scene, leaf) }
+        };
+        match material {
+            Material::Blend { weight: share, a, b } => {
+                let share = share.eval(scene, uv).clamp(0.0, 1.0);
+                self.add(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share));
+                self.add(scene, *b, vertex, sides, n_leaves, weight * share);
+            }
+            _ if weight == 0.0 => {}
+            Material::Emissive { .. } => {}
+            Material::Diffuse { albedo } => {
+                let albedo = weight * albedo.eval(scene, uv);
+                self.diffuse += albedo;
+                self.ambient += albedo;
+            }
+            Material::Mirror { reflectance } => {
+                self.push(Shiny::Mirror { tint: weight * reflectance.eval(scene, uv) });
+            }
+            Material::Metal { alpha, reflectance, fresnel, .. } => {
+                let tint = weight * fresnel.reflectance(reflectance.eval(scene, uv), vertex.normal.dot(vertex.wo));
+                let alpha = alpha.eval(scene, uv).clamp(0.0, 1.0);
+                self.push(if alpha < SMALLEST_ALPHA {
+                    Shiny::Mirror { tint }
+                } else {
+                    // The lobe about the mirrored direction is four times as wide in solid angle as that of the half
+                    // vector, whose exponent is 2 / α² − 2 (Walter et al. 2007, section 5).
+                    Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
+                });
+            }
+            Material::Glass { .. } => {
+                self.push(pane(weight));
+            }
+            Material::Phong { diffuse, ambient, specular, shininess, transparency, .. } => {
+                let specular = specular.eval(scene, uv).clamp(0.0, 1.0);
+                let opaque = weight * (1.0 - transparency);
+                let diffuse = opaque * (1.0 - specular) * diffuse.eval(scene, uv);
+                self.diffuse += diffuse;
+                self.ambient += *ambient * diffuse;
+                if opaque * specular > 0.0 {
+                    let tint = Vec3::splat(opaque * specular);
+                    self.push(Shiny::Gloss { tint, exponent: *shininess, rough: false });
+                }
+                if *transparency > 0.0 {
+                    self.push(pane(weight * transparency));
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, shiny: Shiny) {
+        self.shiny[self.n_shiny] = shiny;
+        self.n_shiny += 1;
+    }
+
+    pub fn shiny(&self) -> &[Shiny] {
+        &self.shiny[..self.n_shiny]
+    }
+
+    /// Whether lights make a difference to it by themselves.
+    pub fn is_lit(&self) -> bool {
+        let matte = self.diffuse != Vec3::ZERO || self.ambient != Vec3::ZERO;
+        matte || self.shiny().iter().any(|shiny| matches!(shiny, Shiny::Gloss { .. }))
+    }
+
+    /// Radiance towards `wo` from light that brings an irradiance of 1 at a right angle, from `wi`.
+    ///
+    /// - `mirrored`: unit, `wo` mirrored by the normal.
+    /// - `pdf`: per steradian, with which `wi` was found; `None` for light from a point, which no ray finds. Of rough
+    ///   highlights only the share is given that their own rays do not bring.
+    #[inline]
+    pub fn reflected(&self, wi: Vec3, normal: Vec3, mirrored: Vec3, pdf: Option<f32>) -> Vec3 {
+        let cos = normal.dot(wi);
+        if cos <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let mut sum = self.diffuse * (FRAC_1_PI * cos);
+        for shiny in self.shiny() {
+            if let Shiny::Gloss { tint, exponent, rough } = shiny {
+                let lobe = lobe_pdf(*exponent, mirrored.dot(wi));
+                let part = pdf.filter(|_| *rough).map_or(1.0, |pdf| power_heuristic(pdf, lobe));
+                sum += *tint * (lobe * part);
+            }
+        }
+        sum
+    }
+}
+
+/// The share of light that goes straight through a surface, for shadows: refraction is left out. And the way through
+/// its first transparent part, `None` where it has none.
+pub(crate) fn straight_through(
+    scene: &Prepared,
+    id: MaterialId,
+    vertex: &Vertex,
+    sides: &mut Sides,
+) -> Option<(f32, Interface)> {
+    let mut passage = Passage { share: 0.0, n_leaves: 0, first: None };
+    passage.add(scene, id, vertex, sides, 1.0);
+    passage.first.map(|first| (passage.share, first))
+}
+
+struct Passage {
+    share: f32,
+    n_leaves: u32,
+    first: Option<Interface>,
+}
+
+impl Passage {
+    fn add(&mut self, scene: &Prepared, id: MaterialId, vertex: &Vertex, sides: &mut Sides, weight: f32) {
+        let material = &scene.shading.materials[id as usize];
+        let leaf = self.n_leaves;
+        self.n_leaves += u32::from(material.is_clear());
+        let share = match material {
+            Material::Blend { weight: share, a, b } => {
+                let share = share.eval(scene, vertex.uv).clamp(0.0, 1.0);
+                self.add(scene, *a, vertex, sides, weight * (1.0 - share));
+                self.add(scene, *b, vertex, sides, weight * share);
+                return;
+            }
+            _ if weight == 0.0 => return,
+            Material::Glass { .. } => weight,
+            Material::Phong { transparency, .. } if *transparency > 0.0 => weight * transparency,
+            _ => return,
+        };
+        let interface = sides.interface(scene, leaf);
+        // Unbent light meets both sides at the same angle: that of entering counts.
+        let eta = if vertex.front { interface.eta } else { 1.0 / interface.eta };
+        self.share += share * (1.0 - fresnel(vertex.wo.dot(vertex.normal).clamp(0.0, 1.0), eta).0);
+        self.first.get_or_insert(interface);
+    }
+}

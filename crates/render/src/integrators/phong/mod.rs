@@ -1,0 +1,363 @@
+//! The classic local model, a wave of rays at a time: Phong 1975 for light, Whitted 1980 for mirrors and glass.
+//!
+//! Each light adds a matte part, a highlight, and a small share to surfaces that it cannot reach (ambient). Lights
+//! with an area are asked at one new point a sample, so that soft shadows get smooth as samples come in; point lights
+//! cast hard ones. Smooth surroundings add ambient light without shadows. Mirrors and glass send rays of their own,
+//! both reflected and refracted, until their weight is small; then chance decides, which costs no accuracy (Arvo and
+//! Kirk 1990). All rays of a wave that are at the same depth go to the kernel in one batch.
+//!
+//! Hits on matte surfaces, and on those with one part that sends a ray, are shaded sixteen at a time (`simd/classic.rs`). What
+//! is here shades all others, and whatever is asked of it as the reference.
+//!
+//! What it leaves out, and [`crate::integrators::path`] does not: light from one matte surface to another, and caustics.
+//! Start reading at [`PhongWave::trace`].
+
+mod finish;
+pub(crate) mod lobe;
+pub(crate) mod shadow;
+
+use crate::core::counts::RayCounts;
+use crate::core::settings::RenderSettings;
+use crate::integrators::phong::finish::{Finish, Shiny};
+use crate::integrators::phong::lobe::*;
+use crate::integrators::phong::shadow::Shadows;
+use crate::integrators::simd::classic::ClassicGroup;
+use crate::integrators::simd::sort::{KINDS, SortedHits};
+use crate::integrators::simd::{classic, misses};
+use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
+use crate::prepare::prepared::Prepared;
+use crate::shading::dielectric::{fresnel, refract};
+use crate::shading::interface::Interface;
+use crate::shading::lights::power_heuristic;
+use crate::shading::medium::MediumSets;
+use crate::shading::paths::{Path, PathBatch};
+use crate::shading::surface::{Sides, Vertex, material_of};
+use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::{HitBatch, RayClass};
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
+
+/// How much counts of a light that the ray of a path finds, where it is asked for with the density that `asked` tells for a
+/// position.
+#[inline]
+fn share_of_light(path: &Path, asked: impl FnOnce(Vec3) -> f32) -> f32 {
+    match path.pdf {
+        f32::INFINITY => 1.0,
+        LIGHTS_COUNTED => 0.0,
+        pdf => power_heuristic(pdf, asked(path.position)),
+    }
+}
+
+/// Of hits, see [`SortedHits::of_kind`]; the others are one more than the kinds of the table.
+const MISSES: usize = 0;
+
+/// Scratch memory of one worker: cleared between waves, never given back.
+#[derive(Default)]
+pub(crate) struct PhongWave {
+    paths: PathBatch,
+    next: PathBatch,
+    hits: HitBatch,
+    sorted: SortedHits,
+    shadows: Shadows,
+    sets: MediumSets,
+}
+
+impl PhongWave {
+    /// Follows the paths that `start` pushes, one a slot at most, and adds what they find to `radiance`, indexed by
+    /// slot.
+    ///
+    /// The longest path as for paths: a light seen in two mirrors is three segments away. `None` when `stop` said so; what
+    /// is in `radiance` then is of no use.
+    pub fn trace(
+        &mut self,
+        scene: &Prepared,
+        settings: &RenderSettings,
+        camera_media: &[u32],
+        start: impl FnOnce(&mut PathBatch),
+        radiance: &mut [Vec3],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<RayCounts> {
+        self.paths.start(radiance.len(), scene.tables.features.glass, false);
+        start(&mut self.paths);
+        let camera = self.sets.start(scene, camera_media);
+        self.paths.begin_in(camera);
+        let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
+        for depth in 1..=settings.max_depth {
+            if self.paths.is_empty() {
+                break;
+            }
+            if stop() {
+                return None;
+            }
+            let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
+            scene.geometry.tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.settle(&self.paths.rays, &mut self.hits);
+            self.shade(scene, depth, settings, radiance);
+            counts.shadow += self.shadows.cast(scene, &mut self.sets, class, radiance);
+            counts.bounce += self.next.len() as u64;
+            std::mem::swap(&mut self.paths, &mut self.next);
+        }
+        Some(counts)
+    }
+
+    fn shade(&mut self, scene: &Prepared, depth: u32, settings: &RenderSettings, radiance: &mut [Vec3]) {
+        let tables = &*scene.tables;
+        let (n, is_last) = (self.paths.len(), depth == settings.max_depth);
+        self.next.start(n, tables.features.glass, false);
+        let n_lights = tables.lights.n_each() + usize::from(tables.environment_sampler.is_some());
+        self.shadows.start(scene, n_lights, n);
+        let mut finish = Finish::new();
+        let Some(set) = settings.lanes else {
+            for i in 0..n {
+                self.shade_one(scene, depth, is_last, i, &mut finish, radiance);
+            }
+            return;
+        };
+        let kinds = &tables.classic.kinds;
+        self.sorted.sort(set, scene, kinds, &self.hits, n);
+        for kind in 0..KINDS {
+            let order = self.sorted.of_kind(kind);
+            if order.is_empty() {
+                continue;
+            }
+            if kind == MISSES && tables.environment_sampler.is_none() {
+                misses::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
+                continue;
+            }
+            if kind > MISSES && classic::knows_classic(scene, kind as u32 - 1) {
+                // What emits no light and is the end of its path adds nothing.
+                if is_last {
+                    continue;
+                }
+                self.next.make_room(order.len());
+                let group = ClassicGroup {
+                    scene,
+                    kind: kind as u32 - 1,
+                    depth,
+                    dimension: first_dimension(depth),
+                    paths: &self.paths,
+                    hits: &self.hits,
+                    materials: &self.sorted.materials,
+                    order,
+                    next: &mut self.next,
+                    shadows: &mut self.shadows,
+                    sets: &self.sets,
+                    radiance: &mut *radiance,
+                };
+                classic::shade_classic(set, group);
+                continue;
+            }
+            for k in 0..order.len() {
+                let i = self.sorted.of_kind(kind)[k] as usize;
+                self.shade_one(scene, depth, is_last, i, &mut finish, radiance);
+            }
+        }
+    }
+
+    /// Shades one hit or miss.
+    fn shade_one(
+        &mut self,
+        scene: &Prepared,
+        depth: u32,
+        is_last: bool,
+        i: usize,
+        finish: &mut Finish,
+        radiance: &mut [Vec3],
+    ) {
+        let tables = &*scene.tables;
+        let mut path = self.paths.get(i);
+        let ray = self.paths.rays.get(i);
+        let slot = path.slot as usize;
+        let Some(hit) = self.hits.get(i) else {
+            if tables.features.environment {
+                let sampler = &tables.environment_sampler;
+                let share = sampler.as_ref().map_or(1.0, |sampler| share_of_light(&path, |_| sampler.pdf(ray.dir)));
+                let throughput = path.throughput * self.sets.environment_scale(path.media);
+                radiance[slot] += throughput * share * scene.shading.environment.radiance(ray.dir);
+            }
+            return;
+        };
+        if tables.features.media {
+            path.throughput *= self.sets.transmittance(path.media, hit.t);
+        }
+        let material = material_of(scene, &hit);
+        let vertex = Vertex::new(scene, &ray, &hit, material);
+        if let Some(emission) = tables.emission[material as usize]
+            && vertex.front
+        {
+            let share = match tables.lights.light_of(hit.object, hit.prim) {
+                None => 1.0,
+                // A point shows to the eye alone: in a mirror its ball would be a speck that few samples meet.
+                Some(id) if depth > 1 && tables.lights.is_point(id) => 0.0,
+                Some(id) => share_of_light(&path, |from| {
+                    tables.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))
+                }),
+            };
+            radiance[slot] += path.throughput * share * emission.scale * emission.radiance.eval(scene, vertex.uv);
+        }
+        if is_last {
+            return;
+        }
+        let step = Step { scene, path: &path, vertex: &vertex, depth };
+        let glass = tables.features.glass;
+        let mut sides =
+            glass.then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
+        finish.look_up(scene, material, &vertex, sides.as_mut());
+        if finish.is_lit() {
+            radiance[slot] += path.throughput * self.light(&step, finish);
+        }
+        // A pane sends two.
+        self.next.make_room(2 * finish.shiny().len());
+        for (k, shiny) in finish.shiny().iter().enumerate() {
+            self.send(&step, shiny, step.dimension() + DIM_SHINY + 3 * k as u32);
+        }
+    }
+
+    /// Ambient light, returned at once; direct light waits for its shadow rays.
+    fn light(&mut self, step: &Step, finish: &Finish) -> Vec3 {
+        let Step { scene, path, vertex, .. } = *step;
+        let tables = &*scene.tables;
+        let mirrored = vertex.mirrored();
+        let sets = &self.sets;
+        let mut ambient = Vec3::ZERO;
+        let mut direct = |k: usize, radiance: Vec3, wi: Vec3, target: Option<Vec3>, pdf: Option<f32>| {
+            if !vertex.is_reached_from(wi) {
+                return;
+            }
+            let light = path.throughput * finish.reflected(wi, vertex.normal, mirrored, pdf) * radiance;
+            if light != Vec3::ZERO {
+                self.shadows.push(k, path, light, vertex.leaving(wi), wi, target);
+            }
+        };
+        let dimension = step.dimension();
+        tables.lights.sample_each(
+            &scene.shading.textures,
+            vertex.position,
+            &path.sampler,
+            dimension,
+            |k, sample, is_point| {
+                let mut arriving = sample.radiance / sample.pdf;
+                if tables.features.media {
+                    arriving *= sets.transmittance(path.media, vertex.position.distance(sample.target));
+                }
+                ambient += finish.ambient * arriving * (AMBIENT_SHARE * FRAC_1_PI);
+                direct(k, arriving, sample.wi, Some(sample.target), (!is_point).then_some(sample.pdf));
+            },
+        );
+        if let Some(environment) = &tables.environment_sampler {
+            if let Some((wi, pdf)) = environment.sample(path.sampler.pair(dimension + DIM_ENVIRONMENT)) {
+                let arriving = scene.shading.environment.radiance(wi) / pdf;
+                direct(tables.lights.n_each(), arriving, wi, None, Some(pdf));
+            }
+        } else if tables.features.environment {
+            let scale = sets.environment_scale(path.media);
+            ambient += finish.ambient * tables.ambient.radiance(vertex.normal) * scale;
+        }
+        ambient
+    }
+
+    /// The rays of a mirror or of glass.
+    fn send(&mut self, step: &Step, shiny: &Shiny, dimension: u32) {
+        let Step { path, vertex, .. } = *step;
+        match *shiny {
+            Shiny::Mirror { tint } => {
+                self.follow(step, path.throughput * tint, vertex.mirrored(), None, f32::INFINITY, dimension);
+            }
+            Shiny::Gloss { tint, exponent, rough } => {
+                let mirrored = vertex.mirrored();
+                let weight = path.throughput * tint;
+                if rough {
+                    let wi = within_lobe(mirrored, exponent, path.sampler.pair(dimension + 1));
+                    if vertex.is_reached_from(wi) && wi.dot(vertex.normal) > 0.0 {
+                        let pdf = lobe_pdf(exponent, mirrored.dot(wi));
+                        self.follow(step, weight, wi, None, pdf, dimension);
+                        return;
+                    }
+                    // Below the surface there is nothing to see: the middle of the lobe stands in.
+                }
+                self.follow(step, weight, mirrored, None, LIGHTS_COUNTED, dimension);
+            }
+            Shiny::Pane { share, interface } => {
+                let Interface { eta, squeeze, .. } = interface;
+                let (reflectance, cos_t) = fresnel(vertex.normal.dot(vertex.wo).clamp(0.0, 1.0), eta);
+                let weight = path.throughput * share;
+                self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
+                if reflectance < 1.0 {
+                    let wi = refract(vertex.wo, vertex.normal, eta, cos_t);
+                    // Radiance is squeezed into a narrower cone where light is slower: the factor η².
+                    let weight = weight * ((1.0 - reflectance) * squeeze * squeeze);
+                    self.follow(step, weight, wi, Some(interface), f32::INFINITY, dimension + 2);
+                }
+            }
+        }
+    }
+
+    /// - `through`: what is passed through, if anything is; `pdf`: see [`LIGHTS_COUNTED`].
+    fn follow(
+        &mut self,
+        step: &Step,
+        mut weight: Vec3,
+        wi: Vec3,
+        through: Option<Interface>,
+        pdf: f32,
+        dimension: u32,
+    ) {
+        let Step { scene, path, vertex, depth } = *step;
+        // The true surface decides which side a direction leads to.
+        let reached =
+            if through.is_some() { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) };
+        if !reached {
+            return;
+        }
+        let media = through.map_or(path.media, |interface| interface.beyond);
+        // Inside glass weights carry 1/n², which the way out gives back: it must not count as loss.
+        let ior = self.sets.ior(media);
+        let most = weight.abs().max_element() * ior * ior / least_weight(depth);
+        let survival = if depth >= endless_depth(scene) { most.min(ENDLESS_SURVIVAL) } else { most.min(1.0) };
+        if survival < 1.0 {
+            if path.sampler.single(dimension) >= survival {
+                return;
+            }
+            weight /= survival;
+        }
+        let origin = if through.is_some() { vertex.passing(wi) } else { vertex.leaving(wi) };
+        let next = Path { throughput: weight, media, pdf, position: vertex.position, normal: vertex.normal, ..*path };
+        self.next.push(&Ray::new(origin, wi), &next);
+    }
+}
+
+/// One hit of one ray.
+#[derive(Clone, Copy)]
+struct Step<'a> {
+    scene: &'a Prepared,
+    path: &'a Path,
+    vertex: &'a Vertex,
+    /// Segments so far.
+    depth: u32,
+}
+
+impl Step<'_> {
+    /// The first sample dimension of this vertex.
+    fn dimension(&self) -> u32 {
+        first_dimension(self.depth)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+
+    #[test]
+    fn directions_fill_the_lobe_as_its_density_says() {
+        let axis = Vec3::new(0.48, -0.6, 0.64);
+        for exponent in [0.0, 5.0, 80.0, 1e5] {
+            let n = 4096;
+            let cosines = (0..n).map(|i| axis.dot(within_lobe(axis, exponent, Sampler::new(1, 0, 0, i).pair(0))));
+            // ∫ cos · (n + 1) / 2π · cosⁿ dω = (n + 1) / (n + 2).
+            let mean = cosines.sum::<f32>() / n as f32;
+            let expected = (exponent + 1.0) / (exponent + 2.0);
+            assert!((mean - expected).abs() < 1e-3, "{exponent}: {mean} for {expected}");
+        }
+    }
+}

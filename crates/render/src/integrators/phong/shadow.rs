@@ -1,0 +1,221 @@
+//! Shadow rays of the classic model: opaque things block them, glass dims them and leaves them straight.
+//!
+//! Straight light through glass is an approximation that keeps shadows of glass from being black where nothing
+//! gathers caustics. A scene without glass asks for any hit and is done.
+
+use crate::core::material::{Material, MaterialId};
+use crate::integrators::phong::finish::straight_through;
+use crate::prepare::prepared::Prepared;
+use crate::shading::interface::MediumId;
+use crate::shading::medium::MediumSets;
+use crate::shading::paths::{Path, ShadowBatch};
+use crate::shading::simd::lanes::lanes_of;
+use crate::shading::surface::{Sides, Vertex, material_of};
+use firstlight_kdtree::geometry::{Ray, robust};
+use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass, append};
+use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
+use glam::Vec3;
+
+/// Light that arrives unless something is in its way.
+#[derive(Clone, Copy, Debug)]
+struct Arriving {
+    slot: u32,
+    light: Vec3,
+    /// Where the ray ends; `None` for light from outside the scene.
+    target: Option<Vec3>,
+    /// What the ray began inside of, and is now.
+    start: MediumId,
+    media: MediumId,
+}
+
+/// Shadow rays of one wave by what they were sent to, and scratch memory to trace them.
+///
+/// Those of one light lie together and run in much the same direction. Light is added light by light, and for each of them in
+/// the order of the rays.
+#[derive(Default)]
+pub(crate) struct Shadows {
+    /// Of each light, and then of the surroundings; those behind the first `n` are not in use.
+    asked: Vec<Asked>,
+    n: usize,
+    with_targets: bool,
+    rays: RayBatch,
+    lights: Vec<Arriving>,
+    next_rays: RayBatch,
+    next_lights: Vec<Arriving>,
+    hits: HitBatch,
+}
+
+#[derive(Default)]
+struct Asked {
+    batch: ShadowBatch,
+    /// Where rays end, for those that go on behind glass.
+    targets: [Vec<f32>; 3],
+    /// What each ray begins inside of; only where it may go on.
+    media: Vec<MediumId>,
+}
+
+/// Glass surfaces in the way of one shadow ray before it counts as blocked.
+const MAX_CROSSINGS: usize = 32;
+
+impl Shadows {
+    /// Forgets all rays; there is room for `n_hits` to each of `n` lights.
+    pub fn start(&mut self, scene: &Prepared, n: usize, n_hits: usize) {
+        self.n = n;
+        self.with_targets = scene.tables.features.glass;
+        if self.asked.len() < n {
+            self.asked.resize_with(n, Asked::default);
+        }
+        for asked in &mut self.asked[..n] {
+            asked.batch.start(n_hits);
+            asked.media.clear();
+            let least = n_hits + LANES;
+            if self.with_targets && asked.targets[0].len() < least {
+                asked.targets.iter_mut().for_each(|array| array.resize(least, 0.0));
+            }
+        }
+    }
+
+    /// Light for a path that comes from `target` on light `k`, or from outside along `wi`, to `origin`.
+    #[inline]
+    pub fn push(&mut self, k: usize, path: &Path, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
+        let Asked { batch, targets, media } = &mut self.asked[k];
+        if self.with_targets {
+            media.push(path.media);
+            let target = target.unwrap_or(wi);
+            targets.iter_mut().zip(target.to_array()).for_each(|(array, x)| array[batch.rays.len()] = x);
+        }
+        batch.push(&shadow_ray(origin, wi, target), path.slot, light);
+    }
+
+    /// The same for the lanes of `mask`; rays that end at `target` have a `t_max` of 1, the others none.
+    #[allow(clippy::too_many_arguments)]
+    #[inline(always)]
+    pub fn append<S: Simd>(
+        &mut self,
+        k: usize,
+        mask: Mask,
+        rays: [Vector<S>; 2],
+        t_max: Float<S>,
+        slot: Bits<S>,
+        light: Vector<S>,
+        target: Vector<S>,
+        path_media: &[MediumId; LANES],
+    ) {
+        let Asked { batch, targets, media } = &mut self.asked[k];
+        if self.with_targets {
+            media.extend(lanes_of(mask).map(|lane| path_media[lane]));
+            let at = batch.rays.len();
+            append(&mut targets[0], at, mask, target.x);
+            append(&mut targets[1], at, mask, target.y);
+            append(&mut targets[2], at, mask, target.z);
+        }
+        batch.append(mask, rays, t_max, slot, light);
+    }
+
+    /// Adds what arrives to `radiance`; returns how many rays it took.
+    pub fn cast(&mut self, scene: &Prepared, sets: &mut MediumSets, class: RayClass, radiance: &mut [Vec3]) -> u64 {
+        let mut n_rays = 0;
+        for k in 0..self.n {
+            if self.with_targets {
+                n_rays += self.cast_through(k, scene, sets, class, radiance);
+                continue;
+            }
+            let batch = &mut self.asked[k].batch;
+            if !batch.rays.is_empty() {
+                n_rays += batch.rays.len() as u64;
+                batch.settle(radiance, |rays, occluded| scene.geometry.tree.any_hits(rays, class, occluded));
+            }
+        }
+        n_rays
+    }
+
+    /// The same for one light where rays may go on behind what they meet.
+    fn cast_through(
+        &mut self,
+        k: usize,
+        scene: &Prepared,
+        sets: &mut MediumSets,
+        class: RayClass,
+        radiance: &mut [Vec3],
+    ) -> u64 {
+        let Asked { batch, targets, media } = &mut self.asked[k];
+        std::mem::swap(&mut self.rays, &mut batch.rays);
+        self.lights.clear();
+        self.lights.extend((0..self.rays.len()).map(|i| Arriving {
+            slot: batch.slot[i],
+            light: batch.light_of(i),
+            target: (self.rays.t_max[i] == 1.0).then(|| Vec3::new(targets[0][i], targets[1][i], targets[2][i])),
+            start: media[i],
+            media: media[i],
+        }));
+        let mut n_rays = 0;
+        for _ in 0..MAX_CROSSINGS {
+            if self.rays.is_empty() {
+                break;
+            }
+            n_rays += self.rays.len() as u64;
+            scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
+            scene.settle(&self.rays, &mut self.hits);
+            self.next_rays.clear();
+            self.next_lights.clear();
+            for (i, &arriving) in self.lights.iter().enumerate() {
+                let Some(hit) = self.hits.get(i) else {
+                    // As an interface changes radiance on the way of a path; see `medium`.
+                    let (here, there) = (sets.ior(arriving.start), sets.ior(arriving.media));
+                    let ratio = if arriving.target.is_some() { here / there } else { here };
+                    radiance[arriving.slot as usize] += arriving.light * (ratio * ratio);
+                    continue;
+                };
+                let id = material_of(scene, &hit);
+                if !may_be_clear(scene, id) {
+                    continue;
+                }
+                let ray = self.rays.get(i);
+                let distance = hit.t * ray.dir.length();
+                let unit = Ray { dir: ray.dir.normalize(), ..ray };
+                let vertex = Vertex::new(scene, &unit, &Hit { t: distance, ..hit }, id);
+                let mut sides = Sides::new(scene, sets, arriving.media, &ray, &hit, id, vertex.front);
+                let Some((share, interface)) = straight_through(scene, id, &vertex, &mut sides) else { continue };
+                let mut light = arriving.light * share;
+                if !vertex.front {
+                    light *= inside(scene, id, distance);
+                }
+                if light == Vec3::ZERO {
+                    continue;
+                }
+                let origin =
+                    robust::offset_ray_origin(vertex.position, vertex.error, vertex.geometric_normal, unit.dir);
+                self.next_rays.push(&shadow_ray(origin, unit.dir, arriving.target));
+                self.next_lights.push(Arriving { light, media: interface.beyond, ..arriving });
+            }
+            std::mem::swap(&mut self.rays, &mut self.next_rays);
+            std::mem::swap(&mut self.lights, &mut self.next_lights);
+        }
+        n_rays
+    }
+}
+
+#[inline]
+fn shadow_ray(origin: Vec3, wi: Vec3, target: Option<Vec3>) -> Ray {
+    match target {
+        // The direction spans the way to the light's own bounded point, where the ray ends: t = 1, excluded.
+        Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
+        None => Ray::new(origin, wi),
+    }
+}
+
+fn may_be_clear(scene: &Prepared, id: MaterialId) -> bool {
+    match &scene.shading.materials[id as usize] {
+        Material::Glass { .. } | Material::Blend { .. } => true,
+        Material::Phong { transparency, .. } => *transparency > 0.0,
+        _ => false,
+    }
+}
+
+/// What glass leaves of light on its way through (Beer–Lambert).
+fn inside(scene: &Prepared, id: MaterialId, distance: f32) -> Vec3 {
+    match &scene.shading.materials[id as usize] {
+        Material::Glass { absorption, .. } | Material::Phong { absorption, .. } => (-*absorption * distance).exp(),
+        _ => Vec3::ONE,
+    }
+}

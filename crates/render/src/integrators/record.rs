@@ -1,0 +1,154 @@
+//! What happens in a wave of paths, written down from outside: nothing that is traced knows of it.
+//!
+//! A wave adds light to a slot at three moments of each depth: where a path leaves the scene, where it runs into a
+//! lamp, and where a shadow ray gets through. With one path a slot, what a slot gained between two looks is the light
+//! of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
+
+use crate::prepare::prepared::Prepared;
+use crate::shading::paths::{PathBatch, ShadowBatch};
+use firstlight_kdtree::HitBatch;
+use firstlight_kdtree::geometry::Ray;
+use glam::{DVec3, Vec3};
+
+/// Where light came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LightSource {
+    /// An object of the snapshot.
+    Object(u32),
+    /// What is around the scene.
+    Sky,
+    /// A point on the very rim of a lamp, where a ray towards it passes by: whose it is cannot be told.
+    Rim,
+}
+
+/// How it was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FoundBy {
+    /// The path ran into the light.
+    Itself,
+    /// A vertex asked the light for its share.
+    Asking,
+}
+
+/// Where a segment of a path ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// On an object, in the frame of the snapshot, metres.
+    Surface { position: Vec3, object: u32 },
+    /// Outside of the scene, in this direction (unit).
+    Sky { direction: Vec3 },
+}
+
+/// Light that a vertex asked for and got.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asked {
+    pub source: LightSource,
+    /// The point that was asked, or the direction.
+    pub place: Place,
+    /// What the pixel got of it in this sample, W·m⁻²·sr⁻¹.
+    pub radiance: DVec3,
+}
+
+/// The end of one segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathVertex {
+    pub place: Place,
+    /// Of light that arrives here, the share that reaches the pixel.
+    pub throughput: Vec3,
+    /// What the pixel got of the light that shines from here, W·m⁻²·sr⁻¹.
+    pub radiance: DVec3,
+    pub asked: Option<Asked>,
+}
+
+/// One sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TracedPath {
+    pub sample: u32,
+    /// On the lens.
+    pub origin: Vec3,
+    /// One a segment, in order.
+    pub vertices: Vec<PathVertex>,
+    /// What the film gets.
+    pub radiance: Vec3,
+}
+
+/// The paths of one wave, by slot.
+#[derive(Debug, Default)]
+pub struct Record {
+    pub paths: Vec<TracedPath>,
+    /// What each slot had at the last look.
+    before: Vec<Vec3>,
+}
+
+impl Record {
+    /// Of slots for these samples.
+    pub fn new(samples: impl Iterator<Item = u32>) -> Self {
+        let empty = |sample| TracedPath { sample, origin: Vec3::ZERO, vertices: Vec::new(), radiance: Vec3::ZERO };
+        let paths: Vec<TracedPath> = samples.map(empty).collect();
+        Self { before: vec![Vec3::ZERO; paths.len()], paths }
+    }
+
+    /// Where the rays of a depth end, before anything is shaded.
+    pub fn see_hits(&mut self, batch: &PathBatch, hits: &HitBatch) {
+        for i in 0..batch.len() {
+            let path = &mut self.paths[batch.slot[i] as usize];
+            let ray = batch.rays.get(i);
+            if path.vertices.is_empty() {
+                path.origin = ray.origin;
+            }
+            let place = match hits.get(i) {
+                Some(hit) => Place::Surface { position: ray.at(hit.t), object: hit.object },
+                None => Place::Sky { direction: ray.dir.normalize() },
+            };
+            let throughput = batch.throughput_of(i);
+            path.vertices.push(PathVertex { place, throughput, radiance: DVec3::ZERO, asked: None });
+        }
+    }
+
+    /// After shading: whatever a path of this depth has gained shines from where it ended.
+    pub fn see_shaded(&mut self, batch: &PathBatch, radiance: &[Vec3]) {
+        for i in 0..batch.len() {
+            let slot = batch.slot[i] as usize;
+            let gained = self.gained(slot, radiance);
+            let vertex = self.paths[slot].vertices.last_mut().expect("its hit has been seen");
+            vertex.radiance = gained;
+        }
+    }
+
+    /// After the shadow rays: whatever was gained now came along them.
+    pub fn see_settled(&mut self, scene: &Prepared, shadows: &ShadowBatch, radiance: &[Vec3]) {
+        for i in 0..shadows.rays.len() {
+            let slot = shadows.slot[i] as usize;
+            let gained = self.gained(slot, radiance);
+            if gained == DVec3::ZERO {
+                continue;
+            }
+            let ray = shadows.rays.get(i);
+            let (source, place) = if ray.t_max == f32::INFINITY {
+                (LightSource::Sky, Place::Sky { direction: ray.dir.normalize() })
+            } else {
+                // It ends a hair in front of the lamp and met nothing, so whatever comes next is the lamp.
+                let lamp = scene.geometry.tree.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
+                let lamp = lamp.filter(|hit| scene.tables.lights.light_of(hit.object, hit.prim).is_some());
+                let object = lamp.map_or(HitBatch::MISS, |hit| hit.object);
+                let source = lamp.map_or(LightSource::Rim, |hit| LightSource::Object(hit.object));
+                (source, Place::Surface { position: ray.at(ray.t_max), object })
+            };
+            let vertex = self.paths[slot].vertices.last_mut().expect("its hit has been seen");
+            vertex.asked = Some(Asked { source, place, radiance: gained });
+        }
+    }
+
+    /// The wave is over.
+    pub fn finish(mut self, radiance: &[Vec3]) -> Vec<TracedPath> {
+        for (path, radiance) in self.paths.iter_mut().zip(radiance) {
+            path.radiance = *radiance;
+        }
+        self.paths
+    }
+
+    fn gained(&mut self, slot: usize, radiance: &[Vec3]) -> DVec3 {
+        let before = std::mem::replace(&mut self.before[slot], radiance[slot]);
+        radiance[slot].as_dvec3() - before.as_dvec3()
+    }
+}

@@ -1,0 +1,99 @@
+//! Camera rays, sixteen at a time; see `renderer.rs` for one.
+
+use crate::core::camera::Camera;
+use crate::core::filter::FilterSampler;
+use crate::sampling::SamplerLanes;
+use crate::sampling::warp_lanes::uniform_disc;
+use crate::shading::paths::{PathBatch, PathLanes};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
+use glam::{UVec2, Vec3};
+
+/// Pixels whose camera rays are wanted, in the order of the rays.
+#[derive(Default)]
+pub(crate) struct Pixels {
+    pub x: Vec<u32>,
+    pub y: Vec<u32>,
+    /// Place in the tile.
+    pub local: Vec<u32>,
+}
+
+/// What all camera rays of a picture share.
+#[derive(Clone, Copy)]
+pub(crate) struct Lens<'a> {
+    pub camera: &'a Camera,
+    /// Of the film, pixels.
+    pub size: UVec2,
+    pub filter: &'a FilterSampler,
+    pub seed: u32,
+    pub even_samples: bool,
+}
+
+impl Lens<'_> {
+    /// Whether [`Self::start_paths`] knows filter and aperture.
+    pub fn is_plain(&self) -> bool {
+        self.filter.is_plain() && (self.camera.lens_radius == 0.0 || self.camera.blades < 3)
+    }
+
+    /// Appends a path for each of the pixels; `slot` is that of local pixel 0. There must be room.
+    pub fn start_paths(&self, set: InstructionSet, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
+        let lens = *self;
+        dispatch!(set, start(lens: Lens, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch));
+    }
+}
+
+#[inline(always)]
+fn start<S: Simd>(s: S, lens: Lens, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
+    let Camera { eye, right, up, forward, tan_half_vfov, lens_radius, focus_distance, .. } = *lens.camera;
+    let size = lens.size.as_vec2();
+    let one = Float::splat(s, 1.0);
+    let (right, up) = (Vector::splat(s, right), Vector::splat(s, up));
+    let (eye, forward) = (Vector::splat(s, eye), Vector::splat(s, forward));
+    for first in (0..pixels.local.len()).step_by(LANES) {
+        let count = (pixels.local.len() - first).min(LANES);
+        let mask = if count == LANES { Mask::MAX } else { (1 << count) - 1 };
+        let (x, y) = (load_some(s, &pixels.x[first..]), load_some(s, &pixels.y[first..]));
+        let sampler = if lens.even_samples {
+            SamplerLanes::of_pixels(s, lens.seed, [x, y], sample)
+        } else {
+            SamplerLanes::independent(s, lens.seed, [x, y], sample)
+        };
+        let [dx, dy] = lens.filter.sample_lanes(sampler.pair(0));
+        let (x, y) = (x.to_float() + dx, y.to_float() + dy);
+        let x = (x * 2.0 - size.x) / one.all(size.y) * tan_half_vfov;
+        let y = (one.all(size.y) - y * 2.0) / one.all(size.y) * tan_half_vfov;
+        let mut dir = forward + right * x + up * y;
+        let mut origin = eye;
+        if lens_radius > 0.0 {
+            let [px, py] = uniform_disc(sampler.pair(1));
+            let offset = (right * px + up * py).mul_all(lens_radius);
+            dir = dir - offset * (one / one.all(focus_distance));
+            origin = eye + offset;
+        }
+        let dir = dir.normalize();
+        let path = PathLanes {
+            throughput: Vector::splat(s, Vec3::ONE),
+            pdf: one.all(f32::INFINITY),
+            position: origin,
+            normal: dir,
+            sampler,
+            slot: load_some(s, &pixels.local[first..]) + slot,
+        };
+        to.append(mask, origin, dir, &path);
+        if let Some(media) = &mut to.media {
+            media.resize(media.len() + count, Default::default());
+        }
+        if let Some(tracks) = &mut to.tracks {
+            tracks.resize(tracks.len() + count, Default::default());
+        }
+    }
+}
+
+#[inline(always)]
+fn load_some<S: Simd>(s: S, from: &[u32]) -> Bits<S> {
+    if let Some(all) = from.first_chunk() {
+        return Bits::load(s, all);
+    }
+    let mut some = [0; LANES];
+    some[..from.len()].copy_from_slice(from);
+    Bits::load(s, &some)
+}

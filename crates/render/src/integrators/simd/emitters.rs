@@ -1,0 +1,90 @@
+//! Hits on what shines, sixteen at a time.
+
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::simd::shade::Group;
+use crate::shading::simd::chunk::Chunk;
+use crate::shading::simd::lanes::{lanes_of, transmittance};
+use crate::shading::simd::lights::light_weight;
+use crate::shading::simd::place::{At, Place};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select};
+use glam::Vec3;
+
+/// Adds the light of hits on emitters, weighted against light sampling having found it.
+///
+/// Only where [`crate::prepare::light::LightTable::has_lanes`] and no emission is textured, see [`crate::prepare::material_table::MaterialTable`]; `dimension`, `survival`, `next` and
+/// `shadows` of the group are not used.
+pub(crate) fn shade_emitters(set: InstructionSet, group: Group, radiance: &mut [Vec3]) {
+    dispatch!(set, shade_emissive(group: Group, radiance: &mut [Vec3]));
+}
+
+#[inline(always)]
+fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
+    let Group { scene, techniques, caustics, paths, hits, materials, order, sets, .. } = group;
+    let tables = &*scene.tables;
+    for chunk in order.chunks(LANES) {
+        let Chunk { indices, mask } = Chunk::of(chunk);
+        let index = Bits::load(s, &indices);
+        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = Place::of(s, &at);
+        let pdf = Float::gather(&paths.pdf, index);
+        let distance = Float::gather(&hits.t, index);
+        let color = Vector::gather(&tables.materials.color, Bits::gather(materials, index));
+        let mut light = Vector::gather(&paths.throughput, index).times(color);
+        let mut weight = pdf.all(1.0);
+        let rivals = mask & place.front & pdf.lt(pdf.all(f32::INFINITY));
+        if rivals != 0 {
+            let mut id = [0; LANES];
+            let mut known = 0;
+            for lane in lanes_of(rivals) {
+                let i = indices[lane] as usize;
+                if let Some(light) = tables.lights.light_of(hits.object[i], hits.prim[i]) {
+                    id[lane] = light;
+                    known |= 1 << lane;
+                }
+            }
+            let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
+            let id = Bits::load(s, &id);
+            let other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
+            let by_bounce = if techniques.mis {
+                light_weight(techniques, pdf, other)
+            } else {
+                select(other.is_positive(), pdf.all(0.0), pdf.all(1.0))
+            };
+            weight = select(known, by_bounce, weight);
+        }
+        if let Some(pass) = caustics {
+            weight = lamp_weights(s, pass, &at, &place, weight);
+        }
+        light = light * weight;
+        if scene.tables.features.media {
+            let media = indices.map(|i| paths.media_of(i as usize));
+            light = light.times(transmittance(s, sets, mask, &media, distance));
+        }
+        let light = light.to_arrays();
+        for lane in lanes_of(mask & place.front) {
+            let slot = paths.slot[indices[lane] as usize];
+            radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
+        }
+    }
+}
+
+/// Puts in the weights of light that paths from the lamps could have found as well, one at a time.
+#[inline(always)]
+fn lamp_weights<S: Simd>(s: S, pass: &CausticPass, at: &At<S>, place: &Place<S>, weight: Float<S>) -> Float<S> {
+    let mut gathered = 0;
+    for lane in lanes_of(at.mask & place.front) {
+        gathered |= Mask::from(at.paths.track_of(at.indices[lane] as usize).is_gathered()) << lane;
+    }
+    if gathered == 0 {
+        return weight;
+    }
+    let mut weights = weight.to_array();
+    let vertices = place.stored();
+    for lane in lanes_of(gathered) {
+        let i = at.indices[lane] as usize;
+        let hit = at.hits.get(i).expect("a hit is being shaded");
+        let found = pass.eye_weight(&at.paths.track_of(i), at.paths.media_of(i), &hit, &vertices.vertex(lane));
+        weights[lane] = found.unwrap_or(weights[lane]);
+    }
+    Float::load(s, &weights)
+}

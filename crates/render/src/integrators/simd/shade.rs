@@ -1,0 +1,201 @@
+//! Hits on one kind of material: light from lights, and how paths go on.
+
+use crate::core::material::Material;
+use crate::core::techniques::Techniques;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::simd::track::BounceTracks;
+use crate::integrators::survival::{ROULETTE_GRACE, Survival};
+use crate::prepare::material_table::COATED;
+use crate::prepare::prepared::Prepared;
+use crate::shading::dimensions::DIM_ROULETTE;
+use crate::shading::medium::MediumSets;
+use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
+use crate::shading::simd::chunk::{Chunk, iors};
+use crate::shading::simd::hints::HintLanes;
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
+use crate::shading::simd::lights::{LightPoints, light_weight};
+use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::scatter::{eval, sample, surface_of};
+use firstlight_kdtree::HitBatch;
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select, select_vector};
+use glam::Vec3;
+
+/// Hits of one kind of material, and where their light and their paths go on.
+pub(crate) struct Group<'a> {
+    pub scene: &'a Prepared,
+    pub techniques: &'a Techniques,
+    pub caustics: Option<&'a CausticPass<'a>>,
+    /// Segments so far.
+    pub depth: u32,
+    /// The first sample dimension of the vertices.
+    pub dimension: u32,
+    pub survival: Survival,
+    pub paths: &'a PathBatch,
+    pub hits: &'a HitBatch,
+    /// Of each hit.
+    pub materials: &'a [u32],
+    /// Which of them.
+    pub order: &'a [u32],
+    pub next: &'a mut PathBatch,
+    pub shadows: &'a mut ShadowBatch,
+    pub sets: &'a mut MediumSets,
+}
+
+/// Whether [`shade`] knows what to do with hits on materials of a kind.
+pub(crate) fn knows(kind: usize) -> bool {
+    debug_assert_eq!(
+        Material::Mirror { reflectance: crate::core::material::ColorInput::Constant(Vec3::ONE) }.kind(),
+        MIRROR
+    );
+    (DIFFUSE..=METAL).contains(&kind) || kind == COATED
+}
+
+/// Whether light sampling finds something for hits on materials of a kind.
+pub(crate) fn scatters(kind: usize) -> bool {
+    [DIFFUSE, METAL, COATED].contains(&kind)
+}
+
+/// Shades hits on materials of one [`Material::kind`].
+pub(crate) fn shade(set: InstructionSet, kind: usize, group: Group) {
+    match kind {
+        DIFFUSE => dispatch!(set, shade_diffuse(group: Group)),
+        MIRROR => dispatch!(set, shade_mirror(group: Group)),
+        GLASS => dispatch!(set, shade_glass(group: Group)),
+        METAL => dispatch!(set, shade_metal(group: Group)),
+        _ => dispatch!(set, shade_coated(group: Group)),
+    }
+}
+
+#[inline(always)]
+fn shade_diffuse<S: Simd>(s: S, group: Group) {
+    shade_kind::<S, DIFFUSE>(s, group);
+}
+
+#[inline(always)]
+fn shade_mirror<S: Simd>(s: S, group: Group) {
+    shade_kind::<S, MIRROR>(s, group);
+}
+
+#[inline(always)]
+fn shade_glass<S: Simd>(s: S, group: Group) {
+    shade_kind::<S, GLASS>(s, group);
+}
+
+#[inline(always)]
+fn shade_metal<S: Simd>(s: S, group: Group) {
+    shade_kind::<S, METAL>(s, group);
+}
+
+#[inline(always)]
+fn shade_coated<S: Simd>(s: S, group: Group) {
+    shade_kind::<S, COATED>(s, group);
+}
+
+#[inline(always)]
+fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
+    let Group { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
+    let Group { next, shadows, sets, .. } = group;
+    let features = &scene.tables.features;
+    for chunk in order.chunks(LANES) {
+        let chunk = Chunk::of(chunk);
+        let Chunk { indices, mask } = chunk;
+        let index = Bits::load(s, &indices);
+        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = Place::of(s, &at);
+        let mut throughput = Vector::gather(&paths.throughput, index);
+        let sampler = paths.sampler_lanes(index);
+        let slot = Bits::gather(&paths.slot, index);
+        let mut media = chunk.media(scene, paths);
+        if features.media {
+            let distance = Float::gather(&hits.t, index);
+            throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
+        }
+        let surface = surface_of::<S, KIND>(s, &at, &place, sets, &media);
+        let hints = match caustics {
+            Some(pass) if scatters(KIND) => HintLanes::of(s, pass.guide(), depth, &at, &place, mask & surface.smooth),
+            _ => HintLanes::NONE,
+        };
+        if KIND != MIRROR && KIND != GLASS && techniques.light_sampling && features.light_sampling {
+            let lit = mask & surface.smooth;
+            if lit != 0 {
+                let points =
+                    s.call(LightPoints { scene, techniques, mask: lit, place: &place, sampler: &sampler, dimension });
+                let (wi, found) = (points.wi, points.found);
+                let (value, pdf) = eval::<S, KIND>(&surface, &place, wi);
+                let pdf = hints.mixed(s, wi, pdf);
+                let reached = wi.dot(place.reach_normal).is_positive();
+                let found = found & reached & pdf.is_positive();
+                let weight = light_weight(techniques, points.pdf, pdf) / points.pdf;
+                let mut light = throughput.times(value).times(points.radiance) * weight;
+                let found = found & !light.is_zero();
+                if found != 0 {
+                    let origin = place.leaving();
+                    let infinite = points.infinite;
+                    if features.glass && infinite & found != 0 {
+                        let ior = iors(s, scene, sets, infinite & found, &media);
+                        light = light * (ior * ior);
+                    }
+                    if features.media {
+                        let distance = (points.target - place.position).length();
+                        let passed = light.times(transmittance(s, sets, found & !infinite, &media, distance));
+                        light = select_vector(infinite, light, passed);
+                    }
+                    // The direction spans the way to the light's own bounded point, where the ray ends.
+                    let dir = select_vector(infinite, wi, points.target - origin);
+                    let one = Float::splat(s, 1.0);
+                    let t_max = select(infinite, one.all(f32::INFINITY), one);
+                    shadows.append(found, [origin, dir], t_max, slot, light);
+                }
+            }
+        }
+        let bounce = sample::<S, KIND>(&at, &surface, &place, &hints, &sampler, dimension);
+        let bounce = hints.follow::<S, KIND>(s, &surface, &place, &sampler, dimension, bounce);
+        let beyond = bounce.wi.dot(place.geometric_normal).is_negative();
+        let reached = bounce.wi.dot(place.reach_normal).is_positive();
+        let mut go_on = mask & bounce.go_on;
+        go_on &= (bounce.transmitted & beyond) | (!bounce.transmitted & reached);
+        throughput = throughput.times(bounce.weight);
+        if let Some(glass) = &surface.glass
+            && KIND == GLASS
+        {
+            lanes_of(go_on & bounce.transmitted).for_each(|lane| media[lane] = glass.beyond[lane]);
+        }
+        if let Some(most_kept) = survival.share {
+            let ior = iors(s, scene, sets, go_on, &media);
+            let mut most = throughput.abs().max_element() * ior * ior;
+            if paths.tracks.is_some() {
+                let weight = bounce.weight.to_arrays();
+                let mut gains = [1.0; LANES];
+                lanes_of(go_on).for_each(|lane| gains[lane] = hints.track(&at, lane, &weight).gain);
+                most = most * Float::load(s, &gains);
+            }
+            let kept = (most * ROULETTE_GRACE).at_most(most_kept);
+            let at_stake = go_on & kept.lt(kept.all(1.0));
+            if at_stake != 0 {
+                let survives = sampler.single(dimension + DIM_ROULETTE).lt(kept);
+                go_on &= !at_stake | survives;
+                let scale = select(at_stake, kept.all(1.0) / kept, kept.all(1.0));
+                throughput = throughput * scale;
+            }
+        }
+        go_on &= !throughput.is_zero();
+        if go_on == 0 {
+            continue;
+        }
+        let mut origin = place.leaving();
+        if KIND == GLASS {
+            origin = select_vector(bounce.transmitted, place.passing(), origin);
+        }
+        if let (Some(pass), Some(tracks)) = (caustics, &mut next.tracks) {
+            let of_bounce =
+                BounceTracks { pass, at: &at, place: &place, hints: &hints, bounce: &bounce, media: &media };
+            of_bounce.append::<KIND>(s, go_on, depth == 1, tracks);
+        }
+        let pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };
+        let path = PathLanes { throughput, pdf, position: place.position, normal: place.normal, sampler, slot };
+        next.append(go_on, origin, bounce.wi, &path);
+        if let Some(next_media) = &mut next.media {
+            next_media.extend(lanes_of(go_on).map(|lane| media[lane]));
+        }
+    }
+}

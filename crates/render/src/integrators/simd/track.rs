@@ -1,0 +1,120 @@
+//! What sixteen paths must remember against paths from the lamps; see [`crate::integrators::caustics::pass::CausticPass::follow`].
+
+use crate::core::camera::Camera;
+use crate::core::material::Material;
+use crate::integrators::caustics::pass::CausticPass;
+use crate::prepare::casters::NO_CASTER;
+use crate::shading::bsdf::Scatter;
+use crate::shading::interface::MediumId;
+use crate::shading::simd::bounce::Bounce;
+use crate::shading::simd::hints::HintLanes;
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, MIRROR, lanes_of};
+use crate::shading::simd::place::{At, Place};
+use crate::shading::surface::{blend_at, lobe_at};
+use crate::shading::track::Track;
+use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
+
+/// How the paths go on.
+pub(crate) struct BounceTracks<'a, S: Simd> {
+    pub pass: &'a CausticPass<'a>,
+    pub at: &'a At<'a, S>,
+    pub place: &'a Place<S>,
+    pub hints: &'a HintLanes<'a>,
+    pub bounce: &'a Bounce<S>,
+    /// Behind the bounce.
+    pub media: &'a [MediumId; LANES],
+}
+
+impl<S: Simd> BounceTracks<'_, S> {
+    /// Appends the tracks of the lanes of `go_on`; `is_first`: their hits are those of camera rays.
+    #[inline(always)]
+    pub fn append<const KIND: usize>(&self, s: S, go_on: Mask, is_first: bool, tracks: &mut Vec<Track>) {
+        let Self { pass, at, place, hints, bounce, media } = *self;
+        let (wo, wi, normal) = (place.wo, bounce.wi, place.geometric_normal);
+        let (cos_o, along) = (wo.dot(normal), wi.dot(normal));
+        let mut reversible = !bounce.transmitted & along.is_positive();
+        if KIND == GLASS {
+            for lane in lanes_of(go_on & bounce.transmitted) {
+                let before = at.paths.media_of(at.indices[lane] as usize);
+                reversible |= Mask::from(before != media[lane]) << lane;
+            }
+        }
+        let smooth = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
+        let lost = bounce.pdf.all(f32::NAN);
+        let weights = bounce.weight.to_arrays();
+        let mut old = [Track::default(); LANES];
+        lanes_of(go_on).for_each(|lane| old[lane] = hints.track(at, lane, &weights));
+        let ratio = if is_first {
+            let joined = self.join_ratio(s, cos_o, along.abs());
+            select(smooth, lost, joined)
+        } else {
+            let mut ratios = [f32::NAN; LANES];
+            lanes_of(go_on).for_each(|lane| ratios[lane] = old[lane].ratio());
+            let ratio = Float::load(s, &ratios);
+            let scattered = if KIND == MIRROR || KIND == GLASS {
+                lost
+            } else {
+                let known = !ratio.is_nan() & go_on & reversible & !smooth;
+                ratio * self.reverse_pdf::<KIND>(s, known) * along.abs() / (cos_o * bounce.pdf)
+            };
+            select(smooth, ratio / self.etendue_gain(cos_o, along), scattered)
+        };
+        let ratio = select(reversible, ratio, lost);
+        let ratios = ratio.to_array();
+        let gathered = smooth & !ratio.is_nan();
+        tracks.extend(lanes_of(go_on).map(|lane| {
+            let caster = if gathered >> lane & 1 != 0 {
+                pass.caster_of(&at.hits.get(at.indices[lane] as usize).expect("a hit is being shaded"))
+            } else {
+                NO_CASTER
+            };
+            Track::new(ratios[lane], caster, old[lane].gain)
+        }));
+    }
+
+    /// See [`CausticPass::join_ratio`].
+    #[inline(always)]
+    fn join_ratio(&self, s: S, cos_o: Float<S>, cos_i: Float<S>) -> Float<S> {
+        let Camera { forward, .. } = self.at.scene.camera;
+        let cos_lens = -self.place.wo.dot(Vector::splat(s, forward));
+        let distance2 = (self.place.position - self.at.ray_origin()).length_squared();
+        let scale = distance2 * self.pass.density_scale();
+        scale * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * self.bounce.pdf)
+    }
+
+    /// See [`crate::integrators::caustics`]: with which the surface would scatter the other way.
+    #[inline(always)]
+    fn reverse_pdf<const KIND: usize>(&self, s: S, mask: Mask) -> Float<S> {
+        let Self { at, place, bounce, .. } = *self;
+        if KIND == DIFFUSE {
+            let cos = place.normal.dot(place.wo);
+            return select(cos.is_positive(), cos * FRAC_1_PI, cos.all(0.0));
+        }
+        let mut pdfs = [0.0; LANES];
+        if mask != 0 {
+            let (vertices, wi) = (place.stored(), bounce.wi.to_arrays());
+            for lane in lanes_of(mask) {
+                let i = at.indices[lane] as usize;
+                let (vertex, wi) = (vertices.vertex(lane), Vec3::new(wi[0][lane], wi[1][lane], wi[2][lane]));
+                let material = at.materials[i];
+                pdfs[lane] = match at.scene.shading.materials[material as usize] {
+                    Material::Blend { .. } | Material::Phong { .. } => blend_at(at.scene, material, &vertex, None)
+                        .map_or(0.0, |blend| blend.eval(wi, vertex.wo, vertex.normal).1),
+                    _ => lobe_at(at.scene, material, &vertex, None)
+                        .map_or(0.0, |lobe| lobe.eval(wi, vertex.wo, vertex.normal).1),
+                };
+            }
+        }
+        Float::load(s, &pdfs)
+    }
+
+    /// What a perfectly smooth surface does to the étendue; 1 where the true normal shades.
+    #[inline(always)]
+    fn etendue_gain(&self, cos_o: Float<S>, cos_i: Float<S>) -> Float<S> {
+        let Self { place, bounce, .. } = *self;
+        let (wo, wi) = (place.normal.dot(place.wo), place.normal.dot(bounce.wi));
+        ((cos_i * wo) / (cos_o * wi)).abs()
+    }
+}

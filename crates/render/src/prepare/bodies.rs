@@ -1,0 +1,343 @@
+//! The transparent bodies of a scene, smallest last, and which of them a point is inside of.
+//!
+//! A sphere is a body of its own, alone or in a cloud; so are all triangles of one mesh that have the same material.
+//! Quads, triangles and planes of one material are one body together: a box may be made of them.
+//! Each body has as many rows as its material has transparent parts: a blend of two glasses is, for each path, a body of
+//! the one through which the path came in.
+
+use crate::core::material::{Material, MaterialId};
+use crate::core::snapshot::Geometry;
+use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::geometry::robust::offset_ray_origin;
+use firstlight_kdtree::{Hit, SceneTree, Shape};
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// See the [module](self).
+#[derive(Debug, Default)]
+pub(crate) struct Bodies {
+    rows: Vec<Row>,
+    /// Of each object.
+    of_object: Vec<Surface>,
+    deepest: u32,
+}
+
+/// One transparent part of one body.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    ior: f32,
+    absorption: Vec3,
+    /// How many rows the body has.
+    n_leaves: u32,
+}
+
+/// The bodies whose surfaces an object is, by their first rows.
+#[derive(Clone, Debug, Default)]
+enum Surface {
+    #[default]
+    Opaque,
+    /// All of the object.
+    One(u32),
+    /// One a primitive.
+    Cloud(Vec<u32>),
+    /// One a transparent material.
+    Parts(Vec<(MaterialId, u32)>),
+}
+
+/// The surface of a body, met from one side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Boundary {
+    /// Its first row.
+    pub body: u32,
+    /// Met from outside.
+    pub front: bool,
+}
+
+/// A body that has no row yet.
+struct Candidate {
+    material: MaterialId,
+    /// Cubic metres; infinite for a half-space.
+    volume: f64,
+    low: DVec3,
+    high: DVec3,
+    of: Part,
+}
+
+enum Part {
+    Object(u32),
+    Primitive(u32, u32),
+    Slot(u32),
+    /// All open surfaces of a material.
+    Open(Vec<u32>),
+}
+
+/// Bodies among which the deepest nesting is looked for: nested bodies lie within large ones.
+const N_LARGEST: usize = 256;
+
+/// Hits that are followed to tell whether a point is inside of a body.
+const MOST_HITS: usize = 4096;
+
+impl Bodies {
+    pub fn build(geometry: &Geometry, materials: &[Material]) -> Self {
+        let n_leaves: Vec<u32> = (0..materials.len() as u32).map(|id| leaves_of(materials, id).len() as u32).collect();
+        let mut of_object = vec![Surface::Opaque; geometry.objects.len()];
+        if n_leaves.iter().all(|&n| n == 0) {
+            return Self { rows: Vec::new(), of_object, deepest: 0 };
+        }
+        let mut candidates = candidates(geometry, &n_leaves);
+        // Of equally large bodies the later one counts, as if it had been entered last.
+        candidates.sort_by(|a, b| b.volume.total_cmp(&a.volume));
+        let mut rows = Vec::new();
+        for Candidate { material, of, .. } in &candidates {
+            let first = rows.len() as u32;
+            let leaves = leaves_of(materials, *material);
+            let n_leaves = leaves.len() as u32;
+            rows.extend(leaves.into_iter().map(|(ior, absorption)| Row { ior, absorption, n_leaves }));
+            match of {
+                Part::Object(object) => of_object[*object as usize] = Surface::One(first),
+                Part::Open(objects) => {
+                    objects.iter().for_each(|&object| of_object[object as usize] = Surface::One(first));
+                }
+                Part::Primitive(object, prim) => {
+                    let surface = &mut of_object[*object as usize];
+                    if !matches!(surface, Surface::Cloud(_)) {
+                        let Shape::Spheres { tree, .. } = &geometry.tree.shapes()[*object as usize] else { continue };
+                        *surface = Surface::Cloud(vec![0; tree.len()]);
+                    }
+                    if let Surface::Cloud(bodies) = surface {
+                        bodies[*prim as usize] = first;
+                    }
+                }
+                Part::Slot(object) => match &mut of_object[*object as usize] {
+                    Surface::Parts(parts) => parts.push((*material, first)),
+                    surface => *surface = Surface::Parts(vec![(*material, first)]),
+                },
+            }
+        }
+        let deepest = deepest(&candidates);
+        Self { rows, of_object, deepest }
+    }
+
+    /// How many bodies lie within each other, at most, as far as their boxes tell.
+    pub fn deepest(&self) -> u32 {
+        self.deepest
+    }
+
+    /// Whether some surface of an object is that of a body.
+    pub fn is_transparent(&self, object: u32) -> bool {
+        !matches!(self.of_object[object as usize], Surface::Opaque)
+    }
+
+    /// The boundary that a hit is on.
+    ///
+    /// - `material`: of the hit, transparent or a blend with a transparent part.
+    #[inline]
+    pub fn boundary(&self, object: u32, prim: u32, material: MaterialId, front: bool) -> Boundary {
+        let body = match &self.of_object[object as usize] {
+            Surface::One(body) => *body,
+            Surface::Cloud(bodies) => bodies[prim as usize],
+            Surface::Parts(parts) => parts.iter().find(|(id, _)| *id == material).map_or(0, |(_, body)| *body),
+            Surface::Opaque => 0,
+        };
+        Boundary { body, front }
+    }
+
+    /// Index of refraction of a body whose surface is passed through one transparent part of its material.
+    pub fn ior(&self, boundary: Boundary, leaf: u32) -> f32 {
+        self.rows[(boundary.body + leaf) as usize].ior
+    }
+
+    /// Index of refraction, and absorption per metre.
+    pub fn medium(&self, row: u32) -> (f32, Vec3) {
+        let Row { ior, absorption, .. } = self.rows[row as usize];
+        (ior, absorption)
+    }
+
+    /// n² of the medium in which these bodies overlap.
+    pub fn environment_scale(&self, rows: &[u32]) -> f32 {
+        rows.last().map_or(1.0, |&row| self.medium(row).0.powi(2))
+    }
+
+    pub fn n_leaves(&self, body: u32) -> u32 {
+        self.rows[body as usize].n_leaves
+    }
+
+    /// Rows of the bodies that a point is inside of, ascending; a body that winds around it twice is there twice. Of a
+    /// body with several transparent parts, the first.
+    ///
+    /// Costs a look at each transparent object, and rays through those whose box has the point.
+    pub fn around(&self, geometry: &Geometry, point: Vec3) -> Vec<u32> {
+        let mut rows = Vec::new();
+        let mut open: Vec<(u32, Vec<Shape>)> = Vec::new();
+        for (object, surface) in self.of_object.iter().enumerate() {
+            let shape = &geometry.tree.shapes()[object];
+            match (surface, shape) {
+                (Surface::Opaque, _) => {}
+                (Surface::One(body), Shape::Sphere { center, radius }) => {
+                    let inside = is_inside(point.as_dvec3(), center.as_dvec3(), f64::from(*radius));
+                    rows.extend(inside.then_some(*body));
+                }
+                (Surface::Cloud(bodies), Shape::Spheres { tree, world_from_object }) => {
+                    let local = world_from_object.inverse().transform_point3(point).as_dvec3();
+                    rows.extend((0..tree.len() as u32).filter_map(|prim| {
+                        let (center, radius) = tree.sphere(prim);
+                        is_inside(local, center.as_dvec3(), f64::from(radius)).then_some(bodies[prim as usize])
+                    }));
+                }
+                (Surface::Parts(parts), Shape::Mesh { tree, world_from_object }) => {
+                    let local = world_from_object.inverse().transform_point3(point);
+                    let bounds = tree.bounds();
+                    if local.cmplt(bounds.min).any() || local.cmpgt(bounds.max).any() {
+                        continue;
+                    }
+                    let alone = SceneTree::build(vec![shape.clone()]);
+                    for (material, body) in parts {
+                        let counts = |hit: &Hit| geometry.objects[object].material_of(hit.prim) == *material;
+                        let winding = winding(&alone, point, &counts);
+                        rows.extend((0..winding).map(|_| *body));
+                    }
+                }
+                (Surface::One(body), _) => match open.iter_mut().find(|(other, _)| other == body) {
+                    Some((_, shapes)) => shapes.push(shape.clone()),
+                    None => open.push((*body, vec![shape.clone()])),
+                },
+                _ => {}
+            }
+        }
+        for (body, shapes) in open {
+            let winding = winding(&SceneTree::build(shapes), point, &|_| true);
+            rows.extend((0..winding).map(|_| body));
+        }
+        rows.sort_unstable();
+        rows
+    }
+}
+
+fn is_inside(point: DVec3, center: DVec3, radius: f64) -> bool {
+    point.distance_squared(center) < radius * radius
+}
+
+/// How often closed surfaces wind around a point: backs less fronts that a ray meets on its way out, the middle one of
+/// three rays, for a ray may pass along an edge or through a hole.
+fn winding(tree: &SceneTree, point: Vec3, counts: &dyn Fn(&Hit) -> bool) -> i32 {
+    let directions =
+        [Vec3::new(0.482, 0.617, 0.622), Vec3::new(-0.731, 0.289, -0.618), Vec3::new(0.171, -0.842, 0.512)];
+    let mut windings = directions.map(|dir| {
+        let (mut ray, mut winding) = (Ray::new(point, dir.normalize()), 0);
+        for _ in 0..MOST_HITS {
+            let Some(hit) = tree.closest_hit(&ray) else { break };
+            let found = tree.surface_point(&ray, &hit);
+            if counts(&hit) {
+                winding += if ray.dir.dot(found.geometric_normal) > 0.0 { 1 } else { -1 };
+            }
+            let origin = offset_ray_origin(found.position, found.error, found.geometric_normal, ray.dir);
+            ray = Ray::new(origin, ray.dir);
+        }
+        winding
+    });
+    windings.sort_unstable();
+    windings[1].max(0)
+}
+
+/// Index and absorption of each transparent part of a material, in the order in which shading comes to them.
+fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<(f32, Vec3)> {
+    match &materials[id as usize] {
+        Material::Blend { a, b, .. } => [leaves_of(materials, *a), leaves_of(materials, *b)].concat(),
+        material if !material.is_clear() => Vec::new(),
+        Material::Glass { ior, absorption } | Material::Phong { ior, absorption, .. } => vec![(*ior, *absorption)],
+        _ => Vec::new(),
+    }
+}
+
+/// All bodies, in the order of objects and primitives.
+fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
+    let mut bodies = Vec::new();
+    let mut open: Vec<Candidate> = Vec::new();
+    for (i, (object, shape)) in (0..).zip(geometry.objects.iter().zip(geometry.tree.shapes())) {
+        let is_clear = |id: MaterialId| n_leaves[id as usize] > 0;
+        if !object.materials.iter().any(|&id| is_clear(id)) {
+            continue;
+        }
+        let of_sphere = |material, center: DVec3, radius: f64, of| Candidate {
+            material,
+            volume: 4.0 / 3.0 * PI * radius.powi(3),
+            low: center - radius,
+            high: center + radius,
+            of,
+        };
+        let material = object.materials[0];
+        match shape {
+            Shape::Sphere { center, radius } => {
+                bodies.push(of_sphere(material, center.as_dvec3(), f64::from(*radius), Part::Object(i)));
+            }
+            Shape::Spheres { tree, world_from_object } => {
+                let map = world_from_object.matrix3.as_dmat3();
+                let scale = map.determinant().abs().cbrt();
+                bodies.extend((0..tree.len() as u32).map(|prim| {
+                    let (center, radius) = tree.sphere(prim);
+                    let center = map * center.as_dvec3() + Vec3::from(world_from_object.translation).as_dvec3();
+                    of_sphere(material, center, f64::from(radius) * scale, Part::Primitive(i, prim))
+                }));
+            }
+            Shape::Mesh { tree, world_from_object } => {
+                let map = world_from_object.matrix3.as_dmat3();
+                let offset = Vec3::from(world_from_object.translation).as_dvec3();
+                let mut distinct = object.materials.clone();
+                distinct.sort_unstable();
+                distinct.dedup();
+                for material in distinct.into_iter().filter(|&id| is_clear(id)) {
+                    let mut body = Candidate::empty(material, Part::Slot(i));
+                    for prim in (0..tree.n_triangles() as u32).filter(|&prim| object.material_of(prim) == material) {
+                        body.add(tree.vertices(prim).map(|p| map * p.as_dvec3() + offset));
+                    }
+                    bodies.push(body);
+                }
+            }
+            Shape::Plane { .. } | Shape::Quad { .. } | Shape::Triangle { .. } => {
+                let at = open.iter().position(|body| body.material == material).unwrap_or_else(|| {
+                    open.push(Candidate::empty(material, Part::Open(Vec::new())));
+                    open.len() - 1
+                });
+                let body = &mut open[at];
+                if let Part::Open(objects) = &mut body.of {
+                    objects.push(i);
+                }
+                match shape {
+                    Shape::Triangle { vertices } => body.add(vertices.map(|p| p.as_dvec3())),
+                    Shape::Quad { corner, edge_u, edge_v } => {
+                        let [a, u, v] = [corner, edge_u, edge_v].map(|p| p.as_dvec3());
+                        body.add([a, a + u, a + u + v]);
+                        body.add([a, a + u + v, a + v]);
+                    }
+                    _ => {
+                        body.volume = f64::INFINITY;
+                        (body.low, body.high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+                    }
+                }
+            }
+        }
+    }
+    bodies.extend(open);
+    bodies.iter_mut().for_each(|body| body.volume = body.volume.abs());
+    bodies
+}
+
+impl Candidate {
+    fn empty(material: MaterialId, of: Part) -> Self {
+        Self { material, volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, of }
+    }
+
+    /// Adds a triangle of its surface: by the divergence theorem they sum up to the volume within.
+    fn add(&mut self, [a, b, c]: [DVec3; 3]) {
+        self.volume += a.dot(b.cross(c)) / 6.0;
+        self.low = self.low.min(a).min(b).min(c);
+        self.high = self.high.max(a).max(b).max(c);
+    }
+}
+
+fn deepest(bodies: &[Candidate]) -> u32 {
+    let holds = |a: &Candidate, b: &Candidate| a.low.cmple(b.low).all() && b.high.cmple(a.high).all();
+    let largest = &bodies[..bodies.len().min(N_LARGEST)];
+    let depth = |b: &Candidate| largest.iter().filter(|a| !std::ptr::eq(*a, b) && holds(a, b)).count() as u32 + 1;
+    bodies.iter().map(depth).max().unwrap_or(0)
+}

@@ -1,0 +1,119 @@
+//! The most that any sample of a scene can be, where that is known.
+//!
+//! A check on the whole integrator that costs nothing: in a scene that is lit by its surroundings alone, found by bounces
+//! alone, off surfaces each of which gives back at most what it gets whatever the sample, no sample is brighter than the
+//! brightest of the surroundings. One that is tells of a fault, and is counted with its place like one that is not finite.
+
+use crate::core::color::luminance;
+use crate::core::environment::Environment;
+use crate::core::material::{ColorInput, Emission, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use glam::Vec3;
+
+/// Largest channel of any sample, outside of all glass, before roulette of endless paths; `None` where there is no bound.
+pub(crate) fn radiance_bound(
+    environment: &Environment,
+    emission: &[Option<Emission>],
+    materials: &[Material],
+) -> Option<f32> {
+    let brightest = match environment {
+        Environment::Black | Environment::Image { .. } => return None,
+        Environment::Constant(radiance) => *radiance,
+        Environment::Gradient { zenith, horizon, ground } => zenith.max(*horizon).max(*ground),
+    };
+    let shines = emission.iter().any(Option::is_some);
+    let holds = (0..materials.len() as u32).all(|id| returns_at_most_all(materials, id));
+    (!shines && holds).then(|| brightest.max_element())
+}
+
+/// Whether no sample of the material weighs more than 1 in any channel.
+fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
+    let at_most_one = |input: &ColorInput| matches!(input, ColorInput::Constant(c) if c.max_element() <= 1.0);
+    match &materials[id as usize] {
+        Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => at_most_one(color),
+        // Compensation gives back on some ways what is lost on others.
+        Material::Metal { reflectance, compensate, .. } => at_most_one(reflectance) && !compensate,
+        Material::Glass { .. } => true,
+        Material::Emissive { .. } => true,
+        Material::Phong { diffuse, specular, .. } => {
+            at_most_one(diffuse) && matches!(specular, ScalarInput::Constant(_)) && is_even(diffuse)
+        }
+        // Parts are chosen by luminance: without colour, each weighs as much as all of them.
+        Material::Blend { weight, a, b } => {
+            let part = |id: MaterialId| returns_at_most_all(materials, id) && is_even_part(materials, id);
+            matches!(weight, ScalarInput::Constant(_)) && part(*a) && part(*b)
+        }
+    }
+}
+
+/// Whether a part of a blend is chosen by the very share that it returns.
+fn is_even_part(materials: &[Material], id: MaterialId) -> bool {
+    match &materials[id as usize] {
+        Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => is_even(color),
+        Material::Metal { alpha, reflectance, fresnel, .. } => {
+            let sharp = matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA);
+            *fresnel == Fresnel::Constant
+                && is_even(reflectance)
+                && (sharp || matches!(alpha, ScalarInput::Constant(_)))
+        }
+        Material::Emissive { .. } => false,
+        _ => true,
+    }
+}
+
+/// Neither coloured nor looked up.
+fn is_even(input: &ColorInput) -> bool {
+    matches!(input, ColorInput::Constant(c) if (*c - Vec3::splat(luminance(*c))).abs().max_element() <= 1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::settings::RenderSettings;
+    use crate::core::snapshot::Object;
+    use crate::driver::renderer::{BadSample, advance};
+    use crate::film::tiles::Film;
+    use crate::prepare::prepared::Prepared;
+    use crate::test_scene::prepared;
+    use firstlight_kdtree::Shape;
+    use std::sync::Arc;
+
+    fn scene(material: Material) -> Prepared {
+        let shape = Shape::Sphere { center: Vec3::NEG_Z * 3.0, radius: 1.0 };
+        prepared(vec![shape], vec![Object::plain(0)], vec![material], Environment::Constant(Vec3::splat(0.5)))
+    }
+
+    #[test]
+    fn samples_above_the_bound_are_counted_with_their_places() {
+        let mut scene = scene(Material::Glass { ior: 1.5, absorption: Vec3::ZERO });
+        let run = |scene: &Prepared| {
+            let mut film = Film::new(8, 4);
+            (advance(scene, &RenderSettings::default(), &mut film, 2, &|| false), film)
+        };
+        assert_eq!(scene.tables.radiance_bound, Some(0.5));
+        let (report, film) = run(&scene);
+        assert_eq!((report.n_above, report.above), (0, vec![]));
+        // As if the surroundings were less bright than they are: each sample is found out, and none is left out.
+        Arc::get_mut(&mut scene.tables).unwrap().radiance_bound = Some(0.499);
+        let (report, same) = run(&scene);
+        assert_eq!(report.n_above, 8 * 4 * 2);
+        assert_eq!(report.above[0], BadSample { x: 0, y: 0, sample: 0 });
+        assert_eq!(film.means(), same.means());
+    }
+
+    #[test]
+    fn only_scenes_without_samples_that_outweigh_their_light_have_a_bound() {
+        let color = |c| ColorInput::Constant(Vec3::splat(c));
+        let metal = |compensate| Material::Metal {
+            alpha: ScalarInput::Constant(0.3),
+            reflectance: color(1.0),
+            fresnel: Fresnel::Schlick,
+            compensate,
+        };
+        let bound = |material| scene(material).tables.radiance_bound;
+        assert_eq!(bound(Material::Diffuse { albedo: color(1.0) }), Some(0.5));
+        assert_eq!(bound(metal(false)), Some(0.5));
+        assert_eq!(bound(metal(true)), None);
+        assert_eq!(bound(Material::Diffuse { albedo: color(1.2) }), None);
+        assert_eq!(bound(Material::Emissive { radiance: color(0.1) }), None);
+    }
+}

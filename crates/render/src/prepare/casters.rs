@@ -1,0 +1,300 @@
+//! Which lamp to start from, and where to aim: at what is smooth enough to make caustics.
+//!
+//! A line from a lamp is chosen in three steps: a pair of lamp and caster by the flux between them, a point on the lamp
+//! evenly over its area (on a ball over the cap that the caster can see), a direction evenly over the cone of the ball
+//! around the caster. A line counts only where the caster it was aimed at is what it hits first, so its density follows
+//! from lamp, point and that caster alone, without a sum over all cones it may lie in.
+//!
+//! Densities are per unit of étendue, cos θ · area · solid angle, which is the same at both ends of a line.
+
+use crate::core::material::Material;
+use crate::core::snapshot::Geometry;
+use crate::core::texture::Texture;
+use crate::prepare::guide::Guide;
+use crate::prepare::light::LightTable;
+use crate::prepare::light::shape::LightShape;
+use crate::sampling::{AliasTable, Sampler, cosine_hemisphere, one_minus_cos_from_sin2, uniform_cone};
+use firstlight_kdtree::geometry::{Frame, Ray, robust};
+use firstlight_kdtree::{Hit, Shape};
+use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::OnceLock;
+
+/// No caster.
+pub(crate) const NO_CASTER: u32 = u32::MAX;
+
+/// Up to this many pairs of lamp and caster are weighed one by one; of more, both are chosen apart.
+const MAX_PAIRS: usize = 1 << 16;
+
+/// Sample dimensions of a line.
+const DIM_POINT: u32 = 0;
+const DIM_DIRECTION: u32 = 1;
+const DIM_PAIR: u32 = 2;
+pub(crate) const LINE_DIMENSIONS: u32 = 3;
+
+/// All smooth objects, and with which lamp each goes how well.
+#[derive(Debug)]
+pub(crate) struct CasterTable {
+    casters: Vec<Caster>,
+    /// For each object the first of its casters, and whether each of its primitives is one.
+    by_object: Vec<(u32, bool)>,
+    pairs: Pairs,
+    /// Made when it is first needed.
+    pub(crate) guide: OnceLock<Guide>,
+}
+
+/// A ball around something smooth; without end for a plane.
+#[derive(Clone, Copy, Debug)]
+struct Caster {
+    center: Vec3,
+    radius: f32,
+}
+
+#[derive(Debug)]
+enum Pairs {
+    /// Caster by caster for each light.
+    Joint(AliasTable),
+    Apart {
+        lights: AliasTable,
+        casters: AliasTable,
+    },
+}
+
+/// A line from a lamp.
+pub(crate) struct Line {
+    pub ray: Ray,
+    /// What it has to hit first.
+    pub caster: u32,
+    /// Per unit of étendue, 1 / (m² sr).
+    pub density: f32,
+    /// W·m⁻²·sr⁻¹.
+    pub radiance: Vec3,
+}
+
+impl CasterTable {
+    /// `None` where no light can come to a smooth surface from a finite lamp.
+    pub fn build(geometry: &Geometry, materials: &[Material], lights: &LightTable) -> Option<Self> {
+        let mut casters = Vec::new();
+        let is_smooth: Vec<bool> = materials.iter().map(|material| material.is_specular(materials)).collect();
+        let by_object = geometry
+            .objects
+            .iter()
+            .zip(geometry.tree.shapes())
+            .map(|(object, shape)| {
+                if !object.materials.iter().any(|&id| is_smooth[id as usize]) {
+                    return (NO_CASTER, false);
+                }
+                let first = casters.len() as u32;
+                match shape {
+                    Shape::Spheres { tree, world_from_object } => {
+                        let scale = world_from_object.matrix3.x_axis.length();
+                        casters.extend((0..tree.len() as u32).map(|i| {
+                            let (center, radius) = tree.sphere(i);
+                            Caster { center: world_from_object.transform_point3(center), radius: radius * scale }
+                        }));
+                        (first, true)
+                    }
+                    _ => {
+                        casters.push(Caster::around(geometry, object, shape));
+                        (first, false)
+                    }
+                }
+            })
+            .collect();
+        if casters.is_empty() || lights.is_empty() {
+            return None;
+        }
+        let pairs = Pairs::new(&casters, lights)?;
+        Some(Self { casters, by_object, pairs, guide: OnceLock::new() })
+    }
+
+    /// The caster that a hit lies on, [`NO_CASTER`] if none.
+    #[inline]
+    pub fn of_hit(&self, hit: &Hit) -> u32 {
+        match self.by_object[hit.object as usize] {
+            (first, true) => first + hit.prim,
+            (first, false) => first,
+        }
+    }
+
+    /// A line from some lamp towards some caster; `None` if it points into the lamp.
+    pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<Line> {
+        let (light_id, caster, _) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
+        let light = lights.light(light_id);
+        let Caster { center, radius } = self.casters[caster as usize];
+        let u = sampler.pair(DIM_POINT);
+        let point = match light.shape {
+            LightShape::Sphere { center: lamp, radius: lamp_radius } => {
+                let cap = cap_height(lamp, lamp_radius, center, radius);
+                // The cap is a cone of normals.
+                let (local, _) = uniform_cap(u, cap);
+                light.shape.at_normal(Frame::around((center - lamp).normalize_or(Vec3::Y)).to_world(local))
+            }
+            _ => light.shape.at_area(u),
+        };
+        let u = sampler.pair(DIM_DIRECTION);
+        let to_center = center - point.position;
+        let distance2 = to_center.length_squared();
+        let dir = if distance2 > radius * radius {
+            let one_minus_cos_max = one_minus_cos_from_sin2(radius * radius / distance2);
+            Frame::around(to_center / distance2.sqrt()).to_world(uniform_cone(u, one_minus_cos_max).0)
+        } else {
+            Frame::around(point.normal).to_world(cosine_hemisphere(u))
+        }
+        .normalize();
+        let cos = dir.dot(point.normal);
+        let density = self.density(lights, light_id, caster, point.position, cos);
+        if !(cos > 0.0 && density > 0.0 && density.is_finite()) {
+            return None;
+        }
+        let radiance = light.radiance(textures, point.normal, point.uv);
+        let origin = robust::offset_ray_origin(point.position, point.error, point.normal, dir);
+        Some(Line { ray: Ray::new(origin, dir), caster, density, radiance })
+    }
+
+    /// Density of [`Self::sample`] to start at `position` of a lamp in a direction of cosine `cos` with its normal, on
+    /// which `caster` lies first; per unit of étendue.
+    pub(crate) fn density(&self, lights: &LightTable, light_id: u32, caster: u32, position: Vec3, cos: f32) -> f32 {
+        let pmf = self.pairs.pmf(self.casters.len(), light_id, caster);
+        let Caster { center, radius } = self.casters[caster as usize];
+        let area = match &lights.light(light_id).shape {
+            LightShape::Sphere { center: lamp, radius: lamp_radius } => {
+                TAU * lamp_radius * lamp_radius * cap_height(*lamp, *lamp_radius, center, radius)
+            }
+            flat => flat.area(),
+        };
+        let distance2 = position.distance_squared(center);
+        let by_angle = if distance2 > radius * radius {
+            1.0 / (TAU * one_minus_cos_from_sin2(radius * radius / distance2) * cos)
+        } else {
+            FRAC_1_PI
+        };
+        pmf / area * by_angle
+    }
+}
+
+impl Caster {
+    fn around(geometry: &Geometry, object: &crate::core::snapshot::Object, shape: &Shape) -> Self {
+        let of_points = |center: Vec3, points: &mut dyn Iterator<Item = Vec3>| {
+            // A little more, for the rounding of both ends.
+            let reach2 = points.map(|p| p.distance_squared(center)).fold(0.0, f32::max);
+            Self { center, radius: reach2.sqrt() * (1.0 + 8.0 * f32::EPSILON) }
+        };
+        match shape {
+            Shape::Sphere { center, radius } => Self { center: *center, radius: *radius },
+            Shape::Plane { point, .. } => Self { center: *point, radius: f32::INFINITY },
+            Shape::Quad { corner, edge_u, edge_v } => of_points(
+                *corner + 0.5 * (*edge_u + *edge_v),
+                &mut [*corner, *corner + *edge_u, *corner + *edge_v, *corner + *edge_u + *edge_v].into_iter(),
+            ),
+            Shape::Triangle { vertices } => {
+                of_points((vertices[0] + vertices[1] + vertices[2]) / 3.0, &mut vertices.iter().copied())
+            }
+            Shape::Mesh { tree, world_from_object } => {
+                let bounds = tree.bounds();
+                let center = world_from_object.transform_point3(0.5 * (bounds.min + bounds.max));
+                let mesh = object.mesh.as_ref().expect("a mesh shape brings its mesh");
+                of_points(center, &mut mesh.positions.iter().map(|&p| world_from_object.transform_point3(p)))
+            }
+            Shape::Spheres { .. } => {
+                let bounds = geometry.tree.bounds();
+                of_points(0.5 * (bounds.min + bounds.max), &mut [bounds.min, bounds.max].into_iter())
+            }
+        }
+    }
+
+    /// An estimate of the étendue between a lamp and the ball, zero only where none of the lamp can see any of it.
+    fn coupling(&self, lamp: &LightShape) -> f64 {
+        let lamp_area = lamp.area();
+        if let LightShape::Sphere { center, radius } = lamp {
+            let sin2 = (self.radius * self.radius / center.distance_squared(self.center)).min(1.0);
+            return f64::from(PI * radius * radius * PI * sin2);
+        }
+        const SIDE: u32 = 4;
+        let at = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
+        let over_points = (0..SIDE * SIDE).map(|i| {
+            let point = lamp.at_area(at(i));
+            let offset = self.center - point.position;
+            let distance = offset.length();
+            if distance <= self.radius {
+                return 1.0;
+            }
+            let (cos, sin) = (offset.dot(point.normal) / distance, self.radius / distance);
+            // The form factor of a ball, and a parabola where the horizon cuts it.
+            f64::from(sin * sin * if cos >= sin { cos } else { (cos + sin).max(0.0).powi(2) / (4.0 * sin) })
+        });
+        f64::from(PI * lamp_area) * over_points.sum::<f64>() / f64::from(SIDE * SIDE)
+    }
+}
+
+impl Pairs {
+    fn new(casters: &[Caster], lights: &LightTable) -> Option<Self> {
+        let lights: Vec<_> = (0..lights.len() as u32).map(|id| lights.light(id)).collect();
+        if lights.len() * casters.len() <= MAX_PAIRS {
+            let flux = lights.iter().flat_map(|light| {
+                casters.iter().map(|caster| f64::from(light.mean_radiance) * caster.coupling(&light.shape))
+            });
+            let flux: Vec<f64> = flux.collect();
+            return flux.iter().any(|&flux| flux > 0.0).then(|| Self::Joint(AliasTable::new(&flux)));
+        }
+        let powers: Vec<f64> =
+            lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
+        let total: f64 = powers.iter().sum();
+        if !(total > 0.0) {
+            return None;
+        }
+        let middle =
+            lights.iter().zip(&powers).map(|(light, &power)| light.shape.center().as_dvec3() * (power / total));
+        let middle = middle.sum::<glam::DVec3>().as_vec3();
+        let share = |caster: &Caster| {
+            let distance2 = caster.center.distance_squared(middle);
+            f64::from(if caster.radius.is_finite() {
+                (caster.radius * caster.radius / distance2).min(1.0)
+            } else {
+                1.0
+            })
+        };
+        let casters = AliasTable::new(&casters.iter().map(share).collect::<Vec<_>>());
+        Some(Self::Apart { lights: AliasTable::new(&powers), casters })
+    }
+
+    /// Light, caster and the probability of the choice.
+    fn sample(&self, n_casters: usize, u: f32) -> (u32, u32, f32) {
+        match self {
+            Self::Joint(table) => {
+                let (pair, pmf, _) = table.sample(u);
+                (pair / n_casters as u32, pair % n_casters as u32, pmf)
+            }
+            Self::Apart { lights, casters } => {
+                let (light, light_pmf, u) = lights.sample(u);
+                let (caster, caster_pmf, _) = casters.sample(u);
+                (light, caster, light_pmf * caster_pmf)
+            }
+        }
+    }
+
+    fn pmf(&self, n_casters: usize, light: u32, caster: u32) -> f32 {
+        match self {
+            Self::Joint(table) => table.pmf(light * n_casters as u32 + caster),
+            Self::Apart { lights, casters } => lights.pmf(light) * casters.pmf(caster),
+        }
+    }
+}
+
+/// Height, over the radius, of the cap of a lamp from which some of a ball can be seen; 0..2.
+fn cap_height(lamp: Vec3, lamp_radius: f32, center: Vec3, radius: f32) -> f32 {
+    let distance = lamp.distance(center);
+    if radius.is_infinite() || distance <= (lamp_radius - radius).abs() {
+        return 2.0;
+    }
+    // A little more, so that rounding leaves nothing out.
+    (1.0 - (lamp_radius - radius) / distance + 8.0 * f32::EPSILON).clamp(0.0, 2.0)
+}
+
+/// Even over the cap of the unit sphere around +z, up to the whole of it.
+fn uniform_cap(u: Vec2, height: f32) -> (Vec3, f32) {
+    let one_minus_cos = u.x * height;
+    let sin = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
+    (Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos), one_minus_cos)
+}

@@ -1,0 +1,176 @@
+//! What the classic model makes of materials, as arrays that sixteen lanes read at once; see `phong/finish.rs`.
+
+use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::prepare::arrays::push;
+use crate::prepare::material_table::Kinds;
+use firstlight_simd::padded;
+use glam::Vec3;
+
+/// Materials that are shaded one at a time: all that shines, is clear, has several parts that send rays, or looks up a number.
+pub(crate) const ONE_BY_ONE: u32 = 0;
+/// Nothing but matte.
+pub(crate) const MATTE: u32 = 1;
+/// The others may be matte beside this: highlights and a sharp mirror,
+pub(crate) const GLOSS: u32 = 2;
+/// rough ones,
+pub(crate) const ROUGH: u32 = 3;
+/// or a mirror that shows lights as well.
+pub(crate) const PLAIN_MIRROR: u32 = 4;
+
+/// One row for each material.
+#[derive(Debug, Default)]
+pub(crate) struct ClassicTable {
+    pub kinds: Kinds,
+    pub matte: Inputs,
+    /// Of the ambient light, the share of the matte part that comes back.
+    pub ambient: Vec<f32>,
+    pub shiny: Inputs,
+    /// Of the highlights.
+    pub exponent: Vec<f32>,
+    /// See [`crate::prepare::material_table::SCHLICK`].
+    pub flags: Vec<u32>,
+}
+
+/// A colour and its weight.
+#[derive(Debug, Default)]
+pub(crate) struct Inputs {
+    pub color: [Vec<f32>; 3],
+    /// The same where it has to be looked up.
+    pub inputs: Vec<ColorInput>,
+    /// Whether it has to be.
+    pub textured: Vec<u32>,
+    pub weight: Vec<f32>,
+}
+
+impl Inputs {
+    fn push(&mut self, color: ColorInput, weight: f32) {
+        let constant = if let ColorInput::Constant(color) = color { color } else { Vec3::ZERO };
+        push(&mut self.color, constant);
+        self.inputs.push(color);
+        self.textured.push(u32::from(matches!(color, ColorInput::Texture(_))));
+        self.weight.push(weight);
+    }
+
+    fn padded(self) -> Self {
+        let Self { color, inputs, textured, weight } = self;
+        Self { color: color.map(padded), inputs, textured: padded(textured), weight: padded(weight) }
+    }
+}
+
+/// A material in parts.
+#[derive(Default)]
+struct Row {
+    /// Albedo, weight and share of ambient light.
+    matte: Option<(ColorInput, f32, f32)>,
+    shiny: Option<Shiny>,
+}
+
+struct Shiny {
+    kind: u32,
+    tint: ColorInput,
+    weight: f32,
+    exponent: f32,
+    fresnel: Fresnel,
+}
+
+impl ClassicTable {
+    pub fn build(materials: &[Material]) -> Self {
+        let mut table = Self::default();
+        for id in 0..materials.len() as u32 {
+            let mut row = Row::default();
+            let known = row.add(materials, id, 1.0).is_some();
+            let kind = match (&row.shiny, known) {
+                (_, false) => ONE_BY_ONE,
+                (None, true) => MATTE,
+                (Some(shiny), true) => shiny.kind,
+            };
+            table.kinds.of_material.push(kind);
+            table.kinds.present |= 1 << kind;
+            let black = ColorInput::Constant(Vec3::ZERO);
+            let (albedo, weight, ambient) = row.matte.unwrap_or((black, 0.0, 0.0));
+            table.matte.push(albedo, weight);
+            table.ambient.push(ambient);
+            let nothing = Shiny { kind, tint: black, weight: 0.0, exponent: 0.0, fresnel: Fresnel::Constant };
+            let shiny = row.shiny.unwrap_or(nothing);
+            table.shiny.push(shiny.tint, shiny.weight);
+            table.exponent.push(shiny.exponent);
+            table.flags.push(if shiny.fresnel == Fresnel::Schlick {
+                crate::prepare::material_table::SCHLICK
+            } else {
+                0
+            });
+        }
+        let Self { kinds, matte, ambient, shiny, exponent, flags } = table;
+        Self {
+            kinds: Kinds { of_material: padded(kinds.of_material), ..kinds },
+            matte: matte.padded(),
+            ambient: padded(ambient),
+            shiny: shiny.padded(),
+            exponent: padded(exponent),
+            flags: padded(flags),
+        }
+    }
+}
+
+impl Row {
+    /// `None` where there is no room, or no place at all, for a part.
+    fn add(&mut self, materials: &[Material], id: MaterialId, weight: f32) -> Option<()> {
+        match &materials[id as usize] {
+            _ if weight == 0.0 => Some(()),
+            Material::Diffuse { albedo } => self.set_matte(*albedo, weight, 1.0),
+            Material::Mirror { reflectance } => self.set_shiny(Shiny {
+                kind: PLAIN_MIRROR,
+                tint: *reflectance,
+                weight,
+                exponent: 0.0,
+                fresnel: Fresnel::Constant,
+            }),
+            Material::Metal { alpha: ScalarInput::Constant(alpha), reflectance, fresnel, .. } => {
+                let alpha = alpha.clamp(0.0, 1.0);
+                let rough = alpha >= SMALLEST_ALPHA;
+                self.set_shiny(Shiny {
+                    kind: if rough { ROUGH } else { PLAIN_MIRROR },
+                    tint: *reflectance,
+                    weight,
+                    exponent: if rough { (0.5 / (alpha * alpha) - 0.5).max(0.0) } else { 0.0 },
+                    fresnel: *fresnel,
+                })
+            }
+            Material::Phong {
+                diffuse,
+                ambient,
+                specular: ScalarInput::Constant(specular),
+                shininess,
+                transparency: 0.0,
+                ..
+            } => {
+                let specular = specular.clamp(0.0, 1.0);
+                self.set_matte(*diffuse, weight * (1.0 - specular), *ambient)?;
+                if weight * specular > 0.0 {
+                    self.set_shiny(Shiny {
+                        kind: GLOSS,
+                        tint: ColorInput::Constant(Vec3::ONE),
+                        weight: weight * specular,
+                        exponent: *shininess,
+                        fresnel: Fresnel::Constant,
+                    })?;
+                }
+                Some(())
+            }
+            Material::Blend { weight: ScalarInput::Constant(share), a, b } => {
+                let share = share.clamp(0.0, 1.0);
+                self.add(materials, *a, weight * (1.0 - share))?;
+                self.add(materials, *b, weight * share)
+            }
+            _ => None,
+        }
+    }
+
+    fn set_matte(&mut self, albedo: ColorInput, weight: f32, ambient: f32) -> Option<()> {
+        self.matte.replace((albedo, weight, ambient)).is_none().then_some(())
+    }
+
+    fn set_shiny(&mut self, shiny: Shiny) -> Option<()> {
+        self.shiny.replace(shiny).is_none().then_some(())
+    }
+}

@@ -1,0 +1,504 @@
+//! Light sampling for sixteen points at a time, where no light is textured.
+//!
+//! The formulas are those of [`crate::prepare::light::shape`] and [`crate::prepare::light::selection`]; there is where they are explained.
+
+use crate::core::material::ColorInput;
+use crate::prepare::light::emitter::Light;
+use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
+use crate::prepare::light::triangle_lanes::TriangleLanes;
+use crate::sampling::offset_lanes::offset_origin;
+use crate::sampling::warp_lanes::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
+use firstlight_kdtree::geometry::robust::gamma;
+use firstlight_simd::{
+    Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
+};
+use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+/// The lights as arrays that lanes look up.
+#[derive(Debug)]
+pub(crate) struct WideLights {
+    pub n: usize,
+    pub has_spheres: bool,
+    pub has_quads: bool,
+    pub has_triangles: bool,
+    pub flags: Vec<u32>,
+    /// Corner, centre or first vertex.
+    pub origin: [Vec<f32>; 3],
+    /// Of triangles, whole edges.
+    pub unit_u: [Vec<f32>; 3],
+    pub unit_v: [Vec<f32>; 3],
+    pub normal: [Vec<f32>; 3],
+    pub length_u: Vec<f32>,
+    pub length_v: Vec<f32>,
+    /// Of spheres, the radius.
+    pub radius: Vec<f32>,
+    pub area: Vec<f32>,
+    /// Along the normal of a quad, what its own rounding comes to, metres.
+    pub lift: Vec<f32>,
+    pub radiance: [Vec<f32>; 3],
+}
+
+pub(crate) const SPHERE: u32 = 1;
+pub(crate) const RECTANGLE: u32 = 2;
+pub(crate) const TRIANGLE: u32 = 4;
+/// With [`SPHERE`]: stands for a point light.
+pub(crate) const POINT: u32 = 8;
+
+/// Points on lights as seen from sixteen places; see [`crate::prepare::light::emitter::LightSample`].
+#[derive(Clone, Copy)]
+pub(crate) struct LightLanes<S: Simd> {
+    /// Lanes that found a point.
+    pub found: Mask,
+    pub target: Vector<S>,
+    pub wi: Vector<S>,
+    pub pdf: Float<S>,
+    pub radiance: Vector<S>,
+}
+
+impl WideLights {
+    /// `None` where lights have to be asked one at a time.
+    pub fn build(lights: &[Light]) -> Option<Self> {
+        if lights.is_empty() {
+            return None;
+        }
+        let mut rows: [Vec<f32>; 20] = Default::default();
+        let mut flags = Vec::new();
+        for light in lights {
+            let ColorInput::Constant(radiance) = light.emission.radiance else { return None };
+            let radiance = light.emission.scale * radiance;
+            let (flag, origin, u, v, normal, rest) = match &light.shape {
+                LightShape::Triangle { vertices: [a, b, c], normal, area: _ } => {
+                    let error = gamma(7) * (a.abs() + b.abs() + c.abs());
+                    (TRIANGLE, *a, *b - *a, *c - *a, *normal, [0.0, 0.0, 0.0, normal.abs().dot(error)])
+                }
+                LightShape::Sphere { center, radius } => {
+                    (SPHERE, *center, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, [0.0, 0.0, *radius, 0.0])
+                }
+                LightShape::Quad { corner, edge_u, edge_v, normal, area: _, rectangle } => {
+                    let (length_u, length_v) = (edge_u.length(), edge_v.length());
+                    let error = gamma(8) * (corner.abs() + edge_u.abs() + edge_v.abs());
+                    let rest = [length_u, length_v, 0.0, normal.abs().dot(error)];
+                    let flag = if rectangle.is_some() { RECTANGLE } else { 0 };
+                    (flag, *corner, *edge_u / length_u, *edge_v / length_v, *normal, rest)
+                }
+            };
+            flags.push(if light.is_point { flag | POINT } else { flag });
+            let [length_u, length_v, radius, lift] = rest;
+            let vectors = [origin, u, v, normal, radiance].map(|v| v.to_array());
+            let values = vectors.as_flattened().iter().copied();
+            let values = values.chain([length_u, length_v, radius, light.shape.area(), lift]);
+            rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
+        }
+        let has_spheres = flags.iter().any(|&flag| flag & SPHERE != 0);
+        let has_triangles = flags.contains(&TRIANGLE);
+        let has_quads = flags.iter().any(|&flag| flag & (SPHERE | TRIANGLE) == 0);
+        let [ox, oy, oz, ux, uy, uz, vx, vy, vz, nx, ny, nz, r, g, b, length_u, length_v, radius, area, lift] =
+            rows.map(padded);
+        Some(Self {
+            n: lights.len(),
+            has_spheres,
+            has_quads,
+            has_triangles,
+            flags: padded(flags),
+            origin: [ox, oy, oz],
+            unit_u: [ux, uy, uz],
+            unit_v: [vx, vy, vz],
+            normal: [nx, ny, nz],
+            radiance: [r, g, b],
+            length_u,
+            length_v,
+            radius,
+            area,
+            lift,
+        })
+    }
+}
+
+impl WideLights {
+    /// See [`crate::prepare::light::shape::sphere_as_point`].
+    #[inline(always)]
+    pub fn as_points<S: Simd>(&self, id: Bits<S>, mask: Mask, position: Vector<S>) -> LightLanes<S> {
+        let (center, radius) = (Vector::gather(&self.origin, id), Float::gather(&self.radius, id));
+        let offset = center - position;
+        let distance = offset.length();
+        let wi = offset * (distance.all(1.0) / distance);
+        let found = mask & distance.is_positive() & radius.lt(distance);
+        let n = wi.abs();
+        let around = n.x + n.y + n.z;
+        let lift = (n.dot(center.abs()) + around * radius) * gamma(6) + around * distance * gamma(16);
+        let ratio = distance / radius;
+        let target = offset_origin(center - wi * radius, lift, -wi);
+        LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi }
+    }
+
+    #[inline(always)]
+    pub fn points<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        u: [Float<S>; 2],
+    ) -> LightLanes<S> {
+        let flags = Bits::gather(&self.flags, id);
+        let spheres = if self.has_spheres { mask & flags.has(SPHERE) } else { 0 };
+        let triangles = if self.has_triangles { mask & flags.has(TRIANGLE) } else { 0 };
+        let quads = mask & !spheres & !triangles;
+        let mut all = None;
+        if spheres != 0 {
+            all = Some(self.spheres(by_angle, id, spheres, position, u));
+        }
+        if triangles != 0 {
+            let found = self.triangles(by_angle, id, triangles, position, u);
+            all = Some(all.map_or(found, |all| found.over(triangles, all)));
+        }
+        if quads != 0 && self.has_quads {
+            let found = self.quads(by_angle, id, quads, position, u);
+            all = Some(all.map_or(found, |all| found.over(quads, all)));
+        }
+        let zero = u[0].all(0.0);
+        let nowhere = Vector { x: zero, y: zero, z: zero };
+        all.unwrap_or(LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere })
+    }
+
+    /// See [`LightShape::pdf`].
+    #[inline(always)]
+    pub fn pdf<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        position: Vector<S>,
+        wi: Vector<S>,
+        distance: Float<S>,
+    ) -> Float<S> {
+        let flags = Bits::gather(&self.flags, id);
+        let origin = Vector::gather(&self.origin, id);
+        let area = Float::gather(&self.area, id);
+        let relative = origin - position;
+        let (zero, one) = (distance.all(0.0), distance.all(1.0));
+        let mut pdf = zero;
+        if self.has_quads || self.has_triangles {
+            let normal = Vector::gather(&self.normal, id);
+            let cos = -wi.dot(normal);
+            let by_area = distance * distance / (cos * area);
+            pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
+            if by_angle && self.has_triangles {
+                let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+                let angle = TriangleLanes::new(relative, e1, e2).solid_angle;
+                pdf = select(flags.has(TRIANGLE) & large_enough(angle), one / angle, pdf);
+            }
+            if by_angle && self.has_quads {
+                let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+                let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
+                let (x, y, height) = (relative.dot(unit_u), relative.dot(unit_v), relative.dot(normal));
+                let angle = QuadLanes::new(x, y, height, length_u, length_v, area).solid_angle;
+                pdf = select(flags.has(RECTANGLE) & one.all(SMALL_SOLID_ANGLE).le(angle), one / angle, pdf);
+            }
+        }
+        if self.has_spheres {
+            let radius = Float::gather(&self.radius, id);
+            let (distance2, r2) = (relative.length_squared(), radius * radius);
+            let of_sphere = if by_angle {
+                cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
+            } else {
+                let cos = wi.dot(relative - wi * distance) / radius;
+                select(cos.is_positive(), distance * distance / (cos * area), zero)
+            };
+            pdf = select(flags.has(SPHERE), select(r2.lt(distance2), of_sphere, zero), pdf);
+        }
+        pdf
+    }
+
+    #[inline(always)]
+    pub fn quads<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        u: [Float<S>; 2],
+    ) -> LightLanes<S> {
+        let corner = Vector::gather(&self.origin, id);
+        let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+        let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
+        let (normal, area) = (Vector::gather(&self.normal, id), Float::gather(&self.area, id));
+        let relative = corner - position;
+        let height = relative.dot(normal);
+        let zero = height.all(0.0);
+        let seen = mask & height.lt(zero);
+        let mut uv = u;
+        let (mut angle, mut solid_angle) = (0, area);
+        if by_angle {
+            let quad = QuadLanes::new(relative.dot(unit_u), relative.dot(unit_v), height, length_u, length_v, area);
+            let rectangle = Bits::gather(&self.flags, id).has(RECTANGLE);
+            solid_angle = quad.solid_angle;
+            angle = rectangle & zero.all(SMALL_SOLID_ANGLE).le(solid_angle);
+            if angle & seen != 0 {
+                let [x, y] = quad.sample(u);
+                uv = [select(angle, x, u[0]), select(angle, y, u[1])];
+            }
+        }
+        let point = corner + unit_u * (uv[0] * length_u) + unit_v * (uv[1] * length_v);
+        let offset = point - position;
+        let distance = offset.length();
+        let wi = offset * (distance.all(1.0) / distance);
+        let cos = -wi.dot(normal);
+        let by_area = distance * distance / (cos * area);
+        let pdf = select(angle, zero.all(1.0) / solid_angle, by_area);
+        let found = seen & zero.lt(distance) & (angle | zero.lt(cos));
+        // The rounding of the point, and what the kernel loses over the distance.
+        let lift =
+            Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
+        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+    }
+
+    #[inline(always)]
+    pub fn triangles<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        u: [Float<S>; 2],
+    ) -> LightLanes<S> {
+        let first = Vector::gather(&self.origin, id);
+        let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
+        let (normal, area) = (Vector::gather(&self.normal, id), Float::gather(&self.area, id));
+        let relative = first - position;
+        let (zero, one) = (area.all(0.0), area.all(1.0));
+        let mut found = mask & relative.dot(normal).lt(zero);
+        // See `crate::sampling::uniform_triangle`.
+        let halves = [u[0] * 0.5, u[1] * 0.5];
+        let below = u[0].lt(u[1]);
+        let mut weights = [select(below, halves[0], u[0] - halves[1]), select(below, u[1] - halves[0], halves[1])];
+        let (mut angle, mut solid_angle) = (0, one);
+        if by_angle {
+            let triangle = TriangleLanes::new(relative, e1, e2);
+            solid_angle = triangle.solid_angle;
+            angle = large_enough(solid_angle);
+            if angle & found != 0 {
+                let (dir, seen) = triangle.sample(u);
+                found &= !angle | seen;
+                // Where the direction meets the plane (Möller and Trumbore 1997).
+                let p = dir.cross(e2);
+                let per_determinant = one / p.dot(e1);
+                let from = -relative;
+                let b1 = (from.dot(p) * per_determinant).at_least(0.0).at_most(1.0);
+                let b2 = (dir.dot(from.cross(e1)) * per_determinant).at_least(0.0).at_most(1.0);
+                let over = (b1 + b2).at_least(1.0);
+                weights = [select(angle, b1 / over, weights[0]), select(angle, b2 / over, weights[1])];
+            }
+        }
+        let point = first + e1 * weights[0] + e2 * weights[1];
+        let offset = point - position;
+        let distance = offset.length();
+        let wi = offset * (one / distance);
+        let cos = -wi.dot(normal);
+        let pdf = select(angle, one / solid_angle, distance * distance / (cos * area));
+        let found = found & zero.lt(distance) & (angle | (zero.lt(cos) & zero.lt(area)));
+        let lift =
+            Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
+        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+    }
+
+    #[inline(always)]
+    pub fn spheres<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        u: [Float<S>; 2],
+    ) -> LightLanes<S> {
+        let (center, radius) = (Vector::gather(&self.origin, id), Float::gather(&self.radius, id));
+        let to_center = center - position;
+        let distance2 = to_center.length_squared();
+        let r2 = radius * radius;
+        let one = r2.all(1.0);
+        let zero = r2.all(0.0);
+        let (normal, cone) = if by_angle {
+            let sin2_max = r2 / distance2;
+            let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
+            let [x, y] = uniform_disc(u);
+            let disc2 = x * x + y * y;
+            let one_minus_cos = disc2.at_most(1.0) * one_minus_cos_max;
+            let sin2 = (one_minus_cos * (-one_minus_cos + 2.0)).at_least(0.0);
+            let cos = one - one_minus_cos;
+            let along = sin2 / sin2_max;
+            let cos_alpha = (sin2 / sin2_max.sqrt() + cos * (one - along).at_least(0.0).sqrt()).at_most(1.0);
+            let sin_alpha = (one - cos_alpha * cos_alpha).at_least(0.0).sqrt();
+            // The direction on the disc, unit; any in the middle.
+            let middle = disc2.is_zero();
+            let scale = sin_alpha / select(middle, one, disc2.sqrt());
+            let local = Vector { x: select(middle, sin_alpha, x * scale), y: y * scale, z: -cos_alpha };
+            let axes = frame_around(to_center * (one / distance2.sqrt()));
+            (local.to_world(&axes), one_minus_cos_max)
+        } else {
+            let z = one - u[0] * 2.0;
+            let (sin, cos) = sin_cos(u[1] * TAU);
+            let r = (one - z * z).at_least(0.0).sqrt();
+            (Vector { x: r * cos, y: r * sin, z }, zero)
+        };
+        let point = center + normal * radius;
+        let offset = point - position;
+        let distance = offset.length();
+        let wi = offset * (one / distance);
+        let mut found = mask & zero.lt(distance);
+        let pdf = if by_angle {
+            found &= r2.lt(distance2);
+            cone_pdf(cone)
+        } else {
+            let cos = -wi.dot(normal);
+            found &= zero.lt(cos);
+            distance * distance / (cos * r2 * (4.0 * PI))
+        };
+        let size = center.abs();
+        let n = normal.abs();
+        let around = n.x + n.y + n.z;
+        let lift = (n.dot(size) + around * radius) * gamma(6) + around * distance * gamma(16);
+        let lanes = LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi };
+        let close = found & distance2.lt(r2 * CLOSE);
+        if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
+    }
+}
+
+impl<S: Simd> LightLanes<S> {
+    /// These where the bit is set, else the others.
+    #[inline(always)]
+    pub fn over(self, mask: Mask, other: Self) -> Self {
+        Self {
+            found: self.found | other.found,
+            target: select_vector(mask, self.target, other.target),
+            wi: select_vector(mask, self.wi, other.wi),
+            pdf: select(mask, self.pdf, other.pdf),
+            radiance: other.radiance,
+        }
+    }
+}
+
+/// Triangles that are sampled by solid angle.
+#[inline(always)]
+fn large_enough<S: Simd>(solid_angle: Float<S>) -> Mask {
+    solid_angle.all(SMALL_SOLID_ANGLE).le(solid_angle) & solid_angle.le(solid_angle.all(LARGE_SOLID_ANGLE))
+}
+
+/// Puts in what [`sample_sphere`] finds for the lanes of `close`.
+#[cold]
+fn spheres_close_by<S: Simd>(
+    close: Mask,
+    center: Vector<S>,
+    radius: Float<S>,
+    position: Vector<S>,
+    u: [Float<S>; 2],
+    mut lanes: LightLanes<S>,
+) -> LightLanes<S> {
+    let s = radius.s;
+    let [center, position] = [center, position].map(|v| v.to_arrays());
+    let (radius, u) = (radius.to_array(), u.map(|u| u.to_array()));
+    let (mut target, mut wi, mut pdf) = (lanes.target.to_arrays(), lanes.wi.to_arrays(), lanes.pdf.to_array());
+    for lane in (0..LANES).filter(|lane| close >> lane & 1 != 0) {
+        let at = |v: &[[f32; LANES]; 3]| Vec3::from_array([v[0][lane], v[1][lane], v[2][lane]]);
+        let point = sample_sphere(at(&center), radius[lane], at(&position), Vec2::new(u[0][lane], u[1][lane]));
+        let Some(point) = point else {
+            lanes.found &= !(1 << lane);
+            continue;
+        };
+        for axis in 0..3 {
+            (target[axis][lane], wi[axis][lane]) = (point.target[axis], point.wi[axis]);
+        }
+        pdf[lane] = point.pdf;
+    }
+    lanes.target = Vector::from_arrays(s, &target);
+    lanes.wi = Vector::from_arrays(s, &wi);
+    lanes.pdf = Float::load(s, &pdf);
+    lanes
+}
+
+/// See [`crate::sampling::SphericalQuad`].
+struct QuadLanes<S: Simd> {
+    x0: Float<S>,
+    y0: Float<S>,
+    z0: Float<S>,
+    x1: Float<S>,
+    y1: Float<S>,
+    solid_angle: Float<S>,
+}
+
+impl<S: Simd> QuadLanes<S> {
+    #[inline(always)]
+    pub fn new(
+        x0: Float<S>,
+        y0: Float<S>,
+        height: Float<S>,
+        length_u: Float<S>,
+        length_v: Float<S>,
+        area: Float<S>,
+    ) -> Self {
+        let z0 = -height.abs();
+        let (x1, y1) = (x0 + length_u, y0 + length_v);
+        let unit = x0.all(1.0) / (x0 * x0 + y0 * y0 + z0 * z0).sqrt().at_least(f32::MIN_POSITIVE);
+        let (ax, ay, bx, by, z) = (x0 * unit, y0 * unit, x1 * unit, y1 * unit, z0 * unit);
+        let corner = [
+            Vector { x: ax, y: ay, z },
+            Vector { x: bx, y: ay, z },
+            Vector { x: bx, y: by, z },
+            Vector { x: ax, y: by, z },
+        ];
+        let length = [corner[0].length(), corner[1].length(), corner[2].length(), corner[3].length()];
+        let triple = area * unit * unit * -z;
+        let first = half(&corner, &length, [0, 1, 2]);
+        let second = half(&corner, &length, [0, 2, 3]);
+        let solid_angle = atan2(triple * (first + second), first * second - triple * triple) * 2.0;
+        Self { x0, y0, z0, x1, y1, solid_angle }
+    }
+
+    #[inline(always)]
+    pub fn sample(&self, [u, v]: [Float<S>; 2]) -> [Float<S>; 2] {
+        let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
+        let one = x0.all(1.0);
+        let z2 = z0 * z0;
+        let (h0, r0) = height(z2, y0);
+        let (b1, r1) = height(z2, y1);
+        let (h3, r3) = height(z2, x0);
+        let (b0, n3) = (-h0, -h3);
+        let (cos_2, sin_2) = (-(b1 * n3), (r1 + b1 * b1 * r3).sqrt());
+        let (cos_3, sin_3) = (-(n3 * b0), (r0 + b0 * b0 * r3).sqrt());
+        let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
+        let (sin_part, cos_part) = sin_cos(u * solid_angle);
+        let cos_au = cos_part * cos_sum + sin_part * sin_sum;
+        let sin_au = sin_part * cos_sum - cos_part * sin_sum;
+        let product = cos_au * b0;
+        let (lack_0, lack_1) = (r0 / (b0.abs() + 1.0), r1 / (b1.abs() + 1.0));
+        let lack_au = sin_au * sin_au / (cos_au.abs() + 1.0);
+        let lacking = (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * one.copysign(b1);
+        let difference = select((product * b1).is_positive(), lacking, product - b1);
+        let fu = difference / sin_au;
+        let xu = (-z0).copysign(fu) / (fu * fu - r0).at_least(f32::MIN_POSITIVE).sqrt();
+        // NaN becomes the lower end.
+        let xu = xu.max(x0).min(x1);
+        let d2 = xu * xu + z2;
+        let h0 = y0 / (d2 + y0 * y0).sqrt();
+        let h1 = y1 / (d2 + y1 * y1).sqrt();
+        let hv = h0 + v * (h1 - h0);
+        let hv2 = hv * hv;
+        let yv = hv * d2.sqrt() / (one - hv2).sqrt();
+        let yv = select(hv2.lt(one.all(1.0 - 1e-6)), yv, y1);
+        [(xu - x0) / (x1 - x0), (yv.max(y0).min(y1) - y0) / (y1 - y0)]
+    }
+}
+
+/// Denominator of the solid angle of half the rectangle.
+#[inline(always)]
+fn half<S: Simd>(corner: &[Vector<S>; 4], length: &[Float<S>; 4], [p, q, r]: [usize; 3]) -> Float<S> {
+    let (a, b, c) = (corner[p], corner[q], corner[r]);
+    let (la, lb, lc) = (length[p], length[q], length[r]);
+    la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
+}
+
+/// Height of an edge plane's normal, and the square of what it lacks to 1.
+#[inline(always)]
+fn height<S: Simd>(z2: Float<S>, y: Float<S>) -> (Float<S>, Float<S>) {
+    let h2 = z2 + y * y;
+    (y / h2.sqrt(), z2 / h2)
+}

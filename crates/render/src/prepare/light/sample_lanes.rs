@@ -1,0 +1,168 @@
+//! Lights for sixteen points at a time, see [`LightTable`].
+
+use crate::core::techniques::Techniques;
+use crate::prepare::light::LightTable;
+use crate::prepare::light::lanes::{LightLanes, POINT, WideLights};
+use crate::prepare::light::selection::MAX_ESTIMATED;
+use crate::sampling::SamplerLanes;
+use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, select};
+use glam::Vec3;
+
+impl LightTable {
+    /// As [`Self::sample`] for the lanes of `mask`; `None` where only that can do it.
+    ///
+    /// - `u_select`: of use only where [`Self::selects_apart`].
+    #[inline(always)]
+    pub(crate) fn sample_lanes<S: Simd>(
+        &self,
+        techniques: &Techniques,
+        mask: Mask,
+        position: Vector<S>,
+        normal: Vector<S>,
+        u_select: Float<S>,
+        mut u: [Float<S>; 2],
+    ) -> Option<LightLanes<S>> {
+        let wide = self.lanes.as_ref()?;
+        let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, [position, normal], u_select, &mut u[0]);
+        let mut sample = wide.points(techniques.solid_angle, id, mask, position, u);
+        sample.pdf = sample.pdf * pmf;
+        sample.radiance = Vector::gather(&wide.radiance, id);
+        Some(sample)
+    }
+
+    /// How many questions [`Self::sample_each`] asks.
+    pub(crate) fn n_each(&self) -> usize {
+        if self.selects_apart() { 1 } else { self.lights.len() }
+    }
+
+    /// The answers to question `k` of [`Self::sample_each`] for the lanes of `mask`, and the lanes whose light is a point.
+    /// Only where [`Self::has_lanes`].
+    #[inline(always)]
+    pub(crate) fn sample_each_lanes<S: Simd>(
+        &self,
+        k: u32,
+        mut mask: Mask,
+        position: Vector<S>,
+        sampler: &SamplerLanes<S>,
+        mut dimension: u32,
+    ) -> (LightLanes<S>, Mask) {
+        let wide = self.lanes.as_ref().expect("lanes are asked only where there are any");
+        let s = position.x.s;
+        let (mut id, mut pmf) = (Bits::splat(s, k), Float::splat(s, 1.0));
+        dimension += k;
+        if self.selects_apart() {
+            let choices = sampler.single(dimension).to_array();
+            let (mut ids, mut pmfs) = ([0; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                if let Some(chosen) = self.selection.by_power(choices[lane]) {
+                    (ids[lane], pmfs[lane]) = chosen;
+                }
+            }
+            (id, pmf) = (Bits::load(s, &ids), Float::load(s, &pmfs));
+            mask &= pmf.is_positive();
+            dimension += 1;
+        }
+        let as_point = mask & Bits::gather(&wide.flags, id).has(POINT);
+        let by_area = mask & !as_point;
+        let nowhere = Vector::splat(s, Vec3::ZERO);
+        let mut found = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: pmf, radiance: nowhere };
+        if by_area != 0 {
+            found = wide.points(true, id, by_area, position, sampler.pair(dimension));
+        }
+        if as_point != 0 {
+            found = wide.as_points(id, as_point, position).over(as_point, found);
+        }
+        found.pdf = found.pdf * pmf;
+        found.radiance = Vector::gather(&wide.radiance, id);
+        (found, as_point)
+    }
+
+    /// Whether there are so many lights that choosing one takes a number of its own.
+    pub(crate) fn selects_apart(&self) -> bool {
+        self.lights.len() > MAX_ESTIMATED
+    }
+
+    /// Whether sixteen points at a time can be asked.
+    pub(crate) fn has_lanes(&self) -> bool {
+        self.lanes.is_some()
+    }
+
+    /// See [`Self::pdf`]; only where [`Self::has_lanes`].
+    #[inline(always)]
+    pub(crate) fn pdf_lanes<S: Simd>(
+        &self,
+        techniques: &Techniques,
+        mask: Mask,
+        id: Bits<S>,
+        [position, normal]: [Vector<S>; 2],
+        wi: Vector<S>,
+        distance: Float<S>,
+    ) -> Float<S> {
+        let wide = self.lanes.as_ref().expect("lanes are asked only where there are any");
+        let one = distance.all(1.0);
+        let pdf = wide.pdf(techniques.solid_angle, id, position, wi, distance);
+        if wide.n == 1 {
+            return pdf;
+        }
+        if !techniques.light_selection {
+            return pdf * (1.0 / wide.n as f32);
+        }
+        if wide.n > MAX_ESTIMATED {
+            return pdf * self.selection.wide_tree().pmf(mask, id, position, normal);
+        }
+        let (mut own, mut sum) = (one.all(0.0), one.all(0.0));
+        for (i, bounds) in (0..).zip(self.selection.bounds()) {
+            let estimate = bounds.estimate_lanes(position, normal);
+            own = select(id.equals(i), estimate, own);
+            sum += estimate;
+        }
+        select(sum.is_positive(), pdf * own / sum, one.all(0.0))
+    }
+
+    /// A light for each lane, its probability, and the lanes that some light can reach.
+    #[inline(always)]
+    fn select_lanes<S: Simd>(
+        &self,
+        wide: &WideLights,
+        techniques: &Techniques,
+        mask: Mask,
+        [position, normal]: [Vector<S>; 2],
+        u_select: Float<S>,
+        u: &mut Float<S>,
+    ) -> (Bits<S>, Float<S>, Mask) {
+        let s = position.x.s;
+        if wide.n == 1 {
+            return (Bits::splat(s, 0), Float::splat(s, 1.0), mask);
+        }
+        if !techniques.light_selection {
+            let scaled = *u * wide.n as f32;
+            let id = scaled.truncate();
+            *u = scaled - id.to_float();
+            return (id, Float::splat(s, 1.0 / wide.n as f32), mask);
+        }
+        if wide.n > MAX_ESTIMATED {
+            return self.selection.wide_tree().sample(mask, position, normal, u_select);
+        }
+        let mut estimates = [Float::splat(s, 0.0); LANES];
+        let mut sum = Float::splat(s, 0.0);
+        for (estimate, bounds) in estimates.iter_mut().zip(self.selection.bounds()) {
+            *estimate = bounds.estimate_lanes(position, normal);
+            sum += *estimate;
+        }
+        let mut rest = *u * sum;
+        let mut within = rest;
+        let (mut id, mut chosen) = (Bits::splat(s, 0), Float::splat(s, 0.0));
+        let mut open = mask;
+        for (i, &estimate) in (0..).zip(&estimates[..wide.n]) {
+            // Until a light takes the lane, the last that counts has it: rounding may leave a rest after all.
+            let take = open & estimate.is_positive();
+            id = Bits { s, v: s.select_u(take, s.splat_u(i), id.v) };
+            chosen = select(take, estimate, chosen);
+            within = select(take, rest, within);
+            rest = rest - estimate;
+            open &= !rest.lt(rest.all(0.0));
+        }
+        *u = (within / chosen).at_least(0.0).at_most(1.0f32.next_down());
+        (id, chosen / sum, mask & chosen.is_positive())
+    }
+}

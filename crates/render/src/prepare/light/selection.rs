@@ -1,0 +1,213 @@
+//! Which light to ask: a few lights by what each could send to the point, many by a tree over them.
+
+use crate::core::techniques::Techniques;
+use crate::prepare::light::emitter::Light;
+use crate::prepare::light::shape::LightShape;
+use crate::prepare::light::tree::LightTree;
+use crate::prepare::light::tree_lanes::WideTree;
+use crate::sampling::AliasTable;
+use firstlight_simd::{Float, Simd, Vector, select};
+use glam::Vec3;
+
+/// Up to this many lights their contributions are estimated one by one; more would cost more than they save.
+pub const MAX_ESTIMATED: usize = 16;
+
+#[derive(Debug, Default)]
+pub(crate) struct Selection {
+    /// Bounds for the estimate; empty when there are too many lights.
+    bounds: Vec<LightBounds>,
+    /// When there are many.
+    tree: LightTree,
+    wide_tree: WideTree,
+    /// The same by power alone, for what has no point to ask from.
+    alias: AliasTable,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightBounds {
+    center: Vec3,
+    radius: f32,
+    /// Of a flat light; zero for a sphere.
+    normal: Vec3,
+    /// Mean radiance times the area that can face a point.
+    intensity: f32,
+}
+
+impl Selection {
+    pub fn build(lights: &[Light]) -> Self {
+        if lights.len() <= MAX_ESTIMATED {
+            return Self { bounds: lights.iter().map(LightBounds::new).collect(), ..Self::default() };
+        }
+        let powers: Vec<f64> =
+            lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
+        let tree = LightTree::build(lights);
+        let wide_tree = WideTree::new(&tree);
+        Self { bounds: Vec::new(), tree, wide_tree, alias: AliasTable::new(&powers) }
+    }
+
+    /// A light and the probability of the choice; `None` when no light can reach the point.
+    ///
+    /// Few lights are chosen by `u`, which is left as a uniform number again: then the points on each light are spread
+    /// as evenly as the choices.
+    #[inline]
+    pub fn sample(
+        &self,
+        lights: &[Light],
+        techniques: &Techniques,
+        position: Vec3,
+        normal: Vec3,
+        u_select: impl FnOnce() -> f32,
+        u: &mut f32,
+    ) -> Option<(u32, f32)> {
+        match lights.len() {
+            0 => None,
+            1 => Some((0, 1.0)),
+            n if !techniques.light_selection => {
+                let scaled = *u * n as f32;
+                *u = scaled.fract();
+                Some((scaled as u32, 1.0 / n as f32))
+            }
+            n if n <= MAX_ESTIMATED => {
+                let (estimates, sum) = self.estimates(position, normal);
+                let mut rest = *u * sum;
+                let chosen = (0..n).find(|&i| {
+                    rest -= estimates[i];
+                    rest < 0.0
+                });
+                // Rounding may leave a rest after the last light that counts.
+                let chosen = chosen.or_else(|| (0..n).rev().find(|&i| estimates[i] > 0.0))?;
+                if rest < 0.0 {
+                    rest += estimates[chosen];
+                }
+                *u = (rest / estimates[chosen]).clamp(0.0, 1.0f32.next_down());
+                (estimates[chosen] > 0.0).then(|| (chosen as u32, estimates[chosen] / sum))
+            }
+            _ => self.tree.sample(position, normal, u_select()),
+        }
+    }
+
+    /// Of many lights, one by its power alone, and the probability of the choice.
+    #[inline]
+    pub fn by_power(&self, u: f32) -> Option<(u32, f32)> {
+        let (id, pmf, _) = self.alias.sample(u);
+        (pmf > 0.0).then_some((id, pmf))
+    }
+
+    /// The probability that light `id` is asked where few are asked each and many by [`Self::by_power`].
+    #[inline]
+    pub fn pmf_each(&self, lights: &[Light], id: u32) -> f32 {
+        if lights.len() <= MAX_ESTIMATED { 1.0 } else { self.alias.pmf(id) }
+    }
+
+    /// The probability that [`Self::sample`] picks light `id`.
+    #[inline]
+    pub fn pmf(&self, lights: &[Light], techniques: &Techniques, id: u32, position: Vec3, normal: Vec3) -> f32 {
+        match lights.len() {
+            0 => 0.0,
+            1 => 1.0,
+            n if !techniques.light_selection => 1.0 / n as f32,
+            n if n <= MAX_ESTIMATED => {
+                let (estimates, sum) = self.estimates(position, normal);
+                if sum > 0.0 { estimates[id as usize] / sum } else { 0.0 }
+            }
+            _ => self.tree.pmf(id, position, normal),
+        }
+    }
+
+    /// Of few lights.
+    #[inline]
+    pub fn bounds(&self) -> &[LightBounds] {
+        &self.bounds
+    }
+
+    /// Of many lights.
+    #[inline]
+    pub fn wide_tree(&self) -> &WideTree {
+        &self.wide_tree
+    }
+
+    #[inline]
+    fn estimates(&self, position: Vec3, normal: Vec3) -> ([f32; MAX_ESTIMATED], f32) {
+        let mut estimates = [0.0; MAX_ESTIMATED];
+        let mut sum = 0.0;
+        for (estimate, bounds) in estimates.iter_mut().zip(&self.bounds) {
+            *estimate = bounds.estimate(position, normal);
+            sum += *estimate;
+        }
+        (estimates, sum)
+    }
+}
+
+impl LightBounds {
+    fn new(light: &Light) -> Self {
+        let (center, radius, normal, projected) = match light.shape {
+            LightShape::Sphere { center, radius } => (center, radius, Vec3::ZERO, 0.25 * light.shape.area()),
+            LightShape::Quad { corner, edge_u, edge_v, normal, area, .. } => {
+                let radius = 0.5 * (edge_u + edge_v).length().max((edge_u - edge_v).length());
+                (corner + 0.5 * (edge_u + edge_v), radius, normal, area)
+            }
+            LightShape::Triangle { vertices, normal, area } => {
+                let center = (vertices[0] + vertices[1] + vertices[2]) / 3.0;
+                let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f32::max);
+                (center, radius, normal, area)
+            }
+        };
+        Self { center, radius, normal, intensity: light.mean_radiance * projected }
+    }
+
+    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
+    #[inline]
+    fn estimate(&self, position: Vec3, normal: Vec3) -> f32 {
+        let offset = self.center - position;
+        let distance2 = offset.length_squared();
+        let r2 = self.radius * self.radius;
+        if distance2 <= r2 {
+            // Within the bounds of the light anything can happen.
+            return self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE);
+        }
+        let distance = distance2.sqrt();
+        let wi = offset / distance;
+        let sin_u = self.radius / distance;
+        let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
+        // The largest cosine of any direction to the bounding sphere, a little more so that rounding hides none.
+        let bound = |cos: f32| {
+            if cos >= cos_u {
+                1.0
+            } else {
+                let sin = (1.0 - cos * cos).max(0.0).sqrt();
+                (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).clamp(0.0, 1.0)
+            }
+        };
+        let receiver = bound(wi.dot(normal));
+        let emitter = if self.normal == Vec3::ZERO { 1.0 } else { bound(-wi.dot(self.normal)) };
+        self.intensity * receiver * emitter / distance2
+    }
+
+    /// The same for sixteen points.
+    #[inline(always)]
+    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+        let s = position.x.s;
+        let (r2, one) = (self.radius * self.radius, Float::splat(s, 1.0));
+        let offset = Vector::splat(s, self.center) - position;
+        let distance2 = offset.length_squared();
+        let distance = distance2.sqrt();
+        let wi = offset * (one / distance);
+        let sin_u = one.all(self.radius) / distance;
+        let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
+        let mut estimate = largest_cosine(wi.dot(normal), cos_u, sin_u) * self.intensity;
+        if self.normal != Vec3::ZERO {
+            estimate = estimate * largest_cosine(-wi.dot(Vector::splat(s, self.normal)), cos_u, sin_u);
+        }
+        let within = one.all(self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE));
+        select(distance2.le(one.all(r2)), within, estimate / distance2)
+    }
+}
+
+/// The largest cosine to any direction within the cone, a little more so that rounding hides none.
+#[inline(always)]
+fn largest_cosine<S: Simd>(cos: Float<S>, cos_u: Float<S>, sin_u: Float<S>) -> Float<S> {
+    let one = cos.all(1.0);
+    let sin = (one - cos * cos).at_least(0.0).sqrt();
+    let bound = (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).at_least(0.0).at_most(1.0);
+    select(cos_u.le(cos), one, bound)
+}

@@ -1,0 +1,467 @@
+//! Points on spheres, quads and triangles as seen from a shading point, by solid angle where that is stable.
+
+use crate::sampling::{
+    SphericalQuad, SphericalTriangle, cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle,
+};
+use firstlight_kdtree::geometry::{Frame, robust};
+use glam::{Vec2, Vec3};
+
+/// The surface of a light; all emit on their front alone.
+#[derive(Clone, Debug)]
+pub(crate) enum LightShape {
+    Sphere {
+        center: Vec3,
+        radius: f32,
+    },
+    Quad {
+        corner: Vec3,
+        edge_u: Vec3,
+        edge_v: Vec3,
+        normal: Vec3,
+        area: f32,
+        /// Unit edges and their lengths when they are at right angles.
+        rectangle: Option<Rectangle>,
+    },
+    Triangle {
+        vertices: [Vec3; 3],
+        normal: Vec3,
+        area: f32,
+    },
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rectangle {
+    unit_u: Vec3,
+    unit_v: Vec3,
+    length_u: f32,
+    length_v: f32,
+}
+
+/// A sampled point on a light.
+pub(crate) struct LightPoint {
+    pub target: Vec3,
+    pub wi: Vec3,
+    /// Per steradian.
+    pub pdf: f32,
+    /// Unit, at the point.
+    pub normal: Vec3,
+    /// Surface coordinates of flat lights, for textured emission; those of a sphere follow from its normal.
+    pub uv: Vec2,
+}
+
+/// A point of a light, whoever looks at it.
+pub(crate) struct SurfaceOfLight {
+    pub position: Vec3,
+    /// Bound on its error, metres per axis.
+    pub error: Vec3,
+    /// Unit.
+    pub normal: Vec3,
+    /// As of [`LightPoint`].
+    pub uv: Vec2,
+}
+
+/// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
+/// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
+pub(crate) const SMALL_SOLID_ANGLE: f32 = 1e-3;
+
+/// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
+pub(crate) const LARGE_SOLID_ANGLE: f32 = 6.0;
+
+impl LightShape {
+    pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Self {
+        let cross = edge_u.cross(edge_v);
+        let area = cross.length();
+        let (length_u, length_v) = (edge_u.length(), edge_v.length());
+        // At right angles as far as the numbers can tell.
+        let square = edge_u.dot(edge_v).abs() <= 8.0 * f32::EPSILON * length_u * length_v;
+        let rectangle =
+            square.then(|| Rectangle { unit_u: edge_u / length_u, unit_v: edge_v / length_v, length_u, length_v });
+        Self::Quad { corner, edge_u, edge_v, normal: cross / area, area, rectangle }
+    }
+
+    pub fn triangle(vertices: [Vec3; 3]) -> Self {
+        let cross = (vertices[1] - vertices[0]).cross(vertices[2] - vertices[0]);
+        let length = cross.length();
+        Self::Triangle { vertices, normal: cross.normalize_or(Vec3::Z), area: 0.5 * length }
+    }
+
+    /// Square metres, of the side that emits.
+    pub fn area(&self) -> f32 {
+        match self {
+            Self::Sphere { radius, .. } => 4.0 * std::f32::consts::PI * radius * radius,
+            Self::Quad { area, .. } | Self::Triangle { area, .. } => *area,
+        }
+    }
+
+    /// The middle of a sphere or quad, some point inside of a triangle.
+    pub fn center(&self) -> Vec3 {
+        match self {
+            Self::Sphere { center, .. } => *center,
+            Self::Quad { corner, edge_u, edge_v, .. } => *corner + 0.5 * (*edge_u + *edge_v),
+            Self::Triangle { vertices: [a, b, c], .. } => (*a + *b + *c) / 3.0,
+        }
+    }
+
+    /// A point evenly over the area of a flat light; of a sphere, that which faces as [`uniform_sphere`] says.
+    pub fn at_area(&self, u: Vec2) -> SurfaceOfLight {
+        match self {
+            Self::Sphere { .. } => self.at_normal(uniform_sphere(u)),
+            Self::Quad { corner, edge_u, edge_v, normal, .. } => SurfaceOfLight {
+                position: *corner + u.x * *edge_u + u.y * *edge_v,
+                error: robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs()),
+                normal: *normal,
+                uv: u,
+            },
+            Self::Triangle { vertices: [a, b, c], normal, .. } => {
+                let weights = uniform_triangle(u);
+                SurfaceOfLight {
+                    position: *a + weights.x * (*b - *a) + weights.y * (*c - *a),
+                    error: robust::gamma(7) * (a.abs() + b.abs() + c.abs()),
+                    normal: *normal,
+                    uv: weights,
+                }
+            }
+        }
+    }
+
+    /// The point of a sphere with this outward normal; the middle of a flat light, which has but one.
+    pub fn at_normal(&self, outwards: Vec3) -> SurfaceOfLight {
+        match self {
+            Self::Sphere { center, radius } => SurfaceOfLight {
+                position: *center + *radius * outwards,
+                error: robust::gamma(6) * (center.abs() + Vec3::splat(*radius)),
+                normal: outwards,
+                uv: Vec2::ZERO,
+            },
+            _ => self.at_area(Vec2::splat(0.5)),
+        }
+    }
+
+    /// A point of the front seen from `position`, or `None` when there is none.
+    ///
+    /// - `by_angle`: evenly over the solid angle where that is stable, otherwise over the area.
+    /// - `u`: two independent uniform numbers in `[0, 1)`.
+    #[inline]
+    pub(crate) fn sample(&self, position: Vec3, by_angle: bool, u: Vec2) -> Option<LightPoint> {
+        match *self {
+            Self::Sphere { center, radius } if by_angle => sample_sphere(center, radius, position, u),
+            Self::Sphere { center, radius } => sample_sphere_area(center, radius, position, u),
+            Self::Quad { corner, edge_u, edge_v, normal, area, rectangle } => {
+                let relative = corner - position;
+                if relative.dot(normal) >= 0.0 {
+                    return None;
+                }
+                let by_angle = rectangle
+                    .filter(|_| by_angle)
+                    .map(|r| SphericalQuad::new(relative, r.unit_u, r.length_u, r.unit_v, r.length_v))
+                    .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
+                let uv = by_angle.map_or(u, |quad| quad.sample(u));
+                let point = corner + uv.x * edge_u + uv.y * edge_v;
+                let (wi, distance) = direction(position, point)?;
+                let pdf = match by_angle {
+                    Some(quad) => 1.0 / quad.solid_angle(),
+                    None => area_pdf(distance, wi, normal, area)?,
+                };
+                let error = robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs());
+                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv })
+            }
+            Self::Triangle { vertices, normal, area } => {
+                let [a, b, c] = vertices;
+                let relative = vertices.map(|v| v - position);
+                if relative[0].dot(normal) >= 0.0 {
+                    return None;
+                }
+                let by_angle = by_angle.then(|| spherical_triangle(relative)).flatten();
+                let weights = match by_angle {
+                    Some(triangle) => {
+                        let (e1, e2) = (b - a, c - a);
+                        let d = triangle.sample(u)?;
+                        // Where the direction meets the plane (Möller and Trumbore 1997).
+                        let p = d.cross(e2);
+                        let determinant = p.dot(e1);
+                        let s = -relative[0];
+                        let (b1, b2) = (s.dot(p) / determinant, d.dot(s.cross(e1)) / determinant);
+                        let (b1, b2) = (b1.clamp(0.0, 1.0), b2.clamp(0.0, 1.0));
+                        let over = (b1 + b2).max(1.0);
+                        Vec2::new(b1, b2) / over
+                    }
+                    None => uniform_triangle(u),
+                };
+                let point = a + weights.x * (b - a) + weights.y * (c - a);
+                let (wi, distance) = direction(position, point)?;
+                let pdf = match by_angle {
+                    Some(triangle) => 1.0 / triangle.solid_angle(),
+                    None => area_pdf(distance, wi, normal, area)?,
+                };
+                let error = robust::gamma(7) * (a.abs() + b.abs() + c.abs());
+                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: weights })
+            }
+        }
+    }
+
+    /// Density of [`Self::sample`] at the point that lies `distance` metres along `wi`; per steradian.
+    #[inline]
+    pub(crate) fn pdf(&self, position: Vec3, by_angle: bool, wi: Vec3, distance: f32) -> f32 {
+        match *self {
+            Self::Sphere { center, radius } => {
+                let distance2 = (center - position).length_squared();
+                let r2 = radius * radius;
+                if distance2 <= r2 {
+                    0.0
+                } else if by_angle {
+                    cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
+                } else {
+                    let normal = (position + distance * wi - center) / radius;
+                    area_pdf(distance, wi, normal, self.area()).unwrap_or(0.0)
+                }
+            }
+            Self::Quad { corner, normal, area, rectangle, .. } => {
+                let by_angle = rectangle
+                    .filter(|_| by_angle)
+                    .map(|r| SphericalQuad::new(corner - position, r.unit_u, r.length_u, r.unit_v, r.length_v))
+                    .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
+                match by_angle {
+                    Some(quad) => 1.0 / quad.solid_angle(),
+                    None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
+                }
+            }
+            Self::Triangle { vertices, normal, area } => {
+                let by_angle = by_angle.then(|| spherical_triangle(vertices.map(|v| v - position))).flatten();
+                match by_angle {
+                    Some(triangle) => 1.0 / triangle.solid_angle(),
+                    None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
+                }
+            }
+        }
+    }
+}
+
+pub(crate) fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
+    let to_center = center - position;
+    let distance2 = to_center.length_squared();
+    let r2 = radius * radius;
+    if distance2 <= r2 {
+        // Inside: the sphere emits outwards.
+        return None;
+    }
+    let sin2_max = r2 / distance2;
+    let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
+    let (local, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
+    let frame = Frame::around(to_center / distance2.sqrt());
+    if distance2 < CLOSE * r2 {
+        return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));
+    }
+    // The angle at the centre that belongs to the angle at the shading point (Pharr et al., section 6.2.4), written
+    // so that nothing cancels for a sphere of few pixels.
+    let sin2 = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0);
+    let cos = 1.0 - one_minus_cos;
+    let cos_alpha = (sin2 / sin2_max.sqrt() + cos * (1.0 - sin2 / sin2_max).max(0.0).sqrt()).min(1.0);
+    let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
+    let around = local.truncate().normalize_or(Vec2::X);
+    let normal = frame.to_world((around * sin_alpha).extend(-cos_alpha));
+    let point = center + radius * normal;
+    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
+    let (wi, distance) = direction(position, point)?;
+    Some(LightPoint {
+        target: lifted(point, error, normal, distance),
+        wi,
+        pdf: cone_pdf(one_minus_cos_max),
+        normal,
+        uv: Vec2::ZERO,
+    })
+}
+
+/// Within this many squared radii of the centre of a sphere its points are found by [`sphere_from_close_by`].
+pub(crate) const CLOSE: f32 = 2.0;
+
+/// Where the direction `wi` (about the centre) meets a sphere that fills much of the sky.
+///
+/// Right above the surface all points that are seen lie within an angle at the centre that `f32` cannot resolve, so the way to
+/// the surface is what is computed, and its length from the power of the point, which does not cancel.
+#[cold]
+fn sphere_from_close_by(center: Vec3, radius: f32, position: Vec3, wi: Vec3, one_minus_cos_max: f32) -> LightPoint {
+    let (to_center, dir, r) = (center.as_dvec3() - position.as_dvec3(), wi.as_dvec3().normalize(), f64::from(radius));
+    let middle = to_center.dot(dir);
+    let power = to_center.length_squared() - r * r;
+    let distance = power / (middle + (middle * middle - power).max(0.0).sqrt());
+    let normal = (distance * dir - to_center).normalize();
+    let point = (center.as_dvec3() + r * normal).as_vec3();
+    let error = 2.0 * robust::UNIT_ROUNDOFF * point.abs();
+    let normal = normal.as_vec3();
+    LightPoint {
+        target: lifted(point, error, normal, distance as f32),
+        wi,
+        pdf: cone_pdf(one_minus_cos_max),
+        normal,
+        uv: Vec2::ZERO,
+    }
+}
+
+/// A sphere seen as a point in its centre, where all of its light is: π r² of radiance over distance².
+///
+/// `None` from inside of it.
+#[inline]
+pub(crate) fn sphere_as_point(center: Vec3, radius: f32, position: Vec3) -> Option<LightPoint> {
+    let (wi, distance) = direction(position, center)?;
+    if distance <= radius {
+        return None;
+    }
+    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
+    Some(LightPoint {
+        target: lifted(center - radius * wi, error, -wi, distance),
+        wi,
+        pdf: (distance / radius).powi(2) / std::f32::consts::PI,
+        normal: -wi,
+        uv: Vec2::ZERO,
+    })
+}
+
+/// Evenly over the whole sphere: half of the points, and more, lie on the side that is not seen.
+fn sample_sphere_area(center: Vec3, radius: f32, position: Vec3, u: Vec2) -> Option<LightPoint> {
+    let normal = uniform_sphere(u);
+    let point = center + radius * normal;
+    let (wi, distance) = direction(position, point)?;
+    let pdf = area_pdf(distance, wi, normal, 4.0 * std::f32::consts::PI * radius * radius)?;
+    let error = robust::gamma(6) * (center.abs() + Vec3::splat(radius));
+    Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: Vec2::ZERO })
+}
+
+/// Even over all directions.
+fn uniform_sphere(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.x;
+    let (sin_phi, cos_phi) = (std::f32::consts::TAU * u.y).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    Vec3::new(r * cos_phi, r * sin_phi, z)
+}
+
+/// Longitude and latitude of a unit vector, both 0..1; v = 1 at +Y, u grows counter-clockwise from −X seen from +Y.
+#[inline]
+pub(crate) fn sphere_uv(normal: Vec3) -> Vec2 {
+    use std::f32::consts::{PI, TAU};
+    Vec2::new(0.5 + (-normal.z).atan2(normal.x) / TAU, 1.0 - normal.y.clamp(-1.0, 1.0).acos() / PI)
+}
+
+/// Where a shadow ray may end without meeting the light itself.
+///
+/// The light's own error is one part; the other is what the kernel loses when it works out where a ray from
+/// `distance` metres away crosses the surface: at most a few roundings of numbers of that size, for every shape.
+#[inline]
+fn lifted(point: Vec3, error: Vec3, normal: Vec3, distance: f32) -> Vec3 {
+    robust::offset_ray_origin(point, error + Vec3::splat(robust::gamma(16) * distance), normal, normal)
+}
+
+#[inline]
+fn direction(from: Vec3, to: Vec3) -> Option<(Vec3, f32)> {
+    let offset = to - from;
+    let distance = offset.length();
+    (distance > 0.0).then(|| (offset / distance, distance))
+}
+
+/// A density per square metre turned into one per steradian; `None` when the front is not seen.
+#[inline]
+fn area_pdf(distance: f32, wi: Vec3, normal: Vec3, area: f32) -> Option<f32> {
+    let cos = -wi.dot(normal);
+    (cos > 0.0 && area > 0.0).then(|| distance * distance / (cos * area))
+}
+
+#[inline]
+fn spherical_triangle(relative: [Vec3; 3]) -> Option<SphericalTriangle> {
+    let triangle = SphericalTriangle::new(relative);
+    (SMALL_SOLID_ANGLE..=LARGE_SOLID_ANGLE).contains(&triangle.solid_angle()).then_some(triangle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+    use std::f32::consts::PI;
+
+    fn lights() -> Vec<LightShape> {
+        let tilted = Vec3::new(0.3, -1.0, 0.2);
+        vec![
+            LightShape::Sphere { center: Vec3::new(0.5, 3.0, 0.2), radius: 1.0 },
+            LightShape::Sphere { center: Vec3::new(0.5, 300.0, 0.2), radius: 0.5 },
+            LightShape::quad(Vec3::new(-1.0, 2.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0),
+            LightShape::quad(Vec3::new(-1.0, 2.0, -1.0), Vec3::X * 0.05, Vec3::Z * 0.05),
+            LightShape::quad(Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 0.5, 0.0), Vec3::Z * 2.0),
+            LightShape::triangle([tilted + 3.0 * Vec3::Y, Vec3::new(2.0, 2.0, 0.0), Vec3::new(0.0, 2.5, 2.0)]),
+            LightShape::triangle([Vec3::Y * 9.0, Vec3::new(0.1, 9.0, 0.0), Vec3::new(0.0, 9.0, 0.1)]),
+        ]
+    }
+
+    /// Every light, sampled in both ways.
+    fn cases(lights: &[LightShape]) -> impl Iterator<Item = (bool, usize, &LightShape)> {
+        [true, false]
+            .into_iter()
+            .flat_map(move |by_angle| lights.iter().enumerate().map(move |(case, shape)| (by_angle, case, shape)))
+    }
+
+    /// Irradiance on a floor point from radiance 1 by plain area sampling in f64.
+    fn irradiance_by_area(shape: &LightShape) -> f64 {
+        let n = 1500;
+        let mut sum = 0.0;
+        for i in 0..n * n {
+            let (a, b) = ((f64::from(i % n) + 0.5) / f64::from(n), (f64::from(i / n) + 0.5) / f64::from(n));
+            let (point, normal, area) = match *shape {
+                LightShape::Sphere { center, radius } => {
+                    let (z, phi) = (2.0 * a - 1.0, std::f64::consts::TAU * b);
+                    let r = (1.0 - z * z).sqrt();
+                    let normal = glam::DVec3::new(r * phi.cos(), r * phi.sin(), z);
+                    (center.as_dvec3() + f64::from(radius) * normal, normal, f64::from(shape.area()))
+                }
+                LightShape::Quad { corner, edge_u, edge_v, normal, area, .. } => {
+                    let point = corner.as_dvec3() + a * edge_u.as_dvec3() + b * edge_v.as_dvec3();
+                    (point, normal.as_dvec3(), f64::from(area))
+                }
+                LightShape::Triangle { vertices, normal, area } => {
+                    let [p, q, r] = vertices.map(Vec3::as_dvec3);
+                    let (s, t) = (1.0 - a.sqrt(), b * a.sqrt());
+                    (p + s * (q - p) + t * (r - p), normal.as_dvec3(), f64::from(area))
+                }
+            };
+            let distance = point.length();
+            let cos_light = (-point.dot(normal) / distance).max(0.0);
+            sum += cos_light * (point.y / distance).max(0.0) / (distance * distance) * area;
+        }
+        sum / f64::from(n * n)
+    }
+
+    #[test]
+    fn sampled_irradiance_matches_plain_area_sampling() {
+        for (by_angle, case, shape) in cases(&lights()) {
+            let n = 1 << 14;
+            let mut sum = 0.0;
+            for i in 0..n {
+                if let Some(point) = shape.sample(Vec3::ZERO, by_angle, Sampler::new(1, case as u32, 0, i).pair(0)) {
+                    assert!((point.wi.length() - 1.0).abs() < 1e-5);
+                    sum += f64::from(point.wi.y.max(0.0) / point.pdf) / f64::from(n);
+                }
+            }
+            let expected = irradiance_by_area(shape);
+            assert!((sum / expected - 1.0).abs() < 2e-3, "light {case}: {sum} for {expected}");
+        }
+    }
+
+    #[test]
+    fn pdf_agrees_with_sampling() {
+        for (by_angle, case, shape) in cases(&lights()) {
+            for i in 0..256 {
+                let position = Vec3::new(0.1 * (i % 16) as f32 - 0.8, 0.0, 0.1 * (i / 16) as f32 - 0.8);
+                let Some(point) = shape.sample(position, by_angle, Sampler::new(1, 0, 0, i).pair(0)) else { continue };
+                let pdf = shape.pdf(position, by_angle, point.wi, (point.target - position).length());
+                // By area the normal is found again from the point: a far, small ball leaves it few digits.
+                let bound = if by_angle { 1e-3 } else { 1e-2 };
+                assert!((pdf / point.pdf - 1.0).abs() < bound, "light {case}: {pdf} for {}", point.pdf);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_shines_backwards() {
+        let behind = Vec3::new(0.0, 5.0, 0.0);
+        assert!(lights()[2].sample(behind, true, Vec2::splat(0.3)).is_none());
+        assert!(lights()[0].sample(Vec3::new(0.5, 3.2, 0.2), true, Vec2::splat(0.3)).is_none());
+        assert_eq!(lights()[0].pdf(Vec3::new(0.5, 3.2, 0.2), true, Vec3::Y, 0.8), 0.0);
+        assert!((lights()[0].area() - 4.0 * PI).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,462 @@
+//! A tree over many lights, so that one of them is chosen by what it could send to a point without asking them all.
+//!
+//! Every node knows a ball around its lights, a cone around the directions in which they face, and their power. From
+//! the root down, one of two children is chosen in proportion to a bound on the light that it can send: power over
+//! distance squared, times the largest cosines at both ends (Conty Estevez and Kulla 2018, "Importance Sampling of Many
+//! Lights with Adaptive Tree Splitting", without the splitting). The tree is built by their cost, surface area times
+//! orientation. The same walk down to a given light tells the probability of its choice, exactly.
+
+use crate::prepare::light::emitter::Light;
+use crate::prepare::light::shape::LightShape;
+use firstlight_kdtree::geometry::Aabb;
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// From here on nodes are halved by number, so that the way to a light fits into 64 bits.
+const MAX_UNEVEN_DEPTH: u32 = 32;
+
+const BINS: usize = 12;
+
+#[derive(Debug, Default)]
+pub(crate) struct LightTree {
+    /// Children lie side by side.
+    pub(crate) nodes: Vec<Node>,
+    /// For each light the way to it from the root: bit k says which child on level k.
+    pub(crate) ways: Vec<u64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Node {
+    pub center: Vec3,
+    pub radius: f32,
+    /// Mean direction of the normals, unit.
+    pub axis: Vec3,
+    /// By how much the cosine with some normal can exceed that with the axis: 2 sin(s/2) for normals up to s away.
+    pub widening: f32,
+    /// Luminance of the radiance, times area that can face a point.
+    pub power: f32,
+    /// First of the two children, or `LEAF` plus a light.
+    pub link: u32,
+}
+
+pub(crate) const LEAF: u32 = 1 << 31;
+
+/// A light as the builder sees it.
+#[derive(Clone, Copy)]
+struct Item {
+    bounds: Aabb,
+    cone: Cone,
+    power: f32,
+    id: u32,
+}
+
+/// Directions within `spread` radians of a unit axis.
+#[derive(Clone, Copy)]
+struct Cone {
+    axis: Vec3,
+    spread: f32,
+}
+
+impl LightTree {
+    /// At least two lights.
+    pub fn build(lights: &[Light]) -> Self {
+        let mut items: Vec<Item> = (0..).zip(lights).map(|(id, light)| Item::new(id, light)).collect();
+        let mut tree = Self { nodes: Vec::with_capacity(2 * lights.len()), ways: vec![0; lights.len()] };
+        tree.nodes.push(Node::new(&items));
+        tree.split(0, &mut items, 0, 0);
+        tree
+    }
+
+    fn split(&mut self, at: usize, items: &mut [Item], depth: u32, way: u64) {
+        if let [only] = items {
+            self.nodes[at].link = LEAF | only.id;
+            self.ways[only.id as usize] = way;
+            return;
+        }
+        let middle = match (depth < MAX_UNEVEN_DEPTH).then(|| best_split(items)).flatten() {
+            Some((axis, limit)) => partition(items, |item| item.middle()[axis] < limit),
+            None => {
+                let all = Aabb::from_points(items.iter().map(Item::middle));
+                let axis = (all.max - all.min).max_position();
+                items.sort_unstable_by(|a, b| a.middle()[axis].total_cmp(&b.middle()[axis]).then(a.id.cmp(&b.id)));
+                items.len() / 2
+            }
+        };
+        let (below, above) = items.split_at_mut(middle);
+        let first = self.nodes.len();
+        self.nodes[at].link = first as u32;
+        self.nodes.extend([Node::new(below), Node::new(above)]);
+        self.split(first, below, depth + 1, way);
+        self.split(first + 1, above, depth + 1, way | 1 << depth);
+    }
+
+    /// A light and the probability of the choice; `None` when none can reach the point.
+    pub fn sample(&self, position: Vec3, normal: Vec3, mut u: f32) -> Option<(u32, f32)> {
+        let (mut node, mut pmf) = (self.nodes[0], 1.0);
+        while node.link < LEAF {
+            let children = &self.nodes[node.link as usize..][..2];
+            let bounds = [children[0].bound(position, normal), children[1].bound(position, normal)];
+            let sum = bounds[0] + bounds[1];
+            if sum == 0.0 {
+                return None;
+            }
+            let share = bounds[0] / sum;
+            // What is left of the number serves further down. Rounding must not lead to a child that sends nothing.
+            let second = u >= share && bounds[1] > 0.0 || bounds[0] == 0.0;
+            let part = if second { bounds[1] / sum } else { share };
+            u = ((if second { u - share } else { u }) / part).clamp(0.0, 1.0f32.next_down());
+            pmf *= part;
+            node = children[usize::from(second)];
+        }
+        Some((node.link & !LEAF, pmf))
+    }
+
+    /// The probability that [`Self::sample`] chooses a light.
+    pub fn pmf(&self, id: u32, position: Vec3, normal: Vec3) -> f32 {
+        let (mut node, mut pmf, mut way) = (self.nodes[0], 1.0, self.ways[id as usize]);
+        while node.link < LEAF {
+            let children = &self.nodes[node.link as usize..][..2];
+            let bounds = [children[0].bound(position, normal), children[1].bound(position, normal)];
+            let sum = bounds[0] + bounds[1];
+            if sum == 0.0 {
+                return 0.0;
+            }
+            let second = (way & 1) as usize;
+            // As `sample` divides, so that both tell the same to the last bit.
+            pmf *= bounds[second] / sum;
+            node = children[second];
+            way >>= 1;
+        }
+        pmf
+    }
+}
+
+impl Node {
+    fn new(items: &[Item]) -> Self {
+        let bounds = items.iter().fold(Aabb::EMPTY, |all, item| all.union(item.bounds));
+        let cone = items[1..].iter().fold(items[0].cone, |all, item| all.union(item.cone));
+        let center = 0.5 * (bounds.min + bounds.max);
+        Self {
+            center,
+            // Both a little more, so that rounding leaves nothing out.
+            radius: 0.5 * (bounds.max - bounds.min).length() * (1.0 + 8.0 * f32::EPSILON)
+                + 4.0 * f32::EPSILON * center.length(),
+            axis: cone.axis,
+            widening: 2.0 * (0.5 * cone.spread).sin() + 1e-5,
+            power: items.iter().map(|item| item.power).sum(),
+            link: 0,
+        }
+    }
+
+    /// About the largest irradiance that the lights can cause, never zero where they can cause any.
+    ///
+    /// It is asked for twice a level, so it is made of one root and no other angle: the cosine of the largest lean of a
+    /// ball is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
+    #[inline]
+    fn bound(&self, position: Vec3, normal: Vec3) -> f32 {
+        let offset = self.center - position;
+        let (distance2, r2) = (offset.length_squared(), self.radius * self.radius);
+        if distance2 <= r2 {
+            // Within the ball anything can happen; on average the lights are about a radius away.
+            return self.power / r2.max(f32::MIN_POSITIVE);
+        }
+        let inv_distance = 1.0 / distance2.sqrt();
+        // A little more, so that rounding hides nothing.
+        let slack = 16.0 * f32::EPSILON;
+        let receiver = (offset.dot(normal) + self.radius) * inv_distance + slack;
+        let emitter = (self.radius - offset.dot(self.axis)) * inv_distance + self.widening + slack;
+        self.power * receiver.clamp(0.0, 1.0) * emitter.clamp(0.0, 1.0) * (inv_distance * inv_distance)
+    }
+}
+
+impl Item {
+    fn new(id: u32, light: &Light) -> Self {
+        let everywhere = Cone { axis: Vec3::Z, spread: PI };
+        let (bounds, cone, facing) = match light.shape {
+            LightShape::Sphere { center, radius } => {
+                (Aabb { min: center - radius, max: center + radius }, everywhere, 0.25)
+            }
+            LightShape::Quad { corner, edge_u, edge_v, normal, .. } => {
+                let corners = [corner, corner + edge_u, corner + edge_v, corner + edge_u + edge_v];
+                (Aabb::from_points(corners), Cone { axis: normal, spread: 0.0 }, 1.0)
+            }
+            LightShape::Triangle { vertices, normal, .. } => {
+                (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
+            }
+        };
+        // A light that is black on the mean may still shine somewhere: it keeps a little.
+        let power = (light.mean_radiance * light.shape.area() * facing).max(f32::MIN_POSITIVE);
+        Self { bounds, cone, power, id }
+    }
+
+    fn middle(&self) -> Vec3 {
+        0.5 * (self.bounds.min + self.bounds.max)
+    }
+}
+
+impl Cone {
+    fn union(self, other: Self) -> Self {
+        let (wide, narrow) = if self.spread >= other.spread { (self, other) } else { (other, self) };
+        if wide.spread >= PI {
+            return wide;
+        }
+        let between = wide.axis.angle_between(narrow.axis);
+        if between + narrow.spread <= wide.spread {
+            return wide;
+        }
+        let spread = 0.5 * (wide.spread + between + narrow.spread);
+        let across = wide.axis.cross(narrow.axis);
+        if spread >= PI || across.length_squared() < 1e-12 {
+            return Self { axis: wide.axis, spread: PI };
+        }
+        let turn = glam::Quat::from_axis_angle(across.normalize(), spread - wide.spread);
+        // Turning rounds.
+        Self { axis: (turn * wide.axis).normalize(), spread: spread + 1e-5 }
+    }
+
+    /// How much of the sphere the lights shine to, weighted by cosine beyond the cone (Conty and Kulla, section 4.4).
+    fn measure(self) -> f32 {
+        let (o, w) = (self.spread, (self.spread + FRAC_PI_2).min(PI));
+        2.0 * PI * (1.0 - o.cos()) + FRAC_PI_2 * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos())
+    }
+}
+
+/// What a half of a split costs: power times area times orientation.
+#[derive(Clone, Copy)]
+struct Half {
+    bounds: Aabb,
+    cone: Option<Cone>,
+    power: f32,
+}
+
+impl Half {
+    const EMPTY: Self = Self { bounds: Aabb::EMPTY, cone: None, power: 0.0 };
+
+    fn with(self, other: Self) -> Self {
+        let cone = match (self.cone, other.cone) {
+            (Some(a), Some(b)) => Some(a.union(b)),
+            (a, b) => a.or(b),
+        };
+        Self { bounds: self.bounds.union(other.bounds), cone, power: self.power + other.power }
+    }
+
+    fn cost(self) -> f32 {
+        let Some(cone) = self.cone else { return 0.0 };
+        let size = self.bounds.max - self.bounds.min;
+        let area = size.x * size.y + size.y * size.z + size.z * size.x;
+        self.power * area * cone.measure()
+    }
+}
+
+/// Axis and limit of the middles; `None` where all middles are one, or where no bound tells a difference.
+fn best_split(items: &[Item]) -> Option<(usize, f32)> {
+    let middles = Aabb::from_points(items.iter().map(Item::middle));
+    let size = middles.max - middles.min;
+    let mut best: Option<(f32, usize, f32)> = None;
+    for axis in 0..3 {
+        if !(size[axis] > 0.0) {
+            continue;
+        }
+        let mut bins = [Half::EMPTY; BINS];
+        for item in items {
+            let place = (item.middle()[axis] - middles.min[axis]) / size[axis] * BINS as f32;
+            let bin = &mut bins[(place as usize).min(BINS - 1)];
+            *bin = bin.with(Half { bounds: item.bounds, cone: Some(item.cone), power: item.power });
+        }
+        // Thin boxes are cut across.
+        let slimness = size.max_element() / size[axis];
+        let mut above = [Half::EMPTY; BINS];
+        for i in (0..BINS - 1).rev() {
+            above[i] = above[i + 1].with(bins[i + 1]);
+        }
+        let mut below = Half::EMPTY;
+        for i in 0..BINS - 1 {
+            below = below.with(bins[i]);
+            if below.cone.is_none() || above[i].cone.is_none() {
+                continue;
+            }
+            let cost = slimness * (below.cost() + above[i].cost());
+            if best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, middles.min[axis] + size[axis] * ((i + 1) as f32 / BINS as f32)));
+            }
+        }
+    }
+    let (_, axis, limit) = best?;
+    // Rounding may put all of them on one side.
+    let n_below = items.iter().filter(|item| item.middle()[axis] < limit).count();
+    (0 < n_below && n_below < items.len()).then_some((axis, limit))
+}
+
+/// Those that `is_below` come first, in their order; how many there are.
+fn partition(items: &mut [Item], is_below: impl Fn(&Item) -> bool) -> usize {
+    items.sort_by_key(|item| !is_below(item));
+    items.partition_point(is_below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::material::{ColorInput, Emission};
+    use crate::core::techniques::Techniques;
+    use crate::prepare::light::tree_lanes::WideTree;
+    use crate::sampling::Sampler;
+    use firstlight_simd::{Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
+
+    fn lights(n: u32, seed: u32) -> Vec<Light> {
+        (0..n)
+            .map(|i| {
+                let sampler = Sampler::new(seed, i, 0, 0);
+                let (a, b, c) = (sampler.pair(0), sampler.pair(1), sampler.pair(2));
+                let at = Vec3::new(8.0 * a.x - 4.0, 3.0 * a.y, 8.0 * b.x - 4.0);
+                let (size, turn) = (0.02 + 0.3 * b.y * b.y, 6.3 * c.x);
+                let (u, v) = (Vec3::new(turn.cos(), 0.2, turn.sin()) * size, Vec3::new(0.0, size, size * c.y));
+                let shape = match i % 3 {
+                    0 => LightShape::Sphere { center: at, radius: size },
+                    1 => LightShape::quad(at, u, v),
+                    _ => LightShape::triangle([at, at + u, at + v]),
+                };
+                let radiance = 0.1 + 20.0 * c.y.powi(4);
+                let emission = Emission { radiance: ColorInput::Constant(Vec3::splat(radiance)), scale: 1.0 };
+                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corner_uvs: None }
+            })
+            .collect()
+    }
+
+    /// Points among the lights, on their rims and far away, with normals every way.
+    fn places() -> Vec<(Vec3, Vec3)> {
+        (0..60)
+            .map(|i| {
+                let sampler = Sampler::new(77, i, 0, 0);
+                let (a, b, c) = (sampler.pair(0), sampler.pair(1), sampler.pair(2));
+                let reach = if i % 3 == 0 { 40.0 } else { 8.0 };
+                let at = Vec3::new(a.x - 0.5, a.y - 0.5, b.x - 0.5) * reach;
+                (at, Vec3::new(b.y - 0.5, c.x - 0.5, c.y - 0.5).normalize())
+            })
+            .collect()
+    }
+
+    #[inline(always)]
+    fn walk_lanes<S: Simd>(s: S, tree: &LightTree, places: &[(Vec3, Vec3)], out: &mut Vec<(u32, u32, u32)>) {
+        let wide = WideTree::new(tree);
+        for (round, chunk) in places.chunks(LANES).enumerate() {
+            let at = |k: usize| chunk[k.min(chunk.len() - 1)];
+            let u: [f32; LANES] = std::array::from_fn(|k| (k as f32 + 0.5) / LANES as f32);
+            let [px, py, pz] = [0, 1, 2].map(|axis| std::array::from_fn(|k| at(k).0[axis]));
+            let [nx, ny, nz] = [0, 1, 2].map(|axis| std::array::from_fn(|k| at(k).1[axis]));
+            let position = Vector::from_arrays(s, &[px, py, pz]);
+            let normal = Vector::from_arrays(s, &[nx, ny, nz]);
+            let (id, pmf, found) = wide.sample(Mask::MAX, position, normal, Float::load(s, &u));
+            let again = wide.pmf(found, id, position, normal).to_array();
+            let (ids, pmfs) = (id.to_array(), pmf.to_array());
+            for (k, &(position, normal)) in chunk.iter().enumerate() {
+                let expected = tree.sample(position, normal, u[k]);
+                let got = (found >> k & 1 != 0).then_some((ids[k], pmfs[k]));
+                assert_eq!(got, expected, "lane {k} of round {round}");
+                if let Some((id, pmf)) = got {
+                    assert_eq!(again[k], pmf);
+                    out.push((round as u32, id, pmf.to_bits()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_walk_the_same_way() {
+        for n in [2, 17, 40, 300] {
+            let (tree, places) = (LightTree::build(&lights(n, 9)), places());
+            let run = |set| {
+                let mut out = Vec::new();
+                let (tree, places, into) = (&tree, &places[..], &mut out);
+                dispatch!(
+                    set,
+                    walk_lanes(tree: &LightTree, places: &[(Vec3, Vec3)], into: &mut Vec<(u32, u32, u32)>)
+                );
+                out
+            };
+            let expected = run(InstructionSet::Portable);
+            assert!(expected.len() > 20, "{n} lights: hardly any place is reached");
+            for set in InstructionSet::available() {
+                assert_eq!(run(set), expected, "{n} lights, {set:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_and_are_those_of_the_choice() {
+        for n in [2, 17, 300] {
+            let tree = LightTree::build(&lights(n, 5));
+            for (position, normal) in places() {
+                let pmfs: Vec<f32> = (0..n).map(|id| tree.pmf(id, position, normal)).collect();
+                let sum: f32 = pmfs.iter().sum();
+                let draws = 512;
+                let mut in_vain = 0;
+                for i in 0..draws {
+                    match tree.sample(position, normal, (i as f32 + 0.5) / draws as f32) {
+                        Some((id, pmf)) => assert_eq!(pmf, pmfs[id as usize]),
+                        None => in_vain += 1,
+                    }
+                }
+                // What is missing to one are choices of nodes that turn out to hold nothing that reaches the point.
+                let missing = 1.0 - sum - in_vain as f32 / draws as f32;
+                assert!(missing.abs() < 0.02, "{sum} with {in_vain} of {draws} in vain");
+            }
+        }
+    }
+
+    #[test]
+    fn frequencies_follow_the_probabilities() {
+        let n = 40;
+        let tree = LightTree::build(&lights(n, 6));
+        let mut n_judged = 0;
+        for (k, (position, normal)) in places().into_iter().take(12).enumerate() {
+            let draws = 200_000;
+            let mut found = vec![0.0_f64; n as usize];
+            for i in 0..draws {
+                let u = Sampler::independent(2, k as u32, i, 0).single(0);
+                if let Some((id, _)) = tree.sample(position, normal, u) {
+                    found[id as usize] += 1.0;
+                }
+            }
+            let expected: Vec<f64> =
+                (0..n).map(|id| f64::from(tree.pmf(id, position, normal)) * f64::from(draws)).collect();
+            let bins = expected.iter().zip(&found).filter(|(e, _)| **e > 5.0);
+            if expected.iter().all(|e| *e == 0.0) {
+                assert!(found.iter().all(|f| *f == 0.0), "place {k}: no light reaches it");
+                continue;
+            }
+            n_judged += 1;
+            let (chi2, dof) = bins.fold((0.0, 0.0), |(sum, dof), (e, f)| (sum + (f - e).powi(2) / e, dof + 1.0));
+            // Wilson–Hilferty; 3.2 σ is 1 % over twelve places.
+            let z = ((chi2 / dof).cbrt() - (1.0 - 2.0 / (9.0 * dof))) / (2.0f64 / (9.0 * dof)).sqrt();
+            assert!(z < 3.2, "place {k}: χ² {chi2:.1} with {dof} degrees of freedom");
+        }
+        assert!(n_judged >= 6, "too few places that light reaches: {n_judged}");
+    }
+
+    #[test]
+    fn no_light_that_reaches_a_point_is_left_out() {
+        let lights = lights(200, 8);
+        let tree = LightTree::build(&lights);
+        let mut n_reaching = 0;
+        for (position, normal) in places() {
+            for (id, light) in (0..).zip(&lights) {
+                let reaches = (0..8).any(|i| {
+                    let u = Sampler::new(3, id, 0, i).pair(0);
+                    let sample = light.sample(&[], &Techniques::ALL, position, u, 1.0);
+                    sample.is_some_and(|sample| sample.wi.dot(normal) > 1e-6)
+                });
+                n_reaching += u32::from(reaches);
+                assert!(!reaches || tree.pmf(id, position, normal) > 0.0, "light {id} from {position} along {normal}");
+            }
+        }
+        assert!(n_reaching > 1000, "the test must see something: {n_reaching}");
+    }
+
+    #[test]
+    fn lights_in_one_place_do_not_break_it() {
+        let one = lights(1, 5).remove(0);
+        let tree = LightTree::build(&vec![one; 1000]);
+        let sum: f32 = (0..1000).map(|id| tree.pmf(id, Vec3::new(9.0, 1.0, 0.0), Vec3::NEG_X)).sum();
+        assert!((sum - 1.0).abs() < 1e-3, "{sum}");
+    }
+}

@@ -1,0 +1,173 @@
+//! The way down a [`LightTree`] from sixteen points at once, each lane to a light of its own.
+//!
+//! The numbers are those of the scalar walk, bit for bit. Nodes are numbered by level here: the first levels, which all
+//! lanes pass, fit into registers.
+
+use crate::prepare::light::tree::{LEAF, LightTree};
+use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
+
+#[derive(Debug, Default)]
+pub(crate) struct WideTree {
+    all: Rows,
+    /// The first of them.
+    top: Rows,
+    /// The way to each light, lower and upper half.
+    ways: [Vec<u32>; 2],
+}
+
+/// How many nodes are looked up in registers.
+const TOP: usize = 2 * LANES;
+
+/// One entry a node; see `Node` of the tree.
+#[derive(Debug, Default)]
+struct Rows {
+    center: [Vec<f32>; 3],
+    radius: Vec<f32>,
+    axis: [Vec<f32>; 3],
+    widening: Vec<f32>,
+    power: Vec<f32>,
+    link: Vec<u32>,
+}
+
+impl WideTree {
+    pub fn new(tree: &LightTree) -> Self {
+        // Numbers in the tree, by level.
+        let mut order = vec![0];
+        let mut all = Rows::default();
+        let mut next = 0;
+        while let Some(&number) = order.get(next) {
+            let node = &tree.nodes[number as usize];
+            let mut link = node.link;
+            if link < LEAF {
+                link = order.len() as u32;
+                order.extend([node.link, node.link + 1]);
+            }
+            for axis in 0..3 {
+                all.center[axis].push(node.center[axis]);
+                all.axis[axis].push(node.axis[axis]);
+            }
+            all.radius.push(node.radius);
+            all.widening.push(node.widening);
+            all.power.push(node.power);
+            all.link.push(link);
+            next += 1;
+        }
+        let half = |shift: u32| padded(tree.ways.iter().map(|way| (way >> shift) as u32).collect());
+        Self { top: all.map(first_of, first_of), all: all.map(padded, padded), ways: [half(0), half(32)] }
+    }
+
+    /// See [`LightTree::sample`]: lights, their probabilities, and the lanes that some light can reach.
+    #[inline(always)]
+    pub fn sample<S: Simd>(
+        &self,
+        mask: Mask,
+        position: Vector<S>,
+        normal: Vector<S>,
+        mut u: Float<S>,
+    ) -> (Bits<S>, Float<S>, Mask) {
+        let s = u.s;
+        let (mut node, mut pmf) = (Bits::splat(s, self.all.link[0]), u.all(1.0));
+        let (mut found, mut open) = (mask, mask & !node.has(LEAF));
+        while open != 0 {
+            let rows = self.rows(open, node);
+            let first = rows.bounds(node, position, normal);
+            let second = rows.bounds(node + 1, position, normal);
+            let sum = first + second;
+            let none = open & sum.is_zero();
+            found &= !none;
+            open &= !none;
+            let share = first / sum;
+            let take = (share.le(u) & second.is_positive()) | first.is_zero();
+            let part = select(take, second / sum, share);
+            let rest = (select(take, u - share, u) / part).at_least(0.0).at_most(1.0f32.next_down());
+            u = select(open, rest, u);
+            pmf = select(open, pmf * part, pmf);
+            node = rows.children(open, take, node);
+            open &= !node.has(LEAF);
+        }
+        (node & !LEAF, pmf, found)
+    }
+
+    /// See [`LightTree::pmf`].
+    #[inline(always)]
+    pub fn pmf<S: Simd>(&self, mask: Mask, id: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+        let s = id.s;
+        let zero = Float::splat(s, 0.0);
+        let (mut node, mut pmf) = (Bits::splat(s, self.all.link[0]), zero.all(1.0));
+        let mut open = mask & !node.has(LEAF);
+        let mut way = Bits::gather(&self.ways[0], id);
+        let mut level = 0;
+        while open != 0 {
+            if level == 32 {
+                way = Bits::gather(&self.ways[1], id);
+            }
+            let rows = self.rows(open, node);
+            let first = rows.bounds(node, position, normal);
+            let second = rows.bounds(node + 1, position, normal);
+            let sum = first + second;
+            let take = way.has(1);
+            let none = open & sum.is_zero();
+            pmf = select(open, pmf * (select(take, second, first) / sum), pmf);
+            pmf = select(none, zero, pmf);
+            open &= !none;
+            node = rows.children(open, take, node);
+            open &= !node.has(LEAF);
+            way = way.shift_right(1);
+            level += 1;
+        }
+        pmf
+    }
+
+    /// Where the children of all open lanes stand.
+    #[inline(always)]
+    fn rows<S: Simd>(&self, open: Mask, node: Bits<S>) -> &Rows {
+        let s = node.s;
+        let near = s.lt_u(node.v, s.splat_u(TOP as u32 - 1));
+        if open & !near == 0 { &self.top } else { &self.all }
+    }
+}
+
+/// The first [`TOP`], or that many.
+fn first_of<T: Copy + Default>(mut array: Vec<T>) -> Vec<T> {
+    array.resize(TOP, T::default());
+    array
+}
+
+impl Rows {
+    fn map(&self, floats: fn(Vec<f32>) -> Vec<f32>, links: fn(Vec<u32>) -> Vec<u32>) -> Self {
+        Self {
+            center: self.center.clone().map(floats),
+            radius: floats(self.radius.clone()),
+            axis: self.axis.clone().map(floats),
+            widening: floats(self.widening.clone()),
+            power: floats(self.power.clone()),
+            link: links(self.link.clone()),
+        }
+    }
+
+    /// See `Node::bound` of the tree.
+    #[inline(always)]
+    fn bounds<S: Simd>(&self, node: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+        let offset = Vector::gather(&self.center, node) - position;
+        let (radius, power) = (Float::gather(&self.radius, node), Float::gather(&self.power, node));
+        let (distance2, r2) = (offset.length_squared(), radius * radius);
+        let inv_distance = radius.all(1.0) / distance2.sqrt();
+        let slack = 16.0 * f32::EPSILON;
+        let receiver = (offset.dot(normal) + radius) * inv_distance + slack;
+        let facing = offset.dot(Vector::gather(&self.axis, node));
+        let emitter = (radius - facing) * inv_distance + Float::gather(&self.widening, node) + slack;
+        let receiver = receiver.at_least(0.0).at_most(1.0);
+        let emitter = emitter.at_least(0.0).at_most(1.0);
+        let outside = power * receiver * emitter * (inv_distance * inv_distance);
+        select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
+    }
+
+    /// Where open lanes go on.
+    #[inline(always)]
+    fn children<S: Simd>(&self, open: Mask, second: Mask, node: Bits<S>) -> Bits<S> {
+        let s = node.s;
+        let child = Bits { s, v: s.select_u(second, (node + 1).v, node.v) };
+        let below = Bits::gather(&self.link, child);
+        Bits { s, v: s.select_u(open, below.v, node.v) }
+    }
+}

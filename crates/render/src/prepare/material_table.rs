@@ -1,0 +1,142 @@
+//! What shading looks up by material, as arrays that sixteen lanes read at once.
+
+use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::snapshot::Geometry;
+use crate::prepare::arrays::push;
+use firstlight_simd::padded;
+use glam::Vec3;
+
+/// What materials are sorted by: numbers below [`Material::KINDS`] + 1.
+#[derive(Debug, Default)]
+pub(crate) struct Kinds {
+    /// Ready to be gathered from.
+    pub of_material: Vec<u32>,
+    /// One bit a kind, for those that there are.
+    pub present: u32,
+}
+
+/// Of a material in a [`MaterialTable`].
+pub(crate) const SCHLICK: u32 = 1;
+pub(crate) const COMPENSATE: u32 = 2;
+pub(crate) const TEXTURED: u32 = 4;
+
+/// The parameters of all materials of one lobe, and of the parts of those of two.
+#[derive(Debug, Default)]
+pub(crate) struct MaterialTable {
+    /// Albedo, reflectance or emitted radiance.
+    pub color: [Vec<f32>; 3],
+    /// The same where it has to be looked up.
+    pub inputs: Vec<ColorInput>,
+    pub alpha: Vec<f32>,
+    pub flags: Vec<u32>,
+    /// See [`Material::kind`]; [`COATED`] for materials of two parts.
+    pub kinds: Kinds,
+    /// Rows of the parts, with their weights; the parts of a classic material have rows behind those of all materials.
+    pub parts: [Vec<u32>; 2],
+    pub weights: [Vec<f32>; 2],
+    /// Whether some emission has to be looked up.
+    pub textured_emission: bool,
+    /// The material of each object; [`SEVERAL`] where its primitives differ.
+    pub of_object: Vec<MaterialId>,
+}
+
+pub(crate) const SEVERAL: MaterialId = MaterialId::MAX;
+
+/// Two parts of different kinds, each matte, rough metal or mirror.
+pub(crate) const COATED: usize = Material::KINDS;
+
+impl MaterialTable {
+    pub fn build(geometry: &Geometry, materials: &[Material]) -> Self {
+        let mut table = Self::default();
+        let mut parts_of_classics = Vec::new();
+        for material in materials {
+            table.add(material, materials);
+            let mut parts = [(0, 0.0); 2];
+            match material {
+                Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
+                    let kinds = [a, b].map(|&id| kind_of_part(&materials[id as usize]));
+                    if let [Some(first), Some(second)] = kinds
+                        && first != second
+                        && 0.0 < *weight
+                        && *weight < 1.0
+                    {
+                        parts = [(*a, 1.0 - weight), (*b, *weight)];
+                    }
+                }
+                Material::Phong { diffuse, specular: ScalarInput::Constant(specular), transparency: 0.0, .. }
+                    if 0.0 < *specular && *specular < 1.0 =>
+                {
+                    let row = (materials.len() + parts_of_classics.len()) as u32;
+                    parts_of_classics.push(Material::Diffuse { albedo: *diffuse });
+                    parts_of_classics.push(Material::Mirror { reflectance: ColorInput::Constant(Vec3::ONE) });
+                    parts = [(row, 1.0 - specular), (row + 1, *specular)];
+                }
+                _ => {}
+            }
+            let kind = if parts[0].1 > 0.0 { COATED } else { material.kind() };
+            table.kinds.of_material.push(kind as u32);
+            table.kinds.present |= 1 << kind;
+            for (k, (row, weight)) in parts.into_iter().enumerate() {
+                table.parts[k].push(row);
+                table.weights[k].push(weight);
+            }
+        }
+        for part in &parts_of_classics {
+            table.add(part, materials);
+            table.kinds.of_material.push(part.kind() as u32);
+        }
+        let of_object = geometry
+            .objects
+            .iter()
+            .map(|object| if let [only] = object.materials[..] { only } else { SEVERAL })
+            .collect();
+        Self {
+            color: table.color.map(padded),
+            inputs: table.inputs,
+            alpha: padded(table.alpha),
+            flags: padded(table.flags),
+            kinds: Kinds { of_material: padded(table.kinds.of_material), ..table.kinds },
+            parts: table.parts.map(padded),
+            weights: table.weights.map(padded),
+            textured_emission: materials.iter().any(is_textured_emitter),
+            of_object: padded(of_object),
+        }
+    }
+
+    /// Color, alpha and flags.
+    fn add(&mut self, material: &Material, materials: &[Material]) {
+        let (color, alpha) = match material {
+            Material::Diffuse { albedo: color }
+            | Material::Mirror { reflectance: color }
+            | Material::Emissive { radiance: color } => (*color, 0.0),
+            Material::Metal { alpha, reflectance, .. } => {
+                (*reflectance, if let ScalarInput::Constant(alpha) = alpha { alpha.clamp(0.0, 1.0) } else { 0.0 })
+            }
+            _ => (ColorInput::Constant(Vec3::ONE), 0.0),
+        };
+        let mut flags = if material.is_textured(materials) { TEXTURED } else { 0 };
+        if let Material::Metal { fresnel, compensate, .. } = material {
+            flags |= if *fresnel == Fresnel::Schlick { SCHLICK } else { 0 };
+            flags |= if *compensate { COMPENSATE } else { 0 };
+        }
+        push(&mut self.color, if let ColorInput::Constant(color) = color { color } else { Vec3::ZERO });
+        self.inputs.push(color);
+        self.alpha.push(alpha);
+        self.flags.push(flags);
+    }
+}
+
+fn is_textured_emitter(material: &Material) -> bool {
+    matches!(material, Material::Emissive { radiance: ColorInput::Texture(_) })
+}
+
+/// `None` for what cannot be a part of a [`COATED`] material.
+fn kind_of_part(material: &Material) -> Option<usize> {
+    match material {
+        Material::Diffuse { .. } | Material::Mirror { .. } => Some(material.kind()),
+        Material::Metal { alpha: ScalarInput::Constant(alpha), .. } => {
+            (*alpha >= SMALLEST_ALPHA).then(|| material.kind())
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,20 @@
+//! What is derived from a snapshot once, so that samples are cheap: tables of lights, materials and surfaces.
+//!
+//! Tables are built from plain data and know nothing of those who read them. [`Prepared`] has them all, and keeps those
+//! whose part of the snapshot did not change.
+
+pub(crate) mod ambient;
+mod arrays;
+pub(crate) mod bodies;
+pub(crate) mod bound;
+pub(crate) mod casters;
+pub(crate) mod classic_table;
+pub(crate) mod contacts;
+pub(crate) mod guide;
+pub(crate) mod instance_table;
+pub(crate) mod light;
+pub(crate) mod material_table;
+pub(crate) mod prepared;
+pub(crate) mod surface_table;
+
+pub use prepared::{Features, Prepared};

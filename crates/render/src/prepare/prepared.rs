@@ -1,0 +1,179 @@
+//! A snapshot with everything that is derived from it.
+
+use crate::core::camera::Camera;
+use crate::core::environment::{Environment, EnvironmentSampler};
+use crate::core::material::{Emission, Material};
+use crate::core::snapshot::{Geometry, Shading, Snapshot};
+use crate::prepare::ambient::AmbientLight;
+use crate::prepare::bodies::{Bodies, Boundary};
+use crate::prepare::bound::radiance_bound;
+use crate::prepare::casters::CasterTable;
+use crate::prepare::classic_table::ClassicTable;
+use crate::prepare::contacts::{Contacts, Touched};
+use crate::prepare::light::LightTable;
+use crate::prepare::material_table::MaterialTable;
+use crate::prepare::surface_table::SurfaceTable;
+use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::{Hit, HitBatch, RayBatch};
+use glam::Vec3;
+use std::ops::Deref;
+use std::sync::Arc;
+
+/// What is rendered: a [`Snapshot`], which it is as far as readers are concerned, and tables of it that are shared as its
+/// parts are.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    snapshot: Snapshot,
+    pub(crate) surfaces: Arc<SurfaceTable>,
+    pub(crate) tables: Arc<Tables>,
+}
+
+impl Deref for Prepared {
+    type Target = Snapshot;
+
+    #[inline(always)]
+    fn deref(&self) -> &Snapshot {
+        &self.snapshot
+    }
+}
+
+/// What is derived from [`Shading`] for one [`Geometry`], because lights are objects.
+#[derive(Debug)]
+pub(crate) struct Tables {
+    pub(crate) ambient: AmbientLight,
+    /// Whether each material looks up a texture, and so needs surface coordinates.
+    pub(crate) textured: Vec<bool>,
+    /// What each material adds itself.
+    pub(crate) emission: Vec<Option<Emission>>,
+    pub(crate) lights: LightTable,
+    pub(crate) bodies: Bodies,
+    pub(crate) contacts: Contacts,
+    pub(crate) environment_sampler: Option<EnvironmentSampler>,
+    pub(crate) materials: MaterialTable,
+    pub(crate) classic: ClassicTable,
+    /// What gathers light, where something does.
+    pub(crate) casters: Option<CasterTable>,
+    /// See [`crate::prepare::bound`].
+    pub(crate) radiance_bound: Option<f32>,
+    pub(crate) features: Features,
+}
+
+/// What the scene uses: what it does not use costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Features {
+    /// Some surface can send a path through itself, so paths keep track of what they are inside of.
+    pub glass: bool,
+    /// Something absorbs light between surfaces: there may be glass, or there is air that does.
+    pub media: bool,
+    /// Some light can be found by choosing a point or direction on it.
+    pub light_sampling: bool,
+    /// The surroundings shine.
+    pub environment: bool,
+    /// Some material looks up a texture.
+    pub textures: bool,
+    /// Something smooth gathers the light of some lamp, so paths are traced from lamps as well.
+    pub caustics: bool,
+}
+
+impl Prepared {
+    pub fn new(snapshot: Snapshot) -> Self {
+        let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
+        let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading));
+        Self { snapshot, surfaces, tables }
+    }
+
+    /// The same objects with another look.
+    pub fn with_shading(&self, shading: Arc<Shading>) -> Self {
+        let tables = Arc::new(Tables::build(&self.geometry, &shading));
+        let snapshot = Snapshot { shading, ..self.snapshot.clone() };
+        Self { snapshot, tables, surfaces: self.surfaces.clone() }
+    }
+
+    /// The same with other trees of the same meshes: all hits stay what they are, and so do the tables.
+    pub fn with_trees(&self, geometry: Arc<Geometry>) -> Self {
+        let surfaces = Arc::new(SurfaceTable::build(&geometry.tree));
+        let snapshot = Snapshot { geometry, ..self.snapshot.clone() };
+        Self { snapshot, surfaces, tables: self.tables.clone() }
+    }
+
+    /// The same seen by another camera.
+    pub fn with_camera(&self, camera: Camera) -> Self {
+        let mut seen = self.clone();
+        seen.snapshot.camera = camera;
+        seen
+    }
+
+    /// What the scene uses.
+    pub fn features(&self) -> Features {
+        self.tables.features
+    }
+
+    /// As if the scene used more than it does: to measure what that would cost.
+    #[doc(hidden)]
+    pub fn with_features(snapshot: Snapshot, features: Features) -> Self {
+        let mut prepared = Self::new(snapshot);
+        Arc::get_mut(&mut prepared.tables).expect("new").features = features;
+        prepared
+    }
+
+    pub fn lights(&self) -> &LightTable {
+        &self.tables.lights
+    }
+
+    /// The bodies that the camera is inside of; see [`Bodies::around`].
+    pub(crate) fn camera_media(&self) -> Vec<u32> {
+        if !self.tables.features.glass {
+            return Vec::new();
+        }
+        self.tables.bodies.around(&self.geometry, self.camera.eye)
+    }
+
+    fn touched(&self) -> Touched<'_> {
+        Touched { geometry: &self.geometry, materials: &self.shading.materials, bodies: &self.tables.bodies }
+    }
+
+    /// See [`Contacts::settle`].
+    pub(crate) fn settle(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        self.tables.contacts.settle(&self.touched(), rays, hits);
+    }
+
+    /// See [`Contacts::along_with`].
+    #[inline]
+    pub(crate) fn along_with(&self, hit: &Hit, ray: impl FnOnce() -> Ray) -> Vec<Boundary> {
+        self.tables.contacts.along_with(&self.touched(), hit, ray)
+    }
+}
+
+impl Tables {
+    fn build(geometry: &Geometry, shading: &Shading) -> Self {
+        let Shading { materials, textures, environment, air } = shading;
+        let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(materials, id)).collect();
+        let lights = LightTable::build(geometry, &emission, textures);
+        let environment_sampler = EnvironmentSampler::build(environment);
+        let bodies = Bodies::build(geometry, materials);
+        let contacts = Contacts::build(geometry, materials);
+        let casters = CasterTable::build(geometry, materials, &lights);
+        let features = Features {
+            glass: materials.iter().any(Material::is_clear),
+            media: materials.iter().any(Material::absorbs) || *air != Vec3::ZERO,
+            light_sampling: !lights.is_empty() || environment_sampler.is_some(),
+            environment: !matches!(environment, Environment::Black),
+            textures: materials.iter().any(|material| material.is_textured(materials)),
+            caustics: casters.is_some(),
+        };
+        Self {
+            ambient: AmbientLight::of(environment),
+            textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
+            radiance_bound: radiance_bound(environment, &emission, materials),
+            emission,
+            lights,
+            bodies,
+            contacts,
+            environment_sampler,
+            materials: MaterialTable::build(geometry, materials),
+            classic: ClassicTable::build(materials),
+            casters,
+            features,
+        }
+    }
+}

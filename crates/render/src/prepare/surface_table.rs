@@ -1,0 +1,94 @@
+//! What shading looks up by object, as arrays that sixteen lanes read at once.
+
+use crate::prepare::arrays::push;
+use crate::prepare::instance_table::InstanceTable;
+use firstlight_kdtree::geometry::Frame;
+use firstlight_kdtree::{SceneTree, Shape, quad_rim, sphere_error};
+use firstlight_simd::padded;
+use glam::Vec3;
+
+/// Shapes that are looked up; all others are asked one at a time.
+pub(crate) const OTHER: u32 = 0;
+pub(crate) const FLAT: u32 = 1;
+pub(crate) const BALL: u32 = 2;
+pub(crate) const PLANE: u32 = 3;
+/// What has a space of its own.
+pub(crate) const MESH: u32 = 4;
+pub(crate) const CLOUD: u32 = 5;
+
+/// The objects of a scene.
+#[derive(Debug, Default)]
+pub(crate) struct SurfaceTable {
+    pub kind: Vec<u32>,
+    /// Corner of a quad, centre of a ball, point of a plane.
+    pub a: [Vec<f32>; 3],
+    /// The edges of a quad, the axes of a plane.
+    pub b: [Vec<f32>; 3],
+    pub c: [Vec<f32>; 3],
+    /// How far points of a quad stay away from its rim, in its coordinates; of a ball the first is the error of a point along each
+    /// axis beside the rounding, metres.
+    pub least: [Vec<f32>; 2],
+    pub normal: [Vec<f32>; 3],
+    /// How far from a quad the next ray must start, metres along the normal; of a ball the radius.
+    pub offset: Vec<f32>,
+    /// Of what has a space of its own, the row in `instances`.
+    pub row: Vec<u32>,
+    pub instances: InstanceTable,
+}
+
+impl SurfaceTable {
+    /// Whether the true normal of an object shades it, whoever looks.
+    pub fn is_shaded_as_it_is(&self, object: u32) -> bool {
+        [FLAT, BALL, PLANE, CLOUD].contains(&self.kind[object as usize])
+    }
+
+    pub fn build(tree: &SceneTree) -> Self {
+        let mut table = Self::default();
+        let mut n_instances = 0;
+        for (object, shape) in tree.shapes().iter().enumerate() {
+            let (kind, points, normal, least, offset) = match shape {
+                Shape::Quad { corner, edge_u, edge_v } => {
+                    let rim = quad_rim(*corner, *edge_u, *edge_v);
+                    let offset = rim.normal.abs().dot(rim.error);
+                    (FLAT, [*corner, *edge_u, *edge_v], rim.normal, rim.least, offset)
+                }
+                Shape::Sphere { center, radius } => {
+                    let error = sphere_error(*center, *radius);
+                    (BALL, [*center, Vec3::ZERO, Vec3::ZERO], Vec3::Z, [error, 0.0], *radius)
+                }
+                Shape::Plane { point, normal } => {
+                    let frame = Frame::around(*normal);
+                    (PLANE, [*point, frame.x, frame.y], *normal, [0.0; 2], 0.0)
+                }
+                Shape::Mesh { .. } => (MESH, [Vec3::ZERO; 3], Vec3::Z, [0.0; 2], 0.0),
+                Shape::Spheres { .. } => (CLOUD, [Vec3::ZERO; 3], Vec3::Z, [0.0; 2], 0.0),
+                Shape::Triangle { .. } => (OTHER, [Vec3::ZERO; 3], Vec3::Z, [0.0; 2], 0.0),
+            };
+            table.row.push(n_instances);
+            if [MESH, CLOUD].contains(&kind) {
+                table.instances.add(tree, object);
+                n_instances += 1;
+            }
+            let [a, b, c] = points;
+            table.kind.push(kind);
+            push(&mut table.a, a);
+            push(&mut table.b, b);
+            push(&mut table.c, c);
+            push(&mut table.normal, normal);
+            table.least.iter_mut().zip(least).for_each(|(array, least)| array.push(least));
+            table.offset.push(offset);
+        }
+        let Self { kind, a, b, c, least, normal, offset, row, instances } = table;
+        Self {
+            kind: padded(kind),
+            row: padded(row),
+            instances: instances.padded(),
+            a: a.map(padded),
+            b: b.map(padded),
+            c: c.map(padded),
+            least: least.map(padded),
+            normal: normal.map(padded),
+            offset: padded(offset),
+        }
+    }
+}

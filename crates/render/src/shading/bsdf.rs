@@ -1,0 +1,378 @@
+//! Scattering at a point: one lobe, or several blended by weight.
+//!
+//! [`Scatter::eval`] and [`Scatter::sample`] are one family. Directions are unit, in world space, leaving
+//! the surface; `normal` is the shading normal on the side of `wo`. Perfectly specular lobes have no `eval`: only
+//! sampling finds them.
+
+use crate::core::color::luminance;
+use crate::core::material::{Fresnel, SMALLEST_ALPHA};
+use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
+use crate::shading::dielectric::{fresnel, refract};
+use crate::shading::ggx;
+use crate::shading::interface::{Interface, MediumId};
+use firstlight_kdtree::geometry::Frame;
+use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// One way of scattering, all inputs looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Lobe {
+    Diffuse { albedo: Vec3 },
+    Mirror { reflectance: Vec3 },
+    Metal { alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool },
+    Glass(Interface),
+}
+
+impl Lobe {
+    /// Something that light passes through, to be told apart from other lobes but not to be sampled.
+    pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, squeeze: 1.0, beyond: MediumId::OUTSIDE });
+}
+
+/// How many lobes a blend of blends may come to.
+pub(crate) const MAX_LOBES: usize = 8;
+
+/// What the integrator asks of a surface, be it one lobe or a blend.
+pub(crate) trait Scatter {
+    /// Whether light sampling can find anything: some lobe is not perfectly specular.
+    fn is_smooth(&self) -> bool;
+
+    /// f · cos of all smooth lobes, and the density of sampling `wi` through one of them; zero for `wi` behind
+    /// `normal`.
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
+
+    /// - `u_lobe`: chooses the lobe, and between reflection and refraction; asked for only where there is a choice;
+    /// - `u`: the direction.
+    ///
+    /// `None` when the sample carries no light.
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample>;
+}
+
+/// Lobes with weights that sum to at most 1.
+#[derive(Clone, Debug)]
+pub(crate) struct Blend {
+    lobes: [WeightedLobe; MAX_LOBES],
+    n: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct WeightedLobe {
+    lobe: Lobe,
+    weight: f32,
+    /// Of being sampled.
+    pmf: f32,
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BsdfSample {
+    pub wi: Vec3,
+    /// f · |cos| / pdf.
+    pub weight: Vec3,
+    /// Per steradian; infinite for a perfectly specular lobe.
+    pub pdf: f32,
+    /// What was passed through, where `wi` lies beyond the surface.
+    pub through: Option<Interface>,
+}
+
+impl Blend {
+    /// From lobes and their weights; at most [`MAX_LOBES`], at least one.
+    pub fn new(parts: &[(Lobe, f32)]) -> Self {
+        let nothing = WeightedLobe { lobe: parts[0].0, weight: 0.0, pmf: 0.0 };
+        let mut blend = Self { lobes: [nothing; MAX_LOBES], n: parts.len() };
+        // Chosen by what they reflect; an even share where all is black.
+        let strength = |(lobe, weight): &(Lobe, f32)| weight * lobe.albedo_estimate();
+        let sum: f32 = parts.iter().map(strength).sum();
+        for (slot, part) in blend.lobes.iter_mut().zip(parts) {
+            let pmf = if sum > 0.0 { strength(part) / sum } else { 1.0 / parts.len() as f32 };
+            *slot = WeightedLobe { lobe: part.0, weight: part.1, pmf };
+        }
+        blend
+    }
+
+    fn lobes(&self) -> &[WeightedLobe] {
+        &self.lobes[..self.n]
+    }
+}
+
+impl Scatter for Blend {
+    fn is_smooth(&self) -> bool {
+        self.lobes().iter().any(|l| l.lobe.is_smooth())
+    }
+
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        let mut sum = (Vec3::ZERO, 0.0);
+        for l in self.lobes().iter().filter(|l| l.lobe.is_smooth()) {
+            let (value, pdf) = l.lobe.eval(wo, wi, normal);
+            sum.0 += l.weight * value;
+            sum.1 += l.pmf * pdf;
+        }
+        sum
+    }
+
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        let mut rest = u_lobe();
+        let lobes = self.lobes();
+        let chosen = lobes
+            .iter()
+            .position(|l| {
+                let here = rest < l.pmf;
+                if !here {
+                    rest -= l.pmf;
+                }
+                here
+            })
+            .or_else(|| lobes.iter().rposition(|l| l.pmf > 0.0))?;
+        let l = &lobes[chosen];
+        let fresh = (rest / l.pmf).clamp(0.0, 1.0f32.next_down());
+        let mut sample = l.lobe.sample(wo, normal, || fresh, u)?;
+        if l.lobe.is_smooth() {
+            // All smooth lobes could have found this direction: the one-sample estimate over their mixture.
+            let (value, pdf) = self.eval(wo, sample.wi, normal);
+            sample.weight = value / pdf;
+            sample.pdf = pdf;
+        } else {
+            sample.weight *= l.weight / l.pmf;
+        }
+        Some(sample)
+    }
+}
+
+impl Lobe {
+    fn albedo_estimate(&self) -> f32 {
+        match self {
+            Self::Diffuse { albedo } => luminance(*albedo),
+            Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => luminance(*reflectance),
+            Self::Glass(_) => 1.0,
+        }
+    }
+}
+
+impl Scatter for Lobe {
+    #[inline]
+    fn is_smooth(&self) -> bool {
+        match self {
+            Self::Diffuse { .. } => true,
+            Self::Metal { alpha, .. } => *alpha >= SMALLEST_ALPHA,
+            Self::Mirror { .. } | Self::Glass(_) => false,
+        }
+    }
+
+    #[inline]
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        let cos = normal.dot(wi);
+        if cos <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        match *self {
+            Self::Diffuse { albedo } => (albedo * (FRAC_1_PI * cos), cosine_hemisphere_pdf(cos)),
+            Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
+                let frame = Frame::around(normal);
+                let (o, i) = (frame.to_local(wo), frame.to_local(wi));
+                if o.z <= 0.0 {
+                    return (Vec3::ZERO, 0.0);
+                }
+                let tint = metal_tint(o, i, alpha, reflectance, fresnel, compensate);
+                (tint * (ggx::reflection(o, i, alpha) * i.z), ggx::reflection_pdf(o, i, alpha))
+            }
+            _ => (Vec3::ZERO, 0.0),
+        }
+    }
+
+    #[inline]
+    fn sample(&self, wo: Vec3, normal: Vec3, u_choice: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        let specular = |wi, weight, through| BsdfSample { wi, weight, pdf: f32::INFINITY, through };
+        match *self {
+            Self::Diffuse { albedo } => {
+                let local = cosine_hemisphere(u);
+                let wi = Frame::around(normal).to_world(local);
+                (local.z > 0.0).then(|| BsdfSample {
+                    wi,
+                    weight: albedo,
+                    pdf: cosine_hemisphere_pdf(local.z),
+                    through: None,
+                })
+            }
+            Self::Mirror { reflectance } => Some(specular(reflect(wo, normal), reflectance, None)),
+            Self::Metal { alpha, reflectance, fresnel, .. } if alpha < SMALLEST_ALPHA => {
+                let tint = fresnel.reflectance(reflectance, normal.dot(wo));
+                Some(specular(reflect(wo, normal), tint, None))
+            }
+            Self::Metal { alpha, reflectance, fresnel, compensate } => {
+                let frame = Frame::around(normal);
+                let o = frame.to_local(wo);
+                if o.z <= 0.0 {
+                    return None;
+                }
+                let h = ggx::sample_visible_normal(o, alpha, u);
+                let i = reflect(o, h);
+                // Below the surface: the light that a second bounce would have returned.
+                if i.z <= 0.0 {
+                    return None;
+                }
+                let tint = metal_tint(o, i, alpha, reflectance, fresnel, compensate);
+                Some(BsdfSample {
+                    wi: frame.to_world(i).normalize(),
+                    weight: tint * ggx::reflection_weight(o, i, alpha),
+                    pdf: ggx::reflection_pdf(o, i, alpha),
+                    through: None,
+                })
+            }
+            Self::Glass(interface) => {
+                let Interface { eta, squeeze, .. } = interface;
+                let (reflectance, cos_t) = fresnel(normal.dot(wo).clamp(0.0, 1.0), eta);
+                if u_choice() < reflectance {
+                    // Weight f·cos/pdf is reflectance over the probability of reflecting: one.
+                    Some(specular(reflect(wo, normal), Vec3::ONE, None))
+                } else {
+                    // Radiance is squeezed into a narrower cone where light is slower: the factor η².
+                    Some(specular(refract(wo, normal, eta, cos_t), Vec3::splat(squeeze * squeeze), Some(interface)))
+                }
+            }
+        }
+    }
+}
+
+impl Fresnel {
+    #[inline]
+    pub(crate) fn reflectance(self, facing: Vec3, cos: f32) -> Vec3 {
+        match self {
+            Self::Constant => facing,
+            Self::Schlick => facing + (Vec3::ONE - facing) * (1.0 - cos).clamp(0.0, 1.0).powi(5),
+        }
+    }
+}
+
+/// Fresnel term, and the energy of further bounces given back (Turquin 2019, equation 16).
+#[inline]
+fn metal_tint(o: Vec3, i: Vec3, alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool) -> Vec3 {
+    let h = (o + i).normalize();
+    let tint = fresnel.reflectance(reflectance, o.dot(h));
+    if !compensate {
+        return tint;
+    }
+    let albedo = ggx::single_scattering_albedo(o.z, alpha);
+    tint * (Vec3::ONE + reflectance * ((1.0 - albedo) / albedo))
+}
+
+#[inline]
+fn reflect(wo: Vec3, normal: Vec3) -> Vec3 {
+    (2.0 * normal.dot(wo) * normal - wo).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+
+    fn metal(alpha: f32, compensate: bool) -> Lobe {
+        Lobe::Metal { alpha, reflectance: Vec3::ONE, fresnel: Fresnel::Constant, compensate }
+    }
+
+    fn direction(cos: f32) -> Vec3 {
+        Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)
+    }
+
+    /// Share of light returned when all of it comes from a uniformly bright surround.
+    fn furnace(bsdf: &impl Scatter, cos: f32) -> Vec3 {
+        let n = 1 << 14;
+        let mut sum = Vec3::ZERO;
+        for i in 0..n {
+            let sampler = Sampler::new(5, 0, 0, i);
+            if let Some(s) = bsdf.sample(direction(cos), Vec3::Z, || sampler.single(1), sampler.pair(0)) {
+                sum += s.weight;
+            }
+        }
+        sum / n as f32
+    }
+
+    #[test]
+    fn white_furnace_loses_nothing_and_makes_nothing() {
+        for cos in [1.0, 0.7, 0.3, 0.05, 1e-3] {
+            for lobe in [Lobe::Diffuse { albedo: Vec3::ONE }, Lobe::Mirror { reflectance: Vec3::ONE }] {
+                assert!((furnace(&lobe, cos) - Vec3::ONE).length() < 1e-4, "{lobe:?} at {cos}");
+            }
+            for alpha in [0.001, 0.05, 0.3, 0.6, 1.0] {
+                let plain = furnace(&metal(alpha, false), cos).x;
+                assert!(plain <= 1.0 + 1e-4, "α {alpha}, cos {cos}: {plain}");
+            }
+        }
+    }
+
+    #[test]
+    fn compensation_returns_what_single_scattering_lost() {
+        for cos in [1.0, 0.7, 0.3, 0.1, 0.03, 0.01] {
+            for alpha in [1e-3, 0.01, 0.03, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 1.0] {
+                let whole = furnace(&metal(alpha, true), cos).x;
+                assert!((whole - 1.0).abs() < 1e-3, "α {alpha}, cos {cos}: {whole}");
+            }
+        }
+    }
+
+    #[test]
+    fn sampling_and_evaluation_give_the_same_mean() {
+        let coat = [(Lobe::Diffuse { albedo: Vec3::new(0.8, 0.4, 0.1) }, 0.7), (metal(0.2, false), 0.3)];
+        same_mean(0, &Lobe::Diffuse { albedo: Vec3::splat(0.6) });
+        same_mean(1, &metal(0.4, false));
+        same_mean(2, &Blend::new(&coat));
+        same_mean(3, &Blend::new(&coat[..1]));
+    }
+
+    fn same_mean(case: u32, bsdf: &impl Scatter) {
+        for cos in [0.9, 0.4, 0.1] {
+            let wo = direction(cos);
+            // ∫ f cos · L with an uneven L, by even directions and by sampling.
+            let light = |w: Vec3| 1.0 + w.x + 0.5 * w.y * w.y;
+            let n = 1 << 16;
+            let (mut even, mut sampled, mut pdf_integral) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+            for i in 0..n {
+                let sampler = Sampler::new(11, case, 0, i);
+                let u = sampler.pair(0);
+                let (r, phi) = ((1.0 - u.x * u.x).sqrt(), std::f32::consts::TAU * u.y);
+                let wi = Vec3::new(r * phi.cos(), r * phi.sin(), u.x);
+                let (value, pdf) = bsdf.eval(wo, wi, Vec3::Z);
+                even += value * light(wi) * std::f32::consts::TAU;
+                pdf_integral += pdf * std::f32::consts::TAU;
+                if let Some(s) = bsdf.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(1)) {
+                    sampled += s.weight * light(s.wi);
+                    let (value, pdf) = bsdf.eval(wo, s.wi, Vec3::Z);
+                    assert!((value / pdf - s.weight).length() < 2e-3 * s.weight.length());
+                    assert!((pdf - s.pdf).abs() < 2e-3 * pdf);
+                }
+            }
+            let (even, sampled) = (even / n as f32, sampled / n as f32);
+            assert!((even - sampled).length() < 0.02 * even.length(), "case {case}, {cos}: {even} {sampled}");
+            assert!(pdf_integral / n as f32 <= 1.01, "case {case}: pdf integrates to more than one");
+        }
+    }
+
+    #[test]
+    fn reflection_is_reciprocal() {
+        let (a, b) = (direction(0.8), Vec3::new(-0.3, 0.5, 0.6).normalize());
+        for lobe in [Lobe::Diffuse { albedo: Vec3::splat(0.6) }, metal(0.3, false)] {
+            let forth = lobe.eval(a, b, Vec3::Z).0 / b.z;
+            let back = lobe.eval(b, a, Vec3::Z).0 / a.z;
+            assert!((forth - back).length() < 1e-4 * forth.length());
+        }
+    }
+
+    #[test]
+    fn glass_splits_all_light_and_nothing_more() {
+        for eta in [1.0 / 1.5, 1.5, 1.0, 1.0 / 1.000_001] {
+            for cos in [1.0, 0.6, 0.2, 1e-3] {
+                let bsdf = Lobe::Glass(Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE });
+                let (reflectance, _) = fresnel(cos, eta);
+                let n = 1000;
+                let reflected = (0..n)
+                    .filter(|i| {
+                        let u = (*i as f32 + 0.5) / n as f32;
+                        let s = bsdf.sample(direction(cos), Vec3::Z, || u, Vec2::ZERO).unwrap();
+                        assert_eq!(s.through.is_some(), s.wi.z < 0.0);
+                        assert_eq!(s.weight, Vec3::splat(if s.through.is_some() { eta * eta } else { 1.0 }));
+                        s.through.is_none()
+                    })
+                    .count();
+                assert!((reflected as f32 / n as f32 - reflectance).abs() < 2.0 / n as f32);
+            }
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! Surfaces whose directions are partly chosen by hints, one at a time.
+
+use crate::prepare::guide::{Hints, SHARE};
+use crate::shading::bsdf::{BsdfSample, Scatter};
+use glam::{Vec2, Vec3};
+
+/// A surface together with the hints: what the integrator asks in place of the surface.
+pub(crate) struct Guided<'a, S> {
+    pub surface: &'a S,
+    pub hints: Hints<'a>,
+}
+
+impl<S: Scatter> Scatter for Guided<'_, S> {
+    fn is_smooth(&self) -> bool {
+        self.surface.is_smooth()
+    }
+
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        let (value, pdf) = self.surface.eval(wo, wi, normal);
+        (value, pdf + SHARE * (self.hints.pdf(wi) - pdf))
+    }
+
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        let choice = u_lobe();
+        let wi = if choice < SHARE {
+            self.hints.sample(choice / SHARE, u)
+        } else {
+            let rest = ((choice - SHARE) / (1.0 - SHARE)).clamp(0.0, 1.0f32.next_down());
+            let sample = self.surface.sample(wo, normal, || rest, u)?;
+            if sample.pdf.is_infinite() {
+                return Some(BsdfSample { weight: sample.weight / (1.0 - SHARE), ..sample });
+            }
+            sample.wi
+        };
+        let (value, pdf) = self.eval(wo, wi, normal);
+        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample { wi, weight: value / pdf, pdf, through: None })
+    }
+}

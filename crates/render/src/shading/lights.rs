@@ -1,0 +1,104 @@
+//! Light at a vertex: asked for, or run into, and how much counts of each.
+
+use crate::core::techniques::Techniques;
+use crate::prepare::light::emitter::LightSample;
+use crate::prepare::prepared::Prepared;
+use crate::sampling::Sampler;
+use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
+use crate::shading::paths::Path;
+use firstlight_kdtree::Hit;
+use glam::Vec3;
+
+/// A point on a light, or a direction to the surroundings: then there is no target. Takes two pairs of dimensions.
+#[inline]
+pub(crate) fn choose_light_point(
+    scene: &Prepared,
+    techniques: &Techniques,
+    position: Vec3,
+    normal: Vec3,
+    sampler: &Sampler,
+    dimension: u32,
+) -> Option<(Option<Vec3>, LightSample)> {
+    let u = sampler.pair(dimension + DIM_LIGHT_POINT);
+    let tables = &*scene.tables;
+    let share = environment_share(scene);
+    let mut u_select = None;
+    let mut select = || *u_select.get_or_insert_with(|| sampler.single(dimension + DIM_LIGHT));
+    if share > 0.0 && (share >= 1.0 || select() < share) {
+        let environment = tables.environment_sampler.as_ref().expect("a share without a sampler");
+        let (wi, pdf) = environment.sample(u)?;
+        let radiance = scene.shading.environment.radiance(wi);
+        return Some((None, LightSample { target: wi, wi, pdf: pdf * share, radiance }));
+    }
+    let u_light = || ((select() - share) / (1.0 - share)).clamp(0.0, 1.0f32.next_down());
+    let mut sample = tables.lights.sample(&scene.shading.textures, techniques, position, normal, u_light, u)?;
+    sample.pdf *= 1.0 - share;
+    Some((Some(sample.target), sample))
+}
+
+/// Probability with which light sampling asks the environment rather than the finite lights.
+#[inline]
+pub(crate) fn environment_share(scene: &Prepared) -> f32 {
+    match (&scene.tables.environment_sampler, scene.tables.lights.is_empty()) {
+        (None, _) => 0.0,
+        (Some(_), true) => 1.0,
+        (Some(_), false) => 0.5,
+    }
+}
+
+/// Light from outside that a path runs into, weighted against light sampling having found it.
+#[inline]
+pub(crate) fn environment_light(scene: &Prepared, techniques: &Techniques, path: &Path, dir: Vec3) -> Vec3 {
+    if !scene.tables.features.environment {
+        return Vec3::ZERO;
+    }
+    let radiance = scene.shading.environment.radiance(dir);
+    match &scene.tables.environment_sampler {
+        Some(sampler) if path.pdf.is_finite() => {
+            radiance * bounce_weight(techniques, path.pdf, environment_share(scene) * sampler.pdf(dir))
+        }
+        _ => radiance,
+    }
+}
+
+/// The same for an emitter that a path hits.
+#[inline]
+pub(crate) fn emitter_weight(scene: &Prepared, techniques: &Techniques, path: &Path, hit: &Hit, dir: Vec3) -> f32 {
+    let lights = &scene.tables.lights;
+    if path.pdf.is_infinite() {
+        return 1.0;
+    }
+    match lights.light_of(hit.object, hit.prim) {
+        Some(id) => {
+            let pdf = lights.pdf(techniques, id, path.position, path.normal, dir, hit.t);
+            bounce_weight(techniques, path.pdf, (1.0 - environment_share(scene)) * pdf)
+        }
+        None => 1.0,
+    }
+}
+
+/// Weight of light that light sampling found with density `own`, and a bounce would have found with `other`.
+#[inline]
+pub(crate) fn light_weight(techniques: &Techniques, own: f32, other: f32) -> f32 {
+    if techniques.mis { power_heuristic(own, other) } else { 1.0 }
+}
+
+/// Weight of light that a bounce found with density `own`, and light sampling would have found with `other`.
+#[inline]
+pub(crate) fn bounce_weight(techniques: &Techniques, own: f32, other: f32) -> f32 {
+    match (techniques.mis, other > 0.0) {
+        (true, _) => power_heuristic(own, other),
+        (false, can_be_sampled) => f32::from(!can_be_sampled),
+    }
+}
+
+/// Weight of a sample found with density `own` that another method finds with density `other` (Veach 1997, β = 2).
+#[inline]
+pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
+    if other == 0.0 {
+        return 1.0;
+    }
+    // By the ratio: squares of densities overflow for lights of a few pixels.
+    let ratio = other / own;
+    1.0 / (1.0 + ratio * ratio)
+}

@@ -1,0 +1,270 @@
+//! Which media is a path inside of? Nested solids each bring an index and an absorption of their own.
+//!
+//! What a path is inside of is a set of bodies ([`crate::prepare::bodies::Bodies`]), of any size: entering a body adds it, leaving takes it out.
+//! Where bodies overlap the smallest one counts, whichever was entered last, so index and absorption are functions of
+//! the position alone and paths from the camera and from the lights agree on them (nested dielectrics with priorities,
+//! Schmidt and Budge 2002).
+//!
+//! An interface changes radiance by (n before / n after)², and both indices come from the sets on its two sides, never
+//! from the surface. The factors of a path cancel but for the first and the last index, so no sequence of surfaces,
+//! however they are nested, open or met in the wrong order, makes radiance / n² grow.
+
+use crate::prepare::bodies::Boundary;
+use crate::prepare::prepared::Prepared;
+use crate::shading::interface::{Interface, MediumId};
+use glam::Vec3;
+use rustc_hash::FxHashMap;
+
+/// The sets of media that the paths of one worker have come to, each made once.
+///
+/// Numbers of sets differ from worker to worker, but nothing depends on more than whether two are equal.
+#[derive(Debug, Default)]
+pub(crate) struct MediumSets {
+    sets: Vec<MediumSet>,
+    ids: FxHashMap<Box<[u32]>, MediumId>,
+    /// By the set before and the boundary that was crossed; `None` where a body is left that the set does not have.
+    crossings: FxHashMap<(MediumId, u32, bool), Option<MediumId>>,
+    camera: MediumId,
+}
+
+/// Sets that one worker remembers.
+const MOST_SETS: usize = 1 << 16;
+
+#[derive(Debug)]
+struct MediumSet {
+    /// Rows of [`crate::prepare::bodies::Bodies`], ascending: the last one counts.
+    rows: Box<[u32]>,
+    ior: f32,
+    /// Per metre.
+    absorption: Vec3,
+}
+
+impl MediumSets {
+    /// Before new paths: the set that the camera is inside of. No path may be on its way.
+    ///
+    /// - `camera`: rows of [`crate::prepare::bodies::Bodies`], ascending; like `scene` the same whenever the same sets are asked.
+    pub fn start(&mut self, scene: &Prepared, camera: &[u32]) -> MediumId {
+        if self.sets.is_empty() || self.sets.len() > MOST_SETS {
+            self.sets.clear();
+            self.ids.clear();
+            self.crossings.clear();
+            self.id_of(scene, Box::default());
+            self.camera = self.id_of(scene, camera.into());
+        }
+        self.camera
+    }
+
+    /// Index of refraction.
+    #[inline]
+    pub fn ior(&self, id: MediumId) -> f32 {
+        self.sets[id.0 as usize].ior
+    }
+
+    /// By how much light from outside of the scene is brighter inside these media: n², as much as for a path that came
+    /// in through surfaces. It is 1 unless a path reaches the outside without having left what it is inside of.
+    #[inline]
+    pub fn environment_scale(&self, id: MediumId) -> f32 {
+        self.ior(id) * self.ior(id)
+    }
+
+    /// What is left of light after `distance` metres (Beer–Lambert).
+    #[inline]
+    pub fn transmittance(&self, id: MediumId, distance: f32) -> Vec3 {
+        let absorption = self.sets[id.0 as usize].absorption;
+        if absorption == Vec3::ZERO {
+            return Vec3::ONE;
+        }
+        // 0 · ∞ would be NaN: a channel without absorption keeps everything, however far.
+        Vec3::select(absorption.cmpgt(Vec3::ZERO), (-absorption * distance).exp(), Vec3::ONE)
+    }
+
+    /// The way through a boundary for a path inside of `from`.
+    ///
+    /// - `leaf`: which of the transparent parts of the material the path takes, see [`crate::prepare::bodies::Bodies`];
+    /// - `others`: in the same place, see [`crate::prepare::contacts`].
+    #[inline]
+    pub fn interface(
+        &mut self,
+        scene: &Prepared,
+        from: MediumId,
+        boundary: Boundary,
+        leaf: u32,
+        others: &[Boundary],
+    ) -> Interface {
+        let here = self.ior(from);
+        // Bodies are entered before others are left: what a path goes through on the way has no thickness.
+        let all = || std::iter::once((boundary, leaf)).chain(others.iter().map(|&other| (other, 0)));
+        let mut in_order =
+            all().filter(|(boundary, _)| boundary.front).chain(all().filter(|(boundary, _)| !boundary.front));
+        let beyond = in_order.try_fold(from, |at, (boundary, leaf)| self.crossed(scene, at, boundary, leaf));
+        match beyond {
+            Some(beyond) => {
+                let eta = here / self.ior(beyond);
+                Interface { eta, squeeze: eta, beyond }
+            }
+            // An open surface from behind, alone or with others: it bends light, but the path stays where it was, and so does its radiance.
+            None => {
+                let eta = scene.tables.bodies.ior(boundary, leaf) / here;
+                Interface { eta, squeeze: 1.0, beyond: from }
+            }
+        }
+    }
+
+    /// `None` where a body is left that was not entered.
+    fn crossed(&mut self, scene: &Prepared, from: MediumId, boundary: Boundary, leaf: u32) -> Option<MediumId> {
+        let Boundary { body, front } = boundary;
+        let row = if front { body + leaf } else { body };
+        if let Some(&found) = self.crossings.get(&(from, row, front)) {
+            return found;
+        }
+        let mut rows = self.sets[from.0 as usize].rows.to_vec();
+        let beyond = if front {
+            rows.insert(rows.partition_point(|&other| other <= row), row);
+            Some(self.id_of(scene, rows.into()))
+        } else {
+            let own = row..row + scene.tables.bodies.n_leaves(body);
+            let at = rows.iter().rposition(|row| own.contains(row));
+            at.map(|at| {
+                rows.remove(at);
+                self.id_of(scene, rows.into())
+            })
+        };
+        self.crossings.insert((from, row, front), beyond);
+        beyond
+    }
+
+    fn id_of(&mut self, scene: &Prepared, rows: Box<[u32]>) -> MediumId {
+        if let Some(&id) = self.ids.get(&rows) {
+            return id;
+        }
+        let id = MediumId(self.sets.len() as u32);
+        let (ior, absorption) = match rows.last() {
+            Some(&row) => scene.tables.bodies.medium(row),
+            None => (1.0, scene.shading.air),
+        };
+        self.ids.insert(rows.clone(), id);
+        self.sets.push(MediumSet { rows, ior, absorption });
+        id
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::environment::Environment;
+    use crate::core::material::{Material, ScalarInput};
+    use crate::core::snapshot::Object;
+    use crate::test_scene::prepared;
+    use firstlight_kdtree::Shape;
+
+    /// Spheres about the origin with these radii, each of a glass of its own; the last material is a blend of the first
+    /// two.
+    fn spheres(radii_and_iors: &[(f32, f32)]) -> Prepared {
+        let mut materials: Vec<Material> =
+            radii_and_iors.iter().map(|&(_, ior)| Material::Glass { ior, absorption: Vec3::ZERO }).collect();
+        materials.push(Material::Blend { weight: ScalarInput::Constant(0.5), a: 0, b: 1 });
+        let shapes: Vec<_> =
+            radii_and_iors.iter().map(|&(radius, _)| Shape::Sphere { center: Vec3::ZERO, radius }).collect();
+        let objects = (0..shapes.len() as u32).map(Object::plain).collect();
+        of(shapes, objects, materials)
+    }
+
+    fn of(shapes: Vec<Shape>, objects: Vec<Object>, materials: Vec<Material>) -> Prepared {
+        prepared(shapes, objects, materials, Environment::Black)
+    }
+
+    /// The way through object `object`, all of whose material is `material`.
+    fn pass(sets: &mut MediumSets, scene: &Prepared, from: MediumId, object: u32, front: bool) -> Interface {
+        let material = scene.geometry.objects[object as usize].materials[0];
+        let boundary = scene.tables.bodies.boundary(object, 0, material, front);
+        sets.interface(scene, from, boundary, 0, &[])
+    }
+
+    #[test]
+    fn a_hundred_bodies_are_left_as_they_were_entered() {
+        let radii: Vec<_> = (0..100).map(|i| (1.0 - 0.009 * i as f32, 1.1 + 0.01 * i as f32)).collect();
+        let scene = spheres(&radii);
+        let mut sets = MediumSets::default();
+        assert_eq!(sets.start(&scene, &[]), MediumId::OUTSIDE);
+        let (mut at, mut ids, mut scale) = (MediumId::OUTSIDE, Vec::new(), 1.0);
+        for i in 0..100 {
+            ids.push(at);
+            let interface = pass(&mut sets, &scene, at, i, true);
+            scale *= f64::from(interface.squeeze).powi(2);
+            at = interface.beyond;
+            assert_eq!(sets.ior(at), radii[i as usize].1);
+        }
+        for i in (0..100).rev() {
+            let interface = pass(&mut sets, &scene, at, i, false);
+            scale *= f64::from(interface.squeeze).powi(2);
+            at = interface.beyond;
+            assert_eq!(at, ids[i as usize], "layer {i}");
+        }
+        assert!((scale - 1.0).abs() < 1e-4, "{scale}");
+        assert_eq!(scene.tables.bodies.deepest(), 100);
+    }
+
+    #[test]
+    fn the_smallest_body_counts_in_whatever_order_they_are_entered_and_left() {
+        let scene = spheres(&[(1.0, 1.5), (0.9, 1.3)]);
+        let mut sets = MediumSets::default();
+        sets.start(&scene, &[]);
+        let large_first = pass(&mut sets, &scene, MediumId::OUTSIDE, 0, true).beyond;
+        let both = pass(&mut sets, &scene, large_first, 1, true);
+        let small_first = pass(&mut sets, &scene, MediumId::OUTSIDE, 1, true).beyond;
+        let again = pass(&mut sets, &scene, small_first, 0, true);
+        assert_eq!((again.beyond, again.eta, sets.ior(again.beyond)), (both.beyond, 1.0, 1.3));
+        // The large one is left first: the small one is what the path is in before and after.
+        let left = pass(&mut sets, &scene, both.beyond, 0, false);
+        assert_eq!((left.beyond, left.eta), (small_first, 1.0));
+        assert_eq!(pass(&mut sets, &scene, left.beyond, 1, false).beyond, MediumId::OUTSIDE);
+    }
+
+    #[test]
+    fn leaving_what_was_not_entered_bends_light_and_changes_nothing_else() {
+        let scene = spheres(&[(1.0, 1.5), (0.9, 1.3)]);
+        let mut sets = MediumSets::default();
+        sets.start(&scene, &[]);
+        let inside = pass(&mut sets, &scene, MediumId::OUTSIDE, 0, true).beyond;
+        let interface = pass(&mut sets, &scene, inside, 1, false);
+        assert_eq!(interface, Interface { eta: 1.3 / 1.5, squeeze: 1.0, beyond: inside });
+    }
+
+    #[test]
+    fn a_blend_of_two_glasses_is_left_as_the_one_that_was_entered() {
+        let mut scene = spheres(&[(1.0, 1.5), (0.9, 1.3)]);
+        let (shapes, materials) = (scene.geometry.tree.shapes().to_vec(), scene.shading.materials.clone());
+        scene = of(shapes, vec![Object::plain(2), Object::plain(1)], materials);
+        let mut sets = MediumSets::default();
+        sets.start(&scene, &[]);
+        for (leaf, ior) in [(0, 1.5), (1, 1.3)] {
+            let boundary = |front| scene.tables.bodies.boundary(0, 0, 2, front);
+            let entered = sets.interface(&scene, MediumId::OUTSIDE, boundary(true), leaf, &[]).beyond;
+            assert_eq!(sets.ior(entered), ior);
+            for part in 0..2 {
+                let left = sets.interface(&scene, entered, boundary(false), part, &[]);
+                assert_eq!((left.beyond, left.eta), (MediumId::OUTSIDE, ior), "in by {leaf}, out by {part}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_knows_what_it_is_inside_of() {
+        let scene = spheres(&[(1.0, 1.5), (0.5, 1.3), (0.2, 1.1)]);
+        let around = |x: f32| scene.tables.bodies.around(&scene.geometry, Vec3::new(x, 0.0, 0.0));
+        assert_eq!([0.0, 0.3, 0.7, 1.2].map(around), [vec![0, 1, 2], vec![0, 1], vec![0], vec![]]);
+        // A box of quads is one body, and so is a half-space; a point beside the box is in the latter alone.
+        let quad = |corner, edge_u, edge_v| Shape::Quad { corner, edge_u, edge_v };
+        let (o, x, y, z) = (Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z);
+        let mut shapes =
+            vec![quad(o, y, x), quad(o + z, x, y), quad(o, z, y), quad(o + x, y, z), quad(o, x, z), quad(o + y, z, x)];
+        shapes.push(Shape::Plane { point: Vec3::Y * 2.0, normal: Vec3::Y });
+        let objects = [0, 0, 0, 0, 0, 0, 1].map(Object::plain).into();
+        let glass = |ior| Material::Glass { ior, absorption: Vec3::ZERO };
+        let scene = of(shapes, objects, vec![glass(1.5), glass(1.3)]);
+        let around = |point| scene.tables.bodies.around(&scene.geometry, point);
+        assert_eq!(around(Vec3::splat(0.5)), [0, 1]);
+        assert_eq!(around(Vec3::new(1.5, 0.5, 0.5)), [0]);
+        assert_eq!(around(Vec3::new(0.5, 3.0, 0.5)), [0; 0]);
+    }
+}

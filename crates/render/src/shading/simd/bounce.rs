@@ -1,0 +1,32 @@
+//! How sixteen paths go on.
+
+use crate::prepare::material_table::TEXTURED;
+use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::texture::looked_up;
+use firstlight_simd::{Bits, Float, Mask, Simd, Vector};
+
+/// Directions in which paths go on.
+pub(crate) struct Bounce<S: Simd> {
+    pub go_on: Mask,
+    pub wi: Vector<S>,
+    pub weight: Vector<S>,
+    pub pdf: Float<S>,
+    pub transmitted: Mask,
+}
+
+/// Albedo or reflectance by rows of the table, with their textures.
+#[inline(always)]
+pub(crate) fn colors_of<S: Simd>(s: S, at: &At<S>, place: &Place<S>, row: Bits<S>) -> Vector<S> {
+    let table = &at.scene.tables.materials;
+    let color = Vector::gather(&table.color, row);
+    if !at.scene.tables.features.textures {
+        return color;
+    }
+    let textured = at.mask & Bits::gather(&table.flags, row).has(TEXTURED);
+    looked_up(s, at.scene, &table.inputs, row, textured, place, color)
+}
+
+#[inline(always)]
+pub(crate) fn mirrored<S: Simd>(wo: Vector<S>, normal: Vector<S>) -> Vector<S> {
+    (normal * (normal.dot(wo) * 2.0) - wo).normalize()
+}

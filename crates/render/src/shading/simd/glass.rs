@@ -1,0 +1,35 @@
+//! The two sides of transparent surfaces, sixteen at a time; see [`crate::shading::medium`].
+
+use crate::shading::interface::MediumId;
+use crate::shading::medium::MediumSets;
+use crate::shading::simd::lanes::lanes_of;
+use crate::shading::simd::place::At;
+use firstlight_simd::{Float, LANES, Mask, Simd};
+
+/// See [`crate::shading::interface::Interface`].
+pub(crate) struct GlassLanes<S: Simd> {
+    pub eta: Float<S>,
+    pub squeeze: Float<S>,
+    pub beyond: [MediumId; LANES],
+}
+
+impl<S: Simd> GlassLanes<S> {
+    /// - `front`: lanes that meet it from outside; `media`: what each path is inside of.
+    #[inline(always)]
+    pub fn of(s: S, at: &At<S>, front: Mask, sets: &mut MediumSets, media: &[MediumId; LANES]) -> Self {
+        let (mut eta, mut squeeze, mut beyond) = ([1.0; LANES], [1.0; LANES], *media);
+        for lane in lanes_of(at.mask) {
+            let i = at.indices[lane] as usize;
+            let (object, prim, front) = (at.hits.object[i], at.hits.prim[i], front >> lane & 1 != 0);
+            let bodies = &at.scene.tables.bodies;
+            let boundary = bodies.boundary(object, prim, at.materials[i], front);
+            let others = match at.hits.get(i) {
+                Some(hit) => at.scene.along_with(&hit, || at.paths.rays.get(i)),
+                None => Vec::new(),
+            };
+            let interface = sets.interface(at.scene, media[lane], boundary, 0, &others);
+            (eta[lane], squeeze[lane], beyond[lane]) = (interface.eta, interface.squeeze, interface.beyond);
+        }
+        Self { eta: Float::load(s, &eta), squeeze: Float::load(s, &squeeze), beyond }
+    }
+}

@@ -1,0 +1,85 @@
+//! Hints of where gathered light comes from, for sixteen surfaces; see [`crate::shading::guided::Guided`] for one.
+
+use crate::prepare::guide::{Guide, Hints, SHARE as HINTED};
+use crate::sampling::SamplerLanes;
+use crate::shading::dimensions::DIM_LOBE;
+use crate::shading::simd::lanes::lanes_of;
+use crate::shading::simd::place::{At, Place};
+use crate::shading::track::Track;
+use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
+use glam::Vec3;
+
+/// What each lane is told.
+pub(crate) struct HintLanes<'a> {
+    /// Lanes that have hints.
+    pub told: Mask,
+    pub hints: [Option<Hints<'a>>; LANES],
+}
+
+impl<'a> HintLanes<'a> {
+    pub const NONE: Self = Self { told: 0, hints: [None; LANES] };
+
+    /// - `mask`: lanes that scatter; `n_vertices`: up to and with these.
+    #[inline(always)]
+    pub fn of<S: Simd>(
+        s: S,
+        guide: Option<&'a Guide>,
+        n_vertices: u32,
+        at: &At<S>,
+        place: &Place<S>,
+        mask: Mask,
+    ) -> Self {
+        let mut found = Self::NONE;
+        let Some(guide) = guide else { return found };
+        let mut asking = 0;
+        if n_vertices > 1 {
+            for lane in lanes_of(mask) {
+                asking |= Mask::from(at.paths.track_of(at.indices[lane] as usize).is_lost()) << lane;
+            }
+        }
+        if asking != 0 {
+            let leaves = guide.leaves_at(s, asking, place.position);
+            let positions = place.position.to_arrays();
+            for lane in lanes_of(asking) {
+                found.hints[lane] = guide.in_leaf(leaves[lane], vec3_of(&positions, lane));
+                found.told |= Mask::from(found.hints[lane].is_some()) << lane;
+            }
+        }
+        found
+    }
+
+    /// The density of the mixture, given that of the surface alone.
+    #[inline(always)]
+    pub fn mixed<S: Simd>(&self, s: S, wi: Vector<S>, pdf: Float<S>) -> Float<S> {
+        if self.told == 0 {
+            return pdf;
+        }
+        let (directions, mut hinted) = (wi.to_arrays(), [0.0; LANES]);
+        for (lane, hints) in self.hints.iter().enumerate() {
+            if let Some(hints) = hints {
+                hinted[lane] = hints.pdf_lanes(s, vec3_of(&directions, lane));
+            }
+        }
+        select(self.told, pdf + (Float::load(s, &hinted) - pdf) * HINTED, pdf)
+    }
+
+    /// The number that chooses a part of a surface: what is left of it where the choice was not to follow a hint.
+    #[inline(always)]
+    pub fn u_lobe<S: Simd>(&self, sampler: &SamplerLanes<S>, dimension: u32) -> Float<S> {
+        let u = sampler.single(dimension + DIM_LOBE);
+        let rest = ((u - HINTED) / u.all(1.0 - HINTED)).at_least(0.0).at_most(1.0f32.next_down());
+        if self.told == 0 { u } else { select(self.told, rest, u) }
+    }
+
+    /// Of a lane whose throughput is multiplied by `weight`.
+    #[inline(always)]
+    pub fn track<S: Simd>(&self, at: &At<S>, lane: usize, weight: &[[f32; LANES]; 3]) -> Track {
+        let track = at.paths.track_of(at.indices[lane] as usize);
+        if self.told >> lane & 1 != 0 { track.guided(vec3_of(weight, lane)) } else { track }
+    }
+}
+
+#[inline(always)]
+pub(crate) fn vec3_of(arrays: &[[f32; LANES]; 3], lane: usize) -> Vec3 {
+    Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane])
+}

@@ -1,0 +1,34 @@
+//! What the files on sixteen hits share.
+
+use crate::shading::interface::MediumId;
+use crate::shading::medium::MediumSets;
+use firstlight_simd::{Float, LANES, Mask, Simd, Vector};
+
+/// Kinds of materials; see [`crate::core::material::Material::kind`].
+pub(crate) const DIFFUSE: usize = 1;
+pub(crate) const MIRROR: usize = 2;
+pub(crate) const GLASS: usize = 3;
+pub(crate) const METAL: usize = 4;
+
+#[inline(always)]
+pub(crate) fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |lane| mask >> lane & 1 != 0)
+}
+
+/// What is left of light after `distance` metres, lane by lane.
+#[inline(always)]
+pub(crate) fn transmittance<S: Simd>(
+    s: S,
+    sets: &MediumSets,
+    mask: Mask,
+    media: &[MediumId; LANES],
+    distance: Float<S>,
+) -> Vector<S> {
+    let distances = distance.to_array();
+    let mut kept = [[1.0; LANES]; 3];
+    for lane in lanes_of(mask) {
+        let found = sets.transmittance(media[lane], distances[lane]);
+        (kept[0][lane], kept[1][lane], kept[2][lane]) = (found.x, found.y, found.z);
+    }
+    Vector::from_arrays(s, &kept)
+}

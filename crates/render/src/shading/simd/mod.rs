@@ -1,0 +1,16 @@
+//! Surfaces, lights and scattering for sixteen hits at a time. What is rare is done lane by lane with the code of
+//! [`crate::shading`] for one; tests hold the two against each other.
+
+pub(crate) mod bounce;
+pub(crate) mod chunk;
+mod coat;
+mod glass;
+mod guided;
+pub(crate) mod hints;
+mod instances;
+pub(crate) mod lanes;
+pub(crate) mod lights;
+pub(crate) mod metal;
+pub(crate) mod place;
+pub(crate) mod scatter;
+pub(crate) mod texture;

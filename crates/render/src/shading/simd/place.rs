@@ -1,0 +1,321 @@
+//! From sixteen hits to what shading needs to know of the places; see [`crate::shading::surface::Vertex`].
+
+use crate::prepare::material_table::TEXTURED;
+use crate::prepare::prepared::Prepared;
+use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
+use crate::sampling::offset_lanes::offset_origin;
+use crate::shading::paths::PathBatch;
+use crate::shading::surface::Vertex;
+use firstlight_kdtree::geometry::robust::UNIT_ROUNDOFF;
+use firstlight_kdtree::{HitBatch, WIDE_ERROR};
+use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Simd, Vector, select, select_vector, three, two};
+use glam::{Vec2, Vec3};
+
+/// Points on surfaces, each seen along a ray.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<S: Simd> {
+    pub position: Vector<S>,
+    /// On the side that the ray came from.
+    pub geometric_normal: Vector<S>,
+    pub normal: Vector<S>,
+    /// What decides whether light can meet the side of `wo`.
+    pub reach_normal: Vector<S>,
+    /// Where rays to the side of `wo` start, before the offset.
+    pub lifted: Vector<S>,
+    /// Metres along the geometric normal that keep a ray from meeting its own surface.
+    pub offset: Float<S>,
+    pub front: Mask,
+    pub wo: Vector<S>,
+    pub uv: [Float<S>; 2],
+}
+
+/// Which hits, and of which materials.
+pub(crate) struct At<'a, S: Simd> {
+    pub scene: &'a Prepared,
+    pub paths: &'a PathBatch,
+    pub hits: &'a HitBatch,
+    pub materials: &'a [u32],
+    /// Indices into them all; only the lanes of `mask` count.
+    pub index: Bits<S>,
+    pub indices: &'a [u32; LANES],
+    pub mask: Mask,
+}
+
+impl<S: Simd> At<'_, S> {
+    #[inline(always)]
+    pub fn ray_origin(&self) -> Vector<S> {
+        let rays = &self.paths.rays;
+        let [x, y, z] = [&rays.origin_x, &rays.origin_y, &rays.origin_z];
+        let (x, y) = (Float::gather(x, self.index), Float::gather(y, self.index));
+        let z = Float::gather(z, self.index);
+        Vector { x, y, z }
+    }
+}
+
+/// Between `least` and as far from 1.
+#[inline(always)]
+fn away_from_rim<S: Simd>(at: Float<S>, least: Float<S>) -> Float<S> {
+    at.max(least).min(at.all(1.0) - least)
+}
+
+impl<S: Simd> Kernel<S> for &At<'_, S> {
+    type Output = Place<S>;
+
+    #[inline(always)]
+    fn run(self, s: S) -> Place<S> {
+        Place::new(s, self)
+    }
+}
+
+impl<S: Simd> Place<S> {
+    /// Long, and asked for by all kinds of materials: they share one copy of it.
+    #[inline(always)]
+    pub fn of(s: S, at: &At<S>) -> Self {
+        s.call(at)
+    }
+
+    #[inline(always)]
+    fn new(s: S, at: &At<S>) -> Self {
+        let (rays, hits, table) = (&at.paths.rays, at.hits, &at.scene.surfaces);
+        let dir = Vector {
+            x: Float::gather(&rays.dir_x, at.index),
+            y: Float::gather(&rays.dir_y, at.index),
+            z: Float::gather(&rays.dir_z, at.index),
+        };
+        let wo = -dir;
+        let object = Bits::gather(&hits.object, at.index);
+        let kind = Bits::gather(&table.kind, object);
+        let (flat, plane) = (kind.equals(FLAT) & at.mask, kind.equals(PLANE) & at.mask);
+        let (mesh, mut cloud) = (kind.equals(MESH) & at.mask, kind.equals(CLOUD) & at.mask);
+        let mut ball = kind.equals(BALL) & at.mask;
+        let mut other = kind.equals(OTHER) & at.mask;
+        if at.scene.tables.features.textures && ball | cloud != 0 {
+            // Longitude and latitude.
+            let material = Bits::gather(at.materials, at.index);
+            let textured = Bits::gather(&at.scene.tables.materials.flags, material).has(TEXTURED);
+            other |= (ball | cloud) & textured;
+            ball &= !textured;
+            cloud &= !textured;
+        }
+        let zero = Float::splat(s, 0.0);
+        let nowhere = Vector { x: zero, y: zero, z: zero };
+        let mut place = Self {
+            position: nowhere,
+            geometric_normal: nowhere,
+            normal: nowhere,
+            reach_normal: nowhere,
+            lifted: nowhere,
+            offset: zero,
+            front: 0,
+            wo,
+            uv: [zero, zero],
+        };
+        if flat != 0 {
+            place.set_flat(table, object, [Float::gather(&hits.u, at.index), Float::gather(&hits.v, at.index)]);
+        }
+        if ball != 0 {
+            place.set_balls(s, at, table, object, dir, ball);
+        }
+        if plane != 0 {
+            place.set_planes(s, at, table, object, dir, plane);
+        }
+        let mut corners = None;
+        let mut row = object;
+        if mesh | cloud != 0 {
+            row = Bits::gather(&table.row, object);
+        }
+        if mesh != 0 {
+            let (found, near_rim) = place.set_meshes(s, at, row, mesh);
+            corners = Some(found);
+            other |= near_rim;
+        }
+        if cloud != 0 {
+            place.set_clouds(s, at, row, dir, cloud);
+        }
+        place.front = Float::splat(s, 0.0).le(wo.dot(place.geometric_normal));
+        place.geometric_normal = select_vector(place.front, place.geometric_normal, -place.geometric_normal);
+        place.normal = place.geometric_normal;
+        place.reach_normal = place.geometric_normal;
+        place.lifted = place.position;
+        if let Some(corners) = &corners {
+            place.smooth_meshes(s, at, row, corners);
+        }
+        if other != 0 {
+            place.set_others(s, at, other);
+        }
+        place
+    }
+
+    #[inline(always)]
+    fn set_flat(&mut self, table: &SurfaceTable, object: Bits<S>, [u, v]: [Float<S>; 2]) {
+        let (a, b) = (Vector::gather(&table.a, object), Vector::gather(&table.b, object));
+        let c = Vector::gather(&table.c, object);
+        let least = [Float::gather(&table.least[0], object), Float::gather(&table.least[1], object)];
+        self.position = a + b * away_from_rim(u, least[0]) + c * away_from_rim(v, least[1]);
+        self.geometric_normal = Vector::gather(&table.normal, object);
+        self.offset = Float::gather(&table.offset, object);
+        self.uv = [u, v];
+    }
+
+    #[inline(always)]
+    fn set_balls(&mut self, s: S, at: &At<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
+        let (center, radius) = (Vector::gather(&table.a, object), Float::gather(&table.offset, object));
+        let t = Float::gather(&at.hits.t, at.index);
+        let [position, normal] = ball_points(s, [at.ray_origin(), dir], t, center, radius);
+        let (n, error) = (normal.abs(), Float::gather(&table.least[0], object));
+        let offset = n.dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF)) + (n.x + n.y + n.z) * error;
+        self.position = select_vector(mask, position, self.position);
+        self.geometric_normal = select_vector(mask, normal, self.geometric_normal);
+        self.offset = select(mask, offset, self.offset);
+    }
+
+    /// In `f64`, as for one plane.
+    #[inline(always)]
+    fn set_planes(&mut self, s: S, at: &At<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
+        let (point, normal) = (Vector::gather(&table.a, object), Vector::gather(&table.normal, object));
+        let t = s.widen(Float::gather(&at.hits.t, at.index).v);
+        let (origin, dir, from, n) = (widened(at.ray_origin()), widened(dir), widened(point), widened(normal));
+        let near = three!(|k| s.add_d(origin[k], s.mul_d(t, dir[k])));
+        let away = three!(|k| s.sub_d(near[k], from[k]));
+        let height = s.div_d(dot_d(s, away, n), dot_d(s, n, n));
+        let [x, y, z] = three!(|k| Float { s, v: s.narrow(s.sub_d(near[k], s.mul_d(n[k], height))) });
+        let position = Vector { x, y, z };
+        // All but the rounding is a power of two away from the size.
+        let error = (point.abs().max_element() + position.abs().max_element()) * WIDE_ERROR as f32;
+        let each = Vector { x: error, y: error, z: error };
+        let offset = normal.abs().dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF) + each);
+        let local = position - point;
+        let axes = [&table.b, &table.c];
+        self.position = select_vector(mask, position, self.position);
+        self.geometric_normal = select_vector(mask, normal, self.geometric_normal);
+        self.offset = select(mask, offset, self.offset);
+        self.uv = two!(|k| select(mask, local.dot(Vector::gather(axes[k], object)), self.uv[k]));
+    }
+
+    /// Lone triangles, textured balls and what is near the rim of a triangle, one at a time.
+    #[inline(always)]
+    fn set_others(&mut self, s: S, at: &At<S>, mask: Mask) {
+        let mut vectors = [
+            self.position.to_arrays(),
+            self.geometric_normal.to_arrays(),
+            self.normal.to_arrays(),
+            self.reach_normal.to_arrays(),
+            self.lifted.to_arrays(),
+        ];
+        let mut scalars = [self.offset.to_array(), self.uv[0].to_array(), self.uv[1].to_array()];
+        self.front &= !mask;
+        for (lane, &i) in at.indices.iter().enumerate() {
+            if mask >> lane & 1 == 0 {
+                continue;
+            }
+            let vertex = vertex_at(at.scene, at.paths, at.hits, at.materials, i as usize);
+            let reach = if vertex.lift == Vec3::ZERO { vertex.geometric_normal } else { vertex.normal };
+            let values =
+                [vertex.position, vertex.geometric_normal, vertex.normal, reach, vertex.position + vertex.lift];
+            for (arrays, value) in vectors.iter_mut().zip(values) {
+                (arrays[0][lane], arrays[1][lane], arrays[2][lane]) = (value.x, value.y, value.z);
+            }
+            scalars[0][lane] = vertex.geometric_normal.abs().dot(vertex.error);
+            (scalars[1][lane], scalars[2][lane]) = (vertex.uv.x, vertex.uv.y);
+            self.front |= Mask::from(vertex.front) << lane;
+        }
+        let [position, geometric_normal, normal, reach_normal, lifted] = &vectors;
+        self.position = Vector::from_arrays(s, position);
+        self.geometric_normal = Vector::from_arrays(s, geometric_normal);
+        self.normal = Vector::from_arrays(s, normal);
+        self.reach_normal = Vector::from_arrays(s, reach_normal);
+        self.lifted = Vector::from_arrays(s, lifted);
+        self.offset = Float::load(s, &scalars[0]);
+        self.uv = [Float::load(s, &scalars[1]), Float::load(s, &scalars[2])];
+    }
+
+    #[inline(always)]
+    pub(crate) fn stored(&self) -> StoredPlaces {
+        StoredPlaces {
+            position: self.position.to_arrays(),
+            geometric_normal: self.geometric_normal.to_arrays(),
+            normal: self.normal.to_arrays(),
+            wo: self.wo.to_arrays(),
+            uv: [self.uv[0].to_array(), self.uv[1].to_array()],
+            front: self.front,
+        }
+    }
+
+    /// Where a ray starts that stays on the side of `wo`.
+    #[inline(always)]
+    pub fn leaving(&self) -> Vector<S> {
+        offset_origin(self.lifted, self.offset, self.geometric_normal)
+    }
+
+    /// Where a ray starts that goes to the far side.
+    #[inline(always)]
+    pub fn passing(&self) -> Vector<S> {
+        offset_origin(self.position, self.offset, -self.geometric_normal)
+    }
+}
+
+/// Places in memory, for what is done with them one at a time.
+pub(crate) struct StoredPlaces {
+    position: [[f32; LANES]; 3],
+    geometric_normal: [[f32; LANES]; 3],
+    normal: [[f32; LANES]; 3],
+    wo: [[f32; LANES]; 3],
+    uv: [[f32; LANES]; 2],
+    front: Mask,
+}
+
+impl StoredPlaces {
+    /// The vertex of a lane, but for where rays leave it.
+    #[inline]
+    pub fn vertex(&self, lane: usize) -> Vertex {
+        let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
+        Vertex {
+            position: at(&self.position),
+            error: Vec3::ZERO,
+            geometric_normal: at(&self.geometric_normal),
+            normal: at(&self.normal),
+            smooth_normal: at(&self.normal),
+            uv: Vec2::new(self.uv[0][lane], self.uv[1][lane]),
+            front: self.front >> lane & 1 != 0,
+            wo: at(&self.wo),
+            lift: Vec3::ZERO,
+        }
+    }
+}
+
+/// Hits projected onto spheres, in `f64` as for one of them, and their outward normals.
+#[inline(always)]
+pub(crate) fn ball_points<S: Simd>(
+    s: S,
+    [origin, dir]: [Vector<S>; 2],
+    t: Float<S>,
+    center: Vector<S>,
+    radius: Float<S>,
+) -> [Vector<S>; 2] {
+    let (t, radius) = (s.widen(t.v), s.widen(radius.v));
+    let (origin, dir, center) = (widened(origin), widened(dir), widened(center));
+    let out = three!(|k| s.sub_d(s.add_d(origin[k], s.mul_d(t, dir[k])), center[k]));
+    let inverse = s.div_d(s.splat_d(1.0), s.sqrt_d(dot_d(s, out, out)));
+    let normal = three!(|k| s.mul_d(out[k], inverse));
+    let [x, y, z] = three!(|k| Float { s, v: s.narrow(s.add_d(center[k], s.mul_d(radius, normal[k]))) });
+    let position = Vector { x, y, z };
+    let [x, y, z] = three!(|k| Float { s, v: s.narrow(normal[k]) });
+    [position, Vector { x, y, z }]
+}
+
+#[inline(always)]
+fn widened<S: Simd>(v: Vector<S>) -> [S::D; 3] {
+    let s = v.x.s;
+    [s.widen(v.x.v), s.widen(v.y.v), s.widen(v.z.v)]
+}
+
+#[inline(always)]
+fn dot_d<S: Simd>(s: S, a: [S::D; 3], b: [S::D; 3]) -> S::D {
+    s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
+}
+
+#[inline(never)]
+fn vertex_at(scene: &Prepared, paths: &PathBatch, hits: &HitBatch, materials: &[u32], i: usize) -> Vertex {
+    let hit = hits.get(i).expect("a hit is being shaded");
+    Vertex::new(scene, &paths.rays.get(i), &hit, materials[i])
+}

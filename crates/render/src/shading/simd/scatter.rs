@@ -1,0 +1,174 @@
+//! How surfaces scatter, sixteen at a time; see [`crate::shading::bsdf`].
+
+use crate::core::material::SMALLEST_ALPHA;
+use crate::prepare::material_table::{COATED, TEXTURED};
+use crate::sampling::SamplerLanes;
+use crate::sampling::warp_lanes::cosine_hemisphere;
+use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
+use crate::shading::interface::MediumId;
+use crate::shading::medium::MediumSets;
+use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
+use crate::shading::simd::coat::Coat;
+use crate::shading::simd::glass::GlassLanes;
+use crate::shading::simd::hints::HintLanes;
+use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, lanes_of};
+use crate::shading::simd::metal;
+use crate::shading::simd::metal::MetalLanes;
+use crate::shading::simd::place::{At, Place};
+use crate::shading::surface::scalar_at;
+use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around, select, select_vector};
+use glam::Vec2;
+use std::f32::consts::FRAC_1_PI;
+
+/// How the surface of each lane scatters.
+pub(crate) struct Surface<S: Simd> {
+    /// Albedo or reflectance.
+    pub color: Vector<S>,
+    pub metal: Option<MetalLanes<S>>,
+    pub coat: Option<Coat<S>>,
+    pub glass: Option<GlassLanes<S>>,
+    /// Lanes that light sampling can do something for.
+    pub smooth: Mask,
+}
+
+/// The parameters of the surfaces; black and without lobe only where the scalar code would say so too.
+#[inline(always)]
+///
+/// - `media`: what each path is inside of.
+pub(crate) fn surface_of<S: Simd, const KIND: usize>(
+    s: S,
+    at: &At<S>,
+    place: &Place<S>,
+    sets: &mut MediumSets,
+    media: &[MediumId; LANES],
+) -> Surface<S> {
+    let table = &at.scene.tables.materials;
+    if KIND == COATED {
+        let coat = Coat::new(s, at, place);
+        let (smooth, zero) = (coat.smooth(), Float::splat(s, 0.0));
+        return Surface {
+            color: Vector { x: zero, y: zero, z: zero },
+            metal: None,
+            coat: Some(coat),
+            glass: None,
+            smooth,
+        };
+    }
+    let material = Bits::gather(at.materials, at.index);
+    let color = colors_of(s, at, place, material);
+    if KIND == METAL {
+        let flags = Bits::gather(&table.flags, material);
+        let mut alpha = Float::gather(&table.alpha, material);
+        let textured = at.mask & flags.has(TEXTURED);
+        if at.scene.tables.features.textures && textured != 0 {
+            let (us, vs) = (place.uv[0].to_array(), place.uv[1].to_array());
+            let mut alphas = alpha.to_array();
+            for lane in lanes_of(textured) {
+                let material = at.materials[at.indices[lane] as usize];
+                alphas[lane] = scalar_at(at.scene, material, Vec2::new(us[lane], vs[lane]));
+            }
+            alpha = Float::load(s, &alphas);
+        }
+        let metal = MetalLanes::new(s, at.mask, place.normal, place.wo, alpha, color, flags);
+        let smooth = Float::splat(s, SMALLEST_ALPHA).le(alpha);
+        return Surface { color, metal: Some(metal), coat: None, glass: None, smooth };
+    }
+    let glass = (KIND == GLASS).then(|| GlassLanes::of(s, at, place.front, sets, media));
+    Surface { color, metal: None, coat: None, glass, smooth: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
+}
+
+/// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.
+#[inline(always)]
+pub(crate) fn eval<S: Simd, const KIND: usize>(
+    surface: &Surface<S>,
+    place: &Place<S>,
+    wi: Vector<S>,
+) -> (Vector<S>, Float<S>) {
+    if let Some(coat) = &surface.coat
+        && KIND == COATED
+    {
+        return coat.eval(place.normal, wi);
+    }
+    let cos = place.normal.dot(wi);
+    let above = cos.is_positive();
+    let zero = cos.all(0.0);
+    if let Some(metal) = &surface.metal
+        && KIND == METAL
+    {
+        let found = metal.eval(metal.local(wi));
+        let valid = above & metal.facing();
+        let value = found.tint * found.value;
+        let pdf = select(valid, found.pdf, zero);
+        return (value, pdf);
+    }
+    let pdf = select(above, cos * FRAC_1_PI, zero);
+    (surface.color * pdf, pdf)
+}
+
+#[inline(always)]
+pub(crate) fn sample<S: Simd, const KIND: usize>(
+    at: &At<S>,
+    surface: &Surface<S>,
+    place: &Place<S>,
+    hints: &HintLanes,
+    sampler: &SamplerLanes<S>,
+    dimension: u32,
+) -> Bounce<S> {
+    let s = at.index.s;
+    let infinite = Float::splat(s, f32::INFINITY);
+    let normal = place.normal;
+    let cos_o = normal.dot(place.wo);
+    match KIND {
+        COATED => {
+            let coat = surface.coat.as_ref().expect("a coated surface has its parts");
+            coat.sample(at.mask, place, hints.u_lobe(sampler, dimension), sampler.pair(dimension + DIM_DIRECTION))
+        }
+        DIFFUSE => {
+            let local = cosine_hemisphere(sampler.pair(dimension + DIM_DIRECTION));
+            let wi = local.to_world(&frame_around(normal));
+            let go_on = local.z.is_positive();
+            Bounce { go_on, wi, weight: surface.color, pdf: local.z * FRAC_1_PI, transmitted: 0 }
+        }
+        METAL => {
+            let metal = surface.metal.as_ref().expect("metal has metal parameters");
+            let [wi, local] = metal.sample(sampler.pair(dimension + DIM_DIRECTION));
+            let found = metal.eval(local);
+            let go_on = metal.facing() & local.z.is_positive();
+            let mut bounce = Bounce { go_on, wi, weight: found.tint * found.weight, pdf: found.pdf, transmitted: 0 };
+            if !surface.smooth & at.mask != 0 {
+                let smooth = surface.smooth;
+                let tint = metal::fresnel(metal.flags, metal.reflectance, cos_o);
+                bounce.go_on |= !smooth;
+                bounce.wi = select_vector(smooth, bounce.wi, mirrored(place.wo, normal));
+                bounce.weight = select_vector(smooth, bounce.weight, tint);
+                bounce.pdf = select(smooth, bounce.pdf, infinite);
+            }
+            bounce
+        }
+        GLASS => {
+            let glass = surface.glass.as_ref().expect("glass has its two sides");
+            let eta = glass.eta;
+            let one = eta.all(1.0);
+            let cos_i = cos_o.at_least(0.0).at_most(1.0);
+            let cos2_t = (one - eta) * (eta + 1.0) + (eta * cos_i) * (eta * cos_i);
+            let total = cos2_t.le(eta.all(0.0));
+            let cos_t = cos2_t.at_least(0.0).sqrt();
+            let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+            let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+            let reflectance = (perpendicular * perpendicular + parallel * parallel) * 0.5;
+            let alike = s.eq(eta.v, one.v) & !total;
+            let reflectance = select(total, one, select(alike, eta.all(0.0), reflectance));
+            let cos_t = select(alike, cos_i, cos_t);
+            let reflected = sampler.single(dimension + DIM_LOBE).lt(reflectance);
+            let refracted = place.wo * -eta + normal * (eta * cos_o - cos_t);
+            let wi = select_vector(reflected, mirrored(place.wo, normal), refracted.normalize());
+            let squeeze = select(reflected, one, glass.squeeze * glass.squeeze);
+            let weight = Vector { x: squeeze, y: squeeze, z: squeeze };
+            Bounce { go_on: Mask::MAX, wi, weight, pdf: infinite, transmitted: !reflected }
+        }
+        _ => {
+            let wi = mirrored(place.wo, normal);
+            Bounce { go_on: Mask::MAX, wi, weight: surface.color, pdf: infinite, transmitted: 0 }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Colours that vary over surfaces: checkers for all lanes at once, pictures one lane at a time.
+
+use crate::core::material::ColorInput;
+use crate::core::texture::TexturePattern;
+use crate::prepare::prepared::Prepared;
+use crate::shading::simd::lanes::lanes_of;
+use crate::shading::simd::place::Place;
+use firstlight_simd::{Bits, Mask, Simd, Vector, floor, select_vector, truncated};
+use glam::Vec2;
+
+/// `color`, but for the lanes of `textured`: there what `inputs` says of their rows.
+#[inline(always)]
+pub(crate) fn looked_up<S: Simd>(
+    s: S,
+    scene: &Prepared,
+    inputs: &[ColorInput],
+    row: Bits<S>,
+    textured: Mask,
+    place: &Place<S>,
+    color: Vector<S>,
+) -> Vector<S> {
+    if textured == 0 {
+        return color;
+    }
+    let rows = row.to_array();
+    let first = rows[textured.trailing_zeros() as usize];
+    let (mut color, mut rest) = (color, textured);
+    if let ColorInput::Texture(id) = inputs[first as usize] {
+        let texture = &scene.shading.textures[id as usize];
+        if let TexturePattern::Checker { a, b } = &texture.pattern {
+            let [u, v] = place.uv;
+            let (m, offset) = (texture.uv_matrix, texture.uv_offset);
+            let x = u * m.x_axis.x + v * m.y_axis.x + offset.x;
+            let y = u * m.x_axis.y + v * m.y_axis.y + offset.y;
+            // See [`crate::core::texture::Texture::eval`].
+            let half = (floor(x) + floor(y)) * 0.5;
+            let even = (half - truncated(half)).is_zero();
+            let alike = textured & row.equals(first);
+            let found = select_vector(even, Vector::splat(s, *a), Vector::splat(s, *b));
+            color = select_vector(alike, found, color);
+            rest &= !alike;
+        }
+    }
+    if rest == 0 {
+        return color;
+    }
+    let (us, vs) = (place.uv[0].to_array(), place.uv[1].to_array());
+    let mut colors = color.to_arrays();
+    for lane in lanes_of(rest) {
+        let found = inputs[rows[lane] as usize].eval(scene, Vec2::new(us[lane], vs[lane]));
+        (colors[0][lane], colors[1][lane], colors[2][lane]) = (found.x, found.y, found.z);
+    }
+    Vector::from_arrays(s, &colors)
+}

@@ -1,0 +1,53 @@
+//! What a path from the eye remembers, so that light found by it can be weighed against a path from a lamp.
+
+use crate::prepare::casters::NO_CASTER;
+use glam::Vec3;
+
+/// Of a path from the eye.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Track {
+    /// Density of finding it from the lamp over that from the eye, without the lamp's factor; NaN if no path from a lamp
+    /// can be it.
+    pub ratio: f32,
+    /// That the last vertex lies on, if it was perfectly smooth.
+    pub caster: u32,
+    /// By how much hints have raised the densities of directions so far, about: roulette must not take the small
+    /// throughput that goes with it for a loss.
+    pub gain: f32,
+}
+
+impl Default for Track {
+    fn default() -> Self {
+        Self { ratio: f32::NAN, caster: NO_CASTER, gain: 1.0 }
+    }
+}
+
+impl Track {
+    /// - `ratio`: NaN if no path from a lamp can be the path so far.
+    /// - `caster`: that the last vertex lies on, if it was perfectly smooth; [`NO_CASTER`] otherwise.
+    #[inline(always)]
+    pub fn new(ratio: f32, caster: u32, gain: f32) -> Self {
+        Self { ratio, caster, gain }
+    }
+
+    /// See [`crate::integrators::caustics::pass::CausticPass::follow`]; NaN if no path from a lamp can be the path so far.
+    #[inline(always)]
+    pub fn ratio(&self) -> f32 {
+        self.ratio
+    }
+
+    /// Whether no path from a lamp can be the path so far and what follows.
+    pub fn is_lost(&self) -> bool {
+        self.ratio.is_nan()
+    }
+
+    /// Whether the last vertex was smooth, and a path from a lamp can be the path so far.
+    pub fn is_gathered(&self) -> bool {
+        self.caster != NO_CASTER && !self.is_lost()
+    }
+
+    pub fn guided(mut self, weight: Vec3) -> Self {
+        self.gain /= weight.abs().max_element().clamp(f32::MIN_POSITIVE, 1.0);
+        self
+    }
+}

@@ -1,0 +1,175 @@
+//! A scene that is rendered without a window, and the pictures of it.
+
+use super::console::remark;
+use super::failure::Failure;
+use super::progress::Progress;
+use super::render_args::{DEFAULT_SPP, RenderArgs};
+use bevy_ecs::prelude::World;
+use firstlight::frame::navigation::Rig;
+use firstlight::frame::{FilmFile, PictureFormat, Print, Target, render_offline_until};
+use firstlight::render::{Display, Film, NoRoom, Purpose, RenderSettings, Room};
+use firstlight::scene::whole_file::Replace;
+use firstlight::scene::{
+    Developing, Extraction, Files, FilmSize, LoadedScene, Part, Rendering, SceneInputs, Shot, ShotDraft, ShotSamples,
+};
+use std::path::Path;
+use std::time::Instant;
+
+/// A scene and how it is to be rendered.
+pub(super) struct Job {
+    pub scene: LoadedScene,
+    pub world: World,
+    pub extraction: Extraction,
+    pub settings: RenderSettings,
+    pub display: Display,
+    pub size: (u32, u32),
+    pub build_seconds: f64,
+    pub draft: ShotDraft,
+}
+
+impl Job {
+    pub fn new(
+        args: &RenderArgs,
+        kept: Option<&Shot>,
+        files: &mut Files,
+        progress: &Progress,
+    ) -> Result<Self, Failure> {
+        let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
+        let scene = args.scene.load(aspect, files, &|text| progress.stage(text.to_owned()))?;
+        if let Some(announcement) = &args.announcement {
+            progress.suspend(|| remark(announcement));
+        }
+        let mut world = bevy_ecs::world::World::new();
+        scene.spawn(&mut world);
+        let start = Instant::now();
+        let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
+        let build_seconds = scene.build_seconds + start.elapsed().as_secs_f64();
+        for problem in &extraction.problems {
+            remark(format_args!("warning: {problem}"));
+        }
+        // What is not asked for is as the film has it that is gone on with, then as the scene has it.
+        let Rendering(of_scene) = *world.resource();
+        let settings = RenderSettings {
+            integrator: (args.integrator.map(Into::into))
+                .or(kept.map(|kept| kept.integrator.into()))
+                .unwrap_or(of_scene.integrator),
+            max_depth: (args.max_depth)
+                .or(kept.map(|kept| kept.max_depth.unwrap_or(u32::MAX)))
+                .unwrap_or(of_scene.max_depth),
+            seed: args.seed.or(kept.map(|kept| kept.seed)).unwrap_or(of_scene.seed),
+            filter: (args.filter.map(Into::into))
+                .or(kept.map(|kept| kept.film.filter.into()))
+                .unwrap_or(of_scene.filter),
+            ..of_scene
+        };
+        let FilmSize { width, height } = *world.resource();
+        let size = args.size.or(kept.map(|kept| (kept.film.width, kept.film.height))).unwrap_or((width, height));
+        let size = scaled(size, args.scale)?;
+        let mut display = world.resource::<Developing>().0;
+        display.exposure_stops += args.exposure;
+        world.insert_resource(Rendering(settings));
+        let draft = ShotDraft::of(&mut world, Some(&scene));
+        Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
+    }
+
+    /// The camera, as it is.
+    pub fn rig(&mut self) -> Option<Rig> {
+        let camera = SceneInputs::of(&mut self.world).camera?;
+        Some(Rig { view: camera.view, projection: camera.projection, lens: camera.lens })
+    }
+
+    /// Looks from there from now on.
+    pub fn set_rig(&mut self, rig: &Rig) {
+        if let Some(camera) = SceneInputs::of(&mut self.world).camera {
+            self.world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
+        }
+        let inputs = SceneInputs::of(&mut self.world);
+        self.extraction.update(Part::Camera, &inputs, &self.scene.trees);
+        self.draft = ShotDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
+    }
+
+    /// Renders a whole picture.
+    pub fn picture(&self, args: &RenderArgs, target: Target) -> Result<Film, Failure> {
+        let mut film = self.new_film(&purposes(args))?;
+        render_offline_until(&self.extraction.prepared, &self.settings, &mut film, target, &|| false, |_| true);
+        Ok(film)
+    }
+
+    /// A film, and the certainty that there is memory for all that it is made for: before any ray is traced.
+    fn new_film(&self, purposes: &[Purpose]) -> Result<Film, Failure> {
+        let (width, height) = self.size;
+        let no_room = |error: NoRoom| Failure::Failed(error.to_string());
+        let from_lamps = self.extraction.prepared.features().caustics;
+        drop(Room::for_film(width, height, from_lamps, purposes).map_err(no_room)?);
+        let mut film = Film::try_new(width, height).map_err(no_room)?;
+        if from_lamps {
+            film.reserve_light().map_err(no_room)?;
+        }
+        Ok(film)
+    }
+
+    /// Writes a picture with its note.
+    pub fn write(&self, film: &Film, path: &Path, replace: Replace) -> Result<(), Failure> {
+        let note = self.note(film, path);
+        let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
+        picture.write(path, replace).map_err(Failure::Failed)
+    }
+
+    /// The note of a picture of this film at `path`.
+    pub fn note(&self, film: &Film, path: &Path) -> String {
+        let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven: film.max_spp() > film.spp() };
+        self.draft.note(path, self.size, samples, self.display.into())
+    }
+
+    /// An empty film, or the one that is gone on with.
+    pub fn film(&self, args: &RenderArgs, kept: Option<(FilmFile, &Path)>) -> Result<Film, Failure> {
+        let shot = self.scene.shot.as_ref();
+        let first = args.samples.as_ref().map(|samples| samples.start).or(shot.map(|shot| shot.first_sample));
+        let Some((FilmFile { film, shot, .. }, path)) = kept else {
+            return Ok(self.new_film(&purposes(args))?.starting_at(first.unwrap_or(0)));
+        };
+        let ours = Shot::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
+        match ours.differs_from(&shot) {
+            None => Ok(film),
+            Some(what) => Err(Failure::Failed(format!(
+                "{}: is a film of another {what}: go on with it as it was begun, or keep a new film",
+                path.display()
+            ))),
+        }
+    }
+
+    /// When it is good enough.
+    pub fn target(&self, args: &RenderArgs) -> Target {
+        let open_ended = args.time.is_none() && args.error.is_none();
+        let of_picture = self.scene.shot.as_ref().filter(|_| !args.resume).map(|shot| shot.spp.max(1));
+        let default = open_ended.then(|| of_picture.unwrap_or(DEFAULT_SPP));
+        let of_range = args.samples.as_ref().map(|samples| samples.end - samples.start);
+        Target { spp: args.spp.or(of_range).or(default), seconds: args.time, error: args.error }
+    }
+}
+
+/// What is written at the end.
+pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
+    let film = args.film.is_some() || args.resume;
+    let picture = match PictureFormat::of(&args.output) {
+        Ok(PictureFormat::Exr) => Purpose::Exr,
+        _ => Purpose::Png,
+    };
+    std::iter::once(picture).chain(film.then_some(Purpose::FilmFile)).collect()
+}
+
+/// Memory kept free for what is written at the end: a picture that cannot be written is not worth the wait.
+pub fn room_to_write(args: &RenderArgs, (width, height): (u32, u32)) -> Result<Room, Failure> {
+    Room::for_files(width, height, &purposes(args)).map_err(|error| Failure::Failed(error.to_string()))
+}
+
+/// `size` times `scale`, if that is a film that can be had.
+pub fn scaled((width, height): (u32, u32), scale: Option<f64>) -> Result<(u32, u32), Failure> {
+    let Some(scale) = scale else { return Ok((width, height)) };
+    // Numbers out of range become the largest one, which is too large.
+    let side = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+    let (width, height) = (side(width), side(height));
+    firstlight::scene::file::check_film_size(width, height)
+        .map_err(|error| Failure::Usage(format!("--scale: {error}")))?;
+    Ok((width, height))
+}

@@ -1,0 +1,297 @@
+//! Sessions that write down what they are asked for, and that are played again from it.
+
+use super::beside::Beside;
+use super::recording::{FORMAT, Header, Line, Recorder, SceneWord, check_recordable, read};
+use super::resources::{Adopted, CurrentScene, PictureSize, Shown, StopAt};
+use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
+use crate::render::{Film, Room};
+use crate::scene::whole_file::{Replace, WholeFile, unwritable};
+use crate::scene::{
+    Developing, Rendering, SceneSource, UpAxis, absolute, check_film_size, relative_path, text_to_path,
+};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+impl Session {
+    /// Writes down from now on what this session is asked for; call it before the first frame, with the scene that is
+    /// opened first.
+    ///
+    /// # Errors
+    /// When the file cannot be made.
+    pub fn record(&mut self, path: &Path, source: &SceneSource, up: Option<UpAxis>) -> Result<(), String> {
+        check_recordable(path)?;
+        let mut out = WholeFile::claim(path, Replace::AllButFilms)?;
+        let folder = folder_of(path);
+        let scene = match source {
+            SceneSource::Builtin(name) => SceneWord::Builtin(name.clone()),
+            SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path) => {
+                SceneWord::File(relative_path(&folder, path))
+            }
+        };
+        let PictureSize { width, height } = *self.world().resource();
+        let header = Header {
+            format: FORMAT,
+            program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
+            scene,
+            up: up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' }),
+            width,
+            height,
+            seed: self.world().resource::<Rendering>().0.seed,
+        };
+        // Only with its first line does it take the place of an older recording; the others are added one by one.
+        let first = ron::to_string(&header).expect("a line is plain data") + "\n";
+        out.write_all(first.as_bytes()).map_err(|error| unwritable(path, &error))?;
+        let file = out.finish_open()?;
+        self.world_mut().insert_resource(Recorder { out: Some((file, path.to_path_buf())), ..Recorder::default() });
+        Ok(())
+    }
+
+    /// Ends the recording with how far the picture is.
+    pub fn end_record(&mut self) {
+        let status = self.status();
+        let spp = if status.divider == 1 { status.spp } else { 0 };
+        let mut recorder = self.world_mut().resource_mut::<Recorder>();
+        let line = Line::End(recorder.frame, spp);
+        recorder.write(&line);
+        recorder.out = None;
+    }
+}
+
+/// What came of playing a recording.
+pub struct Replayed {
+    /// As it was after the last frame; its workers rest.
+    pub session: Session,
+    /// The picture at its end.
+    pub film: Film,
+    /// What was different from when it was recorded.
+    pub warnings: Vec<String>,
+}
+
+/// How to play a recording.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReplayOptions {
+    pub threads: Option<usize>,
+    /// Samples per pixel at the end, in place of those of the recording.
+    pub spp: Option<u32>,
+}
+
+/// Plays a recording without a window, as fast as it goes, and renders the picture at its end.
+///
+/// # Errors
+/// When it cannot be read, or its scene cannot be opened.
+pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sync)) -> Result<Replayed, String> {
+    let (header, lines) = read(path, stop)?;
+    let failed = |reason: String| format!("{}: {reason}", path.display());
+    let source = match &header.scene {
+        SceneWord::Builtin(name) => SceneSource::Builtin(name.clone()),
+        SceneWord::File(file) => {
+            let file = folder_of(path).join(text_to_path(file));
+            SceneSource::parse(&file).map_err(|error| failed(error.to_string()))?
+        }
+    };
+    let up = header.up.map(|up| if up == 'z' { UpAxis::Z } else { UpAxis::Y });
+    // Nobody looks at the pictures in between: the fewest samples there can be.
+    let idle = Target { spp: Some(1), ..Target::default() };
+    // Before the workers begin with a picture that there is no memory for.
+    drop(
+        Room::for_film(header.width.max(1), header.height.max(1), false, &[])
+            .map_err(|error| failed(error.to_string()))?,
+    );
+    let mut session = Session::new(SessionOptions {
+        width: header.width,
+        height: header.height,
+        threads: options.threads,
+        seed: header.seed,
+        target: idle,
+        up,
+        yielding: false,
+        waker: None,
+    })?;
+    session.open(source);
+    let mut player = Player { session, frame: 0, clock: Duration::ZERO, warnings: Vec::new(), edited: 0 };
+    let mut end = None;
+    for line in lines {
+        if stop() {
+            return Err(failed("the replay was stopped".to_owned()));
+        }
+        match line {
+            Line::Do(frame, at, command) => player.command(frame, at, command),
+            Line::Opened(frame, number, print) => player.wait_for_scene(frame, number, &print, stop).map_err(failed)?,
+            Line::End(_, spp) => end = Some(spp),
+        }
+    }
+    player.update();
+    let Player { mut session, mut warnings, .. } = player;
+    session.send(Command::Pause);
+    session.update(Duration::MAX);
+    let spp = options.spp.or(end).unwrap_or(0);
+    if spp == 0 {
+        warnings.push("the recording does not say how many samples its picture had: one each is taken".to_owned());
+    }
+    let world = session.world();
+    let PictureSize { width, height } = *world.resource();
+    let extraction = world.resource::<Shown>().extraction.as_ref();
+    let prepared = extraction.map(|extraction| extraction.prepared.clone());
+    let prepared = prepared.ok_or_else(|| failed("nothing is open".to_owned()))?;
+    let settings = world.resource::<Rendering>().0;
+    check_film_size(width, height).map_err(|bad| failed(bad.to_string()))?;
+    let mut film = Film::try_new(width, height).map_err(|error| failed(error.to_string()))?;
+    let target = Target { spp: Some(spp.max(1)), ..Target::default() };
+    let pool = session.pool();
+    pool.install(|| render_offline_until(&prepared, &settings, &mut film, target, stop, |_| true));
+    Ok(Replayed { session, film, warnings })
+}
+
+impl Replayed {
+    /// Every file that the scene at its end was read from.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.session.world().get_resource::<CurrentScene>().map_or_else(Vec::new, |current| current.0.files())
+    }
+
+    /// How the picture is shown.
+    pub fn display(&self) -> crate::render::Display {
+        self.session.world().resource::<Developing>().0
+    }
+}
+
+struct Player {
+    session: Session,
+    /// The frame whose commands are being collected.
+    frame: u64,
+    clock: Duration,
+    warnings: Vec<String>,
+    /// How often a file was edited while it was recorded.
+    edited: u64,
+}
+
+impl Player {
+    fn command(&mut self, frame: u64, at: f64, command: Command) {
+        if frame != self.frame {
+            self.update();
+            self.frame = frame;
+        }
+        self.clock = self.clock.max(Duration::try_from_secs_f64(at).unwrap_or_default());
+        match command {
+            // Opening is part of the replay; what changes the disk, or how long it takes, is not.
+            Command::SaveScene { .. } | Command::SetThreads { .. } | Command::Pause | Command::Resume => {}
+            other => self.session.send(other),
+        }
+    }
+
+    fn update(&mut self) {
+        self.session.world_mut().insert_resource(StopAt(Target { spp: Some(1), ..Target::default() }));
+        self.session.update(self.clock);
+        // What was asked for beside the picture comes before what is asked for next.
+        while self.session.world().resource::<Beside>().is_editing() {
+            std::thread::sleep(Duration::from_millis(2));
+            self.session.update(self.clock);
+        }
+    }
+
+    /// Runs frames until the scene with this number is there. One that was read again because its file was edited
+    /// does not come again: the file is what it is now.
+    fn wait_for_scene(
+        &mut self,
+        frame: u64,
+        number: u64,
+        print: &str,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), String> {
+        /// Reading a scene may take long, but not for ever.
+        const PATIENCE: Duration = Duration::from_secs(600);
+        self.frame = frame;
+        let start = Instant::now();
+        let mut was_edited = false;
+        loop {
+            self.update();
+            let world = self.session.world();
+            if world.resource::<Adopted>().0 + self.edited >= number {
+                break;
+            }
+            let nothing_comes = world.contains_resource::<CurrentScene>() && world.resource::<Beside>().is_idle();
+            if stop() {
+                return Err("the replay was stopped".to_owned());
+            }
+            let errors = self.session.status().messages.iter().filter(|message| message.kind == MessageKind::Error);
+            let lines: Vec<&str> = errors.map(|message| message.text.as_str()).collect();
+            if !lines.is_empty() && self.session.status().loading.is_none() {
+                return Err(lines.join("; ").replace('\n', "; "));
+            }
+            if nothing_comes {
+                (self.edited, was_edited) = (self.edited + 1, true);
+                break;
+            }
+            if start.elapsed() > PATIENCE {
+                return Err("the scene did not come".to_owned());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        // The frame after it belongs to the commands that come next.
+        self.frame = frame + 1;
+        let current = self.session.world().resource::<CurrentScene>();
+        let now = current.0.content_fingerprint().to_string();
+        let title = current.0.source.title();
+        if now != print && was_edited {
+            self.warnings.push(format!(
+                "{title} was edited while it was recorded, and is played as it is now: the picture is another one"
+            ));
+        } else if now != print {
+            self.warnings.push(format!("{title} has changed since the recording, so the picture is another one"));
+        }
+        Ok(())
+    }
+}
+
+fn folder_of(path: &Path) -> PathBuf {
+    absolute(path).parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn session() -> Session {
+        Session::new(SessionOptions { width: 16, height: 12, threads: Some(1), ..SessionOptions::default() }).unwrap()
+    }
+
+    #[test]
+    fn a_recording_replaces_an_older_one_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, target) = (folder.path().join("s.ron"), folder.path().join("a.rec"));
+        let text = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)))\n";
+        std::fs::write(&scene, text).unwrap();
+        let source = SceneSource::Scene(scene.clone());
+        let mut first = session();
+        assert!(
+            first.record(&scene, &source, None).unwrap_err().contains("s.ron: is there already and is no recording")
+        );
+        assert_eq!(std::fs::read_to_string(&scene).unwrap(), text);
+        // While it is written, no other process writes it.
+        first.record(&target, &source, None).unwrap();
+        let begun = std::fs::read_to_string(&target).unwrap();
+        assert!(begun.lines().count() == 1 && begun.contains("File(\"s.ron\")"), "{begun}");
+        assert!(session().record(&target, &source, None).unwrap_err().contains("is being written by another process"));
+        first.send(Command::Pause);
+        first.update(Duration::ZERO);
+        first.end_record();
+        assert_eq!(read(&target, &|| false).unwrap().1.len(), 2, "a command and the end");
+        let mut second = session();
+        second.record(&target, &source, None).unwrap();
+        second.end_record();
+        assert_eq!(read(&target, &|| false).unwrap().1.len(), 1);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
+    }
+
+    /// Names of any bytes are in the lines too.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_command_with_a_name_that_is_no_utf_8_is_played_as_it_was_given() {
+        use std::os::unix::ffi::OsStringExt;
+        let path = PathBuf::from(std::ffi::OsString::from_vec(b"r\xffm.ron".to_vec()));
+        for command in [Command::SaveScene { path: path.clone() }, Command::Open { path }] {
+            let line = ron::to_string(&Line::Do(1, 0.5, command.clone())).unwrap();
+            assert_eq!(ron::from_str::<Line>(&line).unwrap(), Line::Do(1, 0.5, command));
+        }
+    }
+}

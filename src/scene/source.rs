@@ -1,0 +1,73 @@
+//! What is opened, and how it stands.
+
+use super::builtin::{BUILTIN_SCENES, builtin_text};
+use super::error::{SceneError, suggestion};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// What to open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SceneSource {
+    /// One of [`BUILTIN_SCENES`].
+    Builtin(String),
+    /// A scene file (RON).
+    Scene(PathBuf),
+    /// A model (OBJ), to be framed.
+    Model(PathBuf),
+    /// A picture that was made by this program (PNG, EXR), for the scene that it shows, as it shows it.
+    Picture(PathBuf),
+}
+
+/// Which axis of a model points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpAxis {
+    Y,
+    Z,
+}
+
+impl SceneSource {
+    /// What a word on the command line means: a built-in name, unless a file of that name exists.
+    ///
+    /// # Errors
+    /// When it is neither a built-in scene nor a file that can be opened here.
+    pub fn parse(word: impl AsRef<OsStr>) -> Result<Self, SceneError> {
+        let path = Path::new(word.as_ref());
+        let word = &*word.as_ref().to_string_lossy();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if !path.is_file() && builtin_text(word).is_some() {
+            return Ok(Self::Builtin(word.to_owned()));
+        }
+        match extension.as_deref() {
+            Some("ron") => Ok(Self::Scene(path.to_path_buf())),
+            Some("obj") => Ok(Self::Model(path.to_path_buf())),
+            Some("png" | "exr") => Ok(Self::Picture(path.to_path_buf())),
+            _ if path.is_dir() => Err(SceneError::in_file(
+                path,
+                "is a folder: name a scene (.ron), a model (.obj) or a picture (.png, .exr)",
+            )),
+            _ if path.exists() => {
+                Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)"))
+            }
+            _ => {
+                let hint = suggestion(word, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
+                Err(SceneError::in_file(path, format!("neither a file nor a built-in scene{hint}")))
+            }
+        }
+    }
+
+    /// The file that is opened, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Builtin(_) => None,
+            Self::Scene(path) | Self::Model(path) | Self::Picture(path) => Some(path),
+        }
+    }
+
+    /// What messages and titles call it.
+    pub fn title(&self) -> String {
+        match self {
+            Self::Builtin(name) => name.clone(),
+            Self::Scene(path) | Self::Model(path) | Self::Picture(path) => path.display().to_string(),
+        }
+    }
+}
