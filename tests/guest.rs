@@ -151,7 +151,9 @@ fn a_screen_that_goes_away_ends_the_program_and_leaves_the_settings() {
     desktop.lose();
     let (status, errors) = program.left();
     assert!(!status.success(), "it cannot have been asked to leave");
-    assert!(errors.contains("connection") || errors.contains("display"), "it says why: {errors}");
+    // Ours, or that of Xlib, whoever sees it first.
+    let why = errors.to_lowercase();
+    assert!(why.contains("connection") || why.contains("display"), "it says why: {errors}");
     assert!(!errors.contains("panicked"), "{errors}");
     let kept = std::fs::read_to_string(&settings).expect("settings are there");
     assert!(kept.contains("432") && kept.contains("234") && kept.contains("cornell"), "{kept}");
