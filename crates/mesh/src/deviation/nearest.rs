@@ -465,7 +465,7 @@ mod tests {
     #[test]
     fn a_heap_of_sectors_takes_some_thousand_looks_a_point() {
         let looks = [3000_u32, 30_000].map(|n| {
-            let rim = (0..n).map(|i| f64::from(i)).map(|i| DVec3::new(i.cos(), i.sin(), (i % 7.0) * 1e-3));
+            let rim = (0..n).map(f64::from).map(|i| DVec3::new(i.cos(), i.sin(), (i % 7.0) * 1e-3));
             let points: Vec<DVec3> = std::iter::once(DVec3::ZERO).chain(rim).collect();
             let mesh = Mesh::from_f64(&points, (1..n).map(|i| [0, i, i + 1]).collect()).unwrap();
             let tree = NearestTree::build(&mesh, DVec3::ZERO);
