@@ -1,6 +1,6 @@
 //! Meshes to trace: models from a folder, and made ones that are hard in different ways.
 
-use glam::{DVec3, Vec3, vec3};
+use glam::{Vec3, vec3};
 
 pub struct Mesh {
     pub name: String,
@@ -51,7 +51,7 @@ fn load(folder: &str, name: &str) -> Mesh {
     let mut mesh = empty(name);
     for model in models {
         let first = mesh.positions.len() as u32;
-        mesh.positions.extend(model.mesh.positions.chunks_exact(3).map(|p| DVec3::from_slice(p).as_vec3()));
+        mesh.positions.extend(model.mesh.positions.chunks_exact(3).map(Vec3::from_slice));
         mesh.triangles.extend(model.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
     }
     mesh

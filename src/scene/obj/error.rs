@@ -23,9 +23,6 @@ pub enum ObjError {
     TooManyMaterials { path: PathBuf },
     #[error("{}: {source}", path.display())]
     Mesh { path: PathBuf, source: MeshError },
-    /// The parser refused text that had passed every check.
-    #[error("{}: cannot be parsed: {source}", path.display())]
-    Parser { path: PathBuf, source: tobj::LoadError },
 }
 
 /// What is wrong with one line.

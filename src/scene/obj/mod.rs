@@ -1,14 +1,14 @@
 //! Wavefront OBJ and MTL: any file in, one mesh with material slots out, or an error that names the line.
 //!
-//! The file is screened ([`screen`]), parsed by tobj in `f64`, and assembled: polygons are cut into triangles,
+//! The file is parsed in `f64` ([`parse`]; materials by tobj), and assembled: polygons are cut into triangles,
 //! corners that share position, texture coordinate and normal share a vertex (across groups too), and normals that
 //! the file lacks are computed. Start reading at [`load_obj`]; [`save_obj`] is
 //! the way back.
 
 mod error;
 mod mtl;
+mod parse;
 mod polygon;
-mod screen;
 mod warnings;
 mod write;
 
@@ -17,12 +17,12 @@ pub use mtl::ImportedMaterial;
 pub(super) use write::{NewObj, save_new_obj};
 pub use write::{ObjExtras, save_obj};
 
+use self::parse::{Corner, ParsedObj};
 use self::warnings::Warnings;
 use crate::mesh::{Mesh, NormalWeight};
 use crate::scene::{FileKind, InputFile, Limits, text_to_path};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// A model as its file has it.
@@ -91,36 +91,24 @@ pub fn load_obj(path: &Path) -> Result<ImportedObj, ObjError> {
 /// count as missing. A missing library or material is a warning.
 pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, ObjError> {
     let bytes = read(path, options.max_bytes)?;
-    let screened =
-        screen::screen(&bytes).map_err(|(line, problem)| ObjError::Line { path: path.into(), line, problem })?;
-    if screened.face_materials.is_empty() {
+    let mut parsed =
+        parse::parse(&bytes).map_err(|(line, problem)| ObjError::Line { path: path.into(), line, problem })?;
+    drop(bytes);
+    if parsed.face_materials.is_empty() {
         return Err(ObjError::NoFaces { path: path.into() });
     }
-    if screened.materials.len() > usize::from(u16::MAX) + 1 {
+    if parsed.materials.len() > usize::from(u16::MAX) + 1 {
         return Err(ObjError::TooManyMaterials { path: path.into() });
     }
-    let bad_number = || {
-        let (line, problem) = screen::find_bad_number(&bytes)?;
-        Some(ObjError::Line { path: path.into(), line, problem })
-    };
-    let mut parsed = parse(&screened.text)
-        .map_err(|source| bad_number().unwrap_or(ObjError::Parser { path: path.into(), source }))?;
-    if [&parsed.positions, &parsed.normals, &parsed.texcoords].iter().any(|list| list.iter().any(|v| !v.is_finite())) {
-        return Err(
-            bad_number().unwrap_or(ObjError::Parser { path: path.into(), source: tobj::LoadError::PositionParseError })
-        );
-    }
-
     let mut warnings = Warnings::default();
-    if screened.lines_and_points > 0 {
-        warnings.push(format!("{}: {} lines or points were left out", path.display(), screened.lines_and_points));
+    if parsed.lines_and_points > 0 {
+        warnings.push(format!("{}: {} lines or points were left out", path.display(), parsed.lines_and_points));
     }
     if !matches!(options.normals, ObjNormals::FileOrComputed { .. }) {
         parsed.normals.clear();
-        parsed.normal_indices.clear();
     }
     let corners = Corners::of(&parsed);
-    let (triangles, slots, dropped) = corners.triangles(&parsed, &screened.face_materials);
+    let (triangles, slots, dropped) = corners.triangles(&parsed);
     if dropped > 0 {
         warnings.push(format!("{}: {dropped} triangles use a vertex twice and were left out", path.display()));
     }
@@ -133,7 +121,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
         return Err(ObjError::NoArea { path: path.into(), triangles: mesh.triangles.len() });
     }
     // Slot 0 is what an empty list means.
-    mesh.slots = if screened.materials.len() > 1 { slots } else { Vec::new() };
+    mesh.slots = if parsed.materials.len() > 1 { slots } else { Vec::new() };
     mesh.uvs = corners.uvs;
     let (mesh, normals_from_file) = match options.normals {
         ObjNormals::FileOrComputed { crease_angle } => with_normals(mesh, &corners.normals, crease_angle),
@@ -143,8 +131,8 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     };
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
-    let (materials, libraries) = find_materials(path, screened, options.max_library_bytes, &mut of_materials);
-    let polygons = parsed.face_arities.iter().filter(|&&corners| corners > 3).count();
+    let polygons = parsed.arities.iter().filter(|&&corners| corners > 3).count();
+    let (materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
     let (warnings, material_warnings) = (warnings.into_list(), of_materials.into_list());
     Ok(ImportedObj { mesh, materials, libraries, normals_from_file, polygons, warnings, material_warnings })
 }
@@ -161,14 +149,6 @@ fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
         .map_err(|source| ObjError::Read { path: path.into(), source })
 }
 
-fn parse(text: &[u8]) -> Result<tobj::Mesh, tobj::LoadError> {
-    // Polygons are cut here and not by tobj, whose fans turn concave ones inside out.
-    let options = tobj::LoadOptions { single_index: false, triangulate: false, ..Default::default() };
-    let (mut models, _) =
-        tobj::load_obj_buf(&mut Cursor::new(text), &options, |_| Err(tobj::LoadError::OpenFileFailed))?;
-    models.pop().map(|model| model.mesh).ok_or(tobj::LoadError::GenericFailure)
-}
-
 /// One vertex for each different (position, texture coordinate, normal) that corners use.
 struct Corners {
     /// The vertex of each corner, in file order.
@@ -182,37 +162,46 @@ struct Corners {
 }
 
 impl Corners {
-    fn of(parsed: &tobj::Mesh) -> Self {
-        let position = |i: u32| DVec3::from_slice(&parsed.positions[3 * i as usize..]);
-        if parsed.texcoords.is_empty() && parsed.normals.is_empty() {
-            let count = parsed.positions.len() as u32 / 3;
-            let positions = (0..count).map(position).collect();
-            let vertices = parsed.indices.clone();
-            return Self { vertices, positions, origins: Vec::new(), uvs: Vec::new(), normals: Vec::new() };
-        }
-        let mut found: HashMap<(u32, u32, u32), u32> = HashMap::with_capacity(parsed.positions.len() / 3);
+    /// What no corner uses is left out; the rest is in order of first use.
+    fn of(parsed: &ParsedObj) -> Self {
+        let (has_uvs, has_normals) = (!parsed.uvs.is_empty(), !parsed.normals.is_empty());
         let mut corners = Self {
-            vertices: Vec::new(),
+            vertices: Vec::with_capacity(parsed.corners.len()),
             positions: Vec::new(),
             origins: Vec::new(),
             uvs: Vec::new(),
             normals: Vec::new(),
         };
-        for (k, &index) in parsed.indices.iter().enumerate() {
-            let uv = parsed.texcoord_indices.get(k).copied();
-            let normal = parsed.normal_indices.get(k).copied();
-            let next = found.len() as u32;
-            let vertex = *found.entry((index, uv.unwrap_or(0), normal.unwrap_or(0))).or_insert(next);
+        // By the number in the file: which of the positions that are used it is.
+        let mut used = vec![u32::MAX; parsed.positions.len()];
+        let mut n_used = 0;
+        let mut found: HashMap<Corner, u32> = HashMap::new();
+        for &[position, uv, normal] in &parsed.corners {
+            let number = &mut used[position as usize - 1];
+            let is_new = *number == u32::MAX;
+            if is_new {
+                (*number, n_used) = (n_used, n_used + 1);
+            }
+            let next = corners.positions.len() as u32;
+            if !has_uvs && !has_normals {
+                corners.vertices.push(*number);
+                if is_new {
+                    corners.positions.push(parsed.positions[position as usize - 1]);
+                }
+                continue;
+            }
+            let normal = if has_normals { normal } else { 0 };
+            let vertex = *found.entry([position, uv, normal]).or_insert(next);
             corners.vertices.push(vertex);
             if vertex == next {
-                corners.positions.push(position(index));
-                corners.origins.push(index);
-                if let Some(i) = uv {
-                    let at = 2 * i as usize;
-                    corners.uvs.push(Vec2::new(parsed.texcoords[at] as f32, parsed.texcoords[at + 1] as f32));
+                corners.positions.push(parsed.positions[position as usize - 1]);
+                corners.origins.push(*number);
+                if has_uvs {
+                    let uv = (uv as usize).checked_sub(1).map_or(DVec2::ZERO, |i| parsed.uvs[i]);
+                    corners.uvs.push(uv.as_vec2());
                 }
-                if let Some(i) = normal {
-                    let normal = DVec3::from_slice(&parsed.normals[3 * i as usize..]);
+                if has_normals {
+                    let normal = (normal as usize).checked_sub(1).map_or(DVec3::ZERO, |i| parsed.normals[i]);
                     corners.normals.push(normal.normalize_or_zero().as_vec3());
                 }
             }
@@ -221,13 +210,13 @@ impl Corners {
     }
 
     /// Triangles, their slots, and how many were left out because two corners are one vertex of the file.
-    fn triangles(&self, parsed: &tobj::Mesh, face_materials: &[u32]) -> (Vec<[u32; 3]>, Vec<u16>, usize) {
+    fn triangles(&self, parsed: &ParsedObj) -> (Vec<[u32; 3]>, Vec<u16>, usize) {
         let mut triangles = Vec::with_capacity(self.vertices.len() / 3);
         let mut slots = Vec::with_capacity(self.vertices.len() / 3);
         let (mut dropped, mut start) = (0, 0);
         let (mut polygon, mut cut) = (Vec::new(), Vec::new());
-        for (face, &material) in face_materials.iter().enumerate() {
-            let count = parsed.face_arities.get(face).map_or(3, |&count| count as usize);
+        for (&count, &material) in parsed.arities.iter().zip(&parsed.face_materials) {
+            let count = count as usize;
             cut.clear();
             if count == 3 {
                 cut.push([0, 1, 2]);
@@ -237,7 +226,7 @@ impl Corners {
                 polygon::triangulate(&polygon, &mut cut);
             }
             for corners in &cut {
-                let [a, b, c] = corners.map(|k| parsed.indices[start + k]);
+                let [a, b, c] = corners.map(|k| parsed.corners[start + k][0]);
                 if a == b || b == c || c == a {
                     dropped += 1;
                 } else {
@@ -272,14 +261,14 @@ fn with_normals(mesh: Mesh, from_file: &[Vec3], crease_angle: f32) -> (Mesh, boo
 
 fn find_materials(
     path: &Path,
-    screened: screen::Screened,
+    parsed: ParsedObj,
     max_bytes: u64,
     warnings: &mut Warnings,
 ) -> (Vec<ImportedMaterial>, Vec<PathBuf>) {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut known: HashMap<String, ImportedMaterial> = HashMap::new();
     let mut seen = Vec::new();
-    for line in screened.libraries.iter().take(MAX_LIBRARIES) {
+    for line in parsed.libraries.iter().take(MAX_LIBRARIES) {
         // A name may hold spaces, and a line may hold several names.
         let whole = line.replace('\\', "/");
         let names: Vec<&str> =
@@ -303,7 +292,7 @@ fn find_materials(
             ImportedMaterial { name, ..ImportedMaterial::default() }
         }
     };
-    let materials = screened.materials.into_iter().map(&mut find).collect();
+    let materials = parsed.materials.into_iter().map(&mut find).collect();
     if !missing.is_empty() {
         let more = if missing.len() > 3 { ", …" } else { "" };
         warnings.push(format!(

@@ -97,8 +97,10 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
 
 fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(String)) -> ImportedMaterial {
     let name = &material.name;
-    let mut color = |keyword: &str, value: Option<[f64; 3]>| {
-        let value = Vec3::from_array(value?.map(|v| v as f32));
+    // Whichever of the two number types some other crate asks tobj for.
+    let single = |number| f64::from(number) as f32;
+    let mut color = |keyword: &str, value: Option<[_; 3]>| {
+        let value = Vec3::from_array(value?.map(single));
         let valid = value.is_finite() && value.min_element() >= 0.0;
         if !valid {
             warn(format!("material `{name}`: `{keyword}` must not be negative and was left out"));
@@ -108,22 +110,22 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
     let diffuse = color("Kd", material.diffuse);
     let specular = color("Ks", material.specular);
     let emission = color("Ke", material.emissive);
-    let mut number = |keyword: &str, value: Option<f64>, range: std::ops::RangeInclusive<f64>| {
+    let mut number = |keyword: &str, value: Option<f32>, range: std::ops::RangeInclusive<f32>| {
         let value = value?;
         if !range.contains(&value) {
             warn(format!("material `{name}`: `{keyword}` {value} is out of range and was left out"));
         }
-        range.contains(&value).then_some(value as f32)
+        range.contains(&value).then_some(value)
     };
-    let transparency = material.unknown_param.get("Tr").and_then(|v| v.parse::<f64>().ok());
+    let transparency = material.unknown_param.get("Tr").and_then(|v| v.parse::<f32>().ok());
     ImportedMaterial {
         name: name.clone(),
         diffuse,
         specular,
-        shininess: number("Ns", material.shininess, 0.0..=1e6),
+        shininess: number("Ns", material.shininess.map(single), 0.0..=1e6),
         emission,
-        ior: number("Ni", material.optical_density, 1e-3..=10.0),
-        opacity: number("d", material.dissolve, 0.0..=1.0)
+        ior: number("Ni", material.optical_density.map(single), 1e-3..=10.0),
+        opacity: number("d", material.dissolve.map(single), 0.0..=1.0)
             .or_else(|| number("Tr", transparency, 0.0..=1.0).map(|tr| 1.0 - tr)),
         illumination_model: material.illumination_model,
         diffuse_texture: material.diffuse_texture.as_deref().and_then(|value| texture_path(value, folder)),

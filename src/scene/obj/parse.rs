@@ -1,0 +1,289 @@
+//! The lines of an OBJ file as numbers, in `f64`, each checked where its line is still known.
+
+use super::error::LineProblem;
+use crate::scene::relative::bytes_to_text;
+use glam::{DVec2, DVec3};
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+/// What a file says.
+#[derive(Debug, Default)]
+pub(super) struct ParsedObj {
+    pub positions: Vec<DVec3>,
+    pub uvs: Vec<DVec2>,
+    pub normals: Vec<DVec3>,
+    /// Of all faces, one after the other.
+    pub corners: Vec<Corner>,
+    /// How many corners each face has.
+    pub arities: Vec<u32>,
+    /// The number in `materials` of each face.
+    pub face_materials: Vec<u32>,
+    /// Names after `usemtl`, in order of first use by a face; empty for faces before any of them.
+    pub materials: Vec<String>,
+    /// What stood after each `mtllib`.
+    pub libraries: Vec<String>,
+    /// Lines and points that were left out.
+    pub lines_and_points: usize,
+}
+
+/// Position, texture coordinate and normal, from 1; 0 for what the corner does not have.
+pub(super) type Corner = [u32; 3];
+
+/// A problem and the line (from 1) that has it.
+pub(super) type Located = (usize, LineProblem);
+
+/// Reads all lines. Those of an unknown kind are passed over, and so are numbers beyond those that count.
+pub(super) fn parse(bytes: &[u8]) -> Result<ParsedObj, Located> {
+    let mut parsed = ParsedObj::default();
+    let mut furthest = [(0_i64, 0_usize); 3];
+    // The name that faces now belong to, and its number once a face has used it.
+    let (mut name, mut material) = (String::new(), None);
+    let mut known: HashMap<String, u32> = HashMap::new();
+    for (number, line) in lines(bytes) {
+        let located = |problem| (number, problem);
+        match first_word(&line) {
+            b"v" => parsed.positions.push(DVec3::from_array(numbers(&line).map_err(located)?)),
+            b"vn" => parsed.normals.push(DVec3::from_array(numbers(&line).map_err(located)?)),
+            b"vt" => parsed.uvs.push(texture_coordinate(&line).map_err(located)?),
+            b"f" => {
+                let largest = parsed.push_face(&line).map_err(located)?;
+                for (furthest, index) in furthest.iter_mut().zip(largest) {
+                    if index > furthest.0 {
+                        *furthest = (index, number);
+                    }
+                }
+                let current = *material.get_or_insert_with(|| {
+                    *known.entry(name.clone()).or_insert_with(|| {
+                        parsed.materials.push(name.clone());
+                        parsed.materials.len() as u32 - 1
+                    })
+                });
+                parsed.face_materials.push(current);
+            }
+            b"l" | b"p" => parsed.lines_and_points += 1,
+            b"usemtl" => (name, material) = (rest(&line), None),
+            b"mtllib" => parsed.libraries.push(bytes_to_text(rest_bytes(&line))),
+            _ => {}
+        }
+    }
+    // A positive index may point forwards, so only now is it known whether it points at anything.
+    let counts = parsed.counts();
+    for (kind, (index, number)) in furthest.into_iter().enumerate() {
+        if index > counts[kind] as i64 {
+            return Err((number, LineProblem::OutOfRange { what: KINDS[kind], index, count: counts[kind] }));
+        }
+    }
+    Ok(parsed)
+}
+
+const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+impl ParsedObj {
+    fn counts(&self) -> [usize; 3] {
+        [self.positions.len(), self.uvs.len(), self.normals.len()]
+    }
+
+    /// Adds a face; returns the largest index of each kind.
+    fn push_face(&mut self, line: &[u8]) -> Result<[i64; 3], LineProblem> {
+        let counts = self.counts();
+        let (mut largest, mut n_corners) = ([0; 3], 0);
+        for word in words(line).skip(1).take_while(|word| word[0] != b'#') {
+            let indices = parse_corner(word, counts)?;
+            // What is too large for a corner is too large for the file, which its furthest index tells.
+            self.corners.push(indices.map(|index| u32::try_from(index).unwrap_or(u32::MAX)));
+            for (largest, index) in largest.iter_mut().zip(indices) {
+                *largest = index.max(*largest);
+            }
+            n_corners += 1;
+        }
+        self.arities.push(n_corners);
+        if n_corners < 3 { Err(LineProblem::FewCorners { corners: n_corners as usize }) } else { Ok(largest) }
+    }
+}
+
+/// Indices from 1; 0 for what the corner does not have.
+///
+/// - `counts`: what the file has so far.
+fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<[i64; 3], LineProblem> {
+    let malformed = || LineProblem::FaceCorner { text: text_of(word).into_owned() };
+    let mut indices = [0; 3];
+    for (kind, part) in word.split(|&byte| byte == b'/').enumerate() {
+        if kind == 3 || (kind == 0 && part.is_empty()) {
+            return Err(malformed());
+        }
+        if part.is_empty() {
+            continue;
+        }
+        let what = KINDS[kind];
+        let index = parse_index(part).ok_or_else(malformed)?;
+        indices[kind] = match index {
+            0 => return Err(LineProblem::IndexZero { what }),
+            1.. => index,
+            _ => {
+                let count = counts[kind];
+                let absolute = count as i64 + 1 + index;
+                if absolute < 1 {
+                    return Err(LineProblem::OutOfRange { what, index, count });
+                }
+                absolute
+            }
+        };
+    }
+    Ok(indices)
+}
+
+/// Up to 15 digits, so that sums never overflow; nothing longer can be an index.
+fn parse_index(part: &[u8]) -> Option<i64> {
+    let (sign, digits) = match part {
+        [b'-', digits @ ..] => (-1, digits),
+        [b'+', digits @ ..] => (1, digits),
+        digits => (1, digits),
+    };
+    if digits.is_empty() || digits.len() > 15 {
+        return None;
+    }
+    digits
+        .iter()
+        .try_fold(0, |sum, &digit| digit.is_ascii_digit().then(|| sum * 10 + i64::from(digit - b'0')))
+        .map(|value| sign * value)
+}
+
+/// The first `N` numbers of a line; what follows them does not count.
+fn numbers<const N: usize>(line: &[u8]) -> Result<[f64; N], LineProblem> {
+    let mut found = [0.0; N];
+    let mut words = words(line).skip(1).take_while(|word| word[0] != b'#');
+    for number in &mut found {
+        let expected = || LineProblem::Numbers { keyword: text_of(first_word(line)).into_owned(), expected: N };
+        *number = finite(words.next().ok_or_else(expected)?)?;
+    }
+    Ok(found)
+}
+
+/// A missing second number is 0.
+fn texture_coordinate(line: &[u8]) -> Result<DVec2, LineProblem> {
+    let n_words = words(line).skip(1).take_while(|word| word[0] != b'#').count();
+    if n_words == 1 { Ok(DVec2::new(numbers::<1>(line)?[0], 0.0)) } else { Ok(DVec2::from_array(numbers(line)?)) }
+}
+
+fn finite(word: &[u8]) -> Result<f64, LineProblem> {
+    let number = str::from_utf8(word).ok().and_then(|text| text.parse().ok()).filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| LineProblem::NotFinite { text: text_of(word).into_owned() })
+}
+
+/// Logical lines with the number (from 1) of their first physical line: `\` at an end joins the next line on, and
+/// all three kinds of line ends are known.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)> {
+    let mut left = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut number = 0;
+    let mut physical = move || -> Option<(usize, &[u8])> {
+        if left.is_empty() {
+            return None;
+        }
+        number += 1;
+        let end = left.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(left.len());
+        let (line, after) = left.split_at(end);
+        left = after.strip_prefix(b"\r\n").or_else(|| after.get(1..)).unwrap_or_default();
+        Some((number, line))
+    };
+    std::iter::from_fn(move || {
+        let (number, line) = physical()?;
+        let Some(start) = line.strip_suffix(b"\\") else { return Some((number, Cow::Borrowed(line))) };
+        let mut joined = start.to_vec();
+        while let Some((_, next)) = physical() {
+            joined.push(b' ');
+            match next.strip_suffix(b"\\") {
+                Some(more) => joined.extend(more),
+                None => {
+                    joined.extend(next);
+                    break;
+                }
+            }
+        }
+        Some((number, Cow::Owned(joined)))
+    })
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+fn first_word(line: &[u8]) -> &[u8] {
+    words(line).next().unwrap_or_default()
+}
+
+/// What follows the first word, without the white space around it.
+fn rest(line: &[u8]) -> String {
+    text_of(rest_bytes(line)).into_owned()
+}
+
+fn rest_bytes(line: &[u8]) -> &[u8] {
+    let line = line.trim_ascii_start();
+    let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+    line[end..].trim_ascii()
+}
+
+fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+    String::from_utf8_lossy(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_count_from_one_and_from_the_end() {
+        let obj = "v 0 0 0 1\r\nv 1 0 0\rv 0 1 0 # c\nvn 0 0 1\nf -3 2//1 \\\n 3//-1 # end\n";
+        let parsed = parse(obj.as_bytes()).unwrap();
+        assert_eq!(parsed.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
+        assert_eq!((parsed.normals, parsed.arities), (vec![DVec3::Z], vec![3]));
+        assert_eq!(parsed.corners, [[1, 0, 0], [2, 0, 1], [3, 0, 1]]);
+        let parsed = parse(b"v 1 2 3\nvt .5\nvt .25 1e-3 7\nf 1/1 1 1/\n").unwrap();
+        assert_eq!(parsed.uvs, [DVec2::new(0.5, 0.0), DVec2::new(0.25, 1e-3)]);
+        assert_eq!(parsed.corners, [[1, 1, 0], [1, 0, 0], [1, 0, 0]]);
+    }
+
+    #[test]
+    fn positions_keep_all_of_their_digits() {
+        let parsed = parse(b"v 500000.123456789 0.1 -7e-200\n").unwrap();
+        assert_eq!(parsed.positions, [DVec3::new(500_000.123_456_789, 0.1, -7e-200)]);
+    }
+
+    #[test]
+    fn bad_faces_are_named_by_their_line() {
+        let of = |obj: &str| parse(obj.as_bytes()).unwrap_err();
+        let v = "v 0 0 0\n";
+        let out = |index| LineProblem::OutOfRange { what: "vertex", index, count: 1 };
+        assert_eq!(of(&format!("{v}\nf 1 1 2")), (3, out(2)));
+        assert_eq!(of(&format!("{v}\nf 1 1 99999999999")), (3, out(99_999_999_999)));
+        assert_eq!(of(&format!("{v}f 1 1 -2")), (2, out(-2)));
+        assert_eq!(of(&format!("{v}f 1 0 1")), (2, LineProblem::IndexZero { what: "vertex" }));
+        assert_eq!(of(&format!("{v}f 1 1")), (2, LineProblem::FewCorners { corners: 2 }));
+        for corner in ["a", "1/2/3/4", "/1", "1.5", "999999999999999999999", "-", "1/x"] {
+            assert_eq!(of(&format!("{v}f 1 {corner}")), (2, LineProblem::FaceCorner { text: corner.into() }));
+        }
+    }
+
+    #[test]
+    fn bad_numbers_are_named_by_their_line() {
+        let of = |obj: &[u8]| parse(obj).unwrap_err();
+        let numbers = |keyword: &str, expected| LineProblem::Numbers { keyword: keyword.into(), expected };
+        assert_eq!(of(b"v 1 2"), (1, numbers("v", 3)));
+        assert_eq!(of(b"\nvn 1 2 # 3"), (2, numbers("vn", 3)));
+        assert_eq!(of(b"vt"), (1, numbers("vt", 2)));
+        let bad = |line, text: &str| (line, LineProblem::NotFinite { text: text.into() });
+        assert_eq!(of(b"v 1 2 3\nvt 1 #\n# v x\nv 1 nan 2\n"), bad(4, "nan"));
+        assert_eq!(of(b"v 1 1e999 2"), bad(1, "1e999"));
+        assert_eq!(of(b"v 1 \xff 2"), bad(1, "\u{fffd}"));
+        assert!(parse(b"v 1 2 3 x\n").is_ok());
+    }
+
+    #[test]
+    fn materials_and_libraries_keep_names_with_spaces_and_odd_bytes() {
+        let obj = b"\xef\xbb\xbfmtllib my file.mtl\nf 1 1 1\nusemtl Mat #1\nf 1 1 1\nusemtl unused\nusemtl \xff\nf 1 1 1\nusemtl Mat #1\nf 1 1 1\nv 0 0 0\nl 1 1\n";
+        let parsed = parse(obj).unwrap();
+        assert_eq!(parsed.libraries, ["my file.mtl"]);
+        assert_eq!(parsed.materials, ["", "Mat #1", "\u{fffd}"]);
+        assert_eq!(parsed.face_materials, [0, 1, 2, 1]);
+        assert_eq!(parsed.lines_and_points, 1);
+    }
+}
