@@ -1,4 +1,4 @@
-//! What it saves to model only what a scene needs: `cargo bench --no-default-features --bench needs`.
+//! What it saves to model only what a scene needs: `cargo bench -p firstlight-benches --bench needs`.
 //!
 //! Each scene is rendered twice in turns, as it is and with loops that are told that it might also have glass, absorbing
 //! media, textures and surroundings that shine. The pictures must be the same. `-- [SCENE]...` measures other scenes.

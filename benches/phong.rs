@@ -1,4 +1,4 @@
-//! Frames a second of the classic model at one sample a pixel: `cargo bench --no-default-features --bench phong`.
+//! Frames a second of the classic model at one sample a pixel: `cargo bench -p firstlight-benches --bench phong`.
 //!
 //! `-- [SCENE]...` measures other scenes, built-in or files, at the size that each asks for. The median of many
 //! frames with their range, on all threads of the pool (`RAYON_NUM_THREADS`), and the CPU time of one.

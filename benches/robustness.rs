@@ -2,7 +2,7 @@
 //! bounded errors against `origin + t · dir`, and bounded offsets against a fixed epsilon.
 //!
 //! ```text
-//! cargo bench --bench robustness
+//! cargo bench -p firstlight-benches --bench robustness
 //! ```
 //!
 //! Everything runs on one thread; the forms take turns, and each figure is the median over the rounds.

@@ -1,4 +1,4 @@
-//! Time and error of simplification: `cargo bench --no-default-features --bench simplify -- [MODEL.obj]... [--ratio R]`.
+//! Time and error of simplification: `cargo bench -p firstlight-benches --bench simplify -- [MODEL.obj]... [--ratio R]`.
 //!
 //! Without a model, the serpent knot. Our two methods and meshoptimizer (by the crate `meshopt`) take turns; each
 //! figure is the median of several runs with their range, and the error is that of the last run's result. CPU seconds

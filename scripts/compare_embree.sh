@@ -21,4 +21,4 @@ if [ -z "${FIRSTLIGHT_EMBREE:-}" ]; then
     export FIRSTLIGHT_EMBREE
 fi
 [ -f "$FIRSTLIGHT_EMBREE" ] || { echo "no libembree4 at '$FIRSTLIGHT_EMBREE'" >&2; exit 1; }
-cargo bench --quiet --no-default-features --bench kernel -- "$@"
+cargo bench --quiet -p firstlight-benches --bench kernel -- "$@"

@@ -39,5 +39,5 @@ seconds.sort()
 print("%.3f (%.3f–%.3f)" % (seconds[4], seconds[0], seconds[-1]))
 PYTHON
 )
-cargo bench --no-default-features --bench simplify -- "$(realpath "$model")" --ratio "$ratio" \
+cargo bench -p firstlight-benches --bench simplify -- "$(realpath "$model")" --ratio "$ratio" \
     --other fast-simplification "$folder/result.obj" "$seconds"

@@ -1,7 +1,7 @@
 //! How fast the ray kernel is, and how fast others are on the same rays.
 //!
 //! ```text
-//! cargo bench --bench kernel -- [FILTER] [--class NAME] [--size N] [--rounds N] [--quick] [--small] [--crowd]
+//! cargo bench -p firstlight-benches --bench kernel -- [FILTER] [--class NAME] [--size N] [--rounds N] [--quick] [--small] [--crowd]
 //! ```
 //!
 //! - `FIRSTLIGHT_MODELS`: a folder with OBJ files to use besides the made ones.
