@@ -2,7 +2,7 @@
 //! printed ([`printable`]).
 //!
 //! What is said is a [`Message`], whose lines are known: a line end within a line came from a foreign name, and is
-//! escaped like anything else that does not print. JSON goes out as it is. `tests/gates.rs` looks for any other way.
+//! escaped like anything else that does not print. JSON goes out as it is. `tests/source/gates.rs` looks for any other way.
 
 use crate::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

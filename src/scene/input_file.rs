@@ -2,7 +2,7 @@
 //! deadline, and until somebody wants to stop.
 //!
 //! Pipes, devices, sockets and folders are refused at once: a pipe would be waited for, and a device may never end.
-//! `tests/gates.rs` looks for any other way. Start reading at [`InputFile::open`].
+//! `tests/source/gates.rs` looks for any other way. Start reading at [`InputFile::open`].
 
 use super::limits::Limits;
 use std::fs::{File, Metadata};

@@ -2,9 +2,7 @@
 //! left to others when there is nothing to do.
 #![cfg(all(feature = "viewer", target_os = "linux"))]
 
-mod desktop;
-
-use desktop::{Desktop, Losing, Loss, Program, until};
+use crate::desktop::{Desktop, Losing, Loss, Program, until};
 use std::path::Path;
 use std::time::Duration;
 

@@ -2,9 +2,7 @@
 //! and mouse, and looked at.
 #![cfg(all(feature = "viewer", target_os = "linux"))]
 
-mod desktop;
-
-use desktop::{Desktop, Program, until};
+use crate::desktop::{Desktop, Program, until};
 use firstlight::scene::file::{CameraPart, SceneFile};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,7 @@
 //! What a person does with the tools of the real window, one after the other, by synthetic keys and mouse.
 #![cfg(all(feature = "viewer", target_os = "linux"))]
 
-mod desktop;
-
-use desktop::{Desktop, Program, until};
+use crate::desktop::{Desktop, Program, until};
 use firstlight::scene::file::{CameraPart, SceneFile};
 use glam::DVec3;
 use std::time::Duration;

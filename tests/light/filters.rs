@@ -1,8 +1,6 @@
 //! Pixel filters seen from outside: an even picture stays even, an edge is as soft as the filter is wide.
 
-mod common;
-
-use common::{camera, emissive, picture_mean, quad, render, scene};
+use crate::common::{camera, emissive, picture_mean, quad, render, scene};
 use firstlight::render::{Environment, Integrator, PixelFilter, RenderSettings};
 use glam::Vec3;
 

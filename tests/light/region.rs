@@ -1,10 +1,8 @@
 //! A part of the picture that gets all samples: the others keep theirs, and every pixel has the samples that it would
 //! have in a whole picture of as many.
 
-mod common;
-
+use crate::common::*;
 use assert_cmd::Command;
-use common::*;
 use firstlight::frame::{Command as Ask, Session, SessionOptions, StopAt, Target, read_film_file};
 use firstlight::kdtree::Shape;
 use firstlight::render::{Environment, Film, Material, Prepared, Region, RenderSettings, advance, advance_region};

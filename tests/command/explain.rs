@@ -1,9 +1,7 @@
 //! Explanations of pixels, held against the film that they explain, and against light that can be told on paper.
 
-mod common;
-
+use crate::common::*;
 use assert_cmd::Command;
-use common::*;
 use firstlight::frame::{Command as Ask, Explaining, Session, SessionOptions, Target};
 use firstlight::render::{
     Environment, Film, FoundBy, Integrator, LightSource, Place, Prepared, RenderSettings, advance, explain,

@@ -2,12 +2,10 @@
 //!
 //! A ball of flat triangles with the normals of a true one, lit from the side, so that the line between light and
 //! shadow runs across the picture. Where a shadow ray starts on the flat triangle, those in the way are the ball's own
-//! and the line comes out as saw teeth. `cargo test --test terminator -- --nocapture` prints the table of
+//! and the line comes out as saw teeth. `cargo test --test light terminator:: -- --nocapture` prints the table of
 //! `docs/scenes.md`.
 
-mod common;
-
-use common::{camera, emissive, render};
+use crate::common::{camera, emissive, render};
 use firstlight::geometry::{Ray, robust::offset_ray_origin};
 use firstlight::kdtree::{BuildPreset, MeshTree, SceneTree, Shape};
 use firstlight::mesh::Mesh;

@@ -1,8 +1,6 @@
 //! Shading of sixteen paths at a time, held against one path at a time, sample by sample.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{

@@ -1,8 +1,6 @@
 //! Light that smooth surfaces gather, found by paths from the lamps and from the eye together.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{

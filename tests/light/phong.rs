@@ -1,8 +1,6 @@
 //! The classic model against what can be worked out on paper, and against the path tracer where both must agree.
 
-mod common;
-
-use common::{camera, diffuse, emissive, picture_mean, plane, quad, render, scene, sphere};
+use crate::common::{camera, diffuse, emissive, picture_mean, plane, quad, render, scene, sphere};
 use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object, Prepared,

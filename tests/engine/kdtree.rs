@@ -1,14 +1,11 @@
 //! Every tree, every preset and every traversal against trying all primitives: the same bits.
 
-#[path = "common/random.rs"]
-mod random;
-
+use crate::random::Random;
 use firstlight::geometry::{Ray, robust::offset_ray_origin};
 use firstlight::kdtree::{
     BuildPreset, Hit, HitBatch, InstructionSet, MeshTree, RayBatch, RayClass, SceneTree, Shape, SphereTree,
 };
 use glam::{Affine3A, EulerRot, Quat, Vec3, vec3};
-use random::Random;
 use std::sync::Arc;
 
 const PRESETS: [BuildPreset; 3] = [BuildPreset::Quick, BuildPreset::Best, BuildPreset::Median];

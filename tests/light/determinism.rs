@@ -1,8 +1,6 @@
 //! The same scene, seed and samples give the same bytes, whoever computes them and in whatever portions.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use firstlight::render::{
     ColorInput, Environment, Film, Fresnel, Integrator, Material, Prepared, RenderSettings, ScalarInput, advance,
 };

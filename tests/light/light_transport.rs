@@ -1,8 +1,6 @@
 //! Scenes with an answer on paper.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use firstlight::render::{ColorInput, Environment, Fresnel, Material, RenderSettings, ScalarInput, replay_sample};
 use glam::{UVec2, Vec3};
 

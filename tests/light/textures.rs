@@ -1,8 +1,6 @@
 //! Textures through the whole way: scene file, pictures on disk, snapshot, both light models.
 
-mod common;
-
-use common::render;
+use crate::common::render;
 use firstlight::render::{Integrator, RenderSettings, Techniques};
 use firstlight::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
 use glam::Vec3;

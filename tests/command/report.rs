@@ -1,9 +1,7 @@
 //! The report as a user meets it, and the promises that it checks: every technique leaves the mean alone, and the
 //! error that the renderer tells is the error that it has.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,

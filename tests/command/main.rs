@@ -1,0 +1,11 @@
+//! The program, as it is called from a command line.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cli;
+mod cli_simplify;
+mod explain;
+mod faults;
+mod report;
+mod terminal;

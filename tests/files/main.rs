@@ -1,0 +1,11 @@
+//! Everything that comes from a file or goes into one.
+
+mod bad_input;
+mod bad_values;
+mod input_files;
+mod neutral;
+mod obj;
+mod outputs;
+mod pictures;
+mod save;
+mod scene;

@@ -1,0 +1,16 @@
+//! What light does: closed forms, furnaces, one way of tracing against another.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod caustics;
+mod determinism;
+mod filters;
+mod lanes;
+mod light_transport;
+mod phong;
+mod region;
+mod stability;
+mod terminator;
+mod textures;
+mod unbiased;

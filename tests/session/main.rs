@@ -1,0 +1,7 @@
+//! A session without a window: commands in, pictures and changes out.
+
+mod edit;
+mod lists;
+mod living_files;
+mod reset;
+mod session;

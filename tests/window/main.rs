@@ -1,0 +1,8 @@
+//! The real window, with a hand on its keys and mouse.
+
+#[path = "../desktop/mod.rs"]
+mod desktop;
+
+mod guest;
+mod tools;
+mod window;
