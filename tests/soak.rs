@@ -2,12 +2,12 @@
 //!
 //! `FIRSTLIGHT_SOAK_SECONDS`: how long it is flown, instead of a few seconds.
 
-use random::Random;
 #[path = "common/random.rs"]
 mod random;
 
 use firstlight::frame::{Command as Do, MessageKind, Session, SessionOptions};
 use firstlight::scene::SceneSource;
+use random::Random;
 use std::time::{Duration, Instant};
 
 /// Resident memory in bytes.

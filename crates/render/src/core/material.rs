@@ -97,7 +97,7 @@ impl Material {
         }
     }
 
-    /// Whether it, or a part of it, is perfectly smooth everywhere: a mirror or glass.
+    /// Whether it, or a part of it, is specular everywhere: a mirror or glass.
     pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
         match self {
             Self::Mirror { .. } | Self::Glass { .. } => true,

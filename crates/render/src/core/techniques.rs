@@ -14,7 +14,7 @@ pub struct Techniques {
     pub solid_angle: bool,
     /// Lights are asked by what they could send or by their power; off: all alike.
     pub light_selection: bool,
-    /// Where smooth surfaces gather the light of lamps, paths are traced from the lamps as well; off: from the eye alone.
+    /// Where specular surfaces gather the light of lamps, paths are traced from the lamps as well; off: from the eye alone.
     pub caustics: bool,
     /// Dim paths are ended early; off: only very long ones.
     pub roulette: bool,

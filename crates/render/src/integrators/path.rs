@@ -265,7 +265,7 @@ impl PathWave {
     #[inline]
     fn scatter_told(&mut self, step: Step, bsdf: &impl Scatter) {
         let Step { path, vertex, depth, .. } = step;
-        let hints = step.caustics.filter(|_| bsdf.is_smooth());
+        let hints = step.caustics.filter(|_| bsdf.has_non_specular());
         match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
             Some(hints) => self.scatter(Step { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
             None => self.scatter(step, bsdf),
@@ -274,7 +274,7 @@ impl PathWave {
 
     #[inline]
     fn scatter(&mut self, step: Step, bsdf: &impl Scatter) {
-        if step.scene.tables.features.light_sampling && step.techniques.light_sampling && bsdf.is_smooth() {
+        if step.scene.tables.features.light_sampling && step.techniques.light_sampling && bsdf.has_non_specular() {
             self.sample_light(&step, bsdf);
         }
         self.bounce(&step, bsdf);

@@ -1,4 +1,4 @@
-//! Which lamp to start from, and where to aim: at what is smooth enough to make caustics.
+//! Which lamp to start from, and where to aim: at what is specular and makes caustics.
 //!
 //! A line from a lamp is chosen in three steps: a pair of lamp and caster by the flux between them, a point on the lamp
 //! evenly over its area (on a ball over the cap that the caster can see), a direction evenly over the cone of the ball
@@ -32,7 +32,7 @@ const DIM_DIRECTION: u32 = 1;
 const DIM_PAIR: u32 = 2;
 pub(crate) const LINE_DIMENSIONS: u32 = 3;
 
-/// All smooth objects, and with which lamp each goes how well.
+/// All specular objects, and with which lamp each goes how well.
 #[derive(Debug)]
 pub(crate) struct CasterTable {
     casters: Vec<Caster>,
@@ -43,7 +43,7 @@ pub(crate) struct CasterTable {
     pub(crate) guide: OnceLock<Guide>,
 }
 
-/// A ball around something smooth; without end for a plane.
+/// A ball around something specular; without end for a plane.
 #[derive(Clone, Copy, Debug)]
 struct Caster {
     center: Vec3,
@@ -72,16 +72,16 @@ pub(crate) struct Line {
 }
 
 impl CasterTable {
-    /// `None` where no light can come to a smooth surface from a finite lamp.
+    /// `None` where no light can come to a specular surface from a finite lamp.
     pub fn build(geometry: &Geometry, materials: &[Material], lights: &LightTable) -> Option<Self> {
         let mut casters = Vec::new();
-        let is_smooth: Vec<bool> = materials.iter().map(|material| material.is_specular(materials)).collect();
+        let is_specular: Vec<bool> = materials.iter().map(|material| material.is_specular(materials)).collect();
         let by_object = geometry
             .objects
             .iter()
             .zip(geometry.tree.shapes())
             .map(|(object, shape)| {
-                if !object.materials.iter().any(|&id| is_smooth[id as usize]) {
+                if !object.materials.iter().any(|&id| is_specular[id as usize]) {
                     return (NO_CASTER, false);
                 }
                 let first = casters.len() as u32;

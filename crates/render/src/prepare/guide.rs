@@ -1,8 +1,8 @@
 //! Where does gathered light come from? For vertices that are seen in mirrors and through glass.
 //!
-//! Paths from the lamps cannot be joined to the lens through something smooth, so a caustic that is seen in a mirror is
+//! Paths from the lamps cannot be joined to the lens through something specular, so a caustic that is seen in a mirror is
 //! left to paths from the eye, and these hardly ever find the way on to the lamp by themselves. They are told the way: a
-//! first wave of paths from the lamps leaves, at each matte or rough point that it reaches, the point of the smooth
+//! first wave of paths from the lamps leaves, at each matte or rough point that it reaches, the point of the specular
 //! surface that it came from (Jensen 1995, "Importance Driven Path Tracing Using the Photon Map"). A tree over the
 //! points reached gives each place a small list of such exits; part of the directions there are chosen towards them,
 //! the density of the mixture being known exactly, so the mean stays as it is whatever the list holds.

@@ -34,9 +34,9 @@ pub(crate) const MAX_LOBES: usize = 8;
 /// What the integrator asks of a surface, be it one lobe or a blend.
 pub(crate) trait Scatter {
     /// Whether light sampling can find anything: some lobe is not perfectly specular.
-    fn is_smooth(&self) -> bool;
+    fn has_non_specular(&self) -> bool;
 
-    /// f · cos of all smooth lobes, and the density of sampling `wi` through one of them; zero for `wi` behind
+    /// f · cos of all lobes that are not specular, and the density of sampling `wi` through one of them; zero for `wi` behind
     /// `normal`.
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
 
@@ -95,13 +95,13 @@ impl Blend {
 }
 
 impl Scatter for Blend {
-    fn is_smooth(&self) -> bool {
-        self.lobes().iter().any(|l| l.lobe.is_smooth())
+    fn has_non_specular(&self) -> bool {
+        self.lobes().iter().any(|l| l.lobe.has_non_specular())
     }
 
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let mut sum = (Vec3::ZERO, 0.0);
-        for l in self.lobes().iter().filter(|l| l.lobe.is_smooth()) {
+        for l in self.lobes().iter().filter(|l| l.lobe.has_non_specular()) {
             let (value, pdf) = l.lobe.eval(wo, wi, normal);
             sum.0 += l.weight * value;
             sum.1 += l.pmf * pdf;
@@ -125,8 +125,8 @@ impl Scatter for Blend {
         let l = &lobes[chosen];
         let fresh = (rest / l.pmf).clamp(0.0, 1.0f32.next_down());
         let mut sample = l.lobe.sample(wo, normal, || fresh, u)?;
-        if l.lobe.is_smooth() {
-            // All smooth lobes could have found this direction: the one-sample estimate over their mixture.
+        if l.lobe.has_non_specular() {
+            // All lobes that are not specular could have found this direction: the one-sample estimate over their mixture.
             let (value, pdf) = self.eval(wo, sample.wi, normal);
             sample.weight = value / pdf;
             sample.pdf = pdf;
@@ -149,7 +149,7 @@ impl Lobe {
 
 impl Scatter for Lobe {
     #[inline]
-    fn is_smooth(&self) -> bool {
+    fn has_non_specular(&self) -> bool {
         match self {
             Self::Diffuse { .. } => true,
             Self::Metal { alpha, .. } => *alpha >= SMALLEST_ALPHA,

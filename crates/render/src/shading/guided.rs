@@ -11,8 +11,8 @@ pub(crate) struct Guided<'a, S> {
 }
 
 impl<S: Scatter> Scatter for Guided<'_, S> {
-    fn is_smooth(&self) -> bool {
-        self.surface.is_smooth()
+    fn has_non_specular(&self) -> bool {
+        self.surface.has_non_specular()
     }
 
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {

@@ -9,7 +9,7 @@ pub(crate) struct Track {
     /// Density of finding it from the lamp over that from the eye, without the lamp's factor; NaN if no path from a lamp
     /// can be it.
     pub ratio: f32,
-    /// That the last vertex lies on, if it was perfectly smooth.
+    /// That the last vertex lies on, if it was specular.
     pub caster: u32,
     /// By how much hints have raised the densities of directions so far, about: roulette must not take the small
     /// throughput that goes with it for a loss.
@@ -24,7 +24,7 @@ impl Default for Track {
 
 impl Track {
     /// - `ratio`: NaN if no path from a lamp can be the path so far.
-    /// - `caster`: that the last vertex lies on, if it was perfectly smooth; [`NO_CASTER`] otherwise.
+    /// - `caster`: that the last vertex lies on, if it was specular; [`NO_CASTER`] otherwise.
     #[inline(always)]
     pub fn new(ratio: f32, caster: u32, gain: f32) -> Self {
         Self { ratio, caster, gain }
@@ -41,7 +41,7 @@ impl Track {
         self.ratio.is_nan()
     }
 
-    /// Whether the last vertex was smooth, and a path from a lamp can be the path so far.
+    /// Whether the last vertex was specular, and a path from a lamp can be the path so far.
     pub fn is_gathered(&self) -> bool {
         self.caster != NO_CASTER && !self.is_lost()
     }

@@ -14,14 +14,14 @@ const _: () = assert!(DIM_DIRECTION == 1 && DIM_LOBE == 3);
 /// What a surface that scatters keeps of a path, at most: most of what can be seen of a caustic is its first light.
 const SURVIVAL: f32 = 0.5;
 
-/// Vertices before perfectly smooth surfaces end paths that they dim.
+/// Vertices before specular surfaces end paths that they dim.
 const ROULETTE_DEPTH: u32 = 4;
 
 /// The most that roulette keeps of a path behind its vertex number `n_vertices`; `None` while all go on.
-pub(crate) fn most_kept(scene: &Prepared, n_vertices: u32, is_smooth: bool) -> Option<f32> {
+pub(crate) fn most_kept(scene: &Prepared, n_vertices: u32, is_specular: bool) -> Option<f32> {
     match n_vertices {
         _ if n_vertices >= endless_depth(scene) => Some(ENDLESS_SURVIVAL),
-        _ if !is_smooth => Some(SURVIVAL),
+        _ if !is_specular => Some(SURVIVAL),
         ROULETTE_DEPTH.. => Some(1.0),
         _ => None,
     }

@@ -163,7 +163,7 @@ impl<S: Simd> Step<'_, S> {
         let (cos_o, cos_i) = (seen.wo.dot(place.geometric_normal), place.wo.dot(place.geometric_normal));
         let surface = surface_of::<S, KIND>(s, at, &seen, sets, media);
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
-        open &= surface.smooth & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
+        open &= surface.non_specular & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
         let importance = distance2 * (cos_lens * cos_lens * cos_lens);
         let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
         let weight = lamp_weight(pass, ratio);
@@ -208,13 +208,13 @@ impl<S: Simd> Step<'_, S> {
         let surface = surface_of::<S, KIND>(s, at, place, sets, self.media);
         let bounce = sample::<S, KIND>(at, &surface, place, &HintLanes::NONE, sampler, dimension);
         let (along, wi) = (bounce.wi.dot(normal), bounce.wi);
-        let smooth = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
+        let specular = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();
         let mut go_on = at.mask & bounce.go_on;
         go_on &= (bounce.transmitted & along.is_negative()) | (!bounce.transmitted & reached);
-        // A path that scatters before anything smooth is left to the eye's side.
+        // A path that scatters before anything specular is left to the eye's side.
         if n_vertices == 1 {
-            go_on &= smooth;
+            go_on &= specular;
         }
         let mut media = *self.media;
         if let Some(glass) = &surface.glass
@@ -227,7 +227,7 @@ impl<S: Simd> Step<'_, S> {
             }
         }
         let (cos_i, cos_o) = (place.wo.dot(normal), along.abs());
-        // What a perfectly smooth surface does to the étendue; 1 where the true normal shades.
+        // What a specular surface does to the étendue; 1 where the true normal shades.
         let gain = ((cos_i * place.normal.dot(wi)) / (along * place.normal.dot(place.wo))).abs();
         // Radiance is squeezed on its way into glass, flux is not.
         let white = Vector::splat(s, Vec3::ONE);
@@ -237,15 +237,15 @@ impl<S: Simd> Step<'_, S> {
             let seen = Place { wo: wi, ..*place };
             let surface = surface_of::<S, KIND>(s, at, &seen, sets, self.media);
             let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
-            go_on &= smooth | (pdf.is_positive() & cos_i.is_positive());
-            factor = select_vector(smooth, factor, value * (cos_o / (cos_i * bounce.pdf)));
-            ratio = select(smooth, ratio, self.ratio * bounce.pdf * cos_i / (cos_o * pdf));
+            go_on &= specular | (pdf.is_positive() & cos_i.is_positive());
+            factor = select_vector(specular, factor, value * (cos_o / (cos_i * bounce.pdf)));
+            ratio = select(specular, ratio, self.ratio * bounce.pdf * cos_i / (cos_o * pdf));
         }
         let mut throughput = self.throughput.times(factor);
         let mut at_stake = 0;
         let (one, mut most) = (ratio.all(1.0), ratio.all(1.0));
         for (kept, lanes) in
-            [(most_kept(at.scene, n_vertices, true), smooth), (most_kept(at.scene, n_vertices, false), !smooth)]
+            [(most_kept(at.scene, n_vertices, true), specular), (most_kept(at.scene, n_vertices, false), !specular)]
         {
             if let Some(kept) = kept {
                 most = select(lanes, one.all(kept), most);

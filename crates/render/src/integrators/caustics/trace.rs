@@ -148,7 +148,7 @@ impl LightWave {
                 let ray = self.paths.rays.get(i);
                 let found = surface_at(pass, &mut self.sets, &ray, &hit, path.media);
                 let Some((vertex, material, surface)) = found else { continue };
-                if n_vertices > 1 && surface.is_smooth() {
+                if n_vertices > 1 && surface.has_non_specular() {
                     traces.push(Trace { at: vertex.position, from: ray.origin });
                 }
                 let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
@@ -237,7 +237,7 @@ impl LightWave {
         let Some((vertex, material, surface)) = found else { return };
         let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
         if n_vertices > 1
-            && surface.is_smooth()
+            && surface.has_non_specular()
             && path.media == self.camera
             && let Some((ray, film, light)) = step.join(&surface, &self.sets)
         {
@@ -340,7 +340,7 @@ impl Step<'_> {
         Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
     }
 
-    /// Chooses how the path goes on, and whether; and tells whether it does so off something perfectly smooth.
+    /// Chooses how the path goes on, and whether; and tells whether it does so off something specular.
     fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath, bool)> {
         let &Self { pass, vertex, material, n_vertices, .. } = self;
         let scene = pass.scene;
@@ -355,9 +355,9 @@ impl Step<'_> {
             }
         };
         let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
-        let is_smooth = sample.pdf.is_infinite();
-        // A path that scatters before anything smooth is left to the eye's side.
-        if n_vertices == 1 && !is_smooth {
+        let is_specular = sample.pdf.is_infinite();
+        // A path that scatters before anything specular is left to the eye's side.
+        if n_vertices == 1 && !is_specular {
             return None;
         }
         let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
@@ -382,7 +382,7 @@ impl Step<'_> {
         if !is_reversible(&bounce) {
             return None;
         }
-        let factor = if is_smooth {
+        let factor = if is_specular {
             let gain = etendue_gain(vertex, vertex.wo, sample.wi);
             path.ratio /= gain;
             // Radiance is squeezed on its way into glass, flux is not.
@@ -398,7 +398,8 @@ impl Step<'_> {
             path.ratio *= sample.pdf * cos_i / (cos_o * pdf);
             value * (cos_o / (cos_i * sample.pdf))
         };
-        let survival = most_kept(scene, n_vertices, is_smooth).map_or(1.0, |most| factor.abs().max_element().min(most));
+        let survival =
+            most_kept(scene, n_vertices, is_specular).map_or(1.0, |most| factor.abs().max_element().min(most));
         path.throughput *= factor;
         if survival < 1.0 {
             if sampler.single(dimension + DIM_ROULETTE) >= survival {
@@ -411,15 +412,15 @@ impl Step<'_> {
         }
         path.aimed_at = casters::NO_CASTER;
         let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
-        Some((Ray::new(origin, sample.wi), path, is_smooth))
+        Some((Ray::new(origin, sample.wi), path, is_specular))
     }
 }
 
 impl Surface {
-    fn is_smooth(&self) -> bool {
+    fn has_non_specular(&self) -> bool {
         match self {
-            Self::Lobe(lobe) => lobe.is_smooth(),
-            Self::Blend(blend) => blend.is_smooth(),
+            Self::Lobe(lobe) => lobe.has_non_specular(),
+            Self::Blend(blend) => blend.has_non_specular(),
         }
     }
 

@@ -6,7 +6,7 @@
 //! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area);
 //! - another vertex that scatters: p_lamp · cos θᵢ / (cos θₒ · p_eye), p_lamp and p_eye being its densities towards
 //!   the eye's side (o) and the lamp's side (i);
-//! - a perfectly smooth one: 1, because étendue is kept by mirrors and lenses; or the ratio of the cosines with the true
+//! - a specular one: 1, because étendue is kept by mirrors and lenses; or the ratio of the cosines with the true
 //!   and with the shading normal, where these differ, as étendue is kept about the shading normal (Veach 1997,
 //!   section 5.3);
 //! - the lamp: the density per étendue with which the line from y was chosen, times paths from the lamps.
@@ -29,7 +29,7 @@ pub(crate) struct Bounce<'a> {
     /// Of the camera ray, if this is its hit.
     pub eye: Option<Vec3>,
     pub wi: Vec3,
-    /// Per steradian; infinite if perfectly smooth.
+    /// Per steradian; infinite if specular.
     pub pdf: f32,
     pub transmitted: bool,
     /// The surface is a blend, of which the part is not known.
@@ -43,12 +43,12 @@ impl CausticPass<'_> {
     #[inline]
     pub fn follow(&self, track: Track, bounce: &Bounce, reverse_pdf: impl FnOnce() -> f32) -> Track {
         let Bounce { vertex, wi, .. } = *bounce;
-        let is_smooth = bounce.pdf.is_infinite();
+        let is_specular = bounce.pdf.is_infinite();
         if track.ratio.is_nan() && bounce.eye.is_none() || !is_reversible(bounce) {
             return Track { gain: track.gain, ..Track::default() };
         }
         let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), wi.dot(vertex.geometric_normal).abs());
-        match (bounce.eye, is_smooth) {
+        match (bounce.eye, is_specular) {
             (Some(_), true) => Track::default(),
             (Some(eye), false) => {
                 let cos_lens = -vertex.wo.dot(self.scene.camera.forward);
@@ -122,7 +122,7 @@ pub(crate) fn is_reversible(bounce: &Bounce) -> bool {
     }
 }
 
-/// What a perfectly smooth vertex does to the étendue of light that comes from `wi` and goes to `wo`.
+/// What a specular vertex does to the étendue of light that comes from `wi` and goes to `wo`.
 #[inline]
 pub(crate) fn etendue_gain(vertex: &Vertex, wi: Vec3, wo: Vec3) -> f32 {
     if vertex.normal == vertex.geometric_normal {

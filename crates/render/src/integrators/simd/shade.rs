@@ -112,11 +112,13 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
         }
         let surface = surface_of::<S, KIND>(s, &at, &place, sets, &media);
         let hints = match caustics {
-            Some(pass) if scatters(KIND) => HintLanes::of(s, pass.guide(), depth, &at, &place, mask & surface.smooth),
+            Some(pass) if scatters(KIND) => {
+                HintLanes::of(s, pass.guide(), depth, &at, &place, mask & surface.non_specular)
+            }
             _ => HintLanes::NONE,
         };
         if KIND != MIRROR && KIND != GLASS && techniques.light_sampling && features.light_sampling {
-            let lit = mask & surface.smooth;
+            let lit = mask & surface.non_specular;
             if lit != 0 {
                 let points =
                     s.call(LightPoints { scene, techniques, mask: lit, place: &place, sampler: &sampler, dimension });

@@ -41,14 +41,14 @@ impl<S: Simd> BounceTracks<'_, S> {
                 reversible |= Mask::from(before != media[lane]) << lane;
             }
         }
-        let smooth = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
+        let specular = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let lost = bounce.pdf.all(f32::NAN);
         let weights = bounce.weight.to_arrays();
         let mut old = [Track::default(); LANES];
         lanes_of(go_on).for_each(|lane| old[lane] = hints.track(at, lane, &weights));
         let ratio = if is_first {
             let joined = self.join_ratio(s, cos_o, along.abs());
-            select(smooth, lost, joined)
+            select(specular, lost, joined)
         } else {
             let mut ratios = [f32::NAN; LANES];
             lanes_of(go_on).for_each(|lane| ratios[lane] = old[lane].ratio());
@@ -56,14 +56,14 @@ impl<S: Simd> BounceTracks<'_, S> {
             let scattered = if KIND == MIRROR || KIND == GLASS {
                 lost
             } else {
-                let known = !ratio.is_nan() & go_on & reversible & !smooth;
+                let known = !ratio.is_nan() & go_on & reversible & !specular;
                 ratio * self.reverse_pdf::<KIND>(s, known) * along.abs() / (cos_o * bounce.pdf)
             };
-            select(smooth, ratio / self.etendue_gain(cos_o, along), scattered)
+            select(specular, ratio / self.etendue_gain(cos_o, along), scattered)
         };
         let ratio = select(reversible, ratio, lost);
         let ratios = ratio.to_array();
-        let gathered = smooth & !ratio.is_nan();
+        let gathered = specular & !ratio.is_nan();
         tracks.extend(lanes_of(go_on).map(|lane| {
             let caster = if gathered >> lane & 1 != 0 {
                 pass.caster_of(&at.hits.get(at.indices[lane] as usize).expect("a hit is being shaded"))
@@ -110,7 +110,7 @@ impl<S: Simd> BounceTracks<'_, S> {
         Float::load(s, &pdfs)
     }
 
-    /// What a perfectly smooth surface does to the étendue; 1 where the true normal shades.
+    /// What a specular surface does to the étendue; 1 where the true normal shades.
     #[inline(always)]
     fn etendue_gain(&self, cos_o: Float<S>, cos_i: Float<S>) -> Float<S> {
         let Self { place, bounce, .. } = *self;

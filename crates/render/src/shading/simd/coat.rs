@@ -62,7 +62,7 @@ impl<S: Simd> Coat<S> {
 
     /// Lanes that light sampling can do something for.
     #[inline(always)]
-    pub fn smooth(&self) -> Mask {
+    pub fn non_specular(&self) -> Mask {
         self.matte.here | self.rough.here
     }
 

@@ -42,13 +42,13 @@ impl HintLanes<'_> {
         }
         let (value, pdf) = eval::<S, KIND>(surface, place, wi);
         let pdf = self.mixed(s, wi, pdf);
-        // A part that is perfectly smooth is found by the surface alone.
-        let smooth = self.told & !sent & bounce.pdf.all(f32::MAX).lt(bounce.pdf);
-        let mixed = self.told & !smooth;
+        // A part that is specular is found by the surface alone.
+        let specular = self.told & !sent & bounce.pdf.all(f32::MAX).lt(bounce.pdf);
+        let mixed = self.told & !specular;
         let found = (sent | bounce.go_on) & pdf.is_positive() & !value.is_zero();
         let over_both = Vector { x: value.x / pdf, y: value.y / pdf, z: value.z / pdf };
         let weight = select_vector(mixed, over_both, bounce.weight);
-        let alone = select_vector(smooth, weight * (pdf.all(1.0) / pdf.all(1.0 - SHARE)), weight);
+        let alone = select_vector(specular, weight * (pdf.all(1.0) / pdf.all(1.0 - SHARE)), weight);
         Bounce {
             go_on: (bounce.go_on & !mixed) | (found & mixed),
             wi: select_vector(mixed, wi, bounce.wi),

@@ -28,7 +28,7 @@ pub(crate) struct Surface<S: Simd> {
     pub coat: Option<Coat<S>>,
     pub glass: Option<GlassLanes<S>>,
     /// Lanes that light sampling can do something for.
-    pub smooth: Mask,
+    pub non_specular: Mask,
 }
 
 /// The parameters of the surfaces; black and without lobe only where the scalar code would say so too.
@@ -45,13 +45,13 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
     let table = &at.scene.tables.materials;
     if KIND == COATED {
         let coat = Coat::new(s, at, place);
-        let (smooth, zero) = (coat.smooth(), Float::splat(s, 0.0));
+        let (non_specular, zero) = (coat.non_specular(), Float::splat(s, 0.0));
         return Surface {
             color: Vector { x: zero, y: zero, z: zero },
             metal: None,
             coat: Some(coat),
             glass: None,
-            smooth,
+            non_specular,
         };
     }
     let material = Bits::gather(at.materials, at.index);
@@ -70,11 +70,11 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
             alpha = Float::load(s, &alphas);
         }
         let metal = MetalLanes::new(s, at.mask, place.normal, place.wo, alpha, color, flags);
-        let smooth = Float::splat(s, SMALLEST_ALPHA).le(alpha);
-        return Surface { color, metal: Some(metal), coat: None, glass: None, smooth };
+        let non_specular = Float::splat(s, SMALLEST_ALPHA).le(alpha);
+        return Surface { color, metal: Some(metal), coat: None, glass: None, non_specular };
     }
     let glass = (KIND == GLASS).then(|| GlassLanes::of(s, at, place.front, sets, media));
-    Surface { color, metal: None, coat: None, glass, smooth: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
+    Surface { color, metal: None, coat: None, glass, non_specular: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
 }
 
 /// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.
@@ -135,13 +135,13 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let found = metal.eval(local);
             let go_on = metal.facing() & local.z.is_positive();
             let mut bounce = Bounce { go_on, wi, weight: found.tint * found.weight, pdf: found.pdf, transmitted: 0 };
-            if !surface.smooth & at.mask != 0 {
-                let smooth = surface.smooth;
+            if !surface.non_specular & at.mask != 0 {
+                let non_specular = surface.non_specular;
                 let tint = metal::fresnel(metal.flags, metal.reflectance, cos_o);
-                bounce.go_on |= !smooth;
-                bounce.wi = select_vector(smooth, bounce.wi, mirrored(place.wo, normal));
-                bounce.weight = select_vector(smooth, bounce.weight, tint);
-                bounce.pdf = select(smooth, bounce.pdf, infinite);
+                bounce.go_on |= !non_specular;
+                bounce.wi = select_vector(non_specular, bounce.wi, mirrored(place.wo, normal));
+                bounce.weight = select_vector(non_specular, bounce.weight, tint);
+                bounce.pdf = select(non_specular, bounce.pdf, infinite);
             }
             bounce
         }
