@@ -10,7 +10,8 @@ use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, Prepared, Rende
 use firstlight::scene::file::{MeshSourcePart, ObjectPart, SceneFile};
 use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
 use firstlight::scene::{
-    Extraction, Limits, LoadOptions, Rendering, SceneInputs, SceneSource, Shot, ShotScene, load, read_picture_within,
+    Extraction, ImageMetadata, ImageScene, Limits, LoadOptions, Rendering, SceneInputs, SceneSource, load,
+    read_picture_within,
 };
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -162,16 +163,16 @@ fn go_on(mut film: Film) {
 /// The note of a picture, in a PNG or EXR or by itself.
 pub fn shot(bytes: &[u8]) {
     let path = write("fuzz.png", bytes);
-    let own_note = std::str::from_utf8(bytes).map_or(Err(String::new()), Shot::from_note);
-    for shot in [Shot::read_within(&path, &LIMITS), own_note].into_iter().flatten() {
-        let again = Shot::from_note(&shot.to_note()).expect("what is written can be read");
+    let own_note = std::str::from_utf8(bytes).map_or(Err(String::new()), ImageMetadata::from_note);
+    for shot in [ImageMetadata::read_within(&path, &LIMITS), own_note].into_iter().flatten() {
+        let again = ImageMetadata::from_note(&shot.to_note()).expect("what is written can be read");
         assert_eq!(format!("{again:?}"), format!("{shot:?}"));
         drop((shot.source(&path), shot.up(), shot.differs_from(&again)));
         drop(shot.moved(&path, &FOLDER.path().join("elsewhere/other.png")));
     }
     // Whole scenes are the business of `render`.
-    let shows_no_scene = |shot: &Shot| shot.text.is_none() && !matches!(shot.scene, ShotScene::Builtin(_));
-    if Shot::read_within(&path, &LIMITS).as_ref().is_ok_and(shows_no_scene)
+    let shows_no_scene = |shot: &ImageMetadata| shot.text.is_none() && !matches!(shot.scene, ImageScene::Builtin(_));
+    if ImageMetadata::read_within(&path, &LIMITS).as_ref().is_ok_and(shows_no_scene)
         && let Err(error) = load(&SceneSource::Picture(path), &LoadOptions::default())
     {
         assert!(!error.to_string().is_empty());

@@ -7,7 +7,7 @@ use crate::rays::RaySet;
 use crate::{WAVE, all_rays};
 use firstlight::geometry::Ray;
 use firstlight::kdtree::{Hit, HitBatch, SceneTree};
-use firstlight::stability::{Judge, Verdict};
+use firstlight::stability::{CheckResult, ReferenceIntersector};
 use glam::Vec3;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
@@ -290,8 +290,8 @@ impl Scene<'_> {
     /// Rays for which Embree does not find the same distance within a ten thousandth, and what the `f64` judge, which
     /// tries every triangle, says of either answer to them.
     pub fn differences(&self, prepared: &Prepared, scene: &SceneTree, set: &RaySet) -> String {
-        let judge = std::cell::LazyCell::new(|| Judge::of(scene));
-        let is_right = |ray: &Ray, hit: Option<Hit>| matches!(judge.check(ray, hit.as_ref()), Verdict::Right(_));
+        let judge = std::cell::LazyCell::new(|| ReferenceIntersector::of(scene));
+        let is_right = |ray: &Ray, hit: Option<Hit>| matches!(judge.check(ray, hit.as_ref()), CheckResult::Right(_));
         let (mut own_wrong, mut their_wrong) = (0, 0);
         let arguments = Self::arguments(prepared.flags);
         let mut rays = prepared.single.iter();

@@ -10,7 +10,8 @@ use firstlight::frame::{FilmFile, PictureFormat, Print, Target, render_offline_u
 use firstlight::render::{Display, Film, NoRoom, Purpose, RenderSettings, Room};
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
-    Developing, Extraction, Files, FilmSize, LoadedScene, Part, Rendering, SceneInputs, Shot, ShotDraft, ShotSamples,
+    DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Part,
+    Rendering, SceneInputs,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -24,13 +25,13 @@ pub(super) struct Job {
     pub display: Display,
     pub size: (u32, u32),
     pub build_seconds: f64,
-    pub draft: ShotDraft,
+    pub draft: MetadataDraft,
 }
 
 impl Job {
     pub fn new(
         args: &RenderArgs,
-        kept: Option<&Shot>,
+        kept: Option<&ImageMetadata>,
         files: &mut Files,
         progress: &Progress,
     ) -> Result<Self, Failure> {
@@ -65,10 +66,10 @@ impl Job {
         let FilmSize { width, height } = *world.resource();
         let size = args.size.or(kept.map(|kept| (kept.film.width, kept.film.height))).unwrap_or((width, height));
         let size = scaled(size, args.scale)?;
-        let mut display = world.resource::<Developing>().0;
+        let mut display = world.resource::<DisplaySettings>().0;
         display.exposure_stops += args.exposure;
         world.insert_resource(Rendering(settings));
-        let draft = ShotDraft::of(&mut world, Some(&scene));
+        let draft = MetadataDraft::of(&mut world, Some(&scene));
         Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
     }
 
@@ -85,7 +86,7 @@ impl Job {
         }
         let inputs = SceneInputs::of(&mut self.world);
         self.extraction.update(Part::Camera, &inputs, &self.scene.trees);
-        self.draft = ShotDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
+        self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
     }
 
     /// Renders a whole picture.
@@ -117,7 +118,7 @@ impl Job {
 
     /// The note of a picture of this film at `path`.
     pub fn note(&self, film: &Film, path: &Path) -> String {
-        let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven: film.max_spp() > film.spp() };
+        let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.max_spp() > film.spp() };
         self.draft.note(path, self.size, samples, self.display.into())
     }
 
@@ -128,7 +129,7 @@ impl Job {
         let Some((FilmFile { film, shot, .. }, path)) = kept else {
             return Ok(self.new_film(&purposes(args))?.starting_at(first.unwrap_or(0)));
         };
-        let ours = Shot::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
+        let ours = ImageMetadata::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
         match ours.differs_from(&shot) {
             None => Ok(film),
             Some(what) => Err(Failure::Failed(format!(

@@ -5,7 +5,7 @@ use super::console::{print, remark};
 use super::failure::Failure;
 use clap::Args;
 use firstlight::frame::{FilmFile, PictureFormat, Print, check_replaced_film, read_film_file, write_film_into};
-use firstlight::scene::Shot;
+use firstlight::scene::ImageMetadata;
 use firstlight::scene::whole_file::Replace;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     }
     // In the order of their samples, so that the result does not depend on how they were named.
     let mut films: Vec<&PathBuf> = args.films.iter().collect();
-    films.sort_by_cached_key(|path| Shot::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
+    films.sort_by_cached_key(|path| ImageMetadata::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
     let (first, others) = films.split_first().expect("two films at least");
     let FilmFile { mut film, shot, warning } = read_film_file(first).map_err(Failure::Failed)?;
     let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
@@ -60,7 +60,9 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     }
     let note = |path: &Path| {
         let samples = (film.first_sample(), film.spp(), film.max_spp() > film.spp());
-        Shot { first_sample: samples.0, spp: samples.1, uneven: samples.2, ..shot.clone() }.moved(first, path).to_note()
+        ImageMetadata { first_sample: samples.0, spp: samples.1, uneven: samples.2, ..shot.clone() }
+            .moved(first, path)
+            .to_note()
     };
     let note_of_film = note(&args.output);
     if !args.overwrite.overwrite {

@@ -8,12 +8,12 @@ use super::stop::Stop;
 use clap::Args;
 use firstlight::render::{Prepared, Purpose, RenderSettings, Room, Techniques};
 use firstlight::report::{
-    Ablation, Key, Ladder, Limits, LinearPicture, Reference, ReferenceStore, Rung, SceneOutcome, climb, csv,
-    foreign_share, page, summary_text,
+    Ablation, ConvergenceCurve, CurveStep, Key, Limits, LinearPicture, Reference, ReferenceStore, SceneOutcome, csv,
+    foreign_share, measure_curve, page, summary_text,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
-    BUILTIN_SCENES, Developing, Extraction, Files, FilmSize, LoadedScene, Rendering, SceneInputs, Trees,
+    BUILTIN_SCENES, DisplaySettings, Extraction, Files, FilmSize, LoadedScene, Rendering, SceneInputs, Trees,
 };
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -192,7 +192,7 @@ struct ReportScene {
     inputs: SceneInputs,
     trees: Trees,
     settings: RenderSettings,
-    developing: Developing,
+    developing: DisplaySettings,
     size: (u32, u32),
     key: Key,
 }
@@ -242,7 +242,7 @@ impl ReportScene {
         progress: &mut Progress,
         stop: &Stop,
     ) -> (Option<SceneOutcome>, Option<String>) {
-        let rungs = self.climb(limits, Techniques::default(), "all techniques", progress, stop);
+        let rungs = self.measure_curve(limits, Techniques::default(), "all techniques", progress, stop);
         let mut missing = stop.is_asked().then(|| "its later steps, and what each technique is worth".to_owned());
         let Some(last_rung) = rungs.last() else { return (None, Some("no step was finished".to_owned())) };
         let reference = match given {
@@ -253,8 +253,8 @@ impl ReportScene {
             },
         };
         let display = self.developing.0;
-        let measure = |rungs: &[Rung]| Ladder::measure(rungs, &reference.picture, &display);
-        let picture = |rung: Option<&Rung>| rung.map(|rung| rung.picture.clone());
+        let measure = |rungs: &[CurveStep]| ConvergenceCurve::measure(rungs, &reference.picture, &display);
+        let picture = |rung: Option<&CurveStep>| rung.map(|rung| rung.picture.clone());
         let last: LinearPicture = picture(rungs.last()).expect("a ladder has at least one step");
         let ablations = if args.no_ablation {
             Vec::new()
@@ -262,7 +262,8 @@ impl ReportScene {
             Techniques::ablations()
                 .into_iter()
                 .map_while(|(technique, techniques)| {
-                    let others = self.climb(limits, techniques, &format!("without {technique}"), progress, stop);
+                    let others =
+                        self.measure_curve(limits, techniques, &format!("without {technique}"), progress, stop);
                     // Half a ladder would be compared with a whole one.
                     if stop.is_asked() {
                         missing
@@ -298,21 +299,21 @@ impl ReportScene {
         Extraction::new(&self.inputs, &self.trees).prepared
     }
 
-    fn climb(
+    fn measure_curve(
         &self,
         limits: Limits,
         techniques: Techniques,
         what: &str,
         progress: &mut Progress,
         stop: &Stop,
-    ) -> Vec<Rung> {
+    ) -> Vec<CurveStep> {
         let settings = RenderSettings { techniques, ..self.settings };
         let mut tell = progress.task(format!("{}, {what}", self.title), Progress::LADDER, self.size);
-        climb(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
+        measure_curve(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
 
     /// One that was kept, or a new one; `None` when somebody stops it before it is good for anything.
-    fn reference(&self, last: &Rung, progress: &mut Progress, stop: &Stop) -> Option<Reference> {
+    fn reference(&self, last: &CurveStep, progress: &mut Progress, stop: &Stop) -> Option<Reference> {
         let store = ReferenceStore::of_platform();
         let spp = last.spp.saturating_mul(REFERENCE_FACTOR);
         let time = duration(f64::from(REFERENCE_FACTOR) * last.spent.wall_seconds);

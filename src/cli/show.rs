@@ -9,7 +9,7 @@ use super::stop::Stop;
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
-use firstlight::scene::ShotSamples;
+use firstlight::scene::ImageSamples;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
@@ -121,7 +121,7 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     }
     let (film, display) = (&played.film, played.display());
     let size = (film.width(), film.height());
-    let samples = ShotSamples { first: 0, spp: film.spp(), uneven: false };
+    let samples = ImageSamples { first: 0, spp: film.spp(), uneven: false };
     let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
     let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
     print.write(&args.output, files.replace()).map_err(Failure::Failed)

@@ -2,7 +2,7 @@
 //!
 //! The story stays until another is asked for, so that one can fly around its paths.
 
-use super::resources::{Clock, Renderer, Shown};
+use super::resources::{Clock, RenderState, Renderer};
 use super::status::{MessageKind, Status};
 use super::worker::{Answer, Question};
 use crate::render::{Explanation, FoundBy, Integrator, LightSource, Place};
@@ -233,9 +233,9 @@ impl Explaining {
 
 /// Asks the workers, and takes their answer.
 ///
-/// Reads [`Shown`]; writes [`Explaining`], [`Status`], and to the [`Renderer`]. Runs after they got their job.
+/// Reads [`RenderState`]; writes [`Explaining`], [`Status`], and to the [`Renderer`]. Runs after they got their job.
 pub fn explain_pixel(
-    shown: Res<Shown>,
+    shown: Res<RenderState>,
     renderer: Res<Renderer>,
     clock: Res<Clock>,
     mut explaining: ResMut<Explaining>,

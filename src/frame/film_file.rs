@@ -3,15 +3,15 @@
 //! Red, green and blue are the means, as in any picture. Beside them, each `f64` of a pixel (see
 //! [`FilmRecord`]) lies in two channels of 32-bit integers, its upper and its lower half, so nothing is rounded. Sample
 //! numbers and the state of the error estimate are RON text in the attribute `firstlight.film` of the layer; the note of
-//! the picture ([`Shot`]) says which scene it is, and makes it open as any picture. The same attribute has a checksum of
+//! the picture ([`ImageMetadata`]) says which scene it is, and makes it open as any picture. The same attribute has a checksum of
 //! every byte of the file but its own digits, so that a change of anything is noticed.
 
 use super::picture_file::mean_channels;
 use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, Purpose, Room};
 use crate::scene::file::check_film_size;
-use crate::scene::shot::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
+use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
-use crate::scene::{FileKind, Fingerprint, InputFile, Limits, ReadError, Shot};
+use crate::scene::{FileKind, Fingerprint, ImageMetadata, InputFile, Limits, ReadError};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
     ReadLayers, Text, WritableImage,
@@ -25,7 +25,7 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct FilmFile {
     pub film: Film,
-    pub shot: Shot,
+    pub shot: ImageMetadata,
     /// What cannot be known of it; for people, with its name.
     pub warning: Option<String>,
 }
@@ -127,7 +127,7 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), S
     const WHAT_TO_DO: &str = "name another file, or allow it by --overwrite";
     let refused = |why: String| format!("{}: is a film {why}, and would be lost: {WHAT_TO_DO}", path.display());
     let old = read(path, &Limits::of_this_process()).map_err(|reason| refused(format!("that {reason}")))?;
-    if let Some(what) = Shot::from_note(note)?.differs_from(&old.shot) {
+    if let Some(what) = ImageMetadata::from_note(note)?.differs_from(&old.shot) {
         return Err(refused(format!("of another {what}")));
     }
     if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
@@ -230,7 +230,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
     }
     let film = Film::from_record(&record).map_err(|error| damaged(&error))?;
     let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
-    let shot = Shot::from_note(&note.ok_or_else(|| damaged(&"its note is missing or too long"))?)?;
+    let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its note is missing or too long"))?)?;
     let of_film = (film.width(), film.height(), film.first_sample(), film.spp());
     if (shot.film.width, shot.film.height, shot.first_sample, shot.spp) != of_film {
         return Err(damaged(&"its note has another size or other samples"));
@@ -260,7 +260,7 @@ mod tests {
     use super::*;
     use crate::frame::{Target, render_offline};
     use crate::render::RenderSettings;
-    use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, ShotDraft, ShotSamples, load};
+    use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
     /// A film of a scene with paths from the lights, and its note.
     fn tiny(spp: u32) -> (Film, String) {
@@ -271,8 +271,8 @@ mod tests {
         let mut film = Film::new(3, 2);
         let target = Target { spp: Some(spp), ..Target::default() };
         render_offline(&extraction.prepared, &RenderSettings::default(), &mut film, target, |_| true);
-        let samples = ShotSamples { first: 0, spp, uneven: false };
-        let draft = ShotDraft::of(&mut world, Some(&loaded));
+        let samples = ImageSamples { first: 0, spp, uneven: false };
+        let draft = MetadataDraft::of(&mut world, Some(&loaded));
         let note = draft.note(Path::new("a.exr"), (3, 2), samples, crate::render::Display::default().into());
         (film, note)
     }
@@ -342,6 +342,6 @@ mod tests {
         write_film_file(&film, &note, &folder.path().join("a.exr")).unwrap();
         let kept = read_film_file(&folder.path().join("a.exr")).unwrap();
         assert_eq!(kept.shot.to_note(), note);
-        assert_eq!(Shot::read(&folder.path().join("a.exr")).unwrap().to_note(), note);
+        assert_eq!(ImageMetadata::read(&folder.path().join("a.exr")).unwrap().to_note(), note);
     }
 }

@@ -1,7 +1,7 @@
 //! What is sharp: the zone of a lens, and a focal plane that stays with what was focused on.
 
 use super::navigation::focus_at;
-use super::resources::{PictureSize, Shown};
+use super::resources::{PictureSize, RenderState};
 use super::selection::pick_along;
 use crate::scene::{Lens, Ordinal, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
@@ -105,7 +105,7 @@ fn under(world: &mut World, [x, y]: [f64; 2]) -> Option<DVec3> {
     let mut cameras = world.query::<(Entity, Option<&Ordinal>, &View, &Projection)>();
     let first = cameras.iter(world).min_by_key(|(entity, rank, ..)| (rank.map_or(u32::MAX, |rank| rank.0), *entity));
     let (view, projection) = first.map(|(_, _, view, projection)| (*view, *projection))?;
-    let scene = world.resource::<Shown>().extraction.as_ref()?;
+    let scene = world.resource::<RenderState>().extraction.as_ref()?;
     pick_along(scene, &view, &projection, x, y, aspect).map(|picked| picked.point)
 }
 

@@ -11,7 +11,7 @@ use super::rig::Rig;
 use super::selection::Selection;
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    Developing, Lens, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection, Rendering,
+    DisplaySettings, Lens, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection, Rendering,
     SceneEnvironment, Shape, View,
 };
 use bevy_ecs::name::Name;
@@ -242,7 +242,7 @@ pub fn notice(
     mut names: RemovedComponents<Name>,
     environment: Option<Res<SceneEnvironment>>,
     rendering: Option<Res<Rendering>>,
-    developing: Option<Res<Developing>>,
+    developing: Option<Res<DisplaySettings>>,
     mut had_environment: Local<bool>,
     mut history: ResMut<History>,
 ) {
@@ -279,7 +279,7 @@ pub fn remember(world: &mut World) {
         entities,
         environment: world.get_resource::<SceneEnvironment>().cloned(),
         settings: world.get_resource::<Rendering>().map(|rendering| rendering.0),
-        display: world.get_resource::<Developing>().map(|developing| developing.0),
+        display: world.get_resource::<DisplaySettings>().map(|developing| developing.0),
         camera,
     };
     world.resource_mut::<History>().record(state);
@@ -352,7 +352,7 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
         world.insert_resource(Rendering(settings));
     }
     if let Some(display) = wanted.display.filter(|_| wanted.display != now.display) {
-        world.insert_resource(Developing(display));
+        world.insert_resource(DisplaySettings(display));
     }
     if let Some((entity, rig)) = wanted.camera.filter(|_| wanted.camera != now.camera) {
         put(world, entity, &Some(rig.view));

@@ -1,21 +1,22 @@
 //! Carries out what a person asks for: commands become changes of components and resources.
 
-use super::around::Around;
+use super::Command;
+use super::background::BackgroundTasks;
 use super::edit::EditQueue;
 use super::explain::Explaining;
 use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
 use super::resources::{
-    Brush, Clock, Hidden, Looking, MAX_THREADS, Paused, PictureSize, Renderer, Shown, StopAt, Threads,
+    Clock, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
 };
 use super::saving::Saving;
+use super::scene_bounds::SceneBounds;
 use super::selection::{Picked, Selection, pick};
 use super::status::{MessageKind, Status};
 use super::views::{Bookmarks, ViewTrail};
-use super::{Command, beside::Beside};
 use crate::render::ToneCurve;
 use crate::scene::bounds::MOST_STOPS;
-use crate::scene::{Developing, Lens, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
+use crate::scene::{DisplaySettings, Lens, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
 use glam::DVec3;
@@ -32,27 +33,27 @@ type CameraParts = (Entity, Option<&'static Ordinal>, &'static mut View, &'stati
 
 /// Everything that commands may change.
 #[derive(SystemParam)]
-pub struct Desk<'w, 's> {
+pub struct CommandParams<'w, 's> {
     cameras: Query<'w, 's, CameraParts>,
-    developing: ResMut<'w, Developing>,
+    developing: ResMut<'w, DisplaySettings>,
     rendering: ResMut<'w, Rendering>,
     size: ResMut<'w, PictureSize>,
     paused: ResMut<'w, Paused>,
     threads: ResMut<'w, Threads>,
     hidden: ResMut<'w, Hidden>,
     stop_at: ResMut<'w, StopAt>,
-    looking: ResMut<'w, Looking>,
+    looking: ResMut<'w, ViewMode>,
     explaining: ResMut<'w, Explaining>,
-    brush: ResMut<'w, Brush>,
+    brush: ResMut<'w, RenderRegion>,
     focus: ResMut<'w, Focus>,
     bookmarks: ResMut<'w, Bookmarks>,
     trail: ResMut<'w, ViewTrail>,
     edits: ResMut<'w, EditQueue>,
     selection: Res<'w, Selection>,
-    around: ResMut<'w, Around>,
-    shown: ResMut<'w, Shown>,
+    around: ResMut<'w, SceneBounds>,
+    shown: ResMut<'w, RenderState>,
     status: ResMut<'w, Status>,
-    beside: Res<'w, Beside>,
+    beside: Res<'w, BackgroundTasks>,
     saving: ResMut<'w, Saving>,
     renderer: Res<'w, Renderer>,
     clock: Res<'w, Clock>,
@@ -62,7 +63,7 @@ pub struct Desk<'w, 's> {
 /// Empties the queue into the world. Equal values mark nothing as changed.
 ///
 /// Reads [`CommandQueue`]; writes the first camera, settings, size; starts loads.
-pub fn input(mut queue: ResMut<CommandQueue>, mut desk: Desk) {
+pub fn input(mut queue: ResMut<CommandQueue>, mut desk: CommandParams) {
     for command in queue.0.drain(..) {
         desk.carry_out(command);
     }
@@ -72,7 +73,7 @@ pub fn input(mut queue: ResMut<CommandQueue>, mut desk: Desk) {
     }
 }
 
-impl Desk<'_, '_> {
+impl CommandParams<'_, '_> {
     fn carry_out(&mut self, command: Command) {
         if let Err(bad) = command.check() {
             self.status.say(self.clock.0, MessageKind::Error, bad);
@@ -117,16 +118,16 @@ impl Desk<'_, '_> {
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {
-                let look = super::Look { inspection, ..self.looking.0 };
-                self.looking.set_if_neq(Looking(look));
+                let look = super::ViewOptions { inspection, ..self.looking.0 };
+                self.looking.set_if_neq(ViewMode(look));
             }
             Command::SetSharpZone { shown } => {
-                let look = super::Look { sharp_zone: shown, ..self.looking.0 };
-                self.looking.set_if_neq(Looking(look));
+                let look = super::ViewOptions { sharp_zone: shown, ..self.looking.0 };
+                self.looking.set_if_neq(ViewMode(look));
             }
             Command::ExplainAt { x, y } => self.explaining.wanted = Some((x, y)),
             Command::ForgetExplanation => self.explaining.forget(),
-            Command::SetRegion { region } => drop(self.brush.set_if_neq(Brush(region))),
+            Command::SetRegion { region } => drop(self.brush.set_if_neq(RenderRegion(region))),
             Command::ToggleFocusLock => self.toggle_focus_lock(),
             Command::FocusFollows { x, y } if x.is_finite() && y.is_finite() => {
                 if !matches!(self.focus.target, FocusTarget::Cursor(_)) {
@@ -221,13 +222,13 @@ impl Desk<'_, '_> {
         if !stops.is_nan() {
             let exposure_stops = stops.clamp(-MOST_STOPS, MOST_STOPS);
             let display = crate::render::Display { exposure_stops, ..self.developing.0 };
-            self.developing.set_if_neq(Developing(display));
+            self.developing.set_if_neq(DisplaySettings(display));
         }
     }
 
     fn set_tone_curve(&mut self, tone_curve: ToneCurve) {
         let display = crate::render::Display { tone_curve, ..self.developing.0 };
-        self.developing.set_if_neq(Developing(display));
+        self.developing.set_if_neq(DisplaySettings(display));
     }
 
     fn resize(&mut self, size: PictureSize) {
@@ -241,7 +242,7 @@ impl Desk<'_, '_> {
 
     /// Corners of the boxes of what is selected, or else of the scene.
     fn what_to_frame(&mut self) -> Vec<DVec3> {
-        let Shown { inputs, extents, .. } = &mut *self.shown;
+        let RenderState { inputs, extents, .. } = &mut *self.shown;
         let selected: Vec<DVec3> = (self.selection.0.iter())
             .flat_map(|entity| {
                 let object = inputs.objects.iter().find(|object| object.entity == *entity);

@@ -12,8 +12,7 @@
 //!
 //! A [`Session`] holds all of it. The workers follow a [`Scheduler`] that knows no threads and no clock.
 
-mod around;
-mod beside;
+mod background;
 mod camera_path;
 mod command;
 mod edit;
@@ -23,6 +22,7 @@ mod focus;
 pub mod gizmo;
 mod history;
 mod input;
+mod latency;
 pub mod navigation;
 mod offline;
 mod picture_file;
@@ -36,6 +36,7 @@ mod reset;
 mod resources;
 mod rig;
 mod saving;
+mod scene_bounds;
 mod scheduler;
 mod selection;
 mod session;
@@ -43,11 +44,9 @@ mod settings;
 mod status;
 mod systems;
 mod views;
-mod waits;
 mod watch;
 mod worker;
 
-pub use around::Around;
 pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
@@ -57,6 +56,7 @@ pub use film_file::{
 };
 pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;
+pub use latency::LatencyHistogram;
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
 pub use picture_file::{PictureFormat, Print, write_errors, write_film};
 pub use recording::check_recordable;
@@ -65,13 +65,13 @@ pub use remake::MeshMeasure;
 pub use remesh::wanted_mesh;
 pub use replay::{ReplayOptions, Replayed, replay};
 pub use reset::{Change, Changes, Level, compare, compare_settings};
-pub use resources::{Brush, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, StopAt, Threads};
+pub use resources::{CurrentScene, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, StopAt, Threads, ViewMode};
 pub use saving::SavedAs;
+pub use scene_bounds::SceneBounds;
 pub use scheduler::{Scheduler, Step, StepReport};
 pub use selection::{OwnBox, Picked, Projector, Selection, pick};
 pub use session::{Session, SessionOptions, Stage};
 pub use settings::{SceneBookmarks, Settings, SettingsStore};
 pub use status::{Message, MessageKind, Picture, Status};
 pub use views::{Bookmarks, ViewTrail};
-pub use waits::Waits;
-pub use worker::{Look, Waker};
+pub use worker::{ViewOptions, Waker};

@@ -3,7 +3,7 @@
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
 use crate::render::{Display, Film, Purpose, Room, develop, relative_errors};
-use crate::scene::shot::{NOTE_KEY, exr_text};
+use crate::scene::image_metadata::{NOTE_KEY, exr_text};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text, WritableImage,

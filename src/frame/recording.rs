@@ -7,7 +7,7 @@
 
 use super::command::Command;
 use super::input::CommandQueue;
-use super::resources::{Adopted, Clock, CurrentScene};
+use super::resources::{Clock, CurrentScene, SceneGeneration};
 use super::status::MessageKind;
 use crate::scene::{FileKind, InputFile, ReadError, check_film_size};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
@@ -78,10 +78,10 @@ impl Recorder {
 
 /// Writes down what this frame is asked for; runs before the commands are carried out.
 ///
-/// Reads the queue of commands, [`Adopted`], [`Clock`]; writes [`Recorder`].
+/// Reads the queue of commands, [`SceneGeneration`], [`Clock`]; writes [`Recorder`].
 pub fn record(
     queue: Res<CommandQueue>,
-    adopted: Res<Adopted>,
+    adopted: Res<SceneGeneration>,
     clock: Res<Clock>,
     current: Option<Res<CurrentScene>>,
     mut recorder: ResMut<Recorder>,

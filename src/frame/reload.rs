@@ -4,14 +4,14 @@
 
 use super::Waker;
 use super::input::ModelUp;
-use super::resources::{Clock, CurrentScene, Renderer, Shown};
+use super::resources::{Clock, CurrentScene, RenderState, Renderer};
 use super::saving::SavedAs;
 use super::status::{MessageKind, Status};
 use super::systems::adopt;
 use super::watch::Watch;
 use crate::scene::{
-    Description, Developing, LoadOptions, LoadedScene, Rendering, SceneContent, SceneError, SceneInputs, SceneSource,
-    load,
+    Description, DisplaySettings, LoadOptions, LoadedScene, Rendering, SceneContent, SceneError, SceneInputs,
+    SceneSource, load,
 };
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;
@@ -174,7 +174,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
     };
     // What a person has set stays, unless the file says something new about it.
     let camera = SceneInputs::of(world).camera.filter(|_| scene.file.camera == old.file.camera);
-    let developing = (scene.file.display == old.file.display).then(|| *world.resource::<Developing>());
+    let developing = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
     let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
         == (old.file.integrator, old.file.max_depth, old.file.film.filter);
     let rendering = same_settings.then(|| *world.resource::<Rendering>());
@@ -182,7 +182,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
     let trees = scene.trees.clone();
     adopt(world, scene, now);
     let names = names_of(&world.resource::<HotReload>().reading);
-    let mut shown = world.resource_mut::<Shown>();
+    let mut shown = world.resource_mut::<RenderState>();
     shown.trees.extend(trees);
     shown.adopted = Some(format!("{names} read again"));
     if let Some(camera) = camera

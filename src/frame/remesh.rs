@@ -3,7 +3,7 @@
 //! The new mesh is made from where the old one came from, by the same code that opens a scene, so that a saved scene
 //! opens with the very same triangles.
 
-use super::beside::Beside;
+use super::background::BackgroundTasks;
 use super::history::History;
 use super::remake::{ForWhom, Remade, Remake};
 use super::resources::{Clock, CurrentScene, Renderer};
@@ -38,21 +38,21 @@ fn run(world: &mut World, for_whom: ForWhom, source: MeshSourcePart, shading: Me
     let revision = History::revision(world);
     let job = Remake { for_whom, source, shading, ratio, revision, folder };
     let pool = world.resource::<Renderer>().0.pool();
-    world.resource::<Beside>().remake(job, pool);
+    world.resource::<BackgroundTasks>().remake(job, pool);
 }
 
 /// How the mesh of an object is to be shaded and what share of its faces is to be kept, also while that is still being made; `None`
 /// where it is not known where it came from.
 pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShadingPart, f64)> {
     let origin = world.get::<MeshOrigin>(entity)?;
-    let pending = world.resource::<Beside>().wanted(entity);
+    let pending = world.resource::<BackgroundTasks>().wanted(entity);
     Some(pending.map_or((origin.shading, origin.simplify.unwrap_or(1.0)), |job| (job.shading, job.ratio)))
 }
 
 /// Forgets a mesh that is still being made, if nothing was changed after it was asked for: an undo takes back the newest.
 pub fn take_back(world: &mut World) -> Option<()> {
     let revision = History::revision(world);
-    let job = world.resource::<Beside>().forget_mesh(revision)?;
+    let job = world.resource::<BackgroundTasks>().forget_mesh(revision)?;
     let now = world.resource::<Clock>().0;
     world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{}: stopped", job.title()));
     Some(())

@@ -1,13 +1,13 @@
 //! Sessions that write down what they are asked for, and that are played again from it.
 
-use super::beside::Beside;
+use super::background::BackgroundTasks;
 use super::recording::{FORMAT, Header, Line, Recorder, SceneWord, check_recordable, read};
-use super::resources::{Adopted, CurrentScene, PictureSize, Shown, StopAt};
+use super::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
 use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
 use crate::render::{Film, Room};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use crate::scene::{
-    Developing, Rendering, SceneSource, UpAxis, absolute, check_film_size, relative_path, text_to_path,
+    DisplaySettings, Rendering, SceneSource, UpAxis, absolute, check_film_size, relative_path, text_to_path,
 };
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -131,7 +131,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     }
     let world = session.world();
     let PictureSize { width, height } = *world.resource();
-    let extraction = world.resource::<Shown>().extraction.as_ref();
+    let extraction = world.resource::<RenderState>().extraction.as_ref();
     let prepared = extraction.map(|extraction| extraction.prepared.clone());
     let prepared = prepared.ok_or_else(|| failed("nothing is open".to_owned()))?;
     let settings = world.resource::<Rendering>().0;
@@ -151,7 +151,7 @@ impl Replayed {
 
     /// How the picture is shown.
     pub fn display(&self) -> crate::render::Display {
-        self.session.world().resource::<Developing>().0
+        self.session.world().resource::<DisplaySettings>().0
     }
 }
 
@@ -183,7 +183,7 @@ impl Player {
         self.session.world_mut().insert_resource(StopAt(Target { spp: Some(1), ..Target::default() }));
         self.session.update(self.clock);
         // What was asked for beside the picture comes before what is asked for next.
-        while self.session.world().resource::<Beside>().is_editing() {
+        while self.session.world().resource::<BackgroundTasks>().is_editing() {
             std::thread::sleep(Duration::from_millis(2));
             self.session.update(self.clock);
         }
@@ -206,10 +206,11 @@ impl Player {
         loop {
             self.update();
             let world = self.session.world();
-            if world.resource::<Adopted>().0 + self.edited >= number {
+            if world.resource::<SceneGeneration>().0 + self.edited >= number {
                 break;
             }
-            let nothing_comes = world.contains_resource::<CurrentScene>() && world.resource::<Beside>().is_idle();
+            let nothing_comes =
+                world.contains_resource::<CurrentScene>() && world.resource::<BackgroundTasks>().is_idle();
             if stop() {
                 return Err("the replay was stopped".to_owned());
             }

@@ -2,7 +2,7 @@
 
 use super::offline::Target;
 use super::reset::Changes;
-use super::worker::{Look, Worker};
+use super::worker::{ViewOptions, Worker};
 use crate::render::{Display, Integrator, Prepared, RenderSettings};
 use crate::scene::{ExtentCache, Extraction, LoadedScene, SceneInputs, Shape, Trees};
 use bevy_ecs::prelude::Resource;
@@ -52,11 +52,11 @@ pub struct Hidden(pub bool);
 
 /// What is shown in place of the picture, and over it; no sample depends on this.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Looking(pub Look);
+pub struct ViewMode(pub ViewOptions);
 
 /// The part of the picture that gets all samples, in fractions of it: left, top, right, bottom.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
-pub struct Brush(pub Option<[f64; 4]>);
+pub struct RenderRegion(pub Option<[f64; 4]>);
 
 /// The far end of the pipe.
 #[derive(Resource)]
@@ -68,16 +68,16 @@ pub struct CurrentScene(pub Arc<LoadedScene>);
 
 /// How many scenes have taken their place so far.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Adopted(pub u64);
+pub struct SceneGeneration(pub u64);
 
 /// What the workers have been given, to compare with.
 #[derive(Resource, Default)]
-pub struct Shown {
+pub struct RenderState {
     pub inputs: SceneInputs,
     pub extraction: Option<Extraction>,
     pub trees: Trees,
     pub(super) extents: ExtentCache,
-    pub(super) look: Look,
+    pub(super) look: ViewOptions,
     pub(super) settings: RenderSettings,
     pub(super) display: Display,
     pub(super) size: Option<PictureSize>,
@@ -100,7 +100,7 @@ pub struct Shown {
     pub(super) revision: u64,
 }
 
-impl Shown {
+impl RenderState {
     /// Of the picture that is rendered now.
     pub(super) fn generation(&self) -> u64 {
         self.generation
@@ -122,4 +122,4 @@ impl Shown {
 
 /// What this frame found to be different.
 #[derive(Resource, Default)]
-pub struct Found(pub Changes);
+pub struct FrameChanges(pub Changes);

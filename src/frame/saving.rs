@@ -1,7 +1,7 @@
 //! Saves the open scene beside the picture: the world is described in the frame, and written on a thread of its own.
 
 use super::Waker;
-use super::beside::Beside;
+use super::background::BackgroundTasks;
 use super::history::{Content, History};
 use super::resources::{Clock, CurrentScene};
 use super::status::{MessageKind, Status};
@@ -88,7 +88,7 @@ pub fn save(world: &mut World) {
         let clean = History::content(world);
         let description = Description::of(world, current.as_deref());
         let content = SceneContent::of(world, &description);
-        if let Some(title) = world.resource::<Beside>().mesh_in_the_making() {
+        if let Some(title) = world.resource::<BackgroundTasks>().mesh_in_the_making() {
             let text = format!("{title} is not done, so it is not in the file: save again when it is");
             world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
         }

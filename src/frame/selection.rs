@@ -1,6 +1,6 @@
 //! What is selected, and what lies under the mouse.
 
-use super::resources::Shown;
+use super::resources::RenderState;
 use super::rig::Rig;
 use crate::geometry::Ray;
 use crate::render::Camera;
@@ -113,7 +113,7 @@ pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
         let at = world.get::<Placement>(entity)?.translation;
         return Some(OwnBox { min, max, world_from_box: DAffine3::from_translation(at) });
     }
-    let shown = &mut *world.resource_mut::<Shown>();
+    let shown = &mut *world.resource_mut::<RenderState>();
     let object = shown.inputs.objects.iter().find(|object| object.entity == entity)?;
     let (min, max) = shown.extents.own_box(&object.shape).unwrap_or_default();
     Some(OwnBox { min, max, world_from_box: object.placement.affine() })

@@ -1,7 +1,6 @@
 //! One scene, its picture, and everything between: what a window or a script holds on to.
 
-use super::around::Around;
-use super::beside::Beside;
+use super::background::BackgroundTasks;
 use super::edit::{EditQueue, edit_scene};
 use super::explain::{Explaining, explain_pixel};
 use super::focus::{Focus, hold_focus};
@@ -11,20 +10,21 @@ use super::navigation::{Rig, Turning};
 use super::recording::{Recorder, record};
 use super::reload::{HotReload, reload};
 use super::resources::{
-    Adopted, Brush, Clock, CurrentScene, Found, Hidden, Looking, MAX_THREADS, Paused, PictureSize, Renderer, Shown,
-    StopAt, Threads,
+    Clock, CurrentScene, FrameChanges, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer,
+    SceneGeneration, StopAt, Threads, ViewMode,
 };
 use super::saving::{SavedAs, Saving, save};
+use super::scene_bounds::SceneBounds;
 use super::selection::{OwnBox, Selection};
 use super::status::{Picture, Status};
 use super::systems::{accumulate, adopt, develop, edit, present, rebuild, reset};
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
-use super::{Command, Target, Waits};
+use super::{Command, LatencyHistogram, Target};
 use crate::render::{Film, Prepared, RenderSettings};
 use crate::scene::{
-    Description, Developing, Extent, Inventory, LoadedScene, Rendering, SceneInputs, SceneSource, ShotDraft, UpAxis,
-    check_film_size,
+    Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, Rendering, SceneInputs, SceneSource,
+    UpAxis, check_film_size,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -95,13 +95,13 @@ impl Session {
         let mut world = World::new();
         world.insert_resource(Renderer(worker));
         let waker = options.waker;
-        world.insert_resource(Beside::new(waker.clone()));
+        world.insert_resource(BackgroundTasks::new(waker.clone()));
         world.insert_resource(PictureSize { width: options.width, height: options.height });
         world.insert_resource(Rendering(RenderSettings { seed: options.seed, ..RenderSettings::default() }));
         world.insert_resource(StopAt(options.target));
         world.insert_resource(Threads(threads));
         world.insert_resource(ModelUp(options.up));
-        let around = Around {
+        let around = SceneBounds {
             extent: Extent::default(),
             corners: Vec::new(),
             home: Rig::default(),
@@ -111,13 +111,13 @@ impl Session {
         world.insert_resource(around);
         world.init_resource::<Clock>();
         world.init_resource::<Paused>();
-        world.init_resource::<Developing>();
+        world.init_resource::<DisplaySettings>();
         world.init_resource::<CommandQueue>();
-        world.init_resource::<Shown>();
-        world.init_resource::<Found>();
+        world.init_resource::<RenderState>();
+        world.init_resource::<FrameChanges>();
         world.init_resource::<Picture>();
         world.init_resource::<Status>();
-        world.init_resource::<Adopted>();
+        world.init_resource::<SceneGeneration>();
         world.init_resource::<SavedAs>();
         world.init_resource::<Recorder>();
         world.insert_resource(Saving::new(waker.clone()));
@@ -129,8 +129,8 @@ impl Session {
         world.init_resource::<Bookmarks>();
         world.init_resource::<ViewTrail>();
         world.init_resource::<Hidden>();
-        world.init_resource::<Looking>();
-        world.init_resource::<Brush>();
+        world.init_resource::<ViewMode>();
+        world.init_resource::<RenderRegion>();
         world.init_resource::<Explaining>();
 
         let mut frame = Schedule::new(Frame);
@@ -166,7 +166,7 @@ impl Session {
         let aspect = self.world.resource::<PictureSize>().aspect();
         let up = self.world.resource::<ModelUp>().0;
         let pool = self.world.resource::<Renderer>().0.pool();
-        self.world.resource::<Beside>().load(source, up, aspect, pool);
+        self.world.resource::<BackgroundTasks>().load(source, up, aspect, pool);
     }
 
     /// Takes over a scene that has been read already.
@@ -227,20 +227,20 @@ impl Session {
         self.world.resource::<Renderer>().0.keep_film()
     }
 
-    /// What a picture of what is seen now is to say about itself: see [`ShotDraft::note`].
-    pub fn shot_draft(&mut self) -> ShotDraft {
+    /// What a picture of what is seen now is to say about itself: see [`MetadataDraft::note`].
+    pub fn shot_draft(&mut self) -> MetadataDraft {
         let current = self.world.get_resource::<CurrentScene>().map(|current| current.0.clone());
-        ShotDraft::of(&mut self.world, current.as_deref())
+        MetadataDraft::of(&mut self.world, current.as_deref())
     }
 
     /// What the workers render now, and how.
     pub fn rendered(&self) -> Option<(Prepared, RenderSettings)> {
-        self.world.resource::<Shown>().rendered()
+        self.world.resource::<RenderState>().rendered()
     }
 
     /// How many scenes have taken their place so far.
     pub fn n_adopted(&self) -> u64 {
-        self.world.resource::<Adopted>().0
+        self.world.resource::<SceneGeneration>().0
     }
 
     /// Where the open scene is saved: where it was saved last, or else the scene file that was opened.
@@ -274,13 +274,13 @@ impl Session {
     }
 
     /// How long the workers took to drop what a change had made worthless, the latest times.
-    pub fn cancels(&self) -> Waits {
+    pub fn cancels(&self) -> LatencyHistogram {
         self.world.resource::<Renderer>().0.cancels()
     }
 
     /// The scene as the picture shows it.
     pub fn inputs(&self) -> &SceneInputs {
-        &self.world.resource::<Shown>().inputs
+        &self.world.resource::<RenderState>().inputs
     }
 
     /// Lists of what is in the scene, which stay right for as long as [`revision`](Self::revision) does not change.
@@ -290,7 +290,7 @@ impl Session {
 
     /// Grows when anything but the camera has been touched.
     pub fn revision(&self) -> u64 {
-        self.world.resource::<Shown>().revision()
+        self.world.resource::<RenderState>().revision()
     }
 
     /// The box around an object or a light, along its own axes.
@@ -300,7 +300,7 @@ impl Session {
 
     /// Memory of all trees, bytes.
     pub fn tree_bytes(&self) -> usize {
-        self.world.resource::<Shown>().trees.bytes()
+        self.world.resource::<RenderState>().trees.bytes()
     }
 
     /// Nothing will come unless something is changed: the workers sleep and nothing is being read.
@@ -311,7 +311,12 @@ impl Session {
         let no_commands = self.world.resource::<CommandQueue>().0.is_empty();
         let saved = self.world.resource::<Saving>().is_idle();
         let explained = self.world.resource::<Explaining>().is_idle();
-        asleep && nothing_to_show && no_commands && saved && explained && self.world.resource::<Beside>().is_idle()
+        asleep
+            && nothing_to_show
+            && no_commands
+            && saved
+            && explained
+            && self.world.resource::<BackgroundTasks>().is_idle()
     }
 
     /// When [`update`](Self::update) should be called even if nothing calls the waker; `None` for never.

@@ -1,22 +1,23 @@
 //! The systems of a frame, in the order in which they run. Each says what it reads and what it writes.
 
-use super::around::Around;
-use super::beside::{Beside, Finished};
+use super::background::{BackgroundTasks, Finished};
 use super::focus::Focus;
 use super::history::History;
 use super::navigation;
 use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
 use super::resources::{
-    Adopted, Brush, Clock, CurrentScene, Found, Hidden, Looking, Paused, PictureSize, Renderer, Shown, StopAt, Threads,
+    Clock, CurrentScene, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer,
+    SceneGeneration, StopAt, Threads, ViewMode,
 };
 use super::saving::SavedAs;
+use super::scene_bounds::SceneBounds;
 use super::status::{MessageKind, Picture, Status};
 use super::views::ViewTrail;
 use super::worker::{Job, Orders};
 use crate::render::RenderSettings;
 use crate::scene::{
-    CameraInput, Developing, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal, Placement, PointLight,
-    Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
+    CameraInput, DisplaySettings, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal, Placement,
+    PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
@@ -77,15 +78,15 @@ impl Touched<'_, '_> {
 
 /// Puts finished work into the world: a scene that was read takes the place of the old one.
 ///
-/// Reads [`Beside`]; writes entities, the resources of the scene, [`CurrentScene`], [`Status`].
+/// Reads [`BackgroundTasks`]; writes entities, the resources of the scene, [`CurrentScene`], [`Status`].
 pub fn edit(world: &mut World) {
     let now = world.resource::<Clock>().0;
-    for finished in world.resource::<Beside>().take() {
+    for finished in world.resource::<BackgroundTasks>().take() {
         match finished {
             Finished::Mesh(remade) => super::remesh::take(world, *remade),
             Finished::Picture { entity, part, result } => super::edit::take_picture(world, entity, part, result),
             Finished::Trees(trees) => {
-                let mut shown = world.resource_mut::<Shown>();
+                let mut shown = world.resource_mut::<RenderState>();
                 let hasty = shown.trees.hasty().len();
                 shown.trees.extend(trees);
                 shown.better_trees |= shown.trees.hasty().len() < hasty;
@@ -110,13 +111,13 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
         navigation::Rig::default,
         |(view, projection, lens)| navigation::Rig { view: *view, projection: *projection, lens: *lens },
     );
-    world.resource_mut::<Around>().home = home;
+    world.resource_mut::<SceneBounds>().home = home;
     world.resource_mut::<History>().forget();
     world.resource_mut::<ViewTrail>().forget();
     world.insert_resource(Focus::default());
     world.insert_resource(super::Selection::default());
     world.resource_mut::<super::Explaining>().forget();
-    let mut shown = world.resource_mut::<Shown>();
+    let mut shown = world.resource_mut::<RenderState>();
     shown.trees.extend(scene.trees.clone());
     shown.adopted = Some(SCENE_OPENED.to_owned());
     let mut status = world.resource_mut::<Status>();
@@ -126,23 +127,23 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     }
     world.insert_resource(CurrentScene(Arc::new(scene)));
     world.insert_resource(SavedAs::default());
-    world.resource_mut::<Adopted>().0 += 1;
+    world.resource_mut::<SceneGeneration>().0 += 1;
 }
 
 /// Finds out what changed, and makes anew that part of the snapshot and no other.
 ///
-/// Reads everything that the picture depends on; writes [`Shown`], [`Found`], [`Around`], [`Status`].
+/// Reads everything that the picture depends on; writes [`RenderState`], [`FrameChanges`], [`SceneBounds`], [`Status`].
 #[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
 pub fn rebuild(
     mut touched: Touched,
     queries: SceneQueries,
     rendering: Option<Res<Rendering>>,
-    beside: Res<Beside>,
+    beside: Res<BackgroundTasks>,
     renderer: Res<Renderer>,
     clock: Res<Clock>,
-    mut shown: ResMut<Shown>,
-    mut found: ResMut<Found>,
-    mut around: ResMut<Around>,
+    mut shown: ResMut<RenderState>,
+    mut found: ResMut<FrameChanges>,
+    mut around: ResMut<SceneBounds>,
     mut status: ResMut<Status>,
 ) {
     let mut changes = Changes::default();
@@ -189,7 +190,7 @@ pub fn rebuild(
             shown.revision += 1;
         }
         shown.inputs = inputs;
-        let Shown { inputs, extraction, trees, extents, .. } = &mut *shown;
+        let RenderState { inputs, extraction, trees, extents, .. } = &mut *shown;
         let rebuilt = match (extraction.as_mut(), part) {
             (None, _) => {
                 *extraction = Some(Extraction::new(inputs, trees));
@@ -213,7 +214,7 @@ pub fn rebuild(
         }
     }
     if std::mem::take(&mut shown.better_trees)
-        && let Shown { extraction: Some(extraction), trees, generation, .. } = &mut *shown
+        && let RenderState { extraction: Some(extraction), trees, generation, .. } = &mut *shown
     {
         // The same hits, sooner: no sample is lost, and no restart is told. After a restart it comes with the job.
         extraction.take_trees(trees);
@@ -232,7 +233,7 @@ fn is_another_list(old: &SceneInputs, new: &SceneInputs) -> bool {
 }
 
 /// What has been built in a hurry is built again at leisure, once it is seen.
-fn improve_trees(shown: &mut Shown, beside: &Beside, renderer: &Renderer) {
+fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer) {
     let hasty = shown.trees.hasty();
     shown.improving.retain(|shape| hasty.contains(shape));
     let new: Vec<Shape> = hasty.into_iter().filter(|shape| !shown.improving.contains(shape)).collect();
@@ -266,8 +267,13 @@ fn missing_trees(inputs: &SceneInputs, trees: &mut Trees) -> Vec<Shape> {
 
 /// Drops the samples when they are worthless, and says why.
 ///
-/// Reads [`Found`], [`PictureSize`]; writes [`Shown`], [`Status`].
-pub fn reset(size: Res<PictureSize>, mut found: ResMut<Found>, mut shown: ResMut<Shown>, mut status: ResMut<Status>) {
+/// Reads [`FrameChanges`], [`PictureSize`]; writes [`RenderState`], [`Status`].
+pub fn reset(
+    size: Res<PictureSize>,
+    mut found: ResMut<FrameChanges>,
+    mut shown: ResMut<RenderState>,
+    mut status: ResMut<Status>,
+) {
     if !size.is_empty() && shown.size != Some(*size) {
         found.0.add(Level::Resize, if shown.size.is_some() { "size" } else { "start" });
         shown.size = Some(*size);
@@ -282,7 +288,7 @@ pub fn reset(size: Res<PictureSize>, mut found: ResMut<Found>, mut shown: ResMut
 
 /// Tells the workers what to add samples to, until when, and with how many threads.
 ///
-/// Reads [`Shown`], [`StopAt`], [`Threads`], [`Paused`]; writes [`Found`] and to the [`Renderer`].
+/// Reads [`RenderState`], [`StopAt`], [`Threads`], [`Paused`]; writes [`FrameChanges`] and to the [`Renderer`].
 #[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
 pub fn accumulate(
     stop_at: Res<StopAt>,
@@ -290,10 +296,10 @@ pub fn accumulate(
     paused: Res<Paused>,
     hidden: Res<Hidden>,
     size: Res<PictureSize>,
-    brush: Res<Brush>,
+    brush: Res<RenderRegion>,
     renderer: Res<Renderer>,
-    mut shown: ResMut<Shown>,
-    mut found: ResMut<Found>,
+    mut shown: ResMut<RenderState>,
+    mut found: ResMut<FrameChanges>,
 ) {
     let mut orders = Orders::default();
     // The first frame finds what the worker was started with.
@@ -332,13 +338,13 @@ pub fn accumulate(
 
 /// Tells the workers how to develop the film; no sample is lost.
 ///
-/// Reads [`Developing`]; writes [`Shown`], [`Found`], and to the [`Renderer`].
+/// Reads [`DisplaySettings`]; writes [`RenderState`], [`FrameChanges`], and to the [`Renderer`].
 pub fn develop(
-    developing: Option<Res<Developing>>,
-    looking: Res<Looking>,
+    developing: Option<Res<DisplaySettings>>,
+    looking: Res<ViewMode>,
     renderer: Res<Renderer>,
-    mut shown: ResMut<Shown>,
-    mut found: ResMut<Found>,
+    mut shown: ResMut<RenderState>,
+    mut found: ResMut<FrameChanges>,
 ) {
     if shown.look != looking.0 {
         found.0.add(Level::Redraw, "view");
@@ -355,14 +361,14 @@ pub fn develop(
 
 /// Fetches what the workers have finished.
 ///
-/// Reads the [`Renderer`] and [`Beside`]; writes [`Picture`] and [`Status`].
+/// Reads the [`Renderer`] and [`BackgroundTasks`]; writes [`Picture`] and [`Status`].
 pub fn present(
     renderer: Res<Renderer>,
-    beside: Res<Beside>,
+    beside: Res<BackgroundTasks>,
     clock: Res<Clock>,
     paused: Res<Paused>,
     mut picture: ResMut<Picture>,
-    shown: ResMut<Shown>,
+    shown: ResMut<RenderState>,
     mut status: ResMut<Status>,
 ) {
     if renderer.0.has_picture() {

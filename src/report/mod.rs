@@ -1,12 +1,12 @@
 //! Speed against error: how fast a picture gets right, what each technique is worth, and whether the renderer's own
 //! estimate of its error can be believed.
 //!
-//! [`climb`] renders one scene at 1, 2, 4 … samples per pixel; a [`ReferenceStore`] has the picture to measure
-//! against; [`Ladder::measure`] brings the two together; [`page()`] and [`csv`] say what came of it.
+//! [`measure_curve`] renders one scene at 1, 2, 4 … samples per pixel; a [`ReferenceStore`] has the picture to measure
+//! against; [`ConvergenceCurve::measure`] brings the two together; [`page()`] and [`csv`] say what came of it.
 
+mod convergence;
 mod curve;
 mod flip;
-mod ladder;
 mod metrics;
 mod mismatch;
 mod outcome;
@@ -17,9 +17,9 @@ mod reference;
 mod table;
 mod trees;
 
+pub use convergence::{ConvergenceCurve, CurveStep, Limits, Spent, Step, cpu_seconds, measure_curve};
 pub use curve::{Seconds, seconds_to, slope};
 pub use flip::flip;
-pub use ladder::{Ladder, Limits, Rung, Spent, Step, climb, cpu_seconds};
 pub use metrics::{Distance, RELATIVE_FLOOR};
 pub use mismatch::{foreign_share, is_another_scene};
 pub use outcome::{Ablation, SceneOutcome};

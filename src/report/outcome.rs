@@ -1,6 +1,6 @@
 //! What a report found out about one scene.
 
-use super::{Ladder, LinearPicture, Made, is_another_scene};
+use super::{ConvergenceCurve, LinearPicture, Made, is_another_scene};
 use crate::render::Display;
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ pub struct SceneOutcome {
     pub height: u32,
     /// How its pictures are developed.
     pub display: Display,
-    pub ladder: Ladder,
+    pub ladder: ConvergenceCurve,
     pub ablations: Vec<Ablation>,
     pub reference: LinearPicture,
     /// Of an own reference; `None` for a given one.
@@ -31,14 +31,14 @@ pub struct SceneOutcome {
 pub struct Ablation {
     /// What is missing.
     pub technique: &'static str,
-    pub ladder: Ladder,
+    pub ladder: ConvergenceCurve,
     /// Not a bit of the picture changed: the scene does not use it.
     pub is_unused: bool,
 }
 
 impl Ablation {
     /// How many times as long the same error takes without it, by relMSE times seconds at the last step.
-    pub fn cost(&self, with: &Ladder) -> f64 {
+    pub fn cost(&self, with: &ConvergenceCurve) -> f64 {
         self.ladder.last().inefficiency() / with.last().inefficiency()
     }
 }

@@ -3,7 +3,7 @@
 use super::curve::Seconds;
 use super::outcome::{Ablation, SceneOutcome};
 use super::plot::{Band, Plot, Series, Style, escape, number};
-use super::{Ladder, LinearPicture};
+use super::{ConvergenceCurve, LinearPicture};
 use crate::printable;
 use crate::render::{Display, develop_pixel};
 use base64::Engine;
@@ -220,7 +220,7 @@ fn ablation_plot(outcome: &SceneOutcome) -> Plot {
     }
 }
 
-fn steps_table(ladder: &Ladder) -> String {
+fn steps_table(ladder: &ConvergenceCurve) -> String {
     let mut rows = String::new();
     for step in &ladder.steps {
         let estimate = step.estimate.map_or("<td>–</td><td>–</td>".to_owned(), |e| {

@@ -1,6 +1,6 @@
 //! All steps of all scenes as one CSV file (RFC 4180), for those who draw their own conclusions.
 
-use super::{Ladder, SceneOutcome};
+use super::{ConvergenceCurve, SceneOutcome};
 use std::fmt::Write;
 
 const HEADER: &str = "scene,width,height,without,spp,wall_s,cpu_s,threads,camera_paths,rays,relmse,rmse,flip,\
@@ -19,7 +19,7 @@ pub fn csv(outcomes: &[SceneOutcome]) -> String {
     text
 }
 
-fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, ladder: &Ladder) {
+fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, ladder: &ConvergenceCurve) {
     let optional = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value}"));
     for step in &ladder.steps {
         let (spent, distance, estimate) = (step.spent, step.distance, step.estimate);

@@ -106,14 +106,14 @@ pub struct MaterialSlots(pub Vec<Entity>);
 #[derive(Component, Clone, Debug, PartialEq)]
 pub enum Material {
     Diffuse {
-        albedo: Paint,
+        albedo: ColorParam,
     },
     Mirror {
-        reflectance: Paint,
+        reflectance: ColorParam,
     },
     Metal {
-        alpha: Amount,
-        reflectance: Paint,
+        alpha: ScalarParam,
+        reflectance: ColorParam,
         fresnel: Fresnel,
         compensate: bool,
     },
@@ -122,9 +122,9 @@ pub enum Material {
         absorption: Vec3,
     },
     Phong {
-        diffuse: Paint,
+        diffuse: ColorParam,
         ambient: f32,
-        specular: Amount,
+        specular: ScalarParam,
         shininess: f32,
         transparency: f32,
         ior: f32,
@@ -132,12 +132,12 @@ pub enum Material {
     },
     /// Of material entities; at most one part is emissive, and then `weight` is a number.
     Blend {
-        weight: Amount,
+        weight: ScalarParam,
         a: Entity,
         b: Entity,
     },
     Emissive {
-        radiance: Paint,
+        radiance: ColorParam,
     },
 }
 
@@ -149,7 +149,7 @@ pub const PHONG_LOBES: usize = 3;
 
 impl Material {
     /// The one of surfaces that have none.
-    pub const GREY: Self = Self::Diffuse { albedo: Paint::Rgb(Vec3::splat(0.5)) };
+    pub const GREY: Self = Self::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) };
 
     /// What it looks up.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<SurfaceTexture>> {
@@ -163,12 +163,12 @@ impl Material {
             Self::Glass { .. } => (None, None),
         };
         let of_amount = amount.and_then(|amount| match amount {
-            Amount::Texture(texture) => Some(texture),
-            Amount::Number(_) => None,
+            ScalarParam::Texture(texture) => Some(texture),
+            ScalarParam::Number(_) => None,
         });
         let of_paint = paint.and_then(|paint| match paint {
-            Paint::Texture(texture) => Some(texture),
-            Paint::Rgb(_) => None,
+            ColorParam::Texture(texture) => Some(texture),
+            ColorParam::Rgb(_) => None,
         });
         of_amount.into_iter().chain(of_paint)
     }
@@ -176,12 +176,12 @@ impl Material {
 
 /// A colour, linear Rec. 709, or a texture.
 #[derive(Clone, Debug)]
-pub enum Paint {
+pub enum ColorParam {
     Rgb(Vec3),
     Texture(Arc<SurfaceTexture>),
 }
 
-impl PartialEq for Paint {
+impl PartialEq for ColorParam {
     /// Textures are equal when they are the same one in memory.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
@@ -194,12 +194,12 @@ impl PartialEq for Paint {
 
 /// A number, or the red channel of a texture.
 #[derive(Clone, Debug)]
-pub enum Amount {
+pub enum ScalarParam {
     Number(f32),
     Texture(Arc<SurfaceTexture>),
 }
 
-impl PartialEq for Amount {
+impl PartialEq for ScalarParam {
     /// Textures are equal when they are the same one in memory.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
@@ -295,4 +295,4 @@ pub struct Rendering(pub RenderSettings);
 
 /// Exposure and tone curve; no sample depends on them.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
-pub struct Developing(pub Display);
+pub struct DisplaySettings(pub Display);

@@ -7,8 +7,8 @@
 
 use super::camera::camera;
 use super::components::{
-    Amount, Balls, Developing, FilmSize, Material, MeshOrigin, Ordinal, Paint, Rendering, SceneEnvironment, Shape,
-    SurfaceTexture,
+    Balls, ColorParam, DisplaySettings, FilmSize, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
+    SceneEnvironment, Shape, SurfaceTexture,
 };
 use super::file::{
     self, CameraPart, DisplayPart, EnvironmentPart, FilmPart, LightPart, MaterialPart, MeshShadingPart, MeshSourcePart,
@@ -54,7 +54,7 @@ impl Description {
         let environment = writer.environment(&inputs.environment);
         let rendering = world.get_resource::<Rendering>().copied().unwrap_or_default().0;
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
-        let display = world.get_resource::<Developing>().copied().unwrap_or_default().0;
+        let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default().0;
         let lights = inputs.lights.iter().map(|light| LightPart::Point {
             name: light.name.clone(),
             position: light.placement.translation,
@@ -179,14 +179,14 @@ impl<'a> Writer<'a> {
         let Shape::Mesh(mesh) = shape else { return false };
         let Some(loaded) = self.loaded else { return false };
         let Some(known) = self.loaded_meshes.get(&address(mesh)) else { return false };
-        let paint = |written: &file::Paint, now: &Paint| match (written, now) {
-            (file::Paint::Rgb(a), Paint::Rgb(b)) => a == b,
-            (file::Paint::Texture(name), Paint::Texture(texture)) => *name == texture.name,
+        let paint = |written: &file::ColorParam, now: &ColorParam| match (written, now) {
+            (file::ColorParam::Rgb(a), ColorParam::Rgb(b)) => a == b,
+            (file::ColorParam::Texture(name), ColorParam::Texture(texture)) => *name == texture.name,
             // Its picture could not be had.
-            (file::Paint::Texture(name), Paint::Rgb(rgb)) => {
+            (file::ColorParam::Texture(name), ColorParam::Rgb(rgb)) => {
                 !loaded.pictures.contains_key(name) && *rgb == Vec3::splat(0.5)
             }
-            (file::Paint::Rgb(_), Paint::Texture(_)) => false,
+            (file::ColorParam::Rgb(_), ColorParam::Texture(_)) => false,
         };
         let same = |written: &MaterialPart, now: &Material| match (written, now) {
             (MaterialPart::Diffuse { albedo: a }, Material::Diffuse { albedo: b }) => paint(a, b),
@@ -286,17 +286,17 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn paint(&mut self, paint: &Paint) -> file::Paint {
+    fn paint(&mut self, paint: &ColorParam) -> file::ColorParam {
         match paint {
-            Paint::Rgb(rgb) => file::Paint::Rgb(*rgb),
-            Paint::Texture(texture) => file::Paint::Texture(self.texture_name(texture)),
+            ColorParam::Rgb(rgb) => file::ColorParam::Rgb(*rgb),
+            ColorParam::Texture(texture) => file::ColorParam::Texture(self.texture_name(texture)),
         }
     }
 
-    fn amount(&mut self, amount: &Amount) -> file::Amount {
+    fn amount(&mut self, amount: &ScalarParam) -> file::ScalarParam {
         match amount {
-            Amount::Number(value) => file::Amount::Number(*value),
-            Amount::Texture(texture) => file::Amount::Texture(self.texture_name(texture)),
+            ScalarParam::Number(value) => file::ScalarParam::Number(*value),
+            ScalarParam::Texture(texture) => file::ScalarParam::Texture(self.texture_name(texture)),
         }
     }
 

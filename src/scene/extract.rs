@@ -3,7 +3,7 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`Part`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{Amount, MAX_LOBES, Material, PHONG_LOBES, Paint, PointLight, Shape, SurfaceTexture};
+use super::components::{ColorParam, MAX_LOBES, Material, PHONG_LOBES, PointLight, ScalarParam, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
 use super::placement::Placement;
 use super::trees::{Trees, address};
@@ -353,7 +353,7 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
     for _ in 0..2 * MAX_LOBES {
         match open.pop() {
             Some(Some(Material::Blend { weight, a, b })) => {
-                textured |= matches!(weight, Amount::Texture(_));
+                textured |= matches!(weight, ScalarParam::Texture(_));
                 open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
             }
             Some(Some(Material::Emissive { .. })) => (lobes, glowing) = (lobes + 1, glowing + 1),
@@ -380,17 +380,17 @@ impl TextureTable {
         })
     }
 
-    fn color(&mut self, paint: &Paint) -> ColorInput {
+    fn color(&mut self, paint: &ColorParam) -> ColorInput {
         match paint {
-            Paint::Rgb(rgb) => ColorInput::Constant(*rgb),
-            Paint::Texture(texture) => ColorInput::Texture(self.id(texture)),
+            ColorParam::Rgb(rgb) => ColorInput::Constant(*rgb),
+            ColorParam::Texture(texture) => ColorInput::Texture(self.id(texture)),
         }
     }
 
-    fn scalar(&mut self, amount: &Amount) -> ScalarInput {
+    fn scalar(&mut self, amount: &ScalarParam) -> ScalarInput {
         match amount {
-            Amount::Number(value) => ScalarInput::Constant(*value),
-            Amount::Texture(texture) => ScalarInput::Texture(self.id(texture)),
+            ScalarParam::Number(value) => ScalarInput::Constant(*value),
+            ScalarParam::Texture(texture) => ScalarInput::Texture(self.id(texture)),
         }
     }
 }

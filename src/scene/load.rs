@@ -2,17 +2,17 @@
 
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::components::{Balls, Shape};
+use super::default_scene;
 use super::error::{Problem, SceneError, suggestion};
 use super::file::{
     EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, ball_grid, locate,
 };
+use super::image_metadata::ImageMetadata;
 use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::picture::read_picture;
 use super::relative::{path_to_text, text_to_path};
-use super::shot::Shot;
-use super::showcase;
 use super::source::{SceneSource, UpAxis};
 use super::stamp::stamp;
 use glam::DVec3;
@@ -70,7 +70,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mesh_source = MeshSourcePart::Obj(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
             let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShadingPart::Auto, None, &folder), Ok)?;
-            let file = showcase::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
+            let file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
             scene.balls = scene.file.objects.iter().map(|_| None).collect();
@@ -93,7 +93,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
 /// The scene that a picture shows, seen as the picture shows it.
 fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     let failed = |reason: String| SceneError::in_file(path, reason);
-    let shot = Shot::read(path).map_err(failed)?;
+    let shot = ImageMetadata::read(path).map_err(failed)?;
     let source = shot.source(path).map_err(failed)?;
     let options = LoadOptions { up: options.up.or(shot.up()), ..*options };
     let mut scene = match (&shot.text, source) {

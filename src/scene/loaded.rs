@@ -2,8 +2,8 @@
 
 use super::components::Balls;
 use super::file::SceneFile;
+use super::image_metadata::ImageMetadata;
 use super::meshes::LoadedMesh;
-use super::shot::Shot;
 use super::source::{SceneSource, UpAxis};
 use super::stamp::Stamp;
 use super::trees::Trees;
@@ -32,7 +32,7 @@ pub struct LoadedScene {
     /// Which axis of a model was asked to point up.
     pub up: Option<UpAxis>,
     /// What the picture said that this was opened by.
-    pub shot: Option<Shot>,
+    pub shot: Option<ImageMetadata>,
     /// Reading and parsing.
     pub load_seconds: f64,
     /// Building trees.

@@ -1,7 +1,7 @@
 //! The meshes that a scene names: from OBJ files or made by the program, shaded as asked, with their own materials.
 
 use super::error::SceneError;
-use super::file::{Amount, MaterialPart, MeshShadingPart, MeshSourcePart, Paint, Rgb, TexturePart, WrapPart};
+use super::file::{ColorParam, MaterialPart, MeshShadingPart, MeshSourcePart, Rgb, ScalarParam, TexturePart, WrapPart};
 use super::obj::{ImportedMaterial, ImportedObj, ObjNormals, ObjOptions, load_obj_with};
 use super::relative::text_to_path;
 use super::stamp::{Stamp, stamp};
@@ -232,11 +232,11 @@ impl LoadedMesh {
     /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
     /// matte, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
-        let share = |color: Vec3| Paint::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
+        let share = |color: Vec3| ColorParam::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
         let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);
         if glows || material.emission_texture.is_some() {
             let radiance = material.emission.unwrap_or(Vec3::ONE).max(Vec3::ZERO);
-            let radiance = self.texture(material.emission_texture.as_ref()).unwrap_or(Paint::Rgb(radiance));
+            let radiance = self.texture(material.emission_texture.as_ref()).unwrap_or(ColorParam::Rgb(radiance));
             return MaterialPart::Emissive { radiance };
         }
         match material.illumination_model {
@@ -252,7 +252,7 @@ impl LoadedMesh {
                     Some((share, shininess)) => MaterialPart::Phong {
                         diffuse: albedo,
                         ambient: 1.0,
-                        specular: Amount::Number(share),
+                        specular: ScalarParam::Number(share),
                         shininess,
                         transparency: 0.0,
                         ior: 1.5,
@@ -264,7 +264,7 @@ impl LoadedMesh {
         }
     }
 
-    fn texture(&mut self, file: Option<&PathBuf>) -> Option<Paint> {
+    fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorParam> {
         let file = file?;
         let name = file.display().to_string();
         let part = TexturePart::Image {
@@ -276,7 +276,7 @@ impl LoadedMesh {
             smooth: true,
         };
         self.textures.push((name.clone(), part, file.clone()));
-        Some(Paint::Texture(name))
+        Some(ColorParam::Texture(name))
     }
 }
 

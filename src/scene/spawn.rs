@@ -2,8 +2,8 @@
 
 use super::camera::{camera, unit};
 use super::components::{
-    Amount, Developing, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, Paint, PointLight, Rendering,
-    SceneEnvironment, Shape, SurfaceTexture,
+    ColorParam, DisplaySettings, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, PointLight, Rendering,
+    ScalarParam, SceneEnvironment, Shape, SurfaceTexture,
 };
 use super::file::{self, EnvironmentPart, LightPart, MaterialPart, ObjectPart, TexturePart};
 use super::loaded::LoadedScene;
@@ -106,7 +106,7 @@ impl LoadedScene {
             ..RenderSettings::default()
         }));
         let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
-        world.insert_resource(Developing(display));
+        world.insert_resource(DisplaySettings(display));
     }
 
     fn environment(&self) -> Environment {
@@ -178,18 +178,18 @@ pub(super) fn material(
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
     materials: &HashMap<&str, Entity>,
 ) -> Material {
-    let paint = |paint: &file::Paint| match paint {
-        file::Paint::Rgb(rgb) => Paint::Rgb(*rgb),
+    let paint = |paint: &file::ColorParam| match paint {
+        file::ColorParam::Rgb(rgb) => ColorParam::Rgb(*rgb),
         // Only a mesh's own picture can be missing, and that was said in a warning.
-        file::Paint::Texture(name) => textures
+        file::ColorParam::Texture(name) => textures
             .get(name.as_str())
-            .map_or(Paint::Rgb(glam::Vec3::splat(0.5)), |texture| Paint::Texture(texture.clone())),
+            .map_or(ColorParam::Rgb(glam::Vec3::splat(0.5)), |texture| ColorParam::Texture(texture.clone())),
     };
-    let amount = |amount: &file::Amount| match amount {
-        file::Amount::Number(value) => Amount::Number(*value),
-        file::Amount::Texture(name) => {
-            textures.get(name.as_str()).map_or(Amount::Number(0.5), |texture| Amount::Texture(texture.clone()))
-        }
+    let amount = |amount: &file::ScalarParam| match amount {
+        file::ScalarParam::Number(value) => ScalarParam::Number(*value),
+        file::ScalarParam::Texture(name) => textures
+            .get(name.as_str())
+            .map_or(ScalarParam::Number(0.5), |texture| ScalarParam::Texture(texture.clone())),
     };
     match part {
         MaterialPart::Diffuse { albedo } => Material::Diffuse { albedo: paint(albedo) },

@@ -8,9 +8,9 @@
 //! - A file that is claimed ([`WholeFile::claim`]) has one writer at a time, from the claim to the end of writing.
 
 use super::Fingerprint;
+use super::image_metadata::FILM_KEY;
 use super::input_file::{FileKind, InputFile};
 use super::relative::absolute;
-use super::shot::FILM_KEY;
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::fmt::Display;

@@ -1,8 +1,8 @@
 //! The same scene elsewhere: moved, scaled, in map coordinates. It goes the whole way, from the text of the scene file.
 
 use super::random::Random;
-use super::stage::{tell, towards};
 use super::tally::{Energy, Tally};
+use super::test_scene::{tell, towards};
 use crate::kdtree::Hit;
 use crate::mesh::procedural;
 use crate::render::{Film, Prepared, RenderSettings, advance};

@@ -1,8 +1,8 @@
 //! Rays that bounce about in a closed white box for ever: none may get out, not even in a corner.
 
 use super::random::Random;
-use super::stage::tell;
 use super::tally::Tally;
+use super::test_scene::tell;
 use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape};
 use crate::mesh::procedural;

@@ -1,22 +1,22 @@
 //! The hard cases, counted: what other renderers are asked to mend, tried here by the million, with findings that can
 //! be replayed.
 //!
-//! Rays are held against an `f64` judge that knows no tree ([`judge`]), light against answers on paper ([`light`]), and the
+//! Rays are held against an `f64` judge that knows no tree ([`reference`]), light against answers on paper ([`light`]), and the
 //! same scene elsewhere against itself ([`anywhere`]). Every ray is a function of case, stage and index alone: the
 //! counts do not depend on threads, and the worst ray can be had again ([`Case::replay`]). Start reading at [`CASES`].
 
 mod anywhere;
 mod bounces;
 mod furnace;
-mod judge;
 mod light;
 mod random;
+mod reference;
 mod replay;
-mod stage;
 mod surfaces;
 mod tally;
+mod test_scene;
 
-pub use judge::{Judge, TEST_ERROR, Verdict};
+pub use reference::{CheckResult, ReferenceIntersector, TEST_ERROR};
 pub use replay::{Replay, ReplayError, Told};
 pub use tally::{Energy, Tally, Worst};
 

@@ -1,6 +1,6 @@
 //! One ray of a case, told in full: for people a labelled line a value, for machines the same names and numbers.
 
-use super::judge::Verdict;
+use super::reference::CheckResult;
 use crate::geometry::Ray;
 use crate::kdtree::Hit;
 use glam::Vec3;
@@ -58,11 +58,11 @@ impl Replay {
         self.push(&format!("{prefix}v"), Told::Single(hit.v));
     }
 
-    pub(super) fn push_verdict(&mut self, verdict: Verdict) {
+    pub(super) fn push_verdict(&mut self, verdict: CheckResult) {
         let (text, ratio) = match verdict {
-            Verdict::Right(ratio) => ("right", Some(ratio)),
-            Verdict::WrongT(ratio) => ("wrong t", Some(ratio)),
-            Verdict::Missed => ("missed", None),
+            CheckResult::Right(ratio) => ("right", Some(ratio)),
+            CheckResult::WrongT(ratio) => ("wrong t", Some(ratio)),
+            CheckResult::Missed => ("missed", None),
         };
         self.push("verdict", Told::Text(text.to_owned()));
         if let Some(ratio) = ratio {

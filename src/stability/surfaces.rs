@@ -1,8 +1,8 @@
 //! Cases that ask the kernel: rays against closed meshes, needles, flat things, and the surfaces that they leave.
 
-use super::judge::Judge;
 use super::random::Random;
-use super::stage::{Probe, Rays, Stage, towards};
+use super::reference::ReferenceIntersector;
+use super::test_scene::{Probe, Rays, TestScene, towards};
 use crate::geometry::Ray;
 use crate::kdtree::{BuildPreset, MeshTree, SceneTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A stage that is built when its turn comes; `None` if nothing is left of it at its place.
 pub struct Plan {
-    pub build: Box<dyn Fn() -> Option<Stage> + Send + Sync>,
+    pub build: Box<dyn Fn() -> Option<TestScene> + Send + Sync>,
 }
 
 /// Size of a scene, and its distance from the origin in units of that size.
@@ -80,10 +80,10 @@ impl Soup {
     }
 }
 
-fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: Rays) -> Stage {
+fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: Rays) -> TestScene {
     let scene = SceneTree::build(shapes);
-    let judge = Judge::of(&scene);
-    Stage { name, scene, judge, rays, brute_every }
+    let judge = ReferenceIntersector::of(&scene);
+    TestScene { name, scene, judge, rays, brute_every }
 }
 
 fn mesh_shape(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
@@ -124,7 +124,7 @@ fn slit_cube() -> Soup {
 }
 
 /// Points well inside a closed surface, within `bounds` of its corners.
-fn insides(judge: &Judge, soup: &Soup, seed: u64) -> Vec<Vec3> {
+fn insides(judge: &ReferenceIntersector, soup: &Soup, seed: u64) -> Vec<Vec3> {
     let bounds = crate::geometry::Aabb::from_points(soup.positions.iter().copied());
     let mut random = Random::new(seed, 0x1251DE);
     let candidates = (0..60).map(|_| bounds.center() + 0.5 * random.point() * bounds.size());
@@ -167,7 +167,7 @@ pub fn closed() -> Vec<Plan> {
                     } else {
                         mesh_shape(&world.tree(), Affine3A::IDENTITY)
                     };
-                    let judge = Judge::of(&SceneTree::build(vec![shape.clone()]));
+                    let judge = ReferenceIntersector::of(&SceneTree::build(vec![shape.clone()]));
                     let origins = insides(&judge, &world, index as u64);
                     let rays = rays_from_inside(world, origins.clone());
                     (!origins.is_empty()).then(|| stage(name.clone(), vec![shape], 4096, rays))

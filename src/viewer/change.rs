@@ -4,7 +4,7 @@
 //! has no difference to tell until the mesh has been whole in it.
 
 use crate::frame::navigation::Rig;
-use crate::frame::{Look, Looking, Picture, Session};
+use crate::frame::{Picture, Session, ViewMode, ViewOptions};
 use crate::render::Display;
 use bevy_ecs::prelude::Entity;
 
@@ -71,7 +71,7 @@ impl PictureChange {
 
 /// Nothing is shown in place of the picture, or over it.
 fn is_plain(session: &Session) -> bool {
-    session.world().resource::<Looking>().0 == Look::default()
+    session.world().resource::<ViewMode>().0 == ViewOptions::default()
 }
 
 /// `None` for pictures of different sizes.

@@ -23,7 +23,6 @@
 //! | [`display`] | is there a display at all |
 
 mod app;
-mod brush;
 mod camera_text;
 mod change;
 mod dialog;
@@ -36,6 +35,7 @@ mod panel;
 mod presenter;
 mod question;
 mod reaction;
+mod region_tool;
 mod saver;
 mod status;
 mod story;

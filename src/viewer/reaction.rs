@@ -1,6 +1,6 @@
 //! How long a person waits: from an input that changes the picture to the first new pixels on the window.
 
-use crate::frame::Waits;
+use crate::frame::LatencyHistogram;
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ pub struct Reaction {
     input: Option<Instant>,
     /// Inputs that wait for the picture of a generation.
     waiting: VecDeque<(u64, Instant)>,
-    waits: Waits,
+    waits: LatencyHistogram,
 }
 
 impl Reaction {
@@ -37,7 +37,7 @@ impl Reaction {
     }
 
     /// From input to picture, of the latest inputs.
-    pub fn waits(&self) -> &Waits {
+    pub fn waits(&self) -> &LatencyHistogram {
         &self.waits
     }
 }

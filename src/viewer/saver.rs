@@ -3,7 +3,7 @@
 use crate::frame::{PictureFormat, Print, Target, Waker, render_offline_until};
 use crate::render::{Display, Film, Prepared, RenderSettings};
 use crate::scene::file::check_film_size;
-use crate::scene::{ShotDraft, ShotSamples};
+use crate::scene::{ImageSamples, MetadataDraft};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -53,7 +53,7 @@ impl Saver {
     pub fn save(
         &mut self,
         film: Receiver<Film>,
-        draft: Option<ShotDraft>,
+        draft: Option<MetadataDraft>,
         display: Display,
         size: (u32, u32),
         scene: &str,
@@ -71,7 +71,7 @@ impl Saver {
     pub fn save_larger(
         &mut self,
         larger: Larger,
-        draft: Option<ShotDraft>,
+        draft: Option<MetadataDraft>,
         display: Display,
         scene: &str,
         format: PictureFormat,
@@ -132,14 +132,14 @@ fn print(
     folder: &Path,
     stem: &str,
     film: &Film,
-    draft: Option<ShotDraft>,
+    draft: Option<MetadataDraft>,
     display: &Display,
     size: (u32, u32),
     format: PictureFormat,
 ) -> Saved {
     let coarse = (film.width(), film.height()) != size;
     let uneven = coarse || film.max_spp() > film.spp();
-    let samples = ShotSamples { first: film.first_sample(), spp: film.spp(), uneven };
+    let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven };
     // Paths in the note count from the folder, whatever the picture will be called.
     let note = draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into()));
     let print = Print { film, display, size, note: note.as_deref() };

@@ -6,7 +6,7 @@ use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,
 };
-use firstlight::report::{Key, Ladder, Limits, LinearPicture, ReferenceStore, climb};
+use firstlight::report::{ConvergenceCurve, Key, Limits, LinearPicture, ReferenceStore, measure_curve};
 use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
@@ -73,12 +73,18 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
     let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
     let size = (32, 24);
     let mut told = Vec::new();
-    let rungs =
-        climb(&room, &settings, size, Limits { spp: 48, seconds: None }, &mut |share| told.push(share), &|| false);
+    let rungs = measure_curve(
+        &room,
+        &settings,
+        size,
+        Limits { spp: 48, seconds: None },
+        &mut |share| told.push(share),
+        &|| false,
+    );
     assert_eq!(rungs.iter().map(|rung| rung.spp).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
     assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
     let truth = LinearPicture::of(&render(&room, &RenderSettings { seed: 2, ..settings }, size.0, size.1, 2048).0);
-    let ladder = Ladder::measure(&rungs, &truth, &Display::default());
+    let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
     // A rung is what a render of so many samples gives, to the bit.
     assert_eq!(rungs[3].picture, LinearPicture::of(&render(&room, &settings, size.0, size.1, 8).0));
     // Against samples, which take no notice of what else the machine does; against its time, only which way it goes.
@@ -91,7 +97,8 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
         assert_eq!(pair[1].spent.camera_paths, 2 * pair[0].spent.camera_paths);
     }
     assert!(ladder.last().distance.flip < ladder.steps[0].distance.flip);
-    let short = climb(&room, &settings, size, Limits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| (), &|| false);
+    let short =
+        measure_curve(&room, &settings, size, Limits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| (), &|| false);
     assert_eq!(short.len(), 1, "the first step is always taken, and no other fits");
 }
 
@@ -243,8 +250,9 @@ fn estimated_error_is_the_true_error_where_no_rare_light_rules() {
         let mut sums = [(0.0, 0.0); 8];
         for seed in 0..6 {
             let settings = RenderSettings { seed, ..settings };
-            let rungs = climb(&prepared, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| (), &|| false);
-            let ladder = Ladder::measure(&rungs, &truth, &Display::default());
+            let rungs =
+                measure_curve(&prepared, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| (), &|| false);
+            let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
             for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
                 sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));
                 sum.1 += step.distance.relative_mse;
@@ -276,8 +284,8 @@ fn the_interval_holds_the_true_error_from_few_samples_on() {
         for seed in 0..seeds {
             let settings = RenderSettings { seed, ..settings };
             let limits = Limits { spp: 32, seconds: None };
-            let rungs = climb(&prepared, &settings, size, limits, &mut |_| (), &|| false);
-            let ladder = Ladder::measure(&rungs, &truth, &Display::default());
+            let rungs = measure_curve(&prepared, &settings, size, limits, &mut |_| (), &|| false);
+            let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
             for step in ladder.steps.iter().filter(|step| step.spp >= 4) {
                 let (k, told) = (step.spp.ilog2() as usize - 2, step.estimate.unwrap());
                 held[k] += u32::from((told.low..=told.high).contains(&step.error()));

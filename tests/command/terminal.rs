@@ -2,7 +2,7 @@
 //! error, has no control characters, no marks that turn the order of letters round, no forged lines and no endless names.
 
 use assert_cmd::Command;
-use firstlight::scene::shot::NOTE_KEY;
+use firstlight::scene::image_metadata::NOTE_KEY;
 use std::ffi::OsStr;
 use std::path::Path;
 use std::time::Duration;

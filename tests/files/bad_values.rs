@@ -8,9 +8,9 @@ use firstlight::frame::{
 };
 use firstlight::render::{Camera, Film, Prepared, RenderSettings, advance};
 use firstlight::scene::file::{CameraPart, FilmPart, SceneFile};
-use firstlight::scene::shot::NOTE_KEY;
+use firstlight::scene::image_metadata::NOTE_KEY;
 use firstlight::scene::{
-    CameraInput, Extraction, Lens, LoadOptions, Projection, SceneInputs, SceneSource, Shot, View, load,
+    CameraInput, Extraction, ImageMetadata, Lens, LoadOptions, Projection, SceneInputs, SceneSource, View, load,
 };
 use glam::DVec3;
 use std::path::Path;
@@ -120,14 +120,14 @@ fn scene_files() {
 fn notes_of_pictures_and_films() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    assert!(Shot::from_note(&note(&format!("camera: ({CAMERA})"))).is_ok(), "what is good is taken");
+    assert!(ImageMetadata::from_note(&note(&format!("camera: ({CAMERA})"))).is_ok(), "what is good is taken");
     let film = Film::new(16, 16);
     for (i, (fields, expected)) in bad_fields().into_iter().enumerate() {
         let note = note(&fields);
         let check = |said: String| {
             assert!(said.contains("cannot be right") && said.contains(expected), "{fields}: {said}");
         };
-        check(Shot::from_note(&note).unwrap_err());
+        check(ImageMetadata::from_note(&note).unwrap_err());
         let damaged = path.join(format!("film-{i}.exr"));
         write_film_file(&film, &note, &damaged).unwrap();
         check(read_film_file(&damaged).map(drop).unwrap_err());
@@ -157,7 +157,7 @@ fn notes_of_pictures_and_films() {
         let name = field.split(':').next().unwrap();
         let old = [": 0", ": 1", ": builtin(\"cornell\")"].map(|value| format!("{name}{value}"));
         let old = old.iter().find(|old| good.contains(*old)).unwrap();
-        let found = Shot::from_note(&good.replace(old, field)).unwrap_err();
+        let found = ImageMetadata::from_note(&good.replace(old, field)).unwrap_err();
         assert!(found.contains(expected), "{field}: {found}");
     }
 }

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::World;
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::{
-    BUILTIN_SCENES, Description, Developing, Extraction, Lens, LoadOptions, LoadedScene, Material, Placement,
+    BUILTIN_SCENES, Description, DisplaySettings, Extraction, Lens, LoadOptions, LoadedScene, Material, Placement,
     PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, View, load, save_scene,
 };
 use glam::{DVec3, Vec3};
@@ -53,7 +53,7 @@ fn assert_same(a: &mut World, b: &mut World, what: &str) {
     assert_eq!(around(&before), around(&after), "{what}");
     assert_eq!(before.materials.len(), after.materials.len(), "{what}");
     assert_eq!(a.resource::<Rendering>().0, b.resource::<Rendering>().0, "{what}");
-    assert_eq!(a.resource::<Developing>(), b.resource::<Developing>(), "{what}");
+    assert_eq!(a.resource::<DisplaySettings>(), b.resource::<DisplaySettings>(), "{what}");
 }
 
 fn picture(world: &mut World, scene: &LoadedScene) -> Vec<Vec3> {
@@ -130,7 +130,7 @@ proptest! {
         let tip = Shape::Triangle { vertices: [DVec3::ZERO, DVec3::X + 1e-3 * moved, DVec3::Y + 1e-3 * turned] };
         let first = objects[0].slots.clone();
         world.spawn((tip, Placement::at(eye), firstlight::scene::MaterialSlots(first)));
-        world.resource_mut::<Developing>().0.exposure_stops = stops;
+        world.resource_mut::<DisplaySettings>().0.exposure_stops = stops;
 
         let path = folder.path().join("edited.ron");
         let saved = save_scene(&mut world, Some(&scene), &path);

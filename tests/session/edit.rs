@@ -8,7 +8,7 @@ use firstlight::frame::{
 };
 use firstlight::render::Inspection;
 use firstlight::scene::file::{MeshShadingPart, MeshSourcePart, Rgb, TexturePart, WrapPart};
-use firstlight::scene::{Material, MaterialSlots, MeshOrigin, Paint, Placement, PointLight, SceneSource, Shape};
+use firstlight::scene::{ColorParam, Material, MaterialSlots, MeshOrigin, Placement, PointLight, SceneSource, Shape};
 use glam::{DVec2, DVec3, Vec3};
 use std::time::{Duration, Instant};
 
@@ -400,8 +400,8 @@ fn colours_become_textures_and_textures_change() {
         rotate: 0.0,
     };
     let texture = |driver: &Driver| match driver.get::<Material>("red") {
-        Material::Diffuse { albedo: Paint::Texture(texture) }
-        | Material::Phong { diffuse: Paint::Texture(texture), .. } => {
+        Material::Diffuse { albedo: ColorParam::Texture(texture) }
+        | Material::Phong { diffuse: ColorParam::Texture(texture), .. } => {
             Some((texture.name.clone(), texture.part.clone()))
         }
         _ => None,

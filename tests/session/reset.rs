@@ -2,12 +2,12 @@
 
 use bevy_ecs::component::{Component, Mutable};
 use bevy_ecs::prelude::{Entity, World};
-use firstlight::frame::{Command, Found, Level, Paused, Session, SessionOptions, StopAt, Target, Threads};
+use firstlight::frame::{Command, FrameChanges, Level, Paused, Session, SessionOptions, StopAt, Target, Threads};
 use firstlight::mesh::procedural;
 use firstlight::render::{Environment, Integrator, ToneCurve};
 use firstlight::scene::{
-    Balls, Lens, Material, MaterialSlots, Paint, Placement, PointLight, Projection, Rendering, SceneEnvironment, Shape,
-    View,
+    Balls, ColorParam, Lens, Material, MaterialSlots, Placement, PointLight, Projection, Rendering, SceneEnvironment,
+    Shape, View,
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -34,7 +34,7 @@ impl Stage {
         let mut session = Session::new(options).unwrap();
         let world = session.world_mut();
         let [red, blue, unused] =
-            [Vec3::X, Vec3::Z, Vec3::Y].map(|rgb| world.spawn(Material::Diffuse { albedo: Paint::Rgb(rgb) }).id());
+            [Vec3::X, Vec3::Z, Vec3::Y].map(|rgb| world.spawn(Material::Diffuse { albedo: ColorParam::Rgb(rgb) }).id());
         let ball = world.spawn((Shape::Sphere { radius: 1.0 }, MaterialSlots(vec![red]))).id();
         let cube = Arc::new(procedural::cuboid(DVec3::ONE));
         let mesh = world.spawn((Shape::Mesh(cube), MaterialSlots(vec![blue]))).id();
@@ -52,7 +52,7 @@ impl Stage {
     fn frame(&mut self) -> Vec<Level> {
         self.frame += 1;
         self.session.update(Duration::from_millis(16 * self.frame));
-        let found = self.session.world().resource::<Found>();
+        let found = self.session.world().resource::<FrameChanges>();
         let mut levels: Vec<Level> = found.0.0.iter().map(|change| change.level).collect();
         levels.sort();
         levels.dedup();

@@ -2,18 +2,18 @@
 
 use super::build::{LeafMaker, build};
 use super::leaf::{BLOCK, LeafBlock, Prims};
+use super::node8::{LEAF, Node8, widen};
 use super::nodes::{KdNode, KdNodes};
 use super::ray::Nearest;
 use super::reference::{BuildConfig, Primitives};
 use super::simd::Simd;
-use super::wide::{LEAF, WideNode, widen};
 
 #[derive(Debug, PartialEq)]
 pub(super) struct BlockTree<B: LeafBlock> {
     /// The tree for packets, picking and as the reference.
     pub nodes: KdNodes,
     /// The same tree for streams.
-    pub wide: Vec<WideNode>,
+    pub wide: Vec<Node8>,
     blocks: Vec<B>,
     /// The blocks of leaves whose first block has the bit [`COMPACT`] set.
     compact: Vec<B::Compact>,
@@ -50,7 +50,7 @@ impl<B: LeafBlock> BlockTree<B> {
     }
 
     pub fn bytes(&self) -> usize {
-        self.nodes.nodes.len() * size_of::<KdNode>() + self.wide.len() * size_of::<WideNode>() + self.block_bytes()
+        self.nodes.nodes.len() * size_of::<KdNode>() + self.wide.len() * size_of::<Node8>() + self.block_bytes()
     }
 
     fn block_bytes(&self) -> usize {

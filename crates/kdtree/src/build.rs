@@ -12,7 +12,7 @@ use super::nodes::{KdNode, KdNodes};
 use super::reference::{BuildConfig, Primitives, Reference, clip_padding};
 use super::simd::InstructionSet;
 use super::split::{Split, median_split};
-use super::split_lanes::find_split;
+use super::split_simd::find_split;
 use crate::geometry::Aabb;
 use glam::Vec3;
 use std::collections::HashSet;

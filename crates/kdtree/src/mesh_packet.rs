@@ -9,7 +9,7 @@ use super::blocks::{PreciseRay, SphereBlock, TriangleBlock};
 use super::lanes::{LaneHits, longest_axis, may_hit, resolve, shear, sphere_hits};
 use super::leaf::{BLOCK, LeafBlock, ShearedRay};
 use super::nodes::{MAX_DEPTH, Node};
-use super::objects::WideFrame;
+use super::objects::FrameF64;
 use super::ray::{Nearest, WIDEN};
 use super::shared_block::SharedBlock;
 use super::simd::{LANES, Mask, Simd};
@@ -123,20 +123,20 @@ impl PacketBlock for TriangleBlock {
 }
 
 impl PacketBlock for SphereBlock {
-    type Frame<S: Simd> = WideFrame<S>;
+    type Frame<S: Simd> = FrameF64<S>;
 
     const HAS_FOOTPRINT: bool = false;
 
     #[inline(always)]
-    fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> WideFrame<S> {
-        WideFrame::new(s, &packet.origin, &packet.dir)
+    fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> FrameF64<S> {
+        FrameF64::new(s, &packet.origin, &packet.dir)
     }
 
     #[inline(always)]
     fn test_rays<S: Simd>(
         s: S,
         packet: &mut MeshPacket<S>,
-        (_, frame): (&Group<S>, &WideFrame<S>),
+        (_, frame): (&Group<S>, &FrameF64<S>),
         leaf: &Leaf<Self>,
         mask: Mask,
     ) {
@@ -398,7 +398,7 @@ impl<S: Simd> MeshPacket<S> {
 
     /// Whichever are fewer, balls or rays, one after the other.
     #[inline(always)]
-    fn test_balls(&mut self, s: S, frame: &WideFrame<S>, block: &SphereBlock, mut mask: Mask) {
+    fn test_balls(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, mut mask: Mask) {
         let n_balls = block.prims().len();
         if n_balls <= mask.count_ones() as usize {
             for lane in 0..n_balls {
@@ -418,7 +418,7 @@ impl<S: Simd> MeshPacket<S> {
 
     /// One ball against all rays.
     #[inline(always)]
-    fn test_ball(&mut self, s: S, frame: &WideFrame<S>, block: &SphereBlock, lane: usize, mask: Mask) {
+    fn test_ball(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, lane: usize, mask: Mask) {
         let (center, radius) = block.sphere(lane % BLOCK);
         let to_center = frame.towards(s, &center.as_dvec3().to_array());
         let radius_squared = s.splat_d(f64::from(radius).powi(2));

@@ -5,9 +5,9 @@
 
 use super::batch::{HitBatch, RayBatch};
 use super::lanes::{LaneHits, Sheared, dot, longest_axis, may_hit, quad_hits, resolve, shear, sphere_hits};
-use super::loose::MAX_SIMPLE;
+use super::primitive_trees::MAX_SIMPLE;
+use super::quad_filter::{FilteredQuad, QuadFilterRays};
 use super::shape::Shape;
-use super::sieve::{SieveRays, SievedQuad};
 use super::simd::{LANES, Mask, Simd};
 use super::sphere_tree::SphereTree;
 use crate::geometry::quad_corners;
@@ -28,8 +28,8 @@ struct Quad {
 
 /// Quads of which each ray is expected to meet few: those that can be the nearest are found first.
 #[derive(Debug, Default)]
-struct QuadSieve {
-    quads: Vec<SievedQuad>,
+struct QuadFilter {
+    quads: Vec<FilteredQuad>,
     /// Of these, for lanes to look up: four corners, and which of the scene's objects.
     corners: [[Vec<f32>; 3]; 4],
     objects: Vec<u32>,
@@ -41,9 +41,9 @@ struct QuadSieve {
 /// From so many quads on it is quicker to sieve them.
 const MIN_SIEVED: usize = 5;
 
-impl QuadSieve {
+impl QuadFilter {
     fn add(&mut self, place: u32, object: u32, [corner, edge_u, edge_v]: [Vec3; 3]) {
-        let Some(quad) = SievedQuad::new(corner, edge_u, edge_v) else { return self.others.push(place) };
+        let Some(quad) = FilteredQuad::new(corner, edge_u, edge_v) else { return self.others.push(place) };
         self.quads.push(quad);
         self.sieved.push(place);
         self.objects.push(object);
@@ -86,7 +86,7 @@ struct Plane {
 #[derive(Debug, Default)]
 pub(super) struct SimpleObjects {
     quads: Vec<Quad>,
-    sieve: Option<QuadSieve>,
+    sieve: Option<QuadFilter>,
     triangles: Vec<Triangle>,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
@@ -95,7 +95,7 @@ pub(super) struct SimpleObjects {
 impl SimpleObjects {
     /// - `objects`: which shapes to take.
     pub fn new(shapes: &[Shape], objects: impl Iterator<Item = u32>) -> Self {
-        let (mut simple, mut sieve) = (Self::default(), QuadSieve::default());
+        let (mut simple, mut sieve) = (Self::default(), QuadFilter::default());
         for object in objects {
             match &shapes[object as usize] {
                 Shape::Quad { corner, edge_u, edge_v } => {
@@ -215,7 +215,7 @@ impl<S: Simd> Packet<S> {
             }
         }
         if (!objects.spheres.is_empty() || !objects.planes.is_empty()) && !self.is_done::<ANY>() {
-            let wide = WideFrame::new(s, &self.origin, &self.dir);
+            let wide = FrameF64::new(s, &self.origin, &self.dir);
             for sphere in &objects.spheres {
                 self.test_sphere(s, &wide, sphere);
                 if self.is_done::<ANY>() {
@@ -244,7 +244,7 @@ impl<S: Simd> Packet<S> {
         origin: &[S::F; 3],
         dir: &[S::F; 3],
     ) {
-        let wide = WideFrame::new(s, origin, dir);
+        let wide = FrameF64::new(s, origin, dir);
         for (prim, (center, radius)) in (0..).zip(tree.centers.iter().zip(&tree.radii)) {
             if self.is_done::<ANY>() {
                 return;
@@ -278,8 +278,8 @@ impl<S: Simd> Packet<S> {
     /// The nearest of many quads, in rays that have met nothing yet: each tests the one that comes first by the sieve, and
     /// only where that leaves a doubt all of them.
     #[inline(always)]
-    fn sift(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadSieve) {
-        let rays = SieveRays::new(s, &self.origin, &self.dir);
+    fn sift(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadFilter) {
+        let rays = QuadFilterRays::new(s, &self.origin, &self.dir);
         // The earliest times at which the two nearest may be met.
         let (mut first, mut second) = (self.t, self.t);
         let mut which = s.splat_u(0);
@@ -314,8 +314,8 @@ impl<S: Simd> Packet<S> {
 
     /// The same for any hit: a quad is tested only where the sieve cannot tell.
     #[inline(always)]
-    fn sift_any(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadSieve) {
-        let rays = SieveRays::new(s, &self.origin, &self.dir);
+    fn sift_any(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadFilter) {
+        let rays = QuadFilterRays::new(s, &self.origin, &self.dir);
         let mut doubts = [0; MAX_SIMPLE];
         // To ask after each whether that was enough would cost more than to look at a few in vain.
         for (quads, doubts) in sieve.quads.chunks(4).zip(doubts.chunks_mut(4)) {
@@ -353,7 +353,7 @@ impl<S: Simd> Packet<S> {
     }
 
     #[inline(always)]
-    fn test_sphere(&mut self, s: S, wide: &WideFrame<S>, sphere: &Sphere) {
+    fn test_sphere(&mut self, s: S, wide: &FrameF64<S>, sphere: &Sphere) {
         let to_center = wide.towards(s, &sphere.center);
         let radius_squared = s.splat_d(sphere.radius_squared);
         let hits = sphere_hits(s, self.lanes, &to_center, radius_squared, &wide.dir, wide.inv_dir_squared);
@@ -462,13 +462,13 @@ fn store_some_u<S: Simd>(s: S, from: S::U, to: &mut [u32]) {
 
 /// The rays in `f64`.
 #[derive(Clone, Copy)]
-pub(super) struct WideFrame<S: Simd> {
+pub(super) struct FrameF64<S: Simd> {
     origin: [S::D; 3],
     pub dir: [S::D; 3],
     pub inv_dir_squared: S::D,
 }
 
-impl<S: Simd> WideFrame<S> {
+impl<S: Simd> FrameF64<S> {
     #[inline(always)]
     pub fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let origin = [s.widen(origin[0]), s.widen(origin[1]), s.widen(origin[2])];

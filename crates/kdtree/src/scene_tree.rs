@@ -7,7 +7,7 @@ use super::leaf::LeafBlock;
 use super::ray::{Nearest, TreeRay};
 use super::shape::{Hit, RayClass, Shape, object_bounds};
 use super::simd::InstructionSet;
-use super::sphere_tree::WideRay;
+use super::sphere_tree::RayF64;
 use super::surface::{Instance, PlacedShapes, SurfacePoint};
 use super::trace::{Instances, TopLevel};
 use super::visits::Visits;
@@ -267,11 +267,11 @@ enum Effort {
 struct SceneRay {
     ray: Ray,
     shear: Shear,
-    wide: WideRay,
+    wide: RayF64,
 }
 
 impl SceneRay {
     fn new(ray: &Ray) -> Self {
-        Self { ray: *ray, shear: Shear::new(ray.dir), wide: WideRay::new(ray) }
+        Self { ray: *ray, shear: Shear::new(ray.dir), wide: RayF64::new(ray) }
     }
 }

@@ -1,13 +1,13 @@
 //! What the traversal asks of the processor beyond [`firstlight_simd`]: to visit a node of eight children at once.
 
-use super::wide::{DescentRay, Stack, WideNode, descend_plain};
+use super::node8::{DescentRay, Node8, Stack, descend_plain};
 use firstlight_simd::Portable;
 pub(super) use firstlight_simd::{InstructionSet, LANES, Mask, dispatch};
 
 /// See [`firstlight_simd::Simd`].
 pub(super) trait Simd: firstlight_simd::Simd {
     /// Visits a node: see `wide::descend_plain`.
-    fn descend(self, node: &WideNode, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize;
+    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize;
 
     /// Asks the memory for the cache line at `at`; any address will do.
     fn prefetch(self, at: *const u8);
@@ -15,7 +15,7 @@ pub(super) trait Simd: firstlight_simd::Simd {
 
 impl Simd for Portable {
     #[inline(always)]
-    fn descend(self, node: &WideNode, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
+    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
         descend_plain(node, ray, t0, t1, stack, height)
     }
 

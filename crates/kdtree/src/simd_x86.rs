@@ -1,13 +1,13 @@
 //! The x86 implementations of [`Simd`].
 
 use super::Simd;
-use crate::wide::{DescentRay, EMPTY, STACK, Stack, WideNode};
+use crate::node8::{DescentRay, EMPTY, Node8, STACK, Stack};
 use firstlight_simd::{Avx2, Avx512, Mask};
 use std::arch::x86_64::*;
 
 impl Simd for Avx512 {
     #[inline(always)]
-    fn descend(self, node: &WideNode, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
+    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
         // SAFETY: `self` proves that the processor has the instructions; rays and nodes are aligned as they are read.
         unsafe {
             // The stores below write eight entries each.
@@ -75,7 +75,7 @@ fn both_halves(far: u64) -> Mask {
 
 impl Simd for Avx2 {
     #[inline(always)]
-    fn descend(self, node: &WideNode, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
+    fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
         // SAFETY: `self` proves that the processor has the instructions; rays and nodes are aligned as they are read.
         unsafe {
             // The stores below write eight entries each.

@@ -107,7 +107,7 @@ impl SphereTree {
     /// Offers the balls along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
         let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.tree.extent);
-        let wide = WideRay::new(ray);
+        let wide = RayF64::new(ray);
         self.tree.nodes.walk(&tree_ray, nearest.t, |first, count| {
             for block in self.tree.leaf(first, count).blocks {
                 for (lane, prim) in block.prims().iter().enumerate() {
@@ -121,7 +121,7 @@ impl SphereTree {
 
     /// The same by trying every ball.
     pub(super) fn offer_hits_naive(&self, ray: &Ray, nearest: &mut Nearest) {
-        let wide = WideRay::new(ray);
+        let wide = RayF64::new(ray);
         for prim in 0..self.len() as u32 {
             let (center, radius) = self.sphere(prim);
             wide.offer_sphere(center, radius, prim, nearest);
@@ -130,13 +130,13 @@ impl SphereTree {
 }
 
 /// A ray in `f64`, for spheres and planes.
-pub(super) struct WideRay {
+pub(super) struct RayF64 {
     pub origin: DVec3,
     pub dir: DVec3,
     inv_dir_squared: f64,
 }
 
-impl WideRay {
+impl RayF64 {
     #[inline]
     pub fn new(ray: &Ray) -> Self {
         let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());

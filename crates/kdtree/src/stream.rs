@@ -8,11 +8,11 @@
 
 use super::block_tree::BlockTree;
 use super::blocks::PreciseRay;
-use super::gate::{Gate, Source};
 use super::leaf::{LeafBlock, LeafRay, ShearedRay};
+use super::node8::{DescentRay, LEAF, Stack};
 use super::ray::Nearest;
+use super::ray_setup::{RaySetup, Source};
 use super::simd::Simd;
-use super::wide::{DescentRay, LEAF, Stack};
 
 /// Rays in flight. Half as many bring 5 % less speed on bounces, twice as many 9 %.
 const SLOTS: usize = 64;
@@ -59,13 +59,13 @@ impl List {
 
 /// Room for the rays in flight and for what waits to be visited by each of them. Made once for many streams, for clearing it takes
 /// longer than tracing a few rays.
-pub(super) struct Flight {
+pub(super) struct StreamState {
     stacks: Box<[Stack]>,
     sheared: Box<[Slot<ShearedRay>]>,
     precise: Box<[Slot<PreciseRay>]>,
 }
 
-impl Flight {
+impl StreamState {
     pub fn new() -> Self {
         let mut stacks: Box<[Stack]> = (0..SLOTS).map(|_| Stack::NEW).collect();
         for stack in &mut stacks {
@@ -76,19 +76,19 @@ impl Flight {
 }
 
 /// A ray that may be in flight.
-pub(super) trait FlyingRay: LeafRay {
+pub(super) trait StreamRay: LeafRay {
     /// The slots for rays of this kind.
     fn slots<'a>(sheared: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>];
 }
 
-impl FlyingRay for ShearedRay {
+impl StreamRay for ShearedRay {
     #[inline(always)]
     fn slots<'a>(sheared: &'a mut [Slot<Self>], _: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>] {
         sheared
     }
 }
 
-impl FlyingRay for PreciseRay {
+impl StreamRay for PreciseRay {
     #[inline(always)]
     fn slots<'a>(_: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<Self>]) -> &'a mut [Slot<Self>] {
         precise
@@ -104,9 +104,9 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     source: &mut impl Source,
-    flight: &mut Flight,
+    flight: &mut StreamState,
 ) where
-    B::Ray: FlyingRay,
+    B::Ray: StreamRay,
 {
     let wide = &tree.wide[..];
     if wide.is_empty() {
@@ -122,7 +122,7 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
         slot.is_busy = false;
         idle.push_if(true, i);
     }
-    let mut gate = Gate::new();
+    let mut gate = RaySetup::new();
     loop {
         let (list, len) = idle.take();
         for &i in &list[..len] {
@@ -186,7 +186,7 @@ fn refill<S: Simd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     slot: &mut Slot<B::Ray>,
-    gate: &mut Gate,
+    gate: &mut RaySetup,
     source: &mut impl Source,
 ) -> bool {
     let Some(lane) = gate.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
@@ -269,7 +269,7 @@ mod tests {
         }
     }
 
-    fn trace(tree: &MeshTree, rays: &[Ray], poisoned: Option<u32>, flight: &mut Flight) -> Vec<(u32, bool, u32)> {
+    fn trace(tree: &MeshTree, rays: &[Ray], poisoned: Option<u32>, flight: &mut StreamState) -> Vec<(u32, bool, u32)> {
         let mut source = Listed { rays, next: 0, poisoned, finished: Vec::new() };
         run::<Portable, _, false>(Portable, &tree.tree, &mut source, flight);
         source.finished.sort_unstable();
@@ -290,16 +290,16 @@ mod tests {
                 Ray::new(Vec3::new(3.0, 2.0, 40.0), (to - Vec3::new(3.0, 2.0, 40.0)).normalize())
             })
             .collect();
-        let whole = trace(&tree, &rays, None, &mut Flight::new());
+        let whole = trace(&tree, &rays, None, &mut StreamState::new());
         assert!(whole.iter().filter(|(_, found, _)| *found).count() > 50);
-        let mut flight = Flight::new();
+        let mut flight = StreamState::new();
         for poisoned in [0, 70, 150] {
             let poisoned = whole.iter().map(|(ray, ..)| *ray).find(|ray| *ray >= poisoned);
             let cut = catch_unwind(AssertUnwindSafe(|| trace(&tree, &rays, poisoned, &mut flight)));
             assert!(cut.is_err(), "the ray {poisoned:?} was to be finished");
             // Fewer than were in flight, and then all.
             for n in [3, rays.len()] {
-                let fresh = trace(&tree, &rays[..n], None, &mut Flight::new());
+                let fresh = trace(&tree, &rays[..n], None, &mut StreamState::new());
                 assert_eq!(trace(&tree, &rays[..n], None, &mut flight), fresh);
             }
         }

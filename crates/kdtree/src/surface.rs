@@ -166,7 +166,7 @@ impl PlacedShapes {
                 let (point, wide) = (point.as_dvec3(), normal.as_dvec3());
                 let near = ray.origin.as_dvec3() + f64::from(hit.t) * ray.dir.as_dvec3();
                 let position = (near - wide * ((near - point).dot(wide) / wide.length_squared())).as_vec3();
-                let wide_error = WIDE_ERROR * (point.abs().max_element() + position.as_dvec3().abs().max_element());
+                let wide_error = F64_ERROR * (point.abs().max_element() + position.as_dvec3().abs().max_element());
                 let error = 2.0 * UNIT_ROUNDOFF * position.abs() + wide_error as f32;
                 SurfacePoint { position, error, geometric_normal: *normal, uv }
             }
@@ -200,7 +200,7 @@ pub fn quad_rim(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> QuadRim {
 /// more digits than the centre has in `f64`, those of `f64` count.
 #[inline]
 pub fn sphere_error(center: Vec3, radius: f32) -> f32 {
-    (WIDE_ERROR * f64::from(center.abs().max_element() + radius)) as f32
+    (F64_ERROR * f64::from(center.abs().max_element() + radius)) as f32
 }
 
 /// - `condition`: growth of a relative error of the next ray's direction on its way into this space.
@@ -262,7 +262,7 @@ fn wide_cross(a: Vec3, b: Vec3) -> (Vec3, f32) {
 }
 
 /// What a few roundings in `f64` add, here and in the test of the next ray, relative to the numbers that they work on.
-pub const WIDE_ERROR: f64 = 16.0 * f64::EPSILON;
+pub const F64_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The hit projected onto the sphere, its error, and the outward normal.
 #[inline]

@@ -8,16 +8,16 @@
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
 use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
-use super::gate::Source;
 use super::instance_tree::{Entry, InstanceTree, Recent};
 use super::lanes::to_own_space;
-use super::loose::LooseTrees;
 use super::mesh_packet::{MeshPacket, NearestLanes, PacketBlock, PacketStack};
 use super::objects::{Packet, SimpleObjects};
+use super::primitive_trees::PrimitiveTrees;
 use super::ray::Nearest;
+use super::ray_setup::Source;
 use super::shape::{RayClass, Shape};
 use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
-use super::stream::{self, Flight};
+use super::stream::{self, StreamState};
 use super::surface::{Instance, PlacedShapes};
 use crate::geometry::{Aabb, Ray};
 use glam::Affine3A;
@@ -36,7 +36,7 @@ pub(super) struct TopLevel {
     pub simple: SimpleObjects,
     /// The numbers of `simple`.
     pub simple_objects: Vec<u32>,
-    pub loose: LooseTrees,
+    pub loose: PrimitiveTrees,
     pub instances: Instances,
 }
 
@@ -63,7 +63,7 @@ const MAX_INSTANCES: usize = 12;
 impl TopLevel {
     /// - `boxes`: of all the shapes.
     pub fn new(shapes: &[Shape], boxes: &[Aabb]) -> Self {
-        let (loose, simple_objects) = LooseTrees::build(shapes, boxes);
+        let (loose, simple_objects) = PrimitiveTrees::build(shapes, boxes);
         let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
         let instances: Vec<u32> = (0..shapes.len() as u32).filter(is_instance).collect();
         let instances = if instances.len() > MAX_INSTANCES {
@@ -120,7 +120,7 @@ trait Answers {
     fn packets(&mut self, set: InstructionSet, packets: &Packets);
 
     /// [`stream`] by the instructions of `set`.
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut Flight);
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut StreamState);
 }
 
 impl Answers for HitBatch {
@@ -146,9 +146,9 @@ impl Answers for HitBatch {
         dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut Flight) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut StreamState) {
         let answers = self;
-        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut Flight));
+        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut StreamState));
     }
 }
 
@@ -176,9 +176,9 @@ impl Answers for [bool] {
         dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut Flight) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut StreamState) {
         let answers = self;
-        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut Flight));
+        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut StreamState));
     }
 }
 
@@ -195,14 +195,14 @@ fn trace<A: Answers + ?Sized>(
 
 /// What tracing a batch takes besides it, kept from one to the next.
 struct Room {
-    flight: Flight,
+    flight: StreamState,
     rounds: Rounds,
     all: Vec<u32>,
 }
 
 thread_local! {
     static ROOM: RefCell<Room> =
-        RefCell::new(Room { flight: Flight::new(), rounds: Rounds::default(), all: Vec::new() });
+        RefCell::new(Room { flight: StreamState::new(), rounds: Rounds::default(), all: Vec::new() });
 }
 
 fn trace_in<A: Answers + ?Sized>(
@@ -338,12 +338,12 @@ fn trace_packet<S: Simd, B: PacketBlock, const ANY: bool>(
 }
 
 #[inline(always)]
-fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut Flight) {
+fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut StreamState) {
     run_stream::<S, HitBatch, false>(s, tree, rays, answers, flight);
 }
 
 #[inline(always)]
-fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut Flight) {
+fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut StreamState) {
     run_stream::<S, [bool], true>(s, tree, rays, answers, flight);
 }
 
@@ -353,7 +353,7 @@ fn run_stream<S: Simd, A: Answers + ?Sized, const ANY: bool>(
     tree: StreamTree,
     rays: Rays,
     answers: &mut A,
-    flight: &mut Flight,
+    flight: &mut StreamState,
 ) {
     let mut source = Queue { rays, answers };
     match tree {
@@ -467,7 +467,7 @@ impl Rounds {
         rays: &RayBatch,
         answers: &mut A,
         queue: &[u32],
-        flight: &mut Flight,
+        flight: &mut StreamState,
     ) {
         self.entries.clear();
         self.pending.clear();

@@ -7,7 +7,7 @@ use super::spot::{self, Spot};
 use crate::frame::selection::Selection;
 use crate::mesh::procedural;
 use crate::scene::file::{MeshShadingPart, MeshSourcePart};
-use crate::scene::{Material, MaterialSlots, MeshOrigin, Ordinal, Paint, Placement, PointLight, Shape};
+use crate::scene::{ColorParam, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Shape};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
@@ -37,7 +37,7 @@ pub fn add(world: &mut World, new: &NewThing) {
     let entity = match new {
         NewThing::Sphere => {
             let material =
-                new_material(world, "ball", Material::Diffuse { albedo: Paint::Rgb(Vec3::new(0.7, 0.35, 0.2)) });
+                new_material(world, "ball", Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.7, 0.35, 0.2)) });
             spawn(
                 world,
                 "ball",
@@ -45,12 +45,13 @@ pub fn add(world: &mut World, new: &NewThing) {
             )
         }
         NewThing::Plane => {
-            let material = new_material(world, "ground", Material::Diffuse { albedo: Paint::Rgb(Vec3::splat(0.5)) });
+            let material =
+                new_material(world, "ground", Material::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) });
             let shape = Shape::Plane { normal: DVec3::Y };
             spawn(world, "ground", (shape, Placement::at(place), MaterialSlots(vec![material])))
         }
         NewThing::AreaLight => {
-            let radiance = Paint::Rgb(Vec3::new(12.0, 11.0, 9.5));
+            let radiance = ColorParam::Rgb(Vec3::new(12.0, 11.0, 9.5));
             let material = new_material(world, "lamp", Material::Emissive { radiance });
             let edge = 2.0 * size;
             // u × v looks down.
@@ -70,7 +71,7 @@ pub fn add(world: &mut World, new: &NewThing) {
         }
         NewThing::Cube => {
             let material =
-                new_material(world, "cube", Material::Diffuse { albedo: Paint::Rgb(Vec3::new(0.25, 0.4, 0.6)) });
+                new_material(world, "cube", Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.25, 0.4, 0.6)) });
             let mesh = procedural::cuboid(DVec3::ONE);
             let shape = Shape::Mesh(std::sync::Arc::new(mesh));
             let placement = sized(Placement::at(place + up), 2.0 * size);
@@ -187,7 +188,7 @@ pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
 
 /// A material for things that come without one.
 pub fn clay(world: &mut World) -> Entity {
-    let clay = Material::Diffuse { albedo: Paint::Rgb(Vec3::new(0.72, 0.56, 0.45)) };
+    let clay = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.72, 0.56, 0.45)) };
     new_material(world, "clay", clay)
 }
 

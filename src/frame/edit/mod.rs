@@ -30,7 +30,7 @@ pub(super) use texture::take as take_picture;
 pub use texture::textures;
 
 use super::history::History;
-use super::resources::{Clock, PictureSize, Shown};
+use super::resources::{Clock, PictureSize, RenderState};
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
 use crate::scene::file::{MeshShadingPart, TexturePart};
@@ -157,7 +157,8 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
     match edit {
         Edit::PickAt { x, y, add } => {
             let aspect = world.resource::<PictureSize>().aspect();
-            let picked = world.resource::<Shown>().extraction.as_ref().and_then(|scene| pick(scene, x, y, aspect));
+            let picked =
+                world.resource::<RenderState>().extraction.as_ref().and_then(|scene| pick(scene, x, y, aspect));
             let mut selection = world.resource_mut::<Selection>();
             match picked {
                 Some(picked) => selection.choose(picked.entity, add),
@@ -170,14 +171,14 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             world.resource_mut::<Selection>().choose(entity, add);
         }
         Edit::SelectAll => {
-            let inputs = &world.resource::<Shown>().inputs;
+            let inputs = &world.resource::<RenderState>().inputs;
             let objects = inputs.objects.iter().map(|object| object.entity);
             let all = objects.chain(inputs.lights.iter().map(|light| light.entity)).collect();
             world.resource_mut::<Selection>().0 = all;
         }
         Edit::SelectUsers { material } => {
             let material = existing(world, material)?;
-            let users = users_of(world, &world.resource::<Shown>().inputs, material);
+            let users = users_of(world, &world.resource::<RenderState>().inputs, material);
             if users.is_empty() {
                 return Err("nothing uses this material".to_owned());
             }

@@ -3,12 +3,12 @@
 use super::property::{MaterialKind, Property};
 use super::sky;
 use crate::render::Fresnel;
-use crate::scene::{Amount, Linear, Material, Paint, Placement, PointLight, Shape};
+use crate::scene::{ColorParam, Linear, Material, Placement, PointLight, ScalarParam, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
 /// The colour of a material, if it has one.
-pub fn paint_of(material: &Material) -> Option<&Paint> {
+pub fn paint_of(material: &Material) -> Option<&ColorParam> {
     match material {
         Material::Diffuse { albedo: paint }
         | Material::Mirror { reflectance: paint }
@@ -19,7 +19,7 @@ pub fn paint_of(material: &Material) -> Option<&Paint> {
     }
 }
 
-pub(super) fn paint_mut(material: &mut Material) -> Option<&mut Paint> {
+pub(super) fn paint_mut(material: &mut Material) -> Option<&mut ColorParam> {
     match material {
         Material::Diffuse { albedo: paint }
         | Material::Mirror { reflectance: paint }
@@ -101,12 +101,12 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
     let share = number.clamp(0.0, 1.0);
     match (property, material) {
         (Property::Color, Material::Emissive { radiance }) => {
-            *radiance = Paint::Rgb(value.max(DVec3::ZERO).as_vec3());
+            *radiance = ColorParam::Rgb(value.max(DVec3::ZERO).as_vec3());
         }
         (Property::Color, material) => {
-            *paint_mut(material)? = Paint::Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3());
+            *paint_mut(material)? = ColorParam::Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3());
         }
-        (Property::Alpha, Material::Metal { alpha, .. }) => *alpha = Amount::Number(number.clamp(1e-3, 1.0)),
+        (Property::Alpha, Material::Metal { alpha, .. }) => *alpha = ScalarParam::Number(number.clamp(1e-3, 1.0)),
         (Property::Schlick, Material::Metal { fresnel, .. }) => {
             *fresnel = if number == 0.0 { Fresnel::Constant } else { Fresnel::Schlick };
         }
@@ -115,10 +115,10 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
             *absorption = value.max(DVec3::ZERO).as_vec3();
         }
         (Property::Ambient, Material::Phong { ambient, .. }) => *ambient = share,
-        (Property::Specular, Material::Phong { specular, .. }) => *specular = Amount::Number(share),
+        (Property::Specular, Material::Phong { specular, .. }) => *specular = ScalarParam::Number(share),
         (Property::Shininess, Material::Phong { shininess, .. }) => *shininess = number.clamp(1.0, 1e5),
         (Property::Transparency, Material::Phong { transparency, .. }) => *transparency = share,
-        (Property::Weight, Material::Blend { weight, .. }) => *weight = Amount::Number(share),
+        (Property::Weight, Material::Blend { weight, .. }) => *weight = ScalarParam::Number(share),
         _ => return None,
     }
     Some(())
@@ -131,18 +131,18 @@ pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result
         return Ok(());
     }
     let was_light = matches!(old, Material::Emissive { .. });
-    let paint = paint_of(old).cloned().unwrap_or(Paint::Rgb(Vec3::splat(0.7)));
+    let paint = paint_of(old).cloned().unwrap_or(ColorParam::Rgb(Vec3::splat(0.7)));
     // A light is brighter than white, and a surface is not.
     let color = match paint {
-        Paint::Rgb(rgb) if was_light => Paint::Rgb(rgb / rgb.max_element().max(1.0)),
-        Paint::Rgb(rgb) if kind == MaterialKind::Emissive => Paint::Rgb(rgb * 5.0),
+        ColorParam::Rgb(rgb) if was_light => ColorParam::Rgb(rgb / rgb.max_element().max(1.0)),
+        ColorParam::Rgb(rgb) if kind == MaterialKind::Emissive => ColorParam::Rgb(rgb * 5.0),
         paint => paint,
     };
     world.entity_mut(entity).insert(match kind {
         MaterialKind::Diffuse => Material::Diffuse { albedo: color },
         MaterialKind::Mirror => Material::Mirror { reflectance: color },
         MaterialKind::Metal => Material::Metal {
-            alpha: Amount::Number(0.04),
+            alpha: ScalarParam::Number(0.04),
             reflectance: color,
             fresnel: Fresnel::Schlick,
             compensate: true,
@@ -151,7 +151,7 @@ pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result
         MaterialKind::Phong => Material::Phong {
             diffuse: color,
             ambient: 1.0,
-            specular: Amount::Number(0.2),
+            specular: ScalarParam::Number(0.2),
             shininess: 50.0,
             transparency: 0.0,
             ior: 1.5,

@@ -4,7 +4,7 @@
 //! towards the eye; from each, the thing falls onto what is below it, and stays where it touches nothing else. What is
 //! in its way is found by rays, which know what a box does not: that a room is empty inside.
 
-use crate::frame::resources::{PictureSize, Shown};
+use crate::frame::resources::{PictureSize, RenderState};
 use crate::frame::selection::pick;
 use crate::geometry::Ray;
 use crate::scene::{Extraction, View};
@@ -33,7 +33,7 @@ const TOUCH: f64 = 0.97;
 
 /// Finds it; where nothing is free, it is the place that the middle of the picture shows.
 pub fn find(world: &World) -> Spot {
-    let shown = world.resource::<Shown>();
+    let shown = world.resource::<RenderState>();
     let view = shown.inputs.camera.map_or_else(View::default, |camera| camera.view);
     let aspect = world.resource::<PictureSize>().aspect();
     let Some(scene) = &shown.extraction else {
@@ -62,7 +62,7 @@ pub fn find(world: &World) -> Spot {
 
 /// How far above `foot` something may hang: `wanted`, or less where a ceiling is in the way.
 pub fn headroom(world: &World, foot: DVec3, wanted: f64) -> f64 {
-    let Some(scene) = &world.resource::<Shown>().extraction else { return wanted };
+    let Some(scene) = &world.resource::<RenderState>().extraction else { return wanted };
     // From a little above, or the ground itself would be found.
     let start = 0.1 * wanted;
     distance(scene, foot + start * DVec3::Y, DVec3::Y).map_or(wanted, |free| wanted.min(0.8 * (start + free)))

@@ -1,12 +1,12 @@
 //! Textures in the place of a material's colour: those that the scene has, a new checker, a picture from a file.
 
 use super::set::{paint_mut, paint_of, set_if_different};
-use crate::frame::beside::Beside;
+use crate::frame::background::BackgroundTasks;
 use crate::frame::resources::{Clock, CurrentScene};
 use crate::frame::status::{MessageKind, Status};
 use crate::render::{ImageTexture, TexturePattern};
 use crate::scene::file::TexturePart;
-use crate::scene::{Material, Paint, SurfaceTexture, texture_of};
+use crate::scene::{ColorParam, Material, SurfaceTexture, texture_of};
 use bevy_ecs::prelude::{Entity, World};
 use std::path::Path;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
     let mut found: Vec<Arc<SurfaceTexture>> = Vec::new();
     for material in world.query::<&Material>().iter(world) {
-        if let Some(Paint::Texture(texture)) = paint_of(material)
+        if let Some(ColorParam::Texture(texture)) = paint_of(material)
             && !found.iter().any(|known| Arc::ptr_eq(known, texture))
         {
             found.push(texture.clone());
@@ -49,7 +49,7 @@ pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(),
     if let (TexturePart::Image { file, .. }, None) = (&part, &known) {
         let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
         let path = folder.join(crate::scene::text_to_path(file));
-        world.resource::<Beside>().read_picture(entity, part, path);
+        world.resource::<BackgroundTasks>().read_picture(entity, part, path);
         return Ok(());
     }
     make(world, entity, part, known)
@@ -74,7 +74,7 @@ fn make(
     // A texture that is only changed keeps its name.
     let old = world.get::<Material>(entity).and_then(paint_of);
     let name = match (old, &part) {
-        (Some(Paint::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
+        (Some(ColorParam::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
         (_, TexturePart::Checker { .. }) => free_name(world, "checker"),
         (_, TexturePart::Image { file, .. }) => {
             let stem = Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -94,7 +94,7 @@ fn same_source(a: &TexturePart, b: &TexturePart) -> bool {
 
 fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
     let mut material = world.get::<Material>(entity).cloned().ok_or("this is not a material")?;
-    *paint_mut(&mut material).ok_or("this material has no colour")? = Paint::Texture(texture);
+    *paint_mut(&mut material).ok_or("this material has no colour")? = ColorParam::Texture(texture);
     set_if_different(world, entity, material);
     Ok(())
 }

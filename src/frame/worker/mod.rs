@@ -12,7 +12,7 @@ mod show;
 mod thread;
 mod views;
 
-use super::{Picture, Target, Waits};
+use super::{LatencyHistogram, Picture, Target};
 use crate::render::{BadSample, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings};
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -45,7 +45,7 @@ pub struct Job {
 
 /// What is shown of it; no sample depends on this.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Look {
+pub struct ViewOptions {
     pub inspection: Inspection,
     /// Tint what is sharp, and draw the focal plane.
     pub sharp_zone: bool,
@@ -145,7 +145,7 @@ struct Inbox {
     /// Of the job of this generation: gives the same samples.
     prepared: Option<(u64, Prepared)>,
     display: Option<Display>,
-    look: Option<Look>,
+    look: Option<ViewOptions>,
     question: Option<(Question, Sender<Answer>)>,
     film_wanted: Vec<Sender<Film>>,
     to_keep: Vec<Sender<Film>>,
@@ -173,7 +173,7 @@ struct Shared {
     outbox: Mutex<Outbox>,
     pool: Mutex<Arc<rayon::ThreadPool>>,
     beside: Mutex<Arc<rayon::ThreadPool>>,
-    cancels: Mutex<Waits>,
+    cancels: Mutex<LatencyHistogram>,
     waker: Option<Waker>,
     yielding: bool,
 }
@@ -233,7 +233,7 @@ impl Worker {
     }
 
     /// Keeps all samples.
-    pub fn set_look(&self, look: Look) {
+    pub fn set_look(&self, look: ViewOptions) {
         self.post(|inbox| inbox.look = Some(look));
     }
 
@@ -245,7 +245,7 @@ impl Worker {
     }
 
     /// How long the thread took to drop what it was at when a job came, the latest times.
-    pub fn cancels(&self) -> Waits {
+    pub fn cancels(&self) -> LatencyHistogram {
         lock(&self.shared.cancels).clone()
     }
 

@@ -2,7 +2,7 @@
 
 use super::idle::IdleFilms;
 use super::views::Views;
-use super::{Answer, BESIDE, Job, Look, Question, Shared, Stats, WORKERS, lock, make_pool};
+use super::{Answer, BESIDE, Job, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{Scheduler, Step, StepReport};
 use crate::frame::{Picture, Target};
 use crate::render::{Display, Film, Region, advance_region, explain};
@@ -24,7 +24,7 @@ pub struct Loop<'a> {
     restarted_at: Instant,
     pub(super) scheduler: Scheduler,
     pub(super) display: Display,
-    pub(super) look: Look,
+    pub(super) look: ViewOptions,
     pub(super) views: Views,
     /// What gets all samples, in fractions of the picture.
     region: Option<[f64; 4]>,
@@ -55,7 +55,7 @@ impl<'a> Loop<'a> {
             restarted_at: Instant::now(),
             scheduler: Scheduler::new(1, 1, target),
             display: Display::default(),
-            look: Look::default(),
+            look: ViewOptions::default(),
             views: Views::default(),
             region: None,
             is_uneven: false,

@@ -4,7 +4,7 @@ use super::parts::{
     CameraPart, EnvironmentPart, LightPart, MaterialPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile,
     TexturePart, TransformPart,
 };
-use super::value::{Amount, Paint, Rgb};
+use super::value::{ColorParam, Rgb, ScalarParam};
 use crate::scene::bounds::{
     check_film_size, check_max_depth, coordinate_rule, is_coordinate, is_size, number, size_rule, triple,
 };
@@ -179,13 +179,13 @@ impl Check<'_> {
                     self.wrong(&path, format!("the blend has more than {MAX_LOBES} plain materials: nest fewer"));
                 } else if glowing > 1 {
                     self.wrong(&path, "the blend has more than one emissive part: keep one of them");
-                } else if glowing == 1 && matches!(weight, Amount::Texture(_)) {
+                } else if glowing == 1 && matches!(weight, ScalarParam::Texture(_)) {
                     self.wrong(&format!("{path}/weight"), "with an emissive part, `weight` must be a number");
                 }
             }
             MaterialPart::Emissive { radiance } => match radiance {
-                Paint::Rgb(rgb) => self.light(&format!("{path}/radiance"), Rgb(*rgb)),
-                Paint::Texture(texture) => self.texture_name(&format!("{path}/radiance"), texture),
+                ColorParam::Rgb(rgb) => self.light(&format!("{path}/radiance"), Rgb(*rgb)),
+                ColorParam::Texture(texture) => self.texture_name(&format!("{path}/radiance"), texture),
             },
         }
     }
@@ -366,26 +366,26 @@ impl Check<'_> {
     }
 
     /// A share of the light in each channel: 0..1.
-    fn share(&mut self, path: &str, field: &str, paint: &Paint) {
+    fn share(&mut self, path: &str, field: &str, paint: &ColorParam) {
         let path = format!("{path}/{field}");
         match paint {
-            Paint::Texture(name) => self.texture_name(&path, name),
-            Paint::Rgb(rgb) if !(rgb.cmpge(Vec3::ZERO).all() && rgb.cmple(Vec3::ONE).all()) => {
+            ColorParam::Texture(name) => self.texture_name(&path, name),
+            ColorParam::Rgb(rgb) if !(rgb.cmpge(Vec3::ZERO).all() && rgb.cmple(Vec3::ONE).all()) => {
                 let Vec3 { x, y, z } = rgb;
                 self.wrong(&path, format!("`{field}` is ({x}, {y}, {z}), but is a share of light: between 0 and 1"));
             }
-            Paint::Rgb(_) => {}
+            ColorParam::Rgb(_) => {}
         }
     }
 
-    fn amount(&mut self, path: &str, field: &str, amount: &Amount) {
+    fn amount(&mut self, path: &str, field: &str, amount: &ScalarParam) {
         let path = format!("{path}/{field}");
         match amount {
-            Amount::Texture(name) => self.texture_name(&path, name),
-            Amount::Number(value) if !(0.0..=1.0).contains(value) => {
+            ScalarParam::Texture(name) => self.texture_name(&path, name),
+            ScalarParam::Number(value) if !(0.0..=1.0).contains(value) => {
                 self.wrong(&path, format!("`{field}` is {value}, but must lie between 0 and 1"));
             }
-            Amount::Number(_) => {}
+            ScalarParam::Number(_) => {}
         }
     }
 

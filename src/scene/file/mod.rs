@@ -17,7 +17,7 @@ pub use parts::{
     MaterialPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart,
     ToneCurvePart, TransformPart, WrapPart, ball_grid,
 };
-pub use value::{Amount, Named, Paint, Rgb};
+pub use value::{ColorParam, Named, Rgb, ScalarParam};
 
 use super::error::{Problem, SceneError};
 use super::input_file::BYTE_ORDER_MARK;

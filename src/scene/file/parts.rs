@@ -1,6 +1,6 @@
 //! The parts of a scene file, as written. Meaning and limits are checked in `check`.
 
-use super::value::{Amount, Named, Paint, Rgb};
+use super::value::{ColorParam, Named, Rgb, ScalarParam};
 use crate::render::{Display, Fresnel, Integrator, PixelFilter, ToneCurve, Wrap};
 use glam::{DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -298,16 +298,16 @@ impl From<WrapPart> for Wrap {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum MaterialPart {
     Diffuse {
-        albedo: Paint,
+        albedo: ColorParam,
     },
     Mirror {
         #[serde(default = "white_paint")]
-        reflectance: Paint,
+        reflectance: ColorParam,
     },
     Metal {
         /// GGX width: the square of the roughness that other programs ask for.
-        alpha: Amount,
-        reflectance: Paint,
+        alpha: ScalarParam,
+        reflectance: ColorParam,
         #[serde(default, skip_serializing_if = "is_default")]
         fresnel: FresnelPart,
         #[serde(default, skip_serializing_if = "is_default")]
@@ -322,13 +322,13 @@ pub enum MaterialPart {
     },
     /// The classic local model. Path tracing takes it for shares of matte, mirror and glass.
     Phong {
-        diffuse: Paint,
+        diffuse: ColorParam,
         /// Of the ambient light, the share of `diffuse` that comes back.
         #[serde(default = "one")]
         ambient: f32,
         /// Share that is mirrored; lights appear in it as highlights.
         #[serde(default = "no_amount", skip_serializing_if = "is_no_amount")]
-        specular: Amount,
+        specular: ScalarParam,
         /// Exponent of the highlights.
         #[serde(default = "default_shininess")]
         shininess: f32,
@@ -342,12 +342,12 @@ pub enum MaterialPart {
         absorption: Rgb,
     },
     Blend {
-        weight: Amount,
+        weight: ScalarParam,
         a: String,
         b: String,
     },
     Emissive {
-        radiance: Paint,
+        radiance: ColorParam,
     },
 }
 
@@ -640,11 +640,11 @@ fn default_shininess() -> f32 {
     20.0
 }
 
-fn no_amount() -> Amount {
-    Amount::Number(0.0)
+fn no_amount() -> ScalarParam {
+    ScalarParam::Number(0.0)
 }
 
-fn is_no_amount(value: &Amount) -> bool {
+fn is_no_amount(value: &ScalarParam) -> bool {
     *value == no_amount()
 }
 
@@ -660,8 +660,8 @@ fn white() -> Rgb {
     Rgb(Vec3::ONE)
 }
 
-fn white_paint() -> Paint {
-    Paint::grey(1.0)
+fn white_paint() -> ColorParam {
+    ColorParam::grey(1.0)
 }
 
 fn one_by_one() -> DVec2 {

@@ -9,14 +9,14 @@ use std::marker::PhantomData;
 
 /// A colour, linear Rec. 709: `0.5` for a grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Paint {
+pub enum ColorParam {
     Rgb(Vec3),
     Texture(String),
 }
 
 /// A number, or the name of a texture whose red channel is taken.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Amount {
+pub enum ScalarParam {
     Number(f32),
     Texture(String),
 }
@@ -25,7 +25,7 @@ pub enum Amount {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rgb(pub Vec3);
 
-impl Paint {
+impl ColorParam {
     pub const fn grey(value: f32) -> Self {
         Self::Rgb(Vec3::splat(value))
     }
@@ -102,7 +102,7 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 }
 
-impl<'de> Deserialize<'de> for Paint {
+impl<'de> Deserialize<'de> for ColorParam {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: true })? {
             Found::Number(value) => Self::grey(value),
@@ -112,7 +112,7 @@ impl<'de> Deserialize<'de> for Paint {
     }
 }
 
-impl<'de> Deserialize<'de> for Amount {
+impl<'de> Deserialize<'de> for ScalarParam {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: false })? {
             Found::Name(name) => Self::Texture(name),
@@ -147,7 +147,7 @@ impl Serialize for Rgb {
     }
 }
 
-impl Serialize for Paint {
+impl Serialize for ColorParam {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Rgb(rgb) => Rgb(*rgb).serialize(serializer),
@@ -156,7 +156,7 @@ impl Serialize for Paint {
     }
 }
 
-impl Serialize for Amount {
+impl Serialize for ScalarParam {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Number(value) => serializer.serialize_f32(*value),

@@ -2,7 +2,7 @@
 
 use super::App;
 use crate::console;
-use crate::frame::{Command, Edit, Explaining, Focus, FocusTarget, Looking, PictureFormat, Selection, gizmo};
+use crate::frame::{Command, Edit, Explaining, Focus, FocusTarget, PictureFormat, Selection, ViewMode, gizmo};
 use crate::render::{Inspection, Integrator};
 use crate::viewer::dialog::Purpose;
 use crate::viewer::keys::Action;
@@ -82,12 +82,12 @@ impl App {
             Action::Brush => self.toggle_brush(now),
             Action::ClearRegion => self.session.send(Command::SetRegion { region: None }),
             Action::Inspect(inspection) => {
-                let shown = self.session.world().resource::<Looking>().0.inspection;
+                let shown = self.session.world().resource::<ViewMode>().0.inspection;
                 let wanted = if shown == inspection { Inspection::Picture } else { inspection };
                 self.session.send(Command::SetInspection(wanted));
             }
             Action::ToggleSharpZone => {
-                let shown = !self.session.world().resource::<Looking>().0.sharp_zone;
+                let shown = !self.session.world().resource::<ViewMode>().0.sharp_zone;
                 self.session.send(Command::SetSharpZone { shown });
                 if shown && !self.session.status().rig.lens.enabled {
                     self.toasts.add(Tone::News, "all is sharp: O opens the lens", now);

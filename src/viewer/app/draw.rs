@@ -1,7 +1,7 @@
 //! Picture and overlays onto the window.
 
 use super::{App, LIVELY, SETTLED};
-use crate::frame::{Around, Explaining, Looking, Projector};
+use crate::frame::{Explaining, Projector, SceneBounds, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
 use crate::viewer::presenter::{PresentError, Presenter};
@@ -28,7 +28,7 @@ impl App {
             tracing::debug!("picture {} of view {} at 1/{}", picture.number, picture.generation, picture.divider);
             self.shown_picture = Some(picture.number);
         }
-        let wanted = self.session.world().resource::<Looking>().0.inspection;
+        let wanted = self.session.world().resource::<ViewMode>().0.inspection;
         self.inspected_since = match self.inspected_since {
             _ if wanted == self.session.picture().inspection || wanted == Inspection::Picture => None,
             Some((same, since)) if same == wanted => Some((same, since)),
@@ -59,7 +59,13 @@ impl App {
         let presented = presenter.present(|context| {
             if overlays {
                 if let Some(story) = &session.world().resource::<Explaining>().story {
-                    story::draw(context, story, ways, &projector, session.world().resource::<Around>().extent.radius);
+                    story::draw(
+                        context,
+                        story,
+                        ways,
+                        &projector,
+                        session.world().resource::<SceneBounds>().extent.radius,
+                    );
                 }
                 handles.draw(context);
                 brush.draw(context, session.status());

@@ -21,7 +21,6 @@ mod leave;
 mod leaving;
 mod memory;
 
-use super::brush::Brush;
 use super::dialog::Dialog;
 use super::display::{self, Display};
 use super::handles::Handles;
@@ -30,11 +29,12 @@ use super::overlay::{self, Help};
 use super::panel::PanelState;
 use super::presenter::{PresentError, Presenter};
 use super::reaction::Reaction;
+use super::region_tool::RegionTool;
 use super::saver::Saver;
 use super::story::WaysShown;
 use super::toasts::{Toasts, Tone};
 use crate::frame::{
-    Command, Explaining, Focus, FocusTarget, MessageKind, Session, SessionOptions, Target, Waits, Waker,
+    Command, Explaining, Focus, FocusTarget, LatencyHistogram, MessageKind, Session, SessionOptions, Target, Waker,
 };
 use crate::render::Inspection;
 use crate::scene::{SceneSource, UpAxis};
@@ -200,7 +200,7 @@ struct App {
     help: Help,
     panel: PanelState,
     handles: Handles,
-    brush: Brush,
+    brush: RegionTool,
     /// Which paths of an explained pixel are drawn.
     ways: WaysShown,
     memory: Memory,
@@ -278,7 +278,7 @@ impl App {
             help: Help::default(),
             panel: PanelState::default(),
             handles: Handles::default(),
-            brush: Brush::default(),
+            brush: RegionTool::default(),
             ways: WaysShown::default(),
             memory,
             leaving,
@@ -338,7 +338,7 @@ impl App {
     /// How long people waited (milliseconds), and the paths of the last picture with the seconds from the restart to the last
     /// of them, in which the window did all that it does.
     fn print_figures(&self) {
-        let milliseconds = |waits: &Waits| {
+        let milliseconds = |waits: &LatencyHistogram| {
             let of = |share| waits.quantile(share).map(|wait| wait.as_secs_f64() * 1e3);
             json!({ "count": waits.len(), "p50": of(0.5), "p99": of(0.99), "longest": of(1.0) })
         };

@@ -2,7 +2,7 @@
 
 use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use super::{Around, Asked};
-use crate::frame::{Bookmarks, Command, Focus, FocusTarget, Looking, Session, f_stop, radius_of_f_stop, sharp_zone};
+use crate::frame::{Bookmarks, Command, Focus, FocusTarget, Session, ViewMode, f_stop, radius_of_f_stop, sharp_zone};
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::status::metres;
 use egui::Ui;
@@ -85,7 +85,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
         if ui.checkbox(&mut enabled, "depth of field").changed() {
             asked.send(Command::ToggleDepthOfField);
         }
-        let looking = session.world().resource::<Looking>().0;
+        let looking = session.world().resource::<ViewMode>().0;
         let mut shown = looking.sharp_zone;
         ui.add_enabled_ui(enabled, |ui| {
             if ui.checkbox(&mut shown, "show sharp zone").changed() {

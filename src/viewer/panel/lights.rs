@@ -6,7 +6,7 @@ use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::Environment;
 use crate::scene::file::EnvironmentPart;
-use crate::scene::{LightEntry, Material, Paint, PointLight};
+use crate::scene::{ColorParam, LightEntry, Material, PointLight};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -73,12 +73,12 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     }
     let Some(material) = entry.material else { return };
     match world.get::<Material>(material) {
-        Some(Material::Emissive { radiance: Paint::Rgb(rgb) }) => {
+        Some(Material::Emissive { radiance: ColorParam::Rgb(rgb) }) => {
             if let Some(value) = color(ui, *rgb, true) {
                 asked.edit(Edit::Set { id: material.to_bits(), property: Property::Color, value });
             }
         }
-        Some(Material::Emissive { radiance: Paint::Texture(texture) }) => {
+        Some(Material::Emissive { radiance: ColorParam::Texture(texture) }) => {
             drop(ui.weak(&*crate::printable::name(&texture.name)))
         }
         _ => {}

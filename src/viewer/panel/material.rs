@@ -8,7 +8,7 @@ use super::texture;
 use super::widgets::{color, row, row_with_hint, rows, slider, vector};
 use crate::frame::{Edit, MaterialKind, Property, Session, paint_of};
 use crate::render::Fresnel;
-use crate::scene::{Amount, Inventory, Material, MaterialEntry, ObjectInput, Paint};
+use crate::scene::{ColorParam, Inventory, Material, MaterialEntry, ObjectInput, ScalarParam};
 use crate::viewer::status::thousands;
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
@@ -90,17 +90,17 @@ fn paint(ui: &mut Ui, session: &Session, id: u64, material: &Material, asked: &m
     row(ui, if is_light { "radiance" } else { "colour" }, |ui| {
         ui.horizontal(|ui| {
             match paint {
-                Paint::Rgb(rgb) => {
+                ColorParam::Rgb(rgb) => {
                     if let Some(value) = color(ui, *rgb, is_light) {
                         asked.edit(Edit::Set { id, property: Property::Color, value });
                     }
                 }
-                Paint::Texture(texture) => drop(ui.label(&*crate::printable::name(&texture.name))),
+                ColorParam::Texture(texture) => drop(ui.label(&*crate::printable::name(&texture.name))),
             }
             texture::menu(ui, session, id, paint, asked);
         })
     });
-    if let Paint::Texture(texture) = paint {
+    if let ColorParam::Texture(texture) = paint {
         texture::numbers(ui, id, &texture.part, asked);
     }
 }
@@ -136,7 +136,8 @@ const IOR: Scale =
     Scale::new("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", Property::Ior, 1.0..=2.5);
 
 fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, asked: &mut Asked) {
-    let number = |amount: &Amount| if let Amount::Number(value) = amount { Some(f64::from(*value)) } else { None };
+    let number =
+        |amount: &ScalarParam| if let ScalarParam::Number(value) = amount { Some(f64::from(*value)) } else { None };
     match material {
         Material::Metal { alpha, fresnel, .. } => {
             if let Some(alpha) = number(alpha) {

@@ -2,7 +2,7 @@
 
 use super::widgets::{number, row, rows, slider, whole};
 use super::{Around, Asked};
-use crate::frame::{Command, Looking, Session, StopAt, Target};
+use crate::frame::{Command, Session, StopAt, Target, ViewMode};
 use crate::render::{Inspection, Integrator, ToneCurve};
 use crate::viewer::status::tone_curve;
 use egui::Ui;
@@ -108,7 +108,7 @@ pub fn display(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 }
             })
         });
-        let looking = session.world().resource::<Looking>().0;
+        let looking = session.world().resource::<ViewMode>().0;
         row(ui, "show", |ui| {
             let shown = looking.inspection;
             egui::ComboBox::from_id_salt("inspection").selected_text(shown.label()).width(130.0).show_ui(ui, |ui| {

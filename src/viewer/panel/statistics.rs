@@ -2,7 +2,7 @@
 
 use super::Around;
 use super::widgets::{row, rows};
-use crate::frame::{History, Session, Waits};
+use crate::frame::{History, LatencyHistogram, Session};
 use crate::scene::Shape;
 use crate::viewer::status::{bytes, percent, seconds, thousands};
 use egui::Ui;
@@ -21,7 +21,7 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         if status.n_above > 0 {
             figure("", format!("{} brighter than the scene can be", status.n_above));
         }
-        let milliseconds = |waits: &Waits| {
+        let milliseconds = |waits: &LatencyHistogram| {
             let of = |share| waits.quantile(share).map(|wait| format!("{:.0} ms", wait.as_secs_f64() * 1e3));
             of(0.5).zip(of(0.99)).map_or("–".to_owned(), |(half, most)| format!("{half}, 1 % over {most}"))
         };

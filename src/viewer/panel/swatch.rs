@@ -2,7 +2,7 @@
 
 use crate::frame::paint_of;
 use crate::scene::file::TexturePart;
-use crate::scene::{Material, Paint};
+use crate::scene::{ColorParam, Material};
 use bevy_ecs::prelude::{Entity, World};
 use egui::{Color32, Sense, Stroke, Ui, vec2};
 use glam::Vec3;
@@ -35,8 +35,8 @@ fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
         Material::Glass { absorption, .. } => [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2],
         material => match paint_of(material) {
             // Of a light, the hue.
-            Some(Paint::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
-            Some(Paint::Texture(texture)) => match &texture.part {
+            Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
+            Some(ColorParam::Texture(texture)) => match &texture.part {
                 TexturePart::Checker { a, b, .. } => [a.0, b.0],
                 TexturePart::Image { .. } => [Vec3::splat(0.75), Vec3::splat(0.1)],
             },

@@ -3,18 +3,18 @@
 use super::Asked;
 use super::widgets::{color, number, row};
 use crate::frame::{Edit, Property, Session, paint_of};
-use crate::scene::Paint;
+use crate::scene::ColorParam;
 use crate::scene::file::{Rgb, TexturePart, WrapPart};
 use crate::viewer::dialog::Purpose;
 use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
 
 /// What can take the place of a colour.
-pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &Paint, asked: &mut Asked) {
+pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: &mut Asked) {
     let mut names: Vec<&str> = (session.inputs().materials.iter())
         .filter_map(|material| match paint_of(&material.material)? {
-            Paint::Texture(texture) => Some(texture.name.as_str()),
-            Paint::Rgb(_) => None,
+            ColorParam::Texture(texture) => Some(texture.name.as_str()),
+            ColorParam::Rgb(_) => None,
         })
         .collect();
     names.sort_unstable();
@@ -28,7 +28,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &Paint, asked: &mut 
         }
         ui.separator();
         if ui.button("new checker").clicked() {
-            let a = if let Paint::Rgb(rgb) = paint { rgb.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::splat(0.7) };
+            let a = if let ColorParam::Rgb(rgb) = paint { rgb.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::splat(0.7) };
             let (squares, offset) = (DVec2::splat(8.0), DVec2::ZERO);
             let part = TexturePart::Checker { a: Rgb(a), b: Rgb(0.2 * a), squares, offset, rotate: 0.0 };
             asked.edit(Edit::Paint { id, part });
@@ -38,7 +38,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &Paint, asked: &mut 
             asked.dialog = Some(Purpose::Texture { id });
             ui.close();
         }
-        if matches!(paint, Paint::Texture(_)) && ui.button("plain colour").clicked() {
+        if matches!(paint, ColorParam::Texture(_)) && ui.button("plain colour").clicked() {
             let value = DVec3::splat(0.5);
             asked.edit(Edit::Set { id, property: Property::Color, value });
             ui.close();

@@ -11,7 +11,7 @@ use crate::integrators::caustics::pilot::prepare_guide;
 use crate::integrators::path::{CameraPath, PathWave};
 use crate::integrators::phong::PhongWave;
 use crate::integrators::record::{Record, TracedPath};
-use crate::integrators::simd::camera::{Lens, Pixels};
+use crate::integrators::simd::camera::{CameraRays, Pixels};
 use crate::integrators::survival::{at_depth, endless_depth};
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
@@ -371,9 +371,9 @@ impl<'a> Pass<'a> {
         Self { snapshot, settings, caustics, camera_media, filter, size, bound, endless }
     }
 
-    fn lens(&self) -> Lens<'_> {
+    fn lens(&self) -> CameraRays<'_> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
-        Lens { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
+        CameraRays { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
     }
 
     /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.

@@ -5,8 +5,8 @@
 
 use crate::core::counts::RayCounts;
 use crate::film::exact_sum::ExactSum;
-use crate::integrators::caustics::arrivals::Splat;
 use crate::integrators::caustics::batches::Batches;
+use crate::integrators::caustics::lens_connections::Splat;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::trace::LightWave;
 use glam::{DVec3, UVec2};

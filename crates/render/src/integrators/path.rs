@@ -26,9 +26,9 @@ use crate::shading::guided::Guided;
 use crate::shading::interface::MediumId;
 use crate::shading::lights::{choose_light_point, emitter_weight, environment_light, light_weight};
 use crate::shading::medium::MediumSets;
+use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch, ShadowBatch};
 use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at};
-use crate::shading::track::Track;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::Vec3;
@@ -43,7 +43,7 @@ impl From<CameraPath> for Path {
             sampler,
             slot,
             media: MediumId::OUTSIDE,
-            track: Track::default(),
+            track: MisState::default(),
         }
     }
 }

@@ -7,7 +7,7 @@
 //! points reached gives each place a small list of such exits; part of the directions there are chosen towards them,
 //! the density of the mixture being known exactly, so the mean stays as it is whatever the list holds.
 
-use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, warp_lanes};
+use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, warp_simd};
 use firstlight_kdtree::geometry::Frame;
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
 use glam::{Vec2, Vec3};
@@ -262,7 +262,7 @@ impl Hints<'_> {
             let inside = distance2.le(radius2);
             let hit = way.dot(wi).is_positive() & way.cross(wi).length_squared().le(radius2);
             if inside | hit != 0 {
-                let found = warp_lanes::cone_pdf(warp_lanes::one_minus_cos_from_sin2(radius2 / distance2));
+                let found = warp_simd::cone_pdf(warp_simd::one_minus_cos_from_sin2(radius2 / distance2));
                 sum += select(inside, zero.all(cone_pdf(2.0)), select(hit, found, zero));
             }
         }

@@ -5,19 +5,19 @@
 mod alias;
 mod distribution;
 mod hash;
-pub(crate) mod offset_lanes;
+pub(crate) mod offset_simd;
 mod sobol;
-mod sobol_lanes;
+mod sobol_simd;
 mod spherical_quad;
 mod spherical_triangle;
 mod warp;
-pub(crate) mod warp_lanes;
+pub(crate) mod warp_simd;
 
 pub use alias::AliasTable;
 pub use distribution::PictureDistribution;
 pub use hash::{hash_combine, hash_u32};
 pub use sobol::Sampler;
-pub(crate) use sobol_lanes::SamplerLanes;
+pub(crate) use sobol_simd::SamplerLanes;
 pub use spherical_quad::SphericalQuad;
 pub use spherical_triangle::SphericalTriangle;
 pub use warp::{

@@ -2,7 +2,7 @@
 
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::interface::MediumId;
-use crate::shading::track::Track;
+use crate::shading::mis_state::MisState;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{RayBatch, append, append_bits};
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
@@ -22,7 +22,7 @@ pub(crate) struct Path {
     pub slot: u32,
     pub media: MediumId,
     /// Against paths from the lamps.
-    pub track: Track,
+    pub track: MisState,
 }
 
 /// Many paths and the rays that they go on along. The arrays may be longer than there are paths.
@@ -40,7 +40,7 @@ pub(crate) struct PathBatch {
     /// Kept only where some surface lets light through.
     pub media: Option<Vec<MediumId>>,
     /// Kept only where paths are traced from the lamps as well.
-    pub tracks: Option<Vec<Track>>,
+    pub tracks: Option<Vec<MisState>>,
 }
 
 /// Sixteen paths, of those that have a bit in some mask.
@@ -139,8 +139,8 @@ impl PathBatch {
     }
 
     #[inline]
-    pub fn track_of(&self, i: usize) -> Track {
-        self.tracks.as_ref().map_or(Track::default(), |tracks| tracks[i])
+    pub fn track_of(&self, i: usize) -> MisState {
+        self.tracks.as_ref().map_or(MisState::default(), |tracks| tracks[i])
     }
 
     #[inline(always)]

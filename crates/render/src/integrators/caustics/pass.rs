@@ -8,7 +8,7 @@ use crate::integrators::caustics::batches::Batches;
 use crate::prepare::casters::CasterTable;
 use crate::prepare::guide::{Guide, Hints};
 use crate::prepare::prepared::Prepared;
-use crate::shading::track::Track;
+use crate::shading::mis_state::MisState;
 use firstlight_simd::InstructionSet;
 use glam::{UVec2, Vec2, Vec3};
 
@@ -72,7 +72,7 @@ impl CausticPass<'_> {
     ///
     /// - `n_vertices`: up to and with this one.
     #[inline]
-    pub fn hints(&self, track: &Track, n_vertices: u32, position: Vec3) -> Option<Hints<'_>> {
+    pub fn hints(&self, track: &MisState, n_vertices: u32, position: Vec3) -> Option<Hints<'_>> {
         let needs_them = n_vertices > 1 && track.is_lost();
         needs_them.then(|| self.guide()?.at(position)).flatten()
     }

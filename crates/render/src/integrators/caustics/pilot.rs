@@ -7,10 +7,10 @@ use crate::prepare::guide::Guide;
 use rayon::prelude::*;
 
 /// Paths from the lamps that show the others the way.
-const SCOUTS: u32 = 1 << 15;
+const PILOT_PATHS: u32 = 1 << 15;
 
 /// Scouts that one worker sends at once.
-const SCOUT_BATCH: u32 = 2048;
+const PILOT_BATCH: u32 = 2048;
 
 /// Sees to it that hints are there; false if `stop` said so before they were.
 ///
@@ -21,10 +21,10 @@ pub(crate) fn prepare_guide(pass: &CausticPass, stop: &(dyn Fn() -> bool + Sync)
     }
     let scouts =
         CausticPass { seed: 0, techniques: Techniques::ALL, max_depth: u32::MAX, camera_media: Vec::new(), ..*pass };
-    let traces: Vec<Option<Vec<_>>> = (0..SCOUTS / SCOUT_BATCH)
+    let traces: Vec<Option<Vec<_>>> = (0..PILOT_PATHS / PILOT_BATCH)
         .into_par_iter()
         .map_init(LightWave::default, |wave, batch| {
-            wave.explore(&scouts, u64::from(batch * SCOUT_BATCH), SCOUT_BATCH, stop)
+            wave.trace_pilots(&scouts, u64::from(batch * PILOT_BATCH), PILOT_BATCH, stop)
         })
         .collect();
     let Some(traces) = traces.into_iter().collect::<Option<Vec<_>>>() else { return false };

@@ -3,16 +3,16 @@
 //! The twin of [`crate::integrators::path`], with light and eye in each other's place. Where shading normals differ from true
 //! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the eye's view is the
 //! one that counts, so surfaces are always looked at from the eye's side here. Hits on what has no shading normals of its
-//! own are taken sixteen at a time ([`crate::integrators::caustics::lanes`]).
+//! own are taken sixteen at a time ([`crate::integrators::caustics::simd`]).
 
 use crate::core::counts::RayCounts;
 use crate::core::filter::PixelFilter;
 use crate::core::material::{Material, MaterialId};
-use crate::integrators::caustics::arrivals::{Arrivals, Splat};
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, VERTEX_DIMENSIONS, most_kept};
-use crate::integrators::caustics::lanes;
-use crate::integrators::caustics::lanes::Group;
+use crate::integrators::caustics::lens_connections::{LensConnections, Splat};
 use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::simd;
+use crate::integrators::caustics::simd::Group;
 use crate::integrators::caustics::weight::{Bounce, etendue_gain, is_reversible};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::prepare::casters;
@@ -23,15 +23,15 @@ use crate::shading::bsdf::{Blend, BsdfSample, Lobe, Scatter};
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
+use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch};
 use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at, material_of};
-use crate::shading::track::Track;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::{Vec2, Vec3};
 
 /// Share of the scouts that glass reflects: more than of the light, so that faint reflections become known as well.
-const SCOUTED_REFLECTION: f32 = 0.25;
+const PILOT_REFLECTION: f32 = 0.25;
 
 /// The state of one path between two vertices.
 #[derive(Clone, Copy)]
@@ -51,7 +51,7 @@ struct LightPath {
 impl From<LightPath> for Path {
     fn from(LightPath { throughput, ratio, sampler, aimed_at, media }: LightPath) -> Self {
         let (position, normal) = (Vec3::ZERO, Vec3::ZERO);
-        Self { throughput, pdf: ratio, position, normal, sampler, slot: aimed_at, media, track: Track::default() }
+        Self { throughput, pdf: ratio, position, normal, sampler, slot: aimed_at, media, track: MisState::default() }
     }
 }
 
@@ -71,7 +71,7 @@ pub(crate) struct LightWave {
     /// Of the hits of one kind, those that are shaded sixteen at a time, and the others.
     together: Vec<u32>,
     apart: Vec<u32>,
-    arrivals: Arrivals,
+    arrivals: LensConnections,
     sets: MediumSets,
     /// What the camera is inside of.
     camera: MediumId,
@@ -121,7 +121,7 @@ impl LightWave {
     }
 
     /// Follows paths to where they first scatter, for [`crate::prepare::guide`].
-    pub fn explore(
+    pub fn trace_pilots(
         &mut self,
         pass: &CausticPass,
         first: u64,
@@ -201,7 +201,7 @@ impl LightWave {
                 if n_vertices == 1 && pass.casters.of_hit(&hit) != self.paths.slot[i as usize] {
                     continue;
                 }
-                let has_lanes = pass.lanes.is_some() && lanes::know(kind, surfaces, &hit);
+                let has_lanes = pass.lanes.is_some() && simd::know(kind, surfaces, &hit);
                 if has_lanes { &mut self.together } else { &mut self.apart }.push(i);
             }
             if !self.together.is_empty() {
@@ -218,7 +218,7 @@ impl LightWave {
                     sets: &mut self.sets,
                     camera: self.camera,
                 };
-                lanes::scatter(set, kind, group);
+                simd::scatter(set, kind, group);
             }
             for k in 0..self.apart.len() {
                 self.scatter_one(pass, n_vertices, self.apart[k] as usize);
@@ -288,7 +288,7 @@ struct Step<'a> {
     hit: &'a Hit,
     material: MaterialId,
     n_vertices: u32,
-    /// Of [`LightWave::explore`], whose paths carry nothing.
+    /// Of [`LightWave::trace_pilots`], whose paths carry nothing.
     is_scout: bool,
 }
 
@@ -350,7 +350,7 @@ impl Step<'_> {
             let u = sampler.single(dimension + DIM_LOBE);
             match scene.shading.materials[material as usize] {
                 // Reflected or not, whatever the shares of the light.
-                Material::Glass { .. } if self.is_scout => f32::from(u >= SCOUTED_REFLECTION) * 1.0f32.next_down(),
+                Material::Glass { .. } if self.is_scout => f32::from(u >= PILOT_REFLECTION) * 1.0f32.next_down(),
                 _ => u,
             }
         };

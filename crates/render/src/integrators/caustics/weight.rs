@@ -17,8 +17,8 @@
 use crate::integrators::caustics::pass::CausticPass;
 use crate::prepare::casters::NO_CASTER;
 use crate::shading::interface::MediumId;
+use crate::shading::mis_state::MisState;
 use crate::shading::surface::Vertex;
-use crate::shading::track::Track;
 use firstlight_kdtree::Hit;
 use glam::Vec3;
 
@@ -41,27 +41,27 @@ pub(crate) struct Bounce<'a> {
 impl CausticPass<'_> {
     /// - `reverse_pdf`: density with which the vertex, reached from `wi`, would have scattered towards `wo`.
     #[inline]
-    pub fn follow(&self, track: Track, bounce: &Bounce, reverse_pdf: impl FnOnce() -> f32) -> Track {
+    pub fn follow(&self, track: MisState, bounce: &Bounce, reverse_pdf: impl FnOnce() -> f32) -> MisState {
         let Bounce { vertex, wi, .. } = *bounce;
         let is_specular = bounce.pdf.is_infinite();
         if track.ratio.is_nan() && bounce.eye.is_none() || !is_reversible(bounce) {
-            return Track { gain: track.gain, ..Track::default() };
+            return MisState { gain: track.gain, ..MisState::default() };
         }
         let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), wi.dot(vertex.geometric_normal).abs());
         match (bounce.eye, is_specular) {
-            (Some(_), true) => Track::default(),
+            (Some(_), true) => MisState::default(),
             (Some(eye), false) => {
                 let cos_lens = -vertex.wo.dot(self.scene.camera.forward);
                 let ratio = self.join_ratio(vertex.position.distance_squared(eye), cos_lens, cos_o, cos_i, bounce.pdf);
-                Track { ratio, caster: NO_CASTER, ..track }
+                MisState { ratio, caster: NO_CASTER, ..track }
             }
             (None, false) => {
                 let ratio = track.ratio * reverse_pdf() * cos_i / (cos_o * bounce.pdf);
-                Track { ratio, caster: NO_CASTER, ..track }
+                MisState { ratio, caster: NO_CASTER, ..track }
             }
             (None, true) => {
                 let ratio = track.ratio / etendue_gain(vertex, wi, vertex.wo);
-                Track { ratio, caster: self.casters.of_hit(bounce.hit), ..track }
+                MisState { ratio, caster: self.casters.of_hit(bounce.hit), ..track }
             }
         }
     }
@@ -86,7 +86,7 @@ impl CausticPass<'_> {
 
     /// Weight of light that a path from the eye finds on a lamp; `None` if paths from lamps do not matter here.
     #[inline]
-    pub fn eye_weight(&self, track: &Track, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
+    pub fn eye_weight(&self, track: &MisState, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
         if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
             return None;
         }

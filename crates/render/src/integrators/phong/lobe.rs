@@ -26,7 +26,7 @@ const VERTEX_DIMENSIONS: u32 = DIM_SHINY + 3 * crate::shading::bsdf::MAX_LOBES a
 /// What a ray may still bring of lights, which a highlight asks for by itself, as the density that it keeps: infinite for
 /// all of it, because nothing else has asked; this for nothing, because a highlight has stood in for them; else the ray lies
 /// within a lobe, with that density per steradian, and lights were asked from where it starts.
-pub(crate) const LIGHTS_COUNTED: f32 = 0.0;
+pub(crate) const DIRECT_ALREADY_SAMPLED: f32 = 0.0;
 
 pub(crate) fn first_dimension(depth: u32) -> u32 {
     CAMERA_DIMENSIONS + (depth - 1) * VERTEX_DIMENSIONS

@@ -43,7 +43,7 @@ use std::f32::consts::FRAC_1_PI;
 fn share_of_light(path: &Path, asked: impl FnOnce(Vec3) -> f32) -> f32 {
     match path.pdf {
         f32::INFINITY => 1.0,
-        LIGHTS_COUNTED => 0.0,
+        DIRECT_ALREADY_SAMPLED => 0.0,
         pdf => power_heuristic(pdf, asked(path.position)),
     }
 }
@@ -275,7 +275,7 @@ impl PhongWave {
                     }
                     // Below the surface there is nothing to see: the middle of the lobe stands in.
                 }
-                self.follow(step, weight, mirrored, None, LIGHTS_COUNTED, dimension);
+                self.follow(step, weight, mirrored, None, DIRECT_ALREADY_SAMPLED, dimension);
             }
             Shiny::Pane { share, interface } => {
                 let Interface { eta, squeeze, .. } = interface;
@@ -292,7 +292,7 @@ impl PhongWave {
         }
     }
 
-    /// - `through`: what is passed through, if anything is; `pdf`: see [`LIGHTS_COUNTED`].
+    /// - `through`: what is passed through, if anything is; `pdf`: see [`DIRECT_ALREADY_SAMPLED`].
     fn follow(
         &mut self,
         step: &Step,

@@ -3,7 +3,7 @@
 use crate::core::camera::Camera;
 use crate::core::filter::FilterSampler;
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_lanes::uniform_disc;
+use crate::sampling::warp_simd::uniform_disc;
 use crate::shading::paths::{PathBatch, PathLanes};
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
 use glam::{UVec2, Vec3};
@@ -19,7 +19,7 @@ pub(crate) struct Pixels {
 
 /// What all camera rays of a picture share.
 #[derive(Clone, Copy)]
-pub(crate) struct Lens<'a> {
+pub(crate) struct CameraRays<'a> {
     pub camera: &'a Camera,
     /// Of the film, pixels.
     pub size: UVec2,
@@ -28,7 +28,7 @@ pub(crate) struct Lens<'a> {
     pub even_samples: bool,
 }
 
-impl Lens<'_> {
+impl CameraRays<'_> {
     /// Whether [`Self::start_paths`] knows filter and aperture.
     pub fn is_plain(&self) -> bool {
         self.filter.is_plain() && (self.camera.lens_radius == 0.0 || self.camera.blades < 3)
@@ -37,12 +37,12 @@ impl Lens<'_> {
     /// Appends a path for each of the pixels; `slot` is that of local pixel 0. There must be room.
     pub fn start_paths(&self, set: InstructionSet, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
         let lens = *self;
-        dispatch!(set, start(lens: Lens, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch));
+        dispatch!(set, start(lens: CameraRays, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch));
     }
 }
 
 #[inline(always)]
-fn start<S: Simd>(s: S, lens: Lens, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
+fn start<S: Simd>(s: S, lens: CameraRays, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
     let Camera { eye, right, up, forward, tan_half_vfov, lens_radius, focus_distance, .. } = *lens.camera;
     let size = lens.size.as_vec2();
     let one = Float::splat(s, 1.0);

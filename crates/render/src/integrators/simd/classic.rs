@@ -4,20 +4,22 @@
 //! once, and what belongs to one light is kept together: so the order in which light is added up at a pixel does not
 //! depend on which hits share a register.
 
-use crate::integrators::phong::lobe::{AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, LIGHTS_COUNTED, least_weight};
+use crate::integrators::phong::lobe::{
+    AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, DIRECT_ALREADY_SAMPLED, least_weight,
+};
 use crate::integrators::phong::shadow::Shadows;
 use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
 use crate::prepare::classic_table::{GLOSS, Inputs, MATTE, ROUGH};
-use crate::prepare::light::lanes::LightLanes;
+use crate::prepare::light::arrays::LightLanes;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::bounce::mirrored;
-use crate::shading::simd::chunk::{Chunk, iors};
+use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{lanes_of, transmittance};
 use crate::shading::simd::metal::fresnel;
-use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{
@@ -103,11 +105,11 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
     let n_lights = tables.lights.n_each();
     let zero = Float::splat(s, 0.0);
     for chunk in order.chunks(LANES) {
-        let chunk = Chunk::of(chunk);
-        let Chunk { indices, mask } = chunk;
+        let chunk = LaneGroup::of(chunk);
+        let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
-        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
-        let place = Place::of(s, &at);
+        let at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = SurfaceLanes::of(s, &at);
         let mut weight = Vector::gather(&paths.throughput, index);
         let sampler = paths.sampler_lanes(index);
         let slot = Bits::gather(&paths.slot, index);
@@ -175,11 +177,11 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         if kind == MATTE {
             continue;
         }
-        let mut pdf = zero.all(if kind == GLOSS { LIGHTS_COUNTED } else { f32::INFINITY });
+        let mut pdf = zero.all(if kind == GLOSS { DIRECT_ALREADY_SAMPLED } else { f32::INFINITY });
         if kind == ROUGH {
             let sampled = within_lobe(wi, exponent, sampler.pair(dimension + DIM_SHINY + 1));
             let above = sampled.dot(place.normal).is_positive() & sampled.dot(place.reach_normal).is_positive();
-            pdf = select(above, lobe_pdf(exponent, wi.dot(sampled)), zero.all(LIGHTS_COUNTED));
+            pdf = select(above, lobe_pdf(exponent, wi.dot(sampled)), zero.all(DIRECT_ALREADY_SAMPLED));
             wi = select_vector(above, sampled, wi);
         }
         let mut throughput = weight.times(tint);
@@ -204,7 +206,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
 }
 
 #[inline(always)]
-fn color_of<S: Simd>(s: S, at: &At<S>, inputs: &Inputs, row: Bits<S>, place: &Place<S>) -> Vector<S> {
+fn color_of<S: Simd>(s: S, at: &HitGroup<S>, inputs: &Inputs, row: Bits<S>, place: &SurfaceLanes<S>) -> Vector<S> {
     let mut color = Vector::gather(&inputs.color, row);
     if at.scene.tables.features.textures {
         let textured = at.mask & Bits::gather(&inputs.textured, row).has(1);
@@ -220,7 +222,7 @@ fn color_of<S: Simd>(s: S, at: &At<S>, inputs: &Inputs, row: Bits<S>, place: &Pl
 #[inline(always)]
 fn reflect<S: Simd>(
     lit: &Lit<S>,
-    place: &Place<S>,
+    place: &SurfaceLanes<S>,
     found: Mask,
     wi: Vector<S>,
     pdf: Float<S>,

@@ -2,10 +2,10 @@
 
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::simd::shade::Group;
-use crate::shading::simd::chunk::Chunk;
+use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{lanes_of, transmittance};
 use crate::shading::simd::lights::light_weight;
-use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select};
 use glam::Vec3;
 
@@ -22,10 +22,10 @@ fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
     let Group { scene, techniques, caustics, paths, hits, materials, order, sets, .. } = group;
     let tables = &*scene.tables;
     for chunk in order.chunks(LANES) {
-        let Chunk { indices, mask } = Chunk::of(chunk);
+        let LaneGroup { indices, mask } = LaneGroup::of(chunk);
         let index = Bits::load(s, &indices);
-        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
-        let place = Place::of(s, &at);
+        let at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = SurfaceLanes::of(s, &at);
         let pdf = Float::gather(&paths.pdf, index);
         let distance = Float::gather(&hits.t, index);
         let color = Vector::gather(&tables.materials.color, Bits::gather(materials, index));
@@ -70,7 +70,13 @@ fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
 
 /// Puts in the weights of light that paths from the lamps could have found as well, one at a time.
 #[inline(always)]
-fn lamp_weights<S: Simd>(s: S, pass: &CausticPass, at: &At<S>, place: &Place<S>, weight: Float<S>) -> Float<S> {
+fn lamp_weights<S: Simd>(
+    s: S,
+    pass: &CausticPass,
+    at: &HitGroup<S>,
+    place: &SurfaceLanes<S>,
+    weight: Float<S>,
+) -> Float<S> {
     let mut gathered = 0;
     for lane in lanes_of(at.mask & place.front) {
         gathered |= Mask::from(at.paths.track_of(at.indices[lane] as usize).is_gathered()) << lane;

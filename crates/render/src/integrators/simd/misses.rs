@@ -4,7 +4,7 @@ use crate::core::environment::Environment;
 use crate::prepare::prepared::Prepared;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::PathBatch;
-use crate::shading::simd::chunk::{Chunk, iors};
+use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select_vector};
 use glam::Vec3;
@@ -27,8 +27,8 @@ pub(crate) fn shade_misses(
 #[inline(always)]
 fn misses<S: Simd>(s: S, scene: &Prepared, paths: &PathBatch, sets: &MediumSets, order: &[u32], radiance: &mut [Vec3]) {
     for chunk in order.chunks(LANES) {
-        let chunk = Chunk::of(chunk);
-        let Chunk { indices, mask } = chunk;
+        let chunk = LaneGroup::of(chunk);
+        let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
         let arriving = match &scene.shading.environment {
             Environment::Black => return,

@@ -3,19 +3,19 @@
 use crate::core::material::Material;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::simd::track::BounceTracks;
+use crate::integrators::simd::track::BounceMisStates;
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::DIM_ROULETTE;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
-use crate::shading::simd::chunk::{Chunk, iors};
 use crate::shading::simd::hints::HintLanes;
+use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
 use crate::shading::simd::lights::{LightPoints, light_weight};
-use crate::shading::simd::place::{At, Place};
 use crate::shading::simd::scatter::{eval, sample, surface_of};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select, select_vector};
 use glam::Vec3;
@@ -97,11 +97,11 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
     let Group { next, shadows, sets, .. } = group;
     let features = &scene.tables.features;
     for chunk in order.chunks(LANES) {
-        let chunk = Chunk::of(chunk);
-        let Chunk { indices, mask } = chunk;
+        let chunk = LaneGroup::of(chunk);
+        let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
-        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
-        let place = Place::of(s, &at);
+        let at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = SurfaceLanes::of(s, &at);
         let mut throughput = Vector::gather(&paths.throughput, index);
         let sampler = paths.sampler_lanes(index);
         let slot = Bits::gather(&paths.slot, index);
@@ -190,7 +190,7 @@ fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
         }
         if let (Some(pass), Some(tracks)) = (caustics, &mut next.tracks) {
             let of_bounce =
-                BounceTracks { pass, at: &at, place: &place, hints: &hints, bounce: &bounce, media: &media };
+                BounceMisStates { pass, at: &at, place: &place, hints: &hints, bounce: &bounce, media: &media };
             of_bounce.append::<KIND>(s, go_on, depth == 1, tracks);
         }
         let pdf = if techniques.light_sampling { bounce.pdf } else { bounce.pdf.all(f32::INFINITY) };

@@ -6,31 +6,31 @@ use crate::integrators::caustics::pass::CausticPass;
 use crate::prepare::casters::NO_CASTER;
 use crate::shading::bsdf::Scatter;
 use crate::shading::interface::MediumId;
+use crate::shading::mis_state::MisState;
 use crate::shading::simd::bounce::Bounce;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, MIRROR, lanes_of};
-use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::{blend_at, lobe_at};
-use crate::shading::track::Track;
 use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
 /// How the paths go on.
-pub(crate) struct BounceTracks<'a, S: Simd> {
+pub(crate) struct BounceMisStates<'a, S: Simd> {
     pub pass: &'a CausticPass<'a>,
-    pub at: &'a At<'a, S>,
-    pub place: &'a Place<S>,
+    pub at: &'a HitGroup<'a, S>,
+    pub place: &'a SurfaceLanes<S>,
     pub hints: &'a HintLanes<'a>,
     pub bounce: &'a Bounce<S>,
     /// Behind the bounce.
     pub media: &'a [MediumId; LANES],
 }
 
-impl<S: Simd> BounceTracks<'_, S> {
+impl<S: Simd> BounceMisStates<'_, S> {
     /// Appends the tracks of the lanes of `go_on`; `is_first`: their hits are those of camera rays.
     #[inline(always)]
-    pub fn append<const KIND: usize>(&self, s: S, go_on: Mask, is_first: bool, tracks: &mut Vec<Track>) {
+    pub fn append<const KIND: usize>(&self, s: S, go_on: Mask, is_first: bool, tracks: &mut Vec<MisState>) {
         let Self { pass, at, place, hints, bounce, media } = *self;
         let (wo, wi, normal) = (place.wo, bounce.wi, place.geometric_normal);
         let (cos_o, along) = (wo.dot(normal), wi.dot(normal));
@@ -44,7 +44,7 @@ impl<S: Simd> BounceTracks<'_, S> {
         let specular = bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let lost = bounce.pdf.all(f32::NAN);
         let weights = bounce.weight.to_arrays();
-        let mut old = [Track::default(); LANES];
+        let mut old = [MisState::default(); LANES];
         lanes_of(go_on).for_each(|lane| old[lane] = hints.track(at, lane, &weights));
         let ratio = if is_first {
             let joined = self.join_ratio(s, cos_o, along.abs());
@@ -70,7 +70,7 @@ impl<S: Simd> BounceTracks<'_, S> {
             } else {
                 NO_CASTER
             };
-            Track::new(ratios[lane], caster, old[lane].gain)
+            MisState::new(ratios[lane], caster, old[lane].gain)
         }));
     }
 

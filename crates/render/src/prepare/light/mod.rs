@@ -3,22 +3,22 @@
 //! [`LightTable::sample`] and [`LightTable::pdf`] are one family: the second gives the density with which the first
 //! would have found a point that a ray hit by itself, which is what multiple importance sampling needs.
 
+pub(crate) mod arrays;
 pub(crate) mod emitter;
-pub(crate) mod lanes;
-mod sample_lanes;
+mod sample_simd;
 mod selection;
 pub(crate) mod shape;
 mod tree;
-mod tree_lanes;
-mod triangle_lanes;
+mod tree_simd;
+mod triangle_simd;
 
 use crate::core::color::luminance;
 use crate::core::material::{ColorInput, Emission};
 use crate::core::snapshot::Geometry;
 use crate::core::techniques::Techniques;
 use crate::core::texture::Texture;
+use crate::prepare::light::arrays::LightArrays;
 use crate::prepare::light::emitter::{Light, LightSample};
-use crate::prepare::light::lanes::WideLights;
 use crate::prepare::light::selection::Selection;
 use crate::prepare::light::shape::{LightShape, sphere_as_point};
 use crate::sampling::Sampler;
@@ -35,7 +35,7 @@ pub struct LightTable {
     /// For each object: where its primitives stand among the lights.
     by_object: Vec<ObjectLights>,
     pub(crate) selection: Selection,
-    pub(crate) lanes: Option<WideLights>,
+    pub(crate) lanes: Option<LightArrays>,
 }
 
 /// Which lights the primitives of an object are.
@@ -125,7 +125,7 @@ impl LightTable {
             })
             .collect();
         let selection = Selection::build(&lights);
-        let lanes = WideLights::build(&lights);
+        let lanes = LightArrays::build(&lights);
         Self { lights, by_object, selection, lanes }
     }
 

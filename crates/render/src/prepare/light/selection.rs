@@ -4,7 +4,7 @@ use crate::core::techniques::Techniques;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
 use crate::prepare::light::tree::LightTree;
-use crate::prepare::light::tree_lanes::WideTree;
+use crate::prepare::light::tree_simd::LightTreeArrays;
 use crate::sampling::AliasTable;
 use firstlight_simd::{Float, Simd, Vector, select};
 use glam::Vec3;
@@ -18,7 +18,7 @@ pub(crate) struct Selection {
     bounds: Vec<LightBounds>,
     /// When there are many.
     tree: LightTree,
-    wide_tree: WideTree,
+    wide_tree: LightTreeArrays,
     /// The same by power alone, for what has no point to ask from.
     alias: AliasTable,
 }
@@ -41,7 +41,7 @@ impl Selection {
         let powers: Vec<f64> =
             lights.iter().map(|light| f64::from(light.mean_radiance) * f64::from(light.shape.area())).collect();
         let tree = LightTree::build(lights);
-        let wide_tree = WideTree::new(&tree);
+        let wide_tree = LightTreeArrays::new(&tree);
         Self { bounds: Vec::new(), tree, wide_tree, alias: AliasTable::new(&powers) }
     }
 
@@ -122,7 +122,7 @@ impl Selection {
 
     /// Of many lights.
     #[inline]
-    pub fn wide_tree(&self) -> &WideTree {
+    pub fn wide_tree(&self) -> &LightTreeArrays {
         &self.wide_tree
     }
 

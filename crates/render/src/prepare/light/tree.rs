@@ -298,7 +298,7 @@ mod tests {
     use super::*;
     use crate::core::material::{ColorInput, Emission};
     use crate::core::techniques::Techniques;
-    use crate::prepare::light::tree_lanes::WideTree;
+    use crate::prepare::light::tree_simd::LightTreeArrays;
     use crate::sampling::Sampler;
     use firstlight_simd::{Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
 
@@ -337,7 +337,7 @@ mod tests {
 
     #[inline(always)]
     fn walk_lanes<S: Simd>(s: S, tree: &LightTree, places: &[(Vec3, Vec3)], out: &mut Vec<(u32, u32, u32)>) {
-        let wide = WideTree::new(tree);
+        let wide = LightTreeArrays::new(tree);
         for (round, chunk) in places.chunks(LANES).enumerate() {
             let at = |k: usize| chunk[k.min(chunk.len() - 1)];
             let u: [f32; LANES] = std::array::from_fn(|k| (k as f32 + 0.5) / LANES as f32);

@@ -1,7 +1,7 @@
 //! How sixteen paths go on.
 
 use crate::prepare::material_table::TEXTURED;
-use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_simd::{Bits, Float, Mask, Simd, Vector};
 
@@ -16,7 +16,7 @@ pub(crate) struct Bounce<S: Simd> {
 
 /// Albedo or reflectance by rows of the table, with their textures.
 #[inline(always)]
-pub(crate) fn colors_of<S: Simd>(s: S, at: &At<S>, place: &Place<S>, row: Bits<S>) -> Vector<S> {
+pub(crate) fn colors_of<S: Simd>(s: S, at: &HitGroup<S>, place: &SurfaceLanes<S>, row: Bits<S>) -> Vector<S> {
     let table = &at.scene.tables.materials;
     let color = Vector::gather(&table.color, row);
     if !at.scene.tables.features.textures {

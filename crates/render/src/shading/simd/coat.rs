@@ -3,11 +3,11 @@
 //! The formulas are those of [`crate::shading::bsdf::Blend`]: light sampling asks both parts, a bounce is chosen from one
 //! and weighted over both.
 
-use crate::sampling::warp_lanes::cosine_hemisphere;
+use crate::sampling::warp_simd::cosine_hemisphere;
 use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
 use crate::shading::simd::lanes::{DIFFUSE, METAL, MIRROR};
 use crate::shading::simd::metal::MetalLanes;
-use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Bits, Float, Mask, Simd, Vector, frame_around, select, select_vector, two};
 use std::f32::consts::FRAC_1_PI;
 
@@ -35,7 +35,7 @@ struct Part<S: Simd> {
 
 impl<S: Simd> Coat<S> {
     #[inline(always)]
-    pub fn new(s: S, at: &At<S>, place: &Place<S>) -> Self {
+    pub fn new(s: S, at: &HitGroup<S>, place: &SurfaceLanes<S>) -> Self {
         let table = &at.scene.tables.materials;
         let material = Bits::gather(at.materials, at.index);
         let rows = two!(|k| Bits::gather(&table.parts[k], material));
@@ -92,7 +92,7 @@ impl<S: Simd> Coat<S> {
     }
 
     #[inline(always)]
-    pub fn sample(&self, mask: Mask, place: &Place<S>, u_lobe: Float<S>, u: [Float<S>; 2]) -> Bounce<S> {
+    pub fn sample(&self, mask: Mask, place: &SurfaceLanes<S>, u_lobe: Float<S>, u: [Float<S>; 2]) -> Bounce<S> {
         let first = u_lobe.lt(self.pmfs[0]) | self.pmfs[1].is_zero();
         let (rough, mirror) = (mask & self.chosen(first, METAL), mask & self.chosen(first, MIRROR));
         let local = cosine_hemisphere(u);

@@ -3,7 +3,7 @@
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::place::At;
+use crate::shading::simd::surface::HitGroup;
 use firstlight_simd::{Float, LANES, Mask, Simd};
 
 /// See [`crate::shading::interface::Interface`].
@@ -16,7 +16,7 @@ pub(crate) struct GlassLanes<S: Simd> {
 impl<S: Simd> GlassLanes<S> {
     /// - `front`: lanes that meet it from outside; `media`: what each path is inside of.
     #[inline(always)]
-    pub fn of(s: S, at: &At<S>, front: Mask, sets: &mut MediumSets, media: &[MediumId; LANES]) -> Self {
+    pub fn of(s: S, at: &HitGroup<S>, front: Mask, sets: &mut MediumSets, media: &[MediumId; LANES]) -> Self {
         let (mut eta, mut squeeze, mut beyond) = ([1.0; LANES], [1.0; LANES], *media);
         for lane in lanes_of(at.mask) {
             let i = at.indices[lane] as usize;

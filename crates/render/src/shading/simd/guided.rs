@@ -6,8 +6,8 @@ use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::simd::bounce::Bounce;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::place::Place;
 use crate::shading::simd::scatter::{Surface, eval};
+use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Simd, Vector, select, select_vector};
 use glam::Vec2;
 
@@ -18,7 +18,7 @@ impl HintLanes<'_> {
         &self,
         s: S,
         surface: &Surface<S>,
-        place: &Place<S>,
+        place: &SurfaceLanes<S>,
         sampler: &SamplerLanes<S>,
         dimension: u32,
         bounce: Bounce<S>,

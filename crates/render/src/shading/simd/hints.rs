@@ -1,11 +1,11 @@
 //! Hints of where gathered light comes from, for sixteen surfaces; see [`crate::shading::guided::Guided`] for one.
 
-use crate::prepare::guide::{Guide, Hints, SHARE as HINTED};
+use crate::prepare::guide::{Guide, Hints, SHARE as GUIDED_SHARE};
 use crate::sampling::SamplerLanes;
 use crate::shading::dimensions::DIM_LOBE;
+use crate::shading::mis_state::MisState;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::place::{At, Place};
-use crate::shading::track::Track;
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
 use glam::Vec3;
 
@@ -25,8 +25,8 @@ impl<'a> HintLanes<'a> {
         s: S,
         guide: Option<&'a Guide>,
         n_vertices: u32,
-        at: &At<S>,
-        place: &Place<S>,
+        at: &HitGroup<S>,
+        place: &SurfaceLanes<S>,
         mask: Mask,
     ) -> Self {
         let mut found = Self::NONE;
@@ -60,20 +60,20 @@ impl<'a> HintLanes<'a> {
                 hinted[lane] = hints.pdf_lanes(s, vec3_of(&directions, lane));
             }
         }
-        select(self.told, pdf + (Float::load(s, &hinted) - pdf) * HINTED, pdf)
+        select(self.told, pdf + (Float::load(s, &hinted) - pdf) * GUIDED_SHARE, pdf)
     }
 
     /// The number that chooses a part of a surface: what is left of it where the choice was not to follow a hint.
     #[inline(always)]
     pub fn u_lobe<S: Simd>(&self, sampler: &SamplerLanes<S>, dimension: u32) -> Float<S> {
         let u = sampler.single(dimension + DIM_LOBE);
-        let rest = ((u - HINTED) / u.all(1.0 - HINTED)).at_least(0.0).at_most(1.0f32.next_down());
+        let rest = ((u - GUIDED_SHARE) / u.all(1.0 - GUIDED_SHARE)).at_least(0.0).at_most(1.0f32.next_down());
         if self.told == 0 { u } else { select(self.told, rest, u) }
     }
 
     /// Of a lane whose throughput is multiplied by `weight`.
     #[inline(always)]
-    pub fn track<S: Simd>(&self, at: &At<S>, lane: usize, weight: &[[f32; LANES]; 3]) -> Track {
+    pub fn track<S: Simd>(&self, at: &HitGroup<S>, lane: usize, weight: &[[f32; LANES]; 3]) -> MisState {
         let track = at.paths.track_of(at.indices[lane] as usize);
         if self.told >> lane & 1 != 0 { track.guided(vec3_of(weight, lane)) } else { track }
     }

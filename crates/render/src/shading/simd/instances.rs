@@ -6,9 +6,9 @@
 
 use crate::prepare::instance_table::{Columns, InstanceTable};
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::place::{At, Place, ball_points};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes, ball_points};
 use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, gamma};
-use firstlight_kdtree::{INSET, Shape, WIDE_ERROR};
+use firstlight_kdtree::{F64_ERROR, INSET, Shape};
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, select, select_vector, three, two};
 use glam::Vec3;
 
@@ -48,13 +48,13 @@ fn set_lane(arrays: &mut [[f32; LANES]; 3], lane: usize, v: Vec3) {
     (arrays[0][lane], arrays[1][lane], arrays[2][lane]) = (v.x, v.y, v.z);
 }
 
-impl<S: Simd> Place<S> {
+impl<S: Simd> SurfaceLanes<S> {
     /// Points on meshes, with the faces' own normals; and lanes that come so near to a rim that they must be asked for one at
     /// a time.
     ///
     /// - `row`: of the objects in the [`InstanceTable`].
     #[inline(always)]
-    pub(crate) fn set_meshes(&mut self, s: S, at: &At<S>, row: Bits<S>, mask: Mask) -> (Corners<S>, Mask) {
+    pub(crate) fn set_meshes(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, mask: Mask) -> (Corners<S>, Mask) {
         let geometry = &*at.scene.geometry;
         let table = &at.scene.surfaces.instances;
         let mut corners = [[[0.0; LANES]; 3]; 3];
@@ -111,7 +111,7 @@ impl<S: Simd> Place<S> {
 
     /// Normals and lift of meshes that have normals at their vertices, once the sides of the faces are known.
     #[inline(always)]
-    pub(crate) fn smooth_meshes(&mut self, s: S, at: &At<S>, row: Bits<S>, corners: &Corners<S>) {
+    pub(crate) fn smooth_meshes(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, corners: &Corners<S>) {
         if corners.smooth == 0 {
             return;
         }
@@ -145,7 +145,7 @@ impl<S: Simd> Place<S> {
 
     /// Points on clouds of balls, with the normals of their outsides.
     #[inline(always)]
-    pub(crate) fn set_clouds(&mut self, s: S, at: &At<S>, row: Bits<S>, dir: Vector<S>, mask: Mask) {
+    pub(crate) fn set_clouds(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, dir: Vector<S>, mask: Mask) {
         let geometry = &*at.scene.geometry;
         let table = &at.scene.surfaces.instances;
         let (mut centers, mut radii) = ([[0.0; LANES]; 3], [1.0; LANES]);
@@ -164,7 +164,7 @@ impl<S: Simd> Place<S> {
         let t = Float::gather(&at.hits.t, at.index);
         let [position, normal] = ball_points(s, [origin, dir], t, center, radius);
         // All but the rounding is a power of two away from the size.
-        let of_ball = (center.abs().max_element() + radius) * WIDE_ERROR as f32;
+        let of_ball = (center.abs().max_element() + radius) * F64_ERROR as f32;
         let along = of_ball + Float::gather(&table.condition, row) * gamma(4) * radius;
         let error = position.abs().mul_all(2.0 * UNIT_ROUNDOFF) + Vector { x: along, y: along, z: along };
         self.carry_to_world(table, row, mask, LocalPoints { position, error, normal });

@@ -1,13 +1,13 @@
 //! Points on lights, sixteen at a time where the lights allow it; see [`crate::shading::lights::choose_light_point`].
 
 use crate::core::techniques::Techniques;
-use crate::prepare::light::lanes::LightLanes;
+use crate::prepare::light::arrays::LightLanes;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::lights::choose_light_point;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::place::Place;
+use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Float, Kernel, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
@@ -27,7 +27,7 @@ pub(crate) struct LightPoints<'a, S: Simd> {
     pub scene: &'a Prepared,
     pub techniques: &'a Techniques,
     pub mask: Mask,
-    pub place: &'a Place<S>,
+    pub place: &'a SurfaceLanes<S>,
     pub sampler: &'a SamplerLanes<S>,
     pub dimension: u32,
 }

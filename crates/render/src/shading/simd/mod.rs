@@ -2,15 +2,15 @@
 //! [`crate::shading`] for one; tests hold the two against each other.
 
 pub(crate) mod bounce;
-pub(crate) mod chunk;
 mod coat;
 mod glass;
 mod guided;
 pub(crate) mod hints;
 mod instances;
+pub(crate) mod lane_group;
 pub(crate) mod lanes;
 pub(crate) mod lights;
 pub(crate) mod metal;
-pub(crate) mod place;
 pub(crate) mod scatter;
+pub(crate) mod surface;
 pub(crate) mod texture;

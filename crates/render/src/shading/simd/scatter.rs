@@ -3,7 +3,7 @@
 use crate::core::material::SMALLEST_ALPHA;
 use crate::prepare::material_table::{COATED, TEXTURED};
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_lanes::cosine_hemisphere;
+use crate::sampling::warp_simd::cosine_hemisphere;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
@@ -14,7 +14,7 @@ use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, lanes_of};
 use crate::shading::simd::metal;
 use crate::shading::simd::metal::MetalLanes;
-use crate::shading::simd::place::{At, Place};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::scalar_at;
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around, select, select_vector};
 use glam::Vec2;
@@ -37,8 +37,8 @@ pub(crate) struct Surface<S: Simd> {
 /// - `media`: what each path is inside of.
 pub(crate) fn surface_of<S: Simd, const KIND: usize>(
     s: S,
-    at: &At<S>,
-    place: &Place<S>,
+    at: &HitGroup<S>,
+    place: &SurfaceLanes<S>,
     sets: &mut MediumSets,
     media: &[MediumId; LANES],
 ) -> Surface<S> {
@@ -81,7 +81,7 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
 #[inline(always)]
 pub(crate) fn eval<S: Simd, const KIND: usize>(
     surface: &Surface<S>,
-    place: &Place<S>,
+    place: &SurfaceLanes<S>,
     wi: Vector<S>,
 ) -> (Vector<S>, Float<S>) {
     if let Some(coat) = &surface.coat
@@ -107,9 +107,9 @@ pub(crate) fn eval<S: Simd, const KIND: usize>(
 
 #[inline(always)]
 pub(crate) fn sample<S: Simd, const KIND: usize>(
-    at: &At<S>,
+    at: &HitGroup<S>,
     surface: &Surface<S>,
-    place: &Place<S>,
+    place: &SurfaceLanes<S>,
     hints: &HintLanes,
     sampler: &SamplerLanes<S>,
     dimension: u32,

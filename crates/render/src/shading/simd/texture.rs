@@ -4,7 +4,7 @@ use crate::core::material::ColorInput;
 use crate::core::texture::TexturePattern;
 use crate::prepare::prepared::Prepared;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::place::Place;
+use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Bits, Mask, Simd, Vector, floor, select_vector, truncated};
 use glam::Vec2;
 
@@ -16,7 +16,7 @@ pub(crate) fn looked_up<S: Simd>(
     inputs: &[ColorInput],
     row: Bits<S>,
     textured: Mask,
-    place: &Place<S>,
+    place: &SurfaceLanes<S>,
     color: Vector<S>,
 ) -> Vector<S> {
     if textured == 0 {

@@ -1,7 +1,7 @@
 //! A scene, the rays that are hard on it, and what must be true of the answers.
 
-use super::judge::{Judge, Solid, Verdict};
 use super::random::Random;
+use super::reference::{CheckResult, ReferenceIntersector, Solid};
 use super::replay::{Replay, Told};
 use super::tally::{Tally, hex, hex3};
 use crate::geometry::{Ray, robust::offset_ray_origin};
@@ -10,10 +10,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 /// One scene with its rays.
-pub struct Stage {
+pub struct TestScene {
     pub name: String,
     pub scene: SceneTree,
-    pub judge: Judge,
+    pub judge: ReferenceIntersector,
     /// The ray of an index.
     pub rays: Rays,
     /// Of so many rays one is held against every primitive; 1 for all.
@@ -33,7 +33,7 @@ pub struct Probe {
 /// Rays that are handed to the kernel together.
 const BATCH: u64 = 2048;
 
-impl Stage {
+impl TestScene {
     /// Traces rays `0..n` and counts what is wrong.
     pub fn run(&self, index: usize, n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         (0..n.div_ceil(BATCH))
@@ -100,15 +100,15 @@ impl Stage {
         let verdict = if index.is_multiple_of(self.brute_every) {
             self.judge.check(ray, hit.as_ref())
         } else {
-            hit.as_ref().map_or(Verdict::Right(0.0), |hit| self.judge.check_hit(ray, hit))
+            hit.as_ref().map_or(CheckResult::Right(0.0), |hit| self.judge.check_hit(ray, hit))
         };
         let severity = match verdict {
-            Verdict::Right(ratio) => ratio,
-            Verdict::WrongT(ratio) => {
+            CheckResult::Right(ratio) => ratio,
+            CheckResult::WrongT(ratio) => {
                 tally.wrong_t += 1;
                 ratio.max(1.0).next_up()
             }
-            Verdict::Missed => {
+            CheckResult::Missed => {
                 tally.missed += 1;
                 1e9
             }

@@ -17,13 +17,13 @@ pub(super) const MAX_SIMPLE: usize = 48;
 
 /// Trees over spheres, quads and triangles. What their leaves hold are the numbers of the objects.
 #[derive(Debug, Default)]
-pub(super) struct LooseTrees {
+pub(super) struct PrimitiveTrees {
     pub spheres: Option<BlockTree<SphereBlock>>,
     pub quads: Option<BlockTree<QuadBlock>>,
     pub triangles: Option<BlockTree<TriangleBlock>>,
 }
 
-impl LooseTrees {
+impl PrimitiveTrees {
     /// Builds trees for the kinds that need one, the most frequent first, and returns the objects that are left.
     ///
     /// - `boxes`: of all the shapes.

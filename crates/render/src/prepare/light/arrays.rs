@@ -5,9 +5,9 @@
 use crate::core::material::ColorInput;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
-use crate::prepare::light::triangle_lanes::TriangleLanes;
-use crate::sampling::offset_lanes::offset_origin;
-use crate::sampling::warp_lanes::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
+use crate::prepare::light::triangle_simd::TriangleLanes;
+use crate::sampling::offset_simd::offset_origin;
+use crate::sampling::warp_simd::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
 use firstlight_kdtree::geometry::robust::gamma;
 use firstlight_simd::{
     Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
@@ -17,7 +17,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// The lights as arrays that lanes look up.
 #[derive(Debug)]
-pub(crate) struct WideLights {
+pub(crate) struct LightArrays {
     pub n: usize,
     pub has_spheres: bool,
     pub has_quads: bool,
@@ -56,7 +56,7 @@ pub(crate) struct LightLanes<S: Simd> {
     pub radiance: Vector<S>,
 }
 
-impl WideLights {
+impl LightArrays {
     /// `None` where lights have to be asked one at a time.
     pub fn build(lights: &[Light]) -> Option<Self> {
         if lights.is_empty() {
@@ -115,7 +115,7 @@ impl WideLights {
     }
 }
 
-impl WideLights {
+impl LightArrays {
     /// See [`crate::prepare::light::shape::sphere_as_point`].
     #[inline(always)]
     pub fn as_points<S: Simd>(&self, id: Bits<S>, mask: Mask, position: Vector<S>) -> LightLanes<S> {

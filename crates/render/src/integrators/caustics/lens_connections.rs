@@ -15,14 +15,14 @@ pub(crate) struct Splat {
 
 /// Shadow rays to the lens, where in the film each leads, and with how much light.
 #[derive(Default)]
-pub(crate) struct Arrivals {
+pub(crate) struct LensConnections {
     pub rays: RayBatch,
     film: [Vec<f32>; 2],
     light: [Vec<f32>; 3],
     pub occluded: Vec<bool>,
 }
 
-impl Arrivals {
+impl LensConnections {
     /// Forgets all rays; there is room for `n` new ones afterwards.
     pub fn start(&mut self, n: usize) {
         self.rays.clear();

@@ -2,7 +2,7 @@
 
 use crate::core::techniques::Techniques;
 use crate::prepare::light::LightTable;
-use crate::prepare::light::lanes::{LightLanes, POINT, WideLights};
+use crate::prepare::light::arrays::{LightArrays, LightLanes, POINT};
 use crate::prepare::light::selection::MAX_ESTIMATED;
 use crate::sampling::SamplerLanes;
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, select};
@@ -123,7 +123,7 @@ impl LightTable {
     #[inline(always)]
     fn select_lanes<S: Simd>(
         &self,
-        wide: &WideLights,
+        wide: &LightArrays,
         techniques: &Techniques,
         mask: Mask,
         [position, normal]: [Vector<S>; 2],

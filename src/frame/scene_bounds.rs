@@ -7,7 +7,7 @@ use glam::DVec3;
 
 /// What the scene is, seen by who moves through it.
 #[derive(Resource, Clone, Debug)]
-pub struct Around {
+pub struct SceneBounds {
     pub extent: Extent,
     /// Corners of the boxes of the things that made it, for framing.
     pub corners: Vec<DVec3>,
@@ -17,7 +17,7 @@ pub struct Around {
     pub pace: Option<f64>,
 }
 
-impl Around {
+impl SceneBounds {
     pub fn surroundings(&self, aspect: f64) -> Surroundings {
         let Extent { center, radius } = self.extent;
         Surroundings { center, radius, home: self.home, aspect, turning: self.turning, pace: self.pace }

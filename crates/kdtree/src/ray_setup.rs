@@ -4,9 +4,9 @@
 
 use super::lanes::{longest_axis, to_own_space};
 use super::leaf::LeafRay;
+use super::node8::DescentRay;
 use super::ray::{Nearest, WIDEN};
 use super::simd::{LANES, Mask, Simd};
-use super::wide::DescentRay;
 use crate::geometry::{Aabb, Ray, Shear};
 use firstlight_simd::three;
 use glam::{Affine3A, Vec3};
@@ -27,7 +27,7 @@ pub(super) trait Source {
 
 /// Sixteen rays in the tree's own space.
 #[repr(C, align(64))]
-pub(super) struct Gate {
+pub(super) struct RaySetup {
     origin: [Lanes; 3],
     dir: [Lanes; 3],
     /// As in `ray::TreeRay`.
@@ -51,7 +51,7 @@ pub(super) struct Gate {
     waiting: Mask,
 }
 
-impl Gate {
+impl RaySetup {
     #[inline(always)]
     pub fn new() -> Self {
         Self {

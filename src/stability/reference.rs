@@ -36,7 +36,7 @@ struct Item {
 
 /// The primitives of one scene.
 #[derive(Debug)]
-pub struct Judge {
+pub struct ReferenceIntersector {
     items: Vec<Item>,
     /// Of each object, in `items`.
     starts: Vec<usize>,
@@ -44,7 +44,7 @@ pub struct Judge {
 
 /// What the judge says of one answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Verdict {
+pub enum CheckResult {
     /// Distance from the named primitive over its bound: at most 1.
     Right(f64),
     /// The same, beyond 1; or how far a nearer sure hit lies in front.
@@ -53,7 +53,7 @@ pub enum Verdict {
     Missed,
 }
 
-impl Judge {
+impl ReferenceIntersector {
     pub fn of(scene: &SceneTree) -> Self {
         let (mut items, mut starts) = (Vec::new(), Vec::new());
         for shape in scene.shapes() {
@@ -103,30 +103,36 @@ impl Judge {
     }
 
     /// Whether the hit lies where it says: takes the same time in every scene.
-    pub fn check_hit(&self, ray: &Ray, hit: &Hit) -> Verdict {
+    pub fn check_hit(&self, ray: &Ray, hit: &Hit) -> CheckResult {
         let item = self.item(hit);
         let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
         // About the origin of the ray: differences of `f32` numbers are exact in `f64`, sums far from zero are not.
         let way = f64::from(hit.t) * dir;
         let ratio = item.seen_from(origin).distance(way) / item.bound(origin, way.length());
         // NaN is wrong as well.
-        if hit.t > 0.0 && hit.t < ray.t_max && ratio <= 1.0 { Verdict::Right(ratio) } else { Verdict::WrongT(ratio) }
+        if hit.t > 0.0 && hit.t < ray.t_max && ratio <= 1.0 {
+            CheckResult::Right(ratio)
+        } else {
+            CheckResult::WrongT(ratio)
+        }
     }
 
     /// The same, and whether there is anything in front, by trying every primitive.
-    pub fn check(&self, ray: &Ray, hit: Option<&Hit>) -> Verdict {
+    pub fn check(&self, ray: &Ray, hit: Option<&Hit>) -> CheckResult {
         let found = hit.map_or(f64::INFINITY, |hit| f64::from(hit.t));
         let length = ray.dir.as_dvec3().length();
         for item in &self.items {
             let Some((t, margin)) = item.sure_hit(ray) else { continue };
             if t + margin < found && t + margin < f64::from(ray.t_max) {
                 return match hit {
-                    None => Verdict::Missed,
-                    Some(_) => Verdict::WrongT(1.0 + (found - t) * length / (margin * length).max(f64::MIN_POSITIVE)),
+                    None => CheckResult::Missed,
+                    Some(_) => {
+                        CheckResult::WrongT(1.0 + (found - t) * length / (margin * length).max(f64::MIN_POSITIVE))
+                    }
                 };
             }
         }
-        hit.map_or(Verdict::Right(0.0), |hit| self.check_hit(ray, hit))
+        hit.map_or(CheckResult::Right(0.0), |hit| self.check_hit(ray, hit))
     }
 
     /// How often the closed surface around `point` winds about it: ±1 inside, 0 outside (van Oosterom and Strackee 1983).

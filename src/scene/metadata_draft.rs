@@ -3,9 +3,9 @@
 use super::describe::Description;
 use super::file::{DisplayPart, FilmPart};
 use super::fingerprint::{Fingerprint, SceneContent};
+use super::image_metadata::{FORMAT, ImageMetadata, ImageSamples, ImageScene};
 use super::loaded::LoadedScene;
 use super::relative::{absolute, relative_path};
-use super::shot::{FORMAT, Shot, ShotSamples, ShotScene};
 use super::source::{SceneSource, UpAxis};
 use bevy_ecs::prelude::World;
 use std::path::Path;
@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 
 /// All that a note needs of a world; made at once, finished later, when the film is there.
 #[derive(Clone, Debug)]
-pub struct ShotDraft {
+pub struct MetadataDraft {
     source: Option<SceneSource>,
     up: Option<UpAxis>,
     description: Description,
@@ -32,7 +32,7 @@ struct Prints {
     has_changed: bool,
 }
 
-impl ShotDraft {
+impl MetadataDraft {
     /// Of what `world` shows; `loaded` is the scene that was opened into it.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let description = Description::of(world, loaded);
@@ -60,21 +60,21 @@ impl ShotDraft {
     }
 
     /// The note of a picture that will lie at `path`, of a film of this size and so many samples.
-    pub fn note(&self, path: &Path, size: (u32, u32), samples: ShotSamples, display: DisplayPart) -> String {
+    pub fn note(&self, path: &Path, size: (u32, u32), samples: ImageSamples, display: DisplayPart) -> String {
         let folder = absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
         let relative = |path: &Path| relative_path(&folder, path);
         let scene = match &self.source {
-            Some(SceneSource::Builtin(name)) => ShotScene::Builtin(name.clone()),
-            Some(SceneSource::Scene(path)) => ShotScene::Scene(relative(path)),
+            Some(SceneSource::Builtin(name)) => ImageScene::Builtin(name.clone()),
+            Some(SceneSource::Scene(path)) => ImageScene::Scene(relative(path)),
             Some(SceneSource::Model(path)) => {
                 let up = self.up.map(|up| if up == UpAxis::Y { 'y' } else { 'z' });
-                ShotScene::Model { path: relative(path), up }
+                ImageScene::Model { path: relative(path), up }
             }
-            Some(SceneSource::Picture(_)) | None => ShotScene::None,
+            Some(SceneSource::Picture(_)) | None => ImageScene::None,
         };
         let file = &self.description.file;
         let Prints { content, has_changed } = self.prints();
-        let shot = Shot {
+        let shot = ImageMetadata {
             format: FORMAT,
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
@@ -94,7 +94,7 @@ impl ShotDraft {
     }
 }
 
-impl ShotDraft {
+impl MetadataDraft {
     fn prints(&self) -> Prints {
         *self.prints.get_or_init(|| {
             let content = self.content.fingerprint();

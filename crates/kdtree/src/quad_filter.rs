@@ -16,7 +16,7 @@ use glam::{DVec3, Vec3};
 
 /// A parallelogram as a plane with coordinates.
 #[derive(Debug)]
-pub(super) struct SievedQuad {
+pub(super) struct FilteredQuad {
     middle: [f32; 3],
     /// The sum of its components' sizes is 1.
     normal: [f32; 3],
@@ -36,7 +36,7 @@ const SIZES: std::ops::Range<f64> = 1e-15..1e12;
 const DIRECTIONS: std::ops::Range<f32> = 1e-15..1e10;
 const FARTHEST: f32 = 1e15;
 
-impl SievedQuad {
+impl FilteredQuad {
     /// `None` for what has no area to speak of, or is too large or too small: such a quad is never left out.
     pub fn new(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Option<Self> {
         let (c, u, v) = (corner.as_dvec3(), edge_u.as_dvec3(), edge_v.as_dvec3());
@@ -69,7 +69,7 @@ impl SievedQuad {
 }
 
 /// Sixteen rays as the sieve wants them.
-pub(super) struct SieveRays<S: Simd> {
+pub(super) struct QuadFilterRays<S: Simd> {
     origin: [S::F; 3],
     dir: [S::F; 3],
     /// The largest component of the direction.
@@ -81,7 +81,7 @@ pub(super) struct SieveRays<S: Simd> {
 }
 
 /// What can be said of a quad.
-pub(super) struct Sieved<S: Simd> {
+pub(super) struct Filtered<S: Simd> {
     /// No hit in front of the origin comes before; ∞ where there is none, −∞ where nothing is known.
     pub earliest: S::F,
     /// Lanes in which there is one, and not after `latest`.
@@ -89,7 +89,7 @@ pub(super) struct Sieved<S: Simd> {
     pub latest: S::F,
 }
 
-impl<S: Simd> SieveRays<S> {
+impl<S: Simd> QuadFilterRays<S> {
     #[inline(always)]
     pub fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let size = s.max(s.abs(dir[0]), s.max(s.abs(dir[1]), s.abs(dir[2])));
@@ -107,9 +107,9 @@ impl<S: Simd> SieveRays<S> {
         }
     }
 
-    /// - `SURE`: whether [`Sieved::hits`] and `latest` are wanted.
+    /// - `SURE`: whether [`Filtered::hits`] and `latest` are wanted.
     #[inline(always)]
-    pub fn look<const SURE: bool>(&self, s: S, quad: &SievedQuad) -> Sieved<S> {
+    pub fn look<const SURE: bool>(&self, s: S, quad: &FilteredQuad) -> Filtered<S> {
         let from = [
             s.sub(s.splat(quad.middle[0]), self.origin[0]),
             s.sub(s.splat(quad.middle[1]), self.origin[1]),
@@ -145,7 +145,7 @@ impl<S: Simd> SieveRays<S> {
             latest = s.add(t, step);
             hits = certain_slope & certain_side & s.lt(zero, t) & s.le(s.add(far, margin), one);
         }
-        Sieved { earliest, hits, latest }
+        Filtered { earliest, hits, latest }
     }
 }
 
@@ -169,19 +169,19 @@ mod tests {
     type Answer = (bool, bool, f32, f32);
 
     #[inline(always)]
-    fn look_once<S: Simd>(s: S, quad: &SievedQuad, ray: [Vec3; 2], out: &mut Answer) {
+    fn look_once<S: Simd>(s: S, quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer) {
         let [origin, dir] = ray.map(|v| [s.splat(v.x), s.splat(v.y), s.splat(v.z)]);
-        let seen = SieveRays::new(s, &origin, &dir).look::<true>(s, quad);
+        let seen = QuadFilterRays::new(s, &origin, &dir).look::<true>(s, quad);
         let (mut earliest, mut latest) = ([0.0; LANES], [0.0; LANES]);
         s.store(seen.earliest, &mut earliest);
         s.store(seen.latest, &mut latest);
         *out = (!(earliest[0] == f32::INFINITY), seen.hits & 1 != 0, earliest[0], latest[0]);
     }
 
-    fn look(set: InstructionSet, quad: &SievedQuad, ray: [Vec3; 2]) -> Answer {
+    fn look(set: InstructionSet, quad: &FilteredQuad, ray: [Vec3; 2]) -> Answer {
         let mut answer = (false, false, 0.0, 0.0);
         let out = &mut answer;
-        dispatch!(set, look_once(quad: &SievedQuad, ray: [Vec3; 2], out: &mut Answer));
+        dispatch!(set, look_once(quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer));
         answer
     }
 
@@ -203,7 +203,7 @@ mod tests {
             let scale = 2.0f32.powi(scale);
             let shift = [Vec3::ZERO, vec3(100.0, -70.0, 30.0), vec3(1e4, 3e4, -2e4)][usize::from(shift)];
             let [corner, u, v] = [(corner + shift) * scale, edge_u * scale, edge_v * scale];
-            let Some(quad) = SievedQuad::new(corner, u, v) else { return Ok(()) };
+            let Some(quad) = FilteredQuad::new(corner, u, v) else { return Ok(()) };
             let far = (far + shift) * scale;
             let on = corner + a * u + b * v;
             // At a point in the quad's plane, from one, into a corner, out of one, along the plane, anywhere.
@@ -238,7 +238,7 @@ mod tests {
             prop_assume!(edge_u.cross(edge_v).length() > 1e-3);
             let rim = quad_rim(corner, edge_u, edge_v);
             prop_assume!(away.dot(rim.normal).abs() > 1e-3);
-            let quad = SievedQuad::new(corner, edge_u, edge_v).expect("a sound quad");
+            let quad = FilteredQuad::new(corner, edge_u, edge_v).expect("a sound quad");
             let on = corner + a * edge_u + b * edge_v;
             let origin = offset_ray_origin(on, rim.error, rim.normal, away);
             for set in InstructionSet::available() {
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_left_open() {
-        let quad = SievedQuad::new(Vec3::ZERO, Vec3::X, Vec3::Z).expect("a sound quad");
+        let quad = FilteredQuad::new(Vec3::ZERO, Vec3::X, Vec3::Z).expect("a sound quad");
         let inside = vec3(0.5, 1.0, 0.5);
         let odd = [f32::NAN, f32::INFINITY, 1e38];
         for set in InstructionSet::available() {
@@ -265,9 +265,9 @@ mod tests {
             }
         }
         for size in [0.0, 1e-30, 1e30, f32::INFINITY, f32::NAN] {
-            assert!(SievedQuad::new(Vec3::ZERO, Vec3::X * size, Vec3::Z * size).is_none(), "{size}");
+            assert!(FilteredQuad::new(Vec3::ZERO, Vec3::X * size, Vec3::Z * size).is_none(), "{size}");
         }
-        assert!(SievedQuad::new(Vec3::ZERO, Vec3::X, Vec3::X * 2.0).is_none(), "no area");
-        assert!(SievedQuad::new(Vec3::ZERO, Vec3::X, Vec3::Z * 1e-9).is_none(), "a needle");
+        assert!(FilteredQuad::new(Vec3::ZERO, Vec3::X, Vec3::X * 2.0).is_none(), "no area");
+        assert!(FilteredQuad::new(Vec3::ZERO, Vec3::X, Vec3::Z * 1e-9).is_none(), "a needle");
     }
 }

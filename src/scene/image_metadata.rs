@@ -30,11 +30,11 @@ pub(super) const FORMAT: u32 = 1;
 
 /// What is in a picture's note.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Shot {
+pub struct ImageMetadata {
     pub format: u32,
     /// Name and version.
     pub program: String,
-    pub scene: ShotScene,
+    pub scene: ImageScene,
     /// Of the scene, without camera, film and display.
     pub fingerprint: String,
     pub camera: CameraPart,
@@ -59,7 +59,7 @@ pub struct Shot {
 /// Which scene a picture shows. Paths count from the picture, with `/` between their parts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum ShotScene {
+pub enum ImageScene {
     Builtin(String),
     Scene(String),
     Model {
@@ -74,7 +74,7 @@ pub enum ShotScene {
 
 /// Which samples are in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ShotSamples {
+pub struct ImageSamples {
     /// The number of each pixel's first sample.
     pub first: u32,
     /// Samples that each pixel has at least.
@@ -83,7 +83,7 @@ pub struct ShotSamples {
     pub uneven: bool,
 }
 
-impl Shot {
+impl ImageMetadata {
     /// Reads the note of a PNG or EXR picture.
     ///
     /// # Errors
@@ -109,8 +109,8 @@ impl Shot {
         let folder = |path: &Path| absolute(path).parent().map(Path::to_path_buf).unwrap_or_default();
         let moved = |path: &str| relative_path(&folder(to), &folder(from).join(text_to_path(path)));
         match &mut self.scene {
-            ShotScene::Scene(path) | ShotScene::Model { path, .. } => *path = moved(path),
-            ShotScene::Builtin(_) | ShotScene::None => {}
+            ImageScene::Scene(path) | ImageScene::Model { path, .. } => *path = moved(path),
+            ImageScene::Builtin(_) | ImageScene::None => {}
         }
         self
     }
@@ -141,7 +141,7 @@ impl Shot {
             return Err(format!("{spp} samples from {first} on: they are numbered below {}", Film::MAX_SAMPLES));
         }
         match self.scene {
-            ShotScene::Model { up: Some(up), .. } if !matches!(up, 'y' | 'z') => {
+            ImageScene::Model { up: Some(up), .. } if !matches!(up, 'y' | 'z') => {
                 Err(format!("`up` is {up:?}, but must be 'y' or 'z'"))
             }
             _ => Ok(()),
@@ -164,17 +164,17 @@ impl Shot {
             found.ok_or_else(|| format!("the scene that it shows, {name}, is not there: put it beside the picture"))
         };
         Ok(match &self.scene {
-            ShotScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
-            ShotScene::Scene(path) => Some(SceneSource::Scene(find(path)?)),
-            ShotScene::Model { path, .. } => Some(SceneSource::Model(find(path)?)),
-            ShotScene::None => None,
+            ImageScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
+            ImageScene::Scene(path) => Some(SceneSource::Scene(find(path)?)),
+            ImageScene::Model { path, .. } => Some(SceneSource::Model(find(path)?)),
+            ImageScene::None => None,
         })
     }
 
     pub fn up(&self) -> Option<UpAxis> {
         match self.scene {
-            ShotScene::Model { up: Some('z'), .. } => Some(UpAxis::Z),
-            ShotScene::Model { up: Some(_), .. } => Some(UpAxis::Y),
+            ImageScene::Model { up: Some('z'), .. } => Some(UpAxis::Z),
+            ImageScene::Model { up: Some(_), .. } => Some(UpAxis::Y),
             _ => None,
         }
     }

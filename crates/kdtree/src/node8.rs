@@ -12,7 +12,7 @@ use super::nodes::{KdNodes, Node};
 /// only the lowest of the lanes below has a child.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
-pub(super) struct WideNode {
+pub(super) struct Node8 {
     pub splits: [f32; 7],
     /// Three bits a plane.
     pub axes: u32,
@@ -23,7 +23,7 @@ pub(super) struct WideNode {
     pub octants: [u64; 8],
 }
 // Two cache lines.
-const _: () = assert!(size_of::<WideNode>() == 128);
+const _: () = assert!(size_of::<Node8>() == 128);
 
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
@@ -80,7 +80,7 @@ impl DescentRay {
 }
 
 /// All wide nodes over a binary tree, root first.
-pub(super) fn widen(tree: &KdNodes) -> Vec<WideNode> {
+pub(super) fn widen(tree: &KdNodes) -> Vec<Node8> {
     let mut nodes = Vec::new();
     if !tree.bounds.is_empty() {
         // Each wide node consumes three levels and leaves at most seven entries behind; one lies at the bottom.
@@ -99,8 +99,8 @@ pub(super) fn widen(tree: &KdNodes) -> Vec<WideNode> {
     nodes.into_iter().flatten().collect()
 }
 
-fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> WideNode {
-    let mut node = WideNode { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], octants: [0; 8] };
+fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> Node8 {
+    let mut node = Node8 { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], octants: [0; 8] };
     // The subtree at each place of a level; `None` below a leaf.
     let mut level = vec![Some(binary)];
     let mut plane = 0;
@@ -163,7 +163,7 @@ fn octant_word(axes: u32, octant: usize) -> u64 {
 /// height.
 #[inline(always)]
 pub(super) fn descend_plain(
-    node: &WideNode,
+    node: &Node8,
     ray: &DescentRay,
     t0: f32,
     t1: f32,
@@ -200,7 +200,7 @@ mod tests {
     use crate::simd::{InstructionSet, Simd, dispatch};
 
     #[inline(always)]
-    fn run<S: Simd>(s: S, cases: &[(WideNode, DescentRay, f32, f32)], out: &mut Vec<u64>) {
+    fn run<S: Simd>(s: S, cases: &[(Node8, DescentRay, f32, f32)], out: &mut Vec<u64>) {
         for (node, ray, t0, t1) in cases {
             let mut stack = Stack::NEW;
             let height = s.descend(node, ray, *t0, *t1, &mut stack, 3);
@@ -224,7 +224,7 @@ mod tests {
             .map(|_| {
                 let mut number = || [0.0, 1.0, -1.0, 0.5, next() as f32 / 8e6 - 1.0][next() as usize % 5];
                 let mut node =
-                    WideNode { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
+                    Node8 { splits: std::array::from_fn(|_| number()), axes: 0, children: [0; 8], octants: [0; 8] };
                 let origin = [number(), number(), number()];
                 let dir = [number(), number(), number()].map(|d| if d == 0.0 && next() % 2 == 0 { -0.0 } else { d });
                 (0..7).for_each(|plane| node.axes |= (next() % 3) << (3 * plane));
@@ -241,7 +241,7 @@ mod tests {
         let run_on = |set| {
             let mut out = Vec::new();
             let (into, cases) = (&mut out, &cases[..]);
-            dispatch!(set, run(cases: &[(WideNode, DescentRay, f32, f32)], into: &mut Vec<u64>));
+            dispatch!(set, run(cases: &[(Node8, DescentRay, f32, f32)], into: &mut Vec<u64>));
             out
         };
         let expected = run_on(InstructionSet::Portable);

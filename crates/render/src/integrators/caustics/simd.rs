@@ -4,23 +4,23 @@
 //! mirrors and glass are known everywhere.
 
 use crate::core::camera::Camera;
-use crate::integrators::caustics::arrivals::Arrivals;
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
+use crate::integrators::caustics::lens_connections::LensConnections;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::simd::shade::{knows, scatters};
 use crate::prepare::casters::NO_CASTER;
 use crate::prepare::material_table::COATED;
 use crate::prepare::surface_table::SurfaceTable;
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_lanes::uniform_disc;
+use crate::sampling::warp_simd::uniform_disc;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
-use crate::shading::simd::chunk::Chunk;
 use crate::shading::simd::hints::HintLanes;
+use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::place::{At, Place};
 use crate::shading::simd::scatter::{eval, sample, surface_of};
+use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
 use glam::{Vec2, Vec3};
@@ -39,7 +39,7 @@ pub(crate) struct Group<'a> {
     /// Which of them.
     pub order: &'a [u32],
     pub next: &'a mut PathBatch,
-    pub arrivals: &'a mut Arrivals,
+    pub arrivals: &'a mut LensConnections,
     pub sets: &'a mut MediumSets,
     /// What the camera is inside of.
     pub camera: MediumId,
@@ -91,11 +91,11 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
     let Group { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals, sets, camera } = group;
     let scene = pass.scene;
     for some in order.chunks(LANES) {
-        let chunk = Chunk::of(some);
-        let Chunk { indices, mask } = chunk;
+        let chunk = LaneGroup::of(some);
+        let LaneGroup { indices, mask } = chunk;
         let index = Bits::load(s, &indices);
-        let at = At { scene, paths, hits, materials, index, indices: &indices, mask };
-        let place = Place::of(s, &at);
+        let at = HitGroup { scene, paths, hits, materials, index, indices: &indices, mask };
+        let place = SurfaceLanes::of(s, &at);
         let media = chunk.media(scene, paths);
         let mut throughput = Vector::gather(&paths.throughput, index);
         if scene.tables.features.media {
@@ -116,9 +116,9 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
 /// One vertex of each of sixteen paths.
 struct Step<'a, S: Simd> {
     pass: &'a CausticPass<'a>,
-    at: &'a At<'a, S>,
+    at: &'a HitGroup<'a, S>,
     /// As seen from the lamp's side.
-    place: &'a Place<S>,
+    place: &'a SurfaceLanes<S>,
     media: &'a [MediumId; LANES],
     throughput: Vector<S>,
     ratio: Float<S>,
@@ -129,7 +129,7 @@ struct Step<'a, S: Simd> {
 impl<S: Simd> Step<'_, S> {
     /// Shadow rays to points of the lens, where in the film they end and the light that they bring.
     #[inline(always)]
-    fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut Arrivals) {
+    fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut LensConnections) {
         let &Self { pass, at, place, media, throughput, ratio, .. } = self;
         let scene = pass.scene;
         let Camera { eye, right, up, forward, tan_half_vfov, focus_distance, .. } = scene.camera;
@@ -159,7 +159,7 @@ impl<S: Simd> Step<'_, S> {
         let distance2 = way.length_squared();
         let distance = distance2.sqrt();
         let cos_lens = depth / distance;
-        let seen = Place { wo: way * (depth.all(-1.0) / distance), ..*place };
+        let seen = SurfaceLanes { wo: way * (depth.all(-1.0) / distance), ..*place };
         let (cos_o, cos_i) = (seen.wo.dot(place.geometric_normal), place.wo.dot(place.geometric_normal));
         let surface = surface_of::<S, KIND>(s, at, &seen, sets, media);
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
@@ -234,7 +234,7 @@ impl<S: Simd> Step<'_, S> {
         let mut factor = if KIND == GLASS { white } else { bounce.weight } * gain;
         let mut ratio = self.ratio / gain;
         if scatters(KIND) && n_vertices > 1 {
-            let seen = Place { wo: wi, ..*place };
+            let seen = SurfaceLanes { wo: wi, ..*place };
             let surface = surface_of::<S, KIND>(s, at, &seen, sets, self.media);
             let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
             go_on &= specular | (pdf.is_positive() & cos_i.is_positive());

@@ -16,7 +16,7 @@ pub struct Limits {
 
 /// What was rendered up to a number of samples.
 #[derive(Clone, Debug)]
-pub struct Rung {
+pub struct CurveStep {
     pub spp: u32,
     pub spent: Spent,
     pub estimate: Option<ErrorEstimate>,
@@ -52,16 +52,16 @@ impl Spent {
 /// Renders `snapshot` on the current rayon pool until `limits`. `progress` is told the share that is done, 0..1.
 ///
 /// When `stop` says so, the step in hand is given up, and those before it are the answer: none, perhaps.
-pub fn climb(
+pub fn measure_curve(
     prepared: &Prepared,
     settings: &RenderSettings,
     (width, height): (u32, u32),
     limits: Limits,
     progress: &mut dyn FnMut(f64),
     stop: &(dyn Fn() -> bool + Sync),
-) -> Vec<Rung> {
+) -> Vec<CurveStep> {
     let mut film = Film::new(width, height);
-    let mut rungs: Vec<Rung> = Vec::new();
+    let mut rungs: Vec<CurveStep> = Vec::new();
     let mut rays = RayCounts::default();
     let mut pace = Pace::default();
     let (mut wall, mut cpu) = (Duration::ZERO, cpu_seconds().map(|_| 0.0));
@@ -89,7 +89,7 @@ pub fn climb(
             camera_paths: rays.camera,
             rays: rays.total(),
         };
-        rungs.push(Rung { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
+        rungs.push(CurveStep { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
         // The next step takes as long as all before it.
         let too_long = limits.seconds.is_some_and(|seconds| 2.0 * spent.wall_seconds > seconds);
         match spp.checked_mul(2) {
@@ -149,15 +149,15 @@ impl Step {
 
 /// All steps of one scene with one choice of techniques.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ladder {
+pub struct ConvergenceCurve {
     pub steps: Vec<Step>,
 }
 
-impl Ladder {
+impl ConvergenceCurve {
     /// At least one rung, all of the size of `reference`.
-    pub fn measure(rungs: &[Rung], reference: &LinearPicture, display: &Display) -> Self {
+    pub fn measure(rungs: &[CurveStep], reference: &LinearPicture, display: &Display) -> Self {
         assert!(!rungs.is_empty(), "a ladder has at least one rung");
-        let step = |rung: &Rung| Step {
+        let step = |rung: &CurveStep| Step {
             spp: rung.spp,
             spent: rung.spent,
             distance: Distance::between(&rung.picture, reference, display),

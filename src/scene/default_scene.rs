@@ -1,13 +1,13 @@
 //! A scene around a lone model: ground, sky, key light, and a camera that sees all of it.
 
 use super::file::{
-    CameraPart, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MaterialPart, MeshShadingPart, MeshSourcePart,
-    Named, ObjectPart, Paint, Rgb, SceneFile, TransformPart,
+    CameraPart, ColorParam, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MaterialPart, MeshShadingPart,
+    MeshSourcePart, Named, ObjectPart, Rgb, SceneFile, TransformPart,
 };
-use super::front::faces_away;
 use super::meshes::LoadedMesh;
+use super::orientation::faces_away;
 use super::source::UpAxis;
-use super::upright::guess_up;
+use super::up_axis::guess_up;
 use crate::mesh::Mesh;
 use glam::{DVec3, Vec3};
 
@@ -29,12 +29,12 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
     };
     let material = |albedo| MaterialPart::Diffuse { albedo };
     let mut materials = vec![
-        ("ground".to_owned(), material(Paint::rgb(0.45, 0.45, 0.43))),
+        ("ground".to_owned(), material(ColorParam::rgb(0.45, 0.45, 0.43))),
         // As large as the model and five radii away: about three times the light of the sky.
-        ("key light".to_owned(), MaterialPart::Emissive { radiance: Paint::rgb(26.0, 24.0, 21.0) }),
+        ("key light".to_owned(), MaterialPart::Emissive { radiance: ColorParam::rgb(26.0, 24.0, 21.0) }),
     ];
     if loaded.slots.is_empty() {
-        materials.push((CLAY.to_owned(), material(Paint::rgb(0.72, 0.56, 0.45))));
+        materials.push((CLAY.to_owned(), material(ColorParam::rgb(0.72, 0.56, 0.45))));
     }
     // Half a turn about the vertical, if the model looks the other way.
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };

@@ -8,14 +8,14 @@ use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{Float, LANES, Mask, Simd};
 
 /// Up to sixteen hits of a list.
-pub(crate) struct Chunk {
+pub(crate) struct LaneGroup {
     /// The first one again, where there are fewer.
     pub indices: [u32; LANES],
     /// Of those that count.
     pub mask: Mask,
 }
 
-impl Chunk {
+impl LaneGroup {
     /// - `some`: 1 to 16 of them.
     #[inline(always)]
     pub fn of(some: &[u32]) -> Self {

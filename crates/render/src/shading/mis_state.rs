@@ -5,7 +5,7 @@ use glam::Vec3;
 
 /// Of a path from the eye.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Track {
+pub(crate) struct MisState {
     /// Density of finding it from the lamp over that from the eye, without the lamp's factor; NaN if no path from a lamp
     /// can be it.
     pub ratio: f32,
@@ -16,13 +16,13 @@ pub(crate) struct Track {
     pub gain: f32,
 }
 
-impl Default for Track {
+impl Default for MisState {
     fn default() -> Self {
         Self { ratio: f32::NAN, caster: NO_CASTER, gain: 1.0 }
     }
 }
 
-impl Track {
+impl MisState {
     /// - `ratio`: NaN if no path from a lamp can be the path so far.
     /// - `caster`: that the last vertex lies on, if it was specular; [`NO_CASTER`] otherwise.
     #[inline(always)]

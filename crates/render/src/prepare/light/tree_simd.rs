@@ -7,7 +7,7 @@ use crate::prepare::light::tree::{LEAF, LightTree};
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
 
 #[derive(Debug, Default)]
-pub(crate) struct WideTree {
+pub(crate) struct LightTreeArrays {
     all: Rows,
     /// The first of them.
     top: Rows,
@@ -29,7 +29,7 @@ struct Rows {
     link: Vec<u32>,
 }
 
-impl WideTree {
+impl LightTreeArrays {
     pub fn new(tree: &LightTree) -> Self {
         // Numbers in the tree, by level.
         let mut order = vec![0];

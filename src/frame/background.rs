@@ -28,7 +28,7 @@ pub enum Finished {
 }
 
 #[derive(Default)]
-struct Board {
+struct TaskBoard {
     finished: Vec<Finished>,
     /// What the newest load is doing.
     progress: Option<String>,
@@ -46,7 +46,7 @@ struct Board {
     base: Option<MeshBase>,
 }
 
-impl Board {
+impl TaskBoard {
     /// What the mesh that comes next is, for people.
     fn mesh_in_the_making(&self) -> Option<String> {
         self.remaking.first().map(|(_, job)| job.title())
@@ -62,12 +62,12 @@ impl Board {
 
 /// Starts such work and collects what comes of it.
 #[derive(Resource, Clone)]
-pub struct Beside {
-    board: Arc<Mutex<Board>>,
+pub struct BackgroundTasks {
+    board: Arc<Mutex<TaskBoard>>,
     waker: Option<Waker>,
 }
 
-impl Beside {
+impl BackgroundTasks {
     pub fn new(waker: Option<Waker>) -> Self {
         Self { board: Arc::default(), waker }
     }
@@ -147,7 +147,7 @@ impl Beside {
             // A slider asks faster than meshes are made: what is outdated before it began is not begun.
             std::thread::sleep(std::time::Duration::from_millis(30));
             let mut base = this.with(|board| board.base.take());
-            while let Some((number, job)) = this.with(Board::next_remake) {
+            while let Some((number, job)) = this.with(TaskBoard::next_remake) {
                 let result =
                     guarded(|| pool.install(|| job.run(&mut base))).unwrap_or_else(|panic| Err(SceneError::new(panic)));
                 this.with(|board| {
@@ -227,13 +227,13 @@ impl Beside {
         })
     }
 
-    fn spawn(&self, name: &str, work: impl FnOnce() + Send + 'static, on_error: impl FnOnce(&mut Board, String)) {
+    fn spawn(&self, name: &str, work: impl FnOnce() + Send + 'static, on_error: impl FnOnce(&mut TaskBoard, String)) {
         if let Err(error) = std::thread::Builder::new().name(name.to_owned()).spawn(work) {
             self.with(|board| on_error(board, format!("no thread can be started: {error}")));
         }
     }
 
-    fn with<T>(&self, use_it: impl FnOnce(&mut Board) -> T) -> T {
+    fn with<T>(&self, use_it: impl FnOnce(&mut TaskBoard) -> T) -> T {
         use_it(&mut self.board.lock().unwrap_or_else(PoisonError::into_inner))
     }
 

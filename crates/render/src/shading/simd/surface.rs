@@ -3,17 +3,17 @@
 use crate::prepare::material_table::TEXTURED;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
-use crate::sampling::offset_lanes::offset_origin;
+use crate::sampling::offset_simd::offset_origin;
 use crate::shading::paths::PathBatch;
 use crate::shading::surface::Vertex;
 use firstlight_kdtree::geometry::robust::UNIT_ROUNDOFF;
-use firstlight_kdtree::{HitBatch, WIDE_ERROR};
+use firstlight_kdtree::{F64_ERROR, HitBatch};
 use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Simd, Vector, select, select_vector, three, two};
 use glam::{Vec2, Vec3};
 
 /// Points on surfaces, each seen along a ray.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<S: Simd> {
+pub(crate) struct SurfaceLanes<S: Simd> {
     pub position: Vector<S>,
     /// On the side that the ray came from.
     pub geometric_normal: Vector<S>,
@@ -30,7 +30,7 @@ pub(crate) struct Place<S: Simd> {
 }
 
 /// Which hits, and of which materials.
-pub(crate) struct At<'a, S: Simd> {
+pub(crate) struct HitGroup<'a, S: Simd> {
     pub scene: &'a Prepared,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
@@ -41,7 +41,7 @@ pub(crate) struct At<'a, S: Simd> {
     pub mask: Mask,
 }
 
-impl<S: Simd> At<'_, S> {
+impl<S: Simd> HitGroup<'_, S> {
     #[inline(always)]
     pub fn ray_origin(&self) -> Vector<S> {
         let rays = &self.paths.rays;
@@ -58,24 +58,24 @@ fn away_from_rim<S: Simd>(at: Float<S>, least: Float<S>) -> Float<S> {
     at.max(least).min(at.all(1.0) - least)
 }
 
-impl<S: Simd> Kernel<S> for &At<'_, S> {
-    type Output = Place<S>;
+impl<S: Simd> Kernel<S> for &HitGroup<'_, S> {
+    type Output = SurfaceLanes<S>;
 
     #[inline(always)]
-    fn run(self, s: S) -> Place<S> {
-        Place::new(s, self)
+    fn run(self, s: S) -> SurfaceLanes<S> {
+        SurfaceLanes::new(s, self)
     }
 }
 
-impl<S: Simd> Place<S> {
+impl<S: Simd> SurfaceLanes<S> {
     /// Long, and asked for by all kinds of materials: they share one copy of it.
     #[inline(always)]
-    pub fn of(s: S, at: &At<S>) -> Self {
+    pub fn of(s: S, at: &HitGroup<S>) -> Self {
         s.call(at)
     }
 
     #[inline(always)]
-    fn new(s: S, at: &At<S>) -> Self {
+    fn new(s: S, at: &HitGroup<S>) -> Self {
         let (rays, hits, table) = (&at.paths.rays, at.hits, &at.scene.surfaces);
         let dir = Vector {
             x: Float::gather(&rays.dir_x, at.index),
@@ -158,7 +158,7 @@ impl<S: Simd> Place<S> {
     }
 
     #[inline(always)]
-    fn set_balls(&mut self, s: S, at: &At<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
+    fn set_balls(&mut self, s: S, at: &HitGroup<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
         let (center, radius) = (Vector::gather(&table.a, object), Float::gather(&table.offset, object));
         let t = Float::gather(&at.hits.t, at.index);
         let [position, normal] = ball_points(s, [at.ray_origin(), dir], t, center, radius);
@@ -171,7 +171,15 @@ impl<S: Simd> Place<S> {
 
     /// In `f64`, as for one plane.
     #[inline(always)]
-    fn set_planes(&mut self, s: S, at: &At<S>, table: &SurfaceTable, object: Bits<S>, dir: Vector<S>, mask: Mask) {
+    fn set_planes(
+        &mut self,
+        s: S,
+        at: &HitGroup<S>,
+        table: &SurfaceTable,
+        object: Bits<S>,
+        dir: Vector<S>,
+        mask: Mask,
+    ) {
         let (point, normal) = (Vector::gather(&table.a, object), Vector::gather(&table.normal, object));
         let t = s.widen(Float::gather(&at.hits.t, at.index).v);
         let (origin, dir, from, n) = (widened(at.ray_origin()), widened(dir), widened(point), widened(normal));
@@ -181,7 +189,7 @@ impl<S: Simd> Place<S> {
         let [x, y, z] = three!(|k| Float { s, v: s.narrow(s.sub_d(near[k], s.mul_d(n[k], height))) });
         let position = Vector { x, y, z };
         // All but the rounding is a power of two away from the size.
-        let error = (point.abs().max_element() + position.abs().max_element()) * WIDE_ERROR as f32;
+        let error = (point.abs().max_element() + position.abs().max_element()) * F64_ERROR as f32;
         let each = Vector { x: error, y: error, z: error };
         let offset = normal.abs().dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF) + each);
         let local = position - point;
@@ -194,7 +202,7 @@ impl<S: Simd> Place<S> {
 
     /// Lone triangles, textured balls and what is near the rim of a triangle, one at a time.
     #[inline(always)]
-    fn set_others(&mut self, s: S, at: &At<S>, mask: Mask) {
+    fn set_others(&mut self, s: S, at: &HitGroup<S>, mask: Mask) {
         let mut vectors = [
             self.position.to_arrays(),
             self.geometric_normal.to_arrays(),

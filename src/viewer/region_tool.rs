@@ -10,13 +10,13 @@ const LEAST: f64 = 4.0;
 
 /// Places are fractions of the picture from its upper left corner.
 #[derive(Debug, Default)]
-pub struct Brush {
+pub struct RegionTool {
     /// The next drag is a rectangle.
     armed: bool,
     drag: Option<[[f64; 2]; 2]>,
 }
 
-impl Brush {
+impl RegionTool {
     /// The next drag is a rectangle, or is not after all.
     pub fn toggle(&mut self) -> bool {
         self.drag = None;
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn a_drag_is_a_rectangle_whichever_way_it_went() {
-        let mut brush = Brush::default();
+        let mut brush = RegionTool::default();
         assert!(!brush.press([0.5, 0.5]) && brush.release([800.0, 400.0]).is_none(), "a drag looks about unless asked");
         assert!(brush.toggle() && brush.press([0.75, 0.25]));
         assert!(brush.mouse_at([0.5, 0.5]) && !brush.mouse_at([0.5, 0.5]));
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_slip_is_no_rectangle_and_the_brush_stays() {
-        let mut brush = Brush::default();
+        let mut brush = RegionTool::default();
         brush.toggle();
         brush.press([0.5, 0.5]);
         brush.mouse_at([0.502, 0.9]);

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 /// The latest thousand waits, and what most of them do not exceed.
 #[derive(Clone, Debug, Default)]
-pub struct Waits(VecDeque<Duration>);
+pub struct LatencyHistogram(VecDeque<Duration>);
 
-impl Waits {
+impl LatencyHistogram {
     /// As many as a minute of steady movement has, about.
     const KEPT: usize = 1000;
 
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_of_the_latest() {
-        let mut waits = Waits::default();
+        let mut waits = LatencyHistogram::default();
         assert!(waits.is_empty() && waits.quantile(0.5).is_none());
         for ms in 0..3000 {
             waits.add(Duration::from_millis(ms));
