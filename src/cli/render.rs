@@ -15,7 +15,7 @@ use firstlight::render::{BadSample, Film, Region};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{Files, SceneSource};
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
@@ -134,6 +134,8 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     });
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     progress.finish();
+    // Samples that agree on nothing but black do not know what they have missed.
+    let is_dark = extraction.prepared.has_light() && is_black(&film);
     let error = film.error_estimate_in(region).map(|error| error.relative);
     let reached = target.reached(film.spp_in(region), report.seconds, error);
     let stopped = stop.is_asked() && !reached;
@@ -160,6 +162,13 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
             first_of(&report.bad)
         ));
     }
+    if is_dark {
+        let spp = film.spp();
+        remark(format_args!(
+            "warning: none of {spp} samples per pixel found any light, so the error is not known: take more samples, or \
+             check that the camera sees something lit"
+        ));
+    }
     if report.n_above > 0 {
         let (n_above, total) = (report.n_above, report.rays.camera);
         remark(format_args!(
@@ -176,10 +185,11 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         ));
     }
     if args.json {
-        print(json(&job, &report, cpu_seconds, &film, files.replaced(), stopped))?;
+        print(json(&job, &report, cpu_seconds, (&film, is_dark), files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output.display(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
+        let error = error.filter(|_| !is_dark);
         let error = error.map_or(String::new(), |error| format!(", error about {:.2} %", 100.0 * error));
         let kept = film_path.map_or(String::new(), |path| format!(", the film kept in {}", path.display()));
         let replaced = replaced(files.replaced(), &args.output);
@@ -232,16 +242,20 @@ fn replaced(paths: &[PathBuf], output: &Path) -> String {
 }
 
 /// One line for machines.
+fn is_black(film: &Film) -> bool {
+    (0..film.height()).all(|y| (0..film.width()).all(|x| film.mean(x, y) == Vec3::ZERO))
+}
+
 fn json(
     job: &Job,
     report: &OfflineReport,
     cpu_seconds: Option<f64>,
-    film: &Film,
+    (film, is_dark): (&Film, bool),
     replaced: &[PathBuf],
     stopped: bool,
 ) -> serde_json::Value {
     let replaced: Vec<_> = replaced.iter().map(|path| path.to_string_lossy()).collect();
-    let error = film.error_estimate();
+    let error = film.error_estimate().filter(|_| !is_dark);
     let places = |samples: &[BadSample]| -> Vec<_> {
         samples.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect()
     };

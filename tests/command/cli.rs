@@ -36,6 +36,39 @@ fn a_png_and_an_exr_show_the_same_light() {
 }
 
 #[test]
+fn a_picture_that_found_no_light_does_not_know_its_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = |environment: &str| {
+        format!(
+            "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), environment: {environment}, materials: {{ \"m\": diffuse(albedo: 0.5), \
+             \"l\": emissive(radiance: 1) }}, objects: [sphere(center: (0, 0, 9), radius: 1, material: \"l\"), \
+             quad(corner: (-9, -9, 0), edge_u: (18, 0, 0), edge_v: (0, 18, 0), material: \"m\"), \
+             quad(corner: (-9, -9, 7), edge_u: (18, 0, 0), edge_v: (0, 18, 0), material: \"m\")])"
+        )
+    };
+    let run = |name: &str, json: &[&str]| {
+        let mut command = Command::cargo_bin("firstlight").unwrap();
+        let words = ["render", name, "-o", "a.png", "--size", "8x6", "--spp", "8"];
+        let output = command.current_dir(path).args(words).args(json).output().unwrap();
+        assert!(output.status.success());
+        [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
+    };
+    // The light is behind a wall.
+    std::fs::write(path.join("dark.ron"), scene("black")).unwrap();
+    let [_, told] = run("dark.ron", &[]);
+    assert!(told.contains("none of 8 samples") && !told.contains("error about"), "{told}");
+    let [json, _] = run("dark.ron", &["--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(json["estimated_error"].is_null(), "{json}");
+    // Where nothing shines, black is right.
+    std::fs::write(path.join("void.ron"), "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), environment: black)")
+        .unwrap();
+    let [_, told] = run("void.ron", &[]);
+    assert!(!told.contains("none of") && told.contains("error about 0.00 %"), "{told}");
+}
+
+#[test]
 fn the_last_line_is_one_json_object() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["render", "cornell", "-o", "c.png", "--size", "24x16", "--spp", "8", "--threads", "2", "--json"];

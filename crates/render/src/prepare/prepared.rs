@@ -116,6 +116,11 @@ impl Prepared {
         prepared
     }
 
+    /// Whether anything shines, wherever it is.
+    pub fn has_light(&self) -> bool {
+        self.tables.features.environment || self.tables.emission.iter().any(Option::is_some)
+    }
+
     pub fn lights(&self) -> &LightTable {
         &self.tables.lights
     }
