@@ -12,6 +12,8 @@ pub mod sampling;
 mod shading;
 #[cfg(test)]
 mod test_scene;
+#[cfg(test)]
+mod test_statistics;
 
 pub use crate::core::camera::{Camera, CameraError};
 pub use crate::core::counts::RayCounts;

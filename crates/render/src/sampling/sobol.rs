@@ -178,6 +178,7 @@ fn to_unit(bits: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_statistics::ChiSquared;
 
     /// The definition by direction numbers (primitive polynomial x + 1), which the bit trick must reproduce.
     fn sobol_second_by_directions(index: u32) -> u32 {
@@ -284,20 +285,18 @@ mod tests {
 
     #[test]
     fn independent_samples_fill_the_square_evenly_and_know_nothing_of_each_other() {
-        // χ² of pairs of one sample, and of one coordinate in two samples that follow each other, in 16 × 16 cells:
-        // 255 degrees of freedom, so 255 ± 22.6; bound at 4.5 σ.
+        // Pairs of one sample, and one coordinate in two samples that follow each other, in 16 × 16 cells.
         let n = 1 << 16;
-        let (mut within, mut between) = ([0u32; 256], [0u32; 256]);
+        let (mut within, mut between) = ([0.0; 256], [0.0; 256]);
         let cell = |x: f32, y: f32| (16.0 * x) as usize + 16 * (16.0 * y) as usize;
         for i in 0..n {
             let at = |s| Sampler::independent(3, i % 256, i / 256, s).pair(4);
-            within[cell(at(0).x, at(0).y)] += 1;
-            between[cell(at(6).x, at(7).x)] += 1;
+            within[cell(at(0).x, at(0).y)] += 1.0;
+            between[cell(at(6).x, at(7).x)] += 1.0;
         }
         let expected = f64::from(n) / 256.0;
         for counts in [within, between] {
-            let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
-            assert!((255.0 - 4.5 * 22.6..255.0 + 4.5 * 22.6).contains(&chi2), "{chi2}");
+            ChiSquared::of(&counts, &[expected; 256], 0.0).assert_below(3.0, "pairs");
         }
     }
 

@@ -89,6 +89,7 @@ pub fn uniform_triangle(u: Vec2) -> Vec2 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
+    use crate::test_statistics::ChiSquared;
 
     fn points(n: u32) -> impl Iterator<Item = Vec2> {
         // Hashed points, not Sobol': χ² needs independent draws.
@@ -101,11 +102,8 @@ mod tests {
     /// χ² over `counts` with equal expectation; 1 % over 5 cases (Šidák) is 2.9 σ of the normal approximation.
     fn assert_even(name: &str, counts: &[u32]) {
         let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
-        let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
-        let dof = (counts.len() - 1) as f64;
-        // Wilson–Hilferty.
-        let z = ((chi2 / dof).cbrt() - (1.0 - 2.0 / (9.0 * dof))) / (2.0 / (9.0 * dof)).sqrt();
-        assert!(z < 2.9, "{name}: χ² {chi2:.1} with {dof} degrees of freedom");
+        let counts: Vec<f64> = counts.iter().map(|&count| f64::from(count)).collect();
+        ChiSquared::of(&counts, &vec![expected; counts.len()], 0.0).assert_below(2.9, name);
     }
 
     #[test]

@@ -140,6 +140,7 @@ fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> 
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
+    use crate::test_statistics::ChiSquared;
     use std::f32::consts::TAU;
 
     #[test]
@@ -194,22 +195,7 @@ mod tests {
                 *slot *= f64::from(n) * std::f64::consts::TAU / (nz * nphi * fine * fine) as f64;
             }
             expected[nz * nphi] = f64::from(n) - expected[..nz * nphi].iter().sum::<f64>();
-            // Bins with an expectation below 5 are merged.
-            let (mut chi2, mut dof, mut rest) = (0.0_f64, -1.0_f64, (0.0, 0.0));
-            for (c, e) in counts.iter().zip(&expected) {
-                if *e < 5.0 {
-                    rest = (rest.0 + c, rest.1 + e);
-                } else {
-                    chi2 += (c - e).powi(2) / e;
-                    dof += 1.0;
-                }
-            }
-            if rest.1 >= 5.0 {
-                chi2 += (rest.0 - rest.1).powi(2) / rest.1;
-                dof += 1.0;
-            }
-            let z = ((chi2 / dof).cbrt() - (1.0 - 2.0 / (9.0 * dof))) / (2.0 / (9.0 * dof)).sqrt();
-            assert!(z < 3.5, "cos {cos_o}, α {alpha}: χ² {chi2:.0} with {dof} degrees of freedom");
+            ChiSquared::of(&counts, &expected, 0.0).assert_below(3.5, &format!("cos {cos_o}, α {alpha}"));
         }
     }
 

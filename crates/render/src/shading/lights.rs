@@ -95,10 +95,12 @@ pub(crate) fn bounce_weight(techniques: &Techniques, own: f32, other: f32) -> f3
 /// Weight of a sample found with density `own` that another method finds with density `other` (Veach 1997, β = 2).
 #[inline]
 pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
-    if other == 0.0 {
-        return 1.0;
-    }
     // By the ratio: squares of densities overflow for lights of a few pixels.
-    let ratio = other / own;
+    if other == 0.0 { 1.0 } else { power_weight(other / own) }
+}
+
+/// The same by the ratio of the other density to its own.
+#[inline]
+pub(crate) fn power_weight(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }

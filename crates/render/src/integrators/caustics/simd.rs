@@ -19,6 +19,7 @@ use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
+use crate::shading::simd::lights::power_weight;
 use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
@@ -282,7 +283,7 @@ impl<S: Simd> Step<'_, S> {
 fn lamp_weight<S: Simd>(pass: &CausticPass, ratio: Float<S>) -> Float<S> {
     let one = ratio.all(1.0);
     if pass.techniques.mis {
-        return one - one / (ratio * ratio + 1.0);
+        return one - power_weight(ratio);
     }
     select(ratio.is_positive(), one, ratio.all(0.0))
 }

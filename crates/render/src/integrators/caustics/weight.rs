@@ -17,6 +17,7 @@
 use crate::integrators::caustics::pass::CausticPass;
 use crate::prepare::casters::NO_CASTER;
 use crate::shading::interface::MediumId;
+use crate::shading::lights::power_weight;
 use crate::shading::mis_state::MisState;
 use crate::shading::surface::Vertex;
 use firstlight_kdtree::Hit;
@@ -99,7 +100,7 @@ impl CausticPass<'_> {
     /// Of the way whose competitor has `ratio` times its density.
     #[inline]
     fn weight_against(&self, ratio: f32) -> f32 {
-        if self.techniques.mis { 1.0 / (1.0 + ratio * ratio) } else { f32::from(!(ratio > 0.0)) }
+        if self.techniques.mis { power_weight(ratio) } else { f32::from(!(ratio > 0.0)) }
     }
 
     /// Weight of a path from the lamp that has `ratio` times the density of the one from the eye.

@@ -18,6 +18,7 @@ use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::bounce::mirrored;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{lanes_of, transmittance};
+use crate::shading::simd::lights::power_weight;
 use crate::shading::simd::metal::fresnel;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
@@ -238,8 +239,7 @@ fn reflect<S: Simd>(
         let mut lobe = lobe_pdf(gloss.exponent, gloss.mirrored.dot(wi));
         if gloss.rough {
             let one = pdf.all(1.0);
-            let ratio = lobe / pdf;
-            lobe = lobe * select(pdf.is_zero() | lobe.is_zero(), one, one / (ratio * ratio + 1.0));
+            lobe = lobe * select(pdf.is_zero() | lobe.is_zero(), one, power_weight(lobe / pdf));
         }
         value = value + gloss.tint * lobe;
     }

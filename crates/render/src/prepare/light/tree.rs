@@ -300,6 +300,7 @@ mod tests {
     use crate::core::techniques::Techniques;
     use crate::prepare::light::tree_simd::LightTreeArrays;
     use crate::sampling::Sampler;
+    use crate::test_statistics::ChiSquared;
     use firstlight_simd::{Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
 
     fn lights(n: u32, seed: u32) -> Vec<Light> {
@@ -419,16 +420,13 @@ mod tests {
             }
             let expected: Vec<f64> =
                 (0..n).map(|id| f64::from(tree.pmf(id, position, normal)) * f64::from(draws)).collect();
-            let bins = expected.iter().zip(&found).filter(|(e, _)| **e > 5.0);
             if expected.iter().all(|e| *e == 0.0) {
                 assert!(found.iter().all(|f| *f == 0.0), "place {k}: no light reaches it");
                 continue;
             }
             n_judged += 1;
-            let (chi2, dof) = bins.fold((0.0, 0.0), |(sum, dof), (e, f)| (sum + (f - e).powi(2) / e, dof + 1.0));
-            // Wilson–Hilferty; 3.2 σ is 1 % over twelve places.
-            let z = ((chi2 / dof).cbrt() - (1.0 - 2.0 / (9.0 * dof))) / (2.0f64 / (9.0 * dof)).sqrt();
-            assert!(z < 3.2, "place {k}: χ² {chi2:.1} with {dof} degrees of freedom");
+            // 3.2 σ is 1 % over twelve places.
+            ChiSquared::of(&found, &expected, 0.0).assert_below(3.2, &format!("place {k}"));
         }
         assert!(n_judged >= 6, "too few places that light reaches: {n_judged}");
     }
