@@ -2,7 +2,7 @@
 
 use super::console::remark;
 use super::failure::Failure;
-use super::job::Job;
+use super::job::RenderJob;
 use super::progress::Progress;
 use super::render_args::RenderArgs;
 use super::stop::Stop;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Renders every frame to `FILE-0001.png` and so on; each is a picture as any other, and opens as one.
 pub(super) fn animate(
     args: &RenderArgs,
-    mut job: Job,
+    mut job: RenderJob,
     mut progress: Progress,
     n_replaced: usize,
     stop: &Stop,
@@ -51,7 +51,7 @@ fn digits(n: usize) -> usize {
 }
 
 /// Where the camera is in each frame.
-fn way(args: &RenderArgs, job: &mut Job) -> Result<Vec<Rig>, Failure> {
+fn way(args: &RenderArgs, job: &mut RenderJob) -> Result<Vec<Rig>, Failure> {
     let rig = job.rig().ok_or_else(|| Failure::Failed("the scene has no camera".to_owned()))?;
     if let Some(n) = args.turntable {
         return Ok(turntable(&rig, n));

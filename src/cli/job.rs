@@ -10,14 +10,14 @@ use firstlight::frame::{FilmFile, PictureFormat, Print, Target, render_offline_u
 use firstlight::render::{Display, Film, NoRoom, Purpose, RenderSettings, Room};
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
-    DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Part,
-    Rendering, SceneInputs,
+    DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Rendering,
+    SceneInputs, SnapshotPart,
 };
 use std::path::Path;
 use std::time::Instant;
 
 /// A scene and how it is to be rendered.
-pub(super) struct Job {
+pub(super) struct RenderJob {
     pub scene: LoadedScene,
     pub world: World,
     pub extraction: Extraction,
@@ -28,7 +28,7 @@ pub(super) struct Job {
     pub draft: MetadataDraft,
 }
 
-impl Job {
+impl RenderJob {
     pub fn new(
         args: &RenderArgs,
         kept: Option<&ImageMetadata>,
@@ -85,7 +85,7 @@ impl Job {
             self.world.entity_mut(camera.entity).insert((rig.view, rig.projection, rig.lens));
         }
         let inputs = SceneInputs::of(&mut self.world);
-        self.extraction.update(Part::Camera, &inputs, &self.scene.trees);
+        self.extraction.update(SnapshotPart::Camera, &inputs, &self.scene.trees);
         self.draft = MetadataDraft::of(&mut self.world, Some(&self.scene)).prepared_as(&self.draft);
     }
 

@@ -39,7 +39,7 @@ use stop::Stop;
 #[command(name = "firstlight", bin_name = "firstlight", version, args_conflicts_with_subcommands = true, after_help = builtin_help())]
 struct CommandLine {
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<CliCommand>,
     #[command(flatten)]
     show: show::ShowArgs,
     /// Instruction set of the renderer; the pictures are the same. Without it: the widest of the processor.
@@ -68,7 +68,7 @@ impl SimdArg {
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum CliCommand {
     /// Render a scene to a picture, without a window.
     Render(render_args::RenderArgs),
     /// Measure speed against error: how fast scenes get right, and what each technique is worth.
@@ -87,7 +87,7 @@ enum Command {
     Simplify(simplify::SimplifyArgs),
 }
 
-impl Command {
+impl CliCommand {
     fn run(&self, stop: &Stop) -> Result<(), Failure> {
         match self {
             Self::Render(args) => render::run(args, stop),

@@ -3,7 +3,7 @@
 use super::animate::{animate, frames};
 use super::console::{print, remark};
 use super::failure::Failure;
-use super::job::{Job, room_to_write};
+use super::job::{RenderJob, room_to_write};
 use super::progress::Progress;
 use super::render_args::RenderArgs;
 use super::stop::Stop;
@@ -89,7 +89,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     if let Some(warning) = kept.as_ref().and_then(|(kept, _)| kept.warning.as_ref()) {
         progress.suspend(|| remark(format_args!("warning: {warning}")));
     }
-    let job = Job::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
+    let job = RenderJob::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
     // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
     let job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
@@ -119,7 +119,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         render_offline_until(&job.extraction.prepared, &job.settings, &mut film, once, &asked, |_| true);
     }
     let region = region.as_ref();
-    let Job { extraction, settings, .. } = &*job;
+    let RenderJob { extraction, settings, .. } = &*job;
     let report = render_region_until(&extraction.prepared, settings, &mut film, region, target, &asked, |now| {
         let by_spp = target.spp.map_or(0.0, |spp| f64::from(now.spp) / f64::from(spp));
         let by_time = target.seconds.map_or(0.0, |seconds| now.seconds / seconds);
@@ -247,7 +247,7 @@ fn is_black(film: &Film) -> bool {
 }
 
 fn json(
-    job: &Job,
+    job: &RenderJob,
     report: &OfflineReport,
     cpu_seconds: Option<f64>,
     (film, is_dark): (&Film, bool),

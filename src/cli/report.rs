@@ -8,8 +8,8 @@ use super::stop::Stop;
 use clap::Args;
 use firstlight::render::{Prepared, Purpose, RenderSettings, Room, Techniques};
 use firstlight::report::{
-    Ablation, ConvergenceCurve, CurveStep, Key, Limits, LinearPicture, Reference, ReferenceStore, SceneOutcome, csv,
-    foreign_share, measure_curve, page, summary_text,
+    Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
+    csv, foreign_share, measure_curve, page, summary_text,
 };
 use firstlight::scene::whole_file::write_whole;
 use firstlight::scene::{
@@ -152,9 +152,11 @@ fn measure_all(
         let scene = SceneArgs { scene: name.clone(), up: None };
         scenes.push(ReportScene::new(args, &scene.load(None, files, &|_| ())?, given)?);
     }
-    let limits =
-        Limits { spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }), seconds: args.time };
-    let mut progress = Progress::new(&scenes, !args.no_ablation, given.is_some());
+    let limits = CurveLimits {
+        spp: args.spp.unwrap_or(if args.time.is_some() { 1 << 20 } else { DEFAULT_SPP }),
+        seconds: args.time,
+    };
+    let mut progress = ReportProgress::new(&scenes, !args.no_ablation, given.is_some());
     if let (Some(seconds), None) = (limits.seconds, given) {
         let longest = duration(f64::from(REFERENCE_FACTOR) * seconds * scenes.len() as f64);
         let message = format!("references that were not kept take up to {longest} in all, beside --time");
@@ -237,9 +239,9 @@ impl ReportScene {
     fn measure(
         &self,
         args: &ReportArgs,
-        limits: Limits,
+        limits: CurveLimits,
         given: Option<&Reference>,
-        progress: &mut Progress,
+        progress: &mut ReportProgress,
         stop: &Stop,
     ) -> (Option<SceneOutcome>, Option<String>) {
         let rungs = self.measure_curve(limits, Techniques::default(), "all techniques", progress, stop);
@@ -301,24 +303,24 @@ impl ReportScene {
 
     fn measure_curve(
         &self,
-        limits: Limits,
+        limits: CurveLimits,
         techniques: Techniques,
         what: &str,
-        progress: &mut Progress,
+        progress: &mut ReportProgress,
         stop: &Stop,
     ) -> Vec<CurveStep> {
         let settings = RenderSettings { techniques, ..self.settings };
-        let mut tell = progress.task(format!("{}, {what}", self.title), Progress::LADDER, self.size);
+        let mut tell = progress.task(format!("{}, {what}", self.title), ReportProgress::LADDER, self.size);
         measure_curve(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
 
     /// One that was kept, or a new one; `None` when somebody stops it before it is good for anything.
-    fn reference(&self, last: &CurveStep, progress: &mut Progress, stop: &Stop) -> Option<Reference> {
+    fn reference(&self, last: &CurveStep, progress: &mut ReportProgress, stop: &Stop) -> Option<Reference> {
         let store = ReferenceStore::of_platform();
         let spp = last.spp.saturating_mul(REFERENCE_FACTOR);
         let time = duration(f64::from(REFERENCE_FACTOR) * last.spent.wall_seconds);
         let title = format!("{}, reference with {spp} samples per pixel, about {time}", self.title);
-        let mut tell = progress.task(title, Progress::REFERENCE, self.size);
+        let mut tell = progress.task(title, ReportProgress::REFERENCE, self.size);
         if let Some(kept) = store.find(&self.key, spp) {
             tell(1.0);
             return Some(kept);
@@ -346,12 +348,12 @@ fn modest(width: u32, height: u32) -> (u32, u32) {
 }
 
 /// How far all of it is; a ladder's share is its pixels, and a reference is as long as many ladders.
-struct Progress {
+struct ReportProgress {
     bar: Bar,
     done: f64,
 }
 
-impl Progress {
+impl ReportProgress {
     const LADDER: f64 = 1.0;
     const REFERENCE: f64 = REFERENCE_FACTOR as f64;
 

@@ -57,7 +57,7 @@ pub fn run(args: &ShowArgs) -> Result<(), Failure> {
         return Stop::obeyed_by(move |_| play(&args));
     }
     #[cfg(feature = "viewer")]
-    if firstlight::viewer::display::find() != firstlight::viewer::display::Display::None {
+    if firstlight::viewer::display::find() != firstlight::viewer::display::DisplayServer::None {
         return open_window(args);
     }
     let args = args.clone();

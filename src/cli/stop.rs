@@ -21,10 +21,10 @@ const STACK: usize = 16 << 20;
 
 /// Whether somebody wants to stop.
 #[derive(Clone, Default)]
-pub struct Stop(Arc<Shared>);
+pub struct Stop(Arc<StopState>);
 
 #[derive(Default)]
-struct Shared {
+struct StopState {
     asked: AtomicBool,
     attended: AtomicBool,
     left: Mutex<Left>,

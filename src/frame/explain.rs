@@ -35,7 +35,7 @@ pub struct PixelStory {
     pub deviation: DVec3,
     /// What paths from the lamps brought beside that, as far as it is known.
     pub from_lamps: Option<DVec3>,
-    pub ways: Vec<Way>,
+    pub ways: Vec<PathRecord>,
 }
 
 /// One light's part.
@@ -48,7 +48,7 @@ pub struct LightRow {
 
 /// One path, in the world, metres.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Way {
+pub struct PathRecord {
     pub sample: u32,
     pub radiance: DVec3,
     /// On the lens.
@@ -155,7 +155,7 @@ impl PixelStory {
         };
         let mut lights: Vec<LightRow> = by_light.iter().map(row).collect();
         lights.sort_by(|a, b| brightness(b.total()).total_cmp(&brightness(a.total())));
-        let ways = explanation.paths.iter().map(|path| Way {
+        let ways = explanation.paths.iter().map(|path| PathRecord {
             sample: path.sample,
             radiance: path.radiance.as_dvec3(),
             origin: names.origin + path.origin.as_dvec3(),

@@ -53,7 +53,7 @@ impl State {
 
 /// A state that can be gone back to, and what was done in it.
 #[derive(Clone, Debug)]
-struct Step {
+struct UndoStep {
     before: State,
     /// What was selected then.
     selected: Vec<Entity>,
@@ -77,8 +77,8 @@ pub struct History {
     unsaved: bool,
     /// What was selected when that was read.
     selected: Vec<Entity>,
-    undo: Vec<Step>,
-    redo: Vec<Step>,
+    undo: Vec<UndoStep>,
+    redo: Vec<UndoStep>,
     /// Grows with every change.
     revision: u64,
     /// A change is under way; what the entities were when it began, and whether it has a step yet.
@@ -167,7 +167,7 @@ impl History {
         let step = history.undo.pop()?;
         history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
-        history.redo.push(Step { before: now.clone(), ..step.clone() });
+        history.redo.push(UndoStep { before: now.clone(), ..step.clone() });
         history.begun = None;
         history.compare();
         restore(world, &now, &step.before);
@@ -182,7 +182,7 @@ impl History {
         let step = history.redo.pop()?;
         history.revision += 1;
         let now = history.now.replace(step.before.clone())?;
-        history.undo.push(Step { before: now.clone(), ..step.clone() });
+        history.undo.push(UndoStep { before: now.clone(), ..step.clone() });
         history.begun = None;
         history.compare();
         restore(world, &now, &step.before);
@@ -207,7 +207,7 @@ impl History {
             None => merge.is_some() && self.redo.is_empty() && self.undo.last().is_some_and(|last| last.merge == merge),
         };
         if !goes_on {
-            self.undo.push(Step { before: old, selected: self.selected.clone(), label, merge });
+            self.undo.push(UndoStep { before: old, selected: self.selected.clone(), label, merge });
             if self.undo.len() > Self::MAX_STEPS {
                 self.undo.remove(0);
             }
@@ -218,7 +218,7 @@ impl History {
     }
 }
 
-type Parts = Or<(
+type UndoParts = Or<(
     Changed<Name>,
     Changed<Ordinal>,
     Changed<Shape>,
@@ -234,7 +234,7 @@ type Parts = Or<(
 /// Reads change ticks; writes [`History`].
 #[allow(clippy::too_many_arguments, clippy::type_complexity)] // A system says what it reads.
 pub fn notice(
-    parts: Query<(), Parts>,
+    parts: Query<(), UndoParts>,
     camera: Query<(), Or<(Changed<View>, Changed<Projection>, Changed<Lens>)>>,
     mut shapes: RemovedComponents<Shape>,
     mut materials: RemovedComponents<Material>,
@@ -299,8 +299,8 @@ fn read_entities(
     world: &mut World,
     old: &Arc<BTreeMap<Entity, Arc<EntityState>>>,
 ) -> Arc<BTreeMap<Entity, Arc<EntityState>>> {
-    type Part = Or<(With<Shape>, With<Material>, With<PointLight>)>;
-    let entities: Vec<Entity> = world.query_filtered::<Entity, Part>().iter(world).collect();
+    type UndoPart = Or<(With<Shape>, With<Material>, With<PointLight>)>;
+    let entities: Vec<Entity> = world.query_filtered::<Entity, UndoPart>().iter(world).collect();
     let read = |entity: Entity| {
         let state = EntityState {
             name: world.get(entity).cloned(),

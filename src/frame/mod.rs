@@ -50,7 +50,7 @@ mod worker;
 pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
-pub use explain::{End, Explaining, LightRow, PixelStory, SnapshotNames, Stop, Way, brightness};
+pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use film_file::{
     FilmFile, check_replaced_film, read_film_file, read_film_file_within, write_film_file, write_film_into,
 };
@@ -68,7 +68,7 @@ pub use reset::{Change, Changes, Level, compare, compare_settings};
 pub use resources::{CurrentScene, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, StopAt, Threads, ViewMode};
 pub use saving::SavedAs;
 pub use scene_bounds::SceneBounds;
-pub use scheduler::{Scheduler, Step, StepReport};
+pub use scheduler::{RenderStep, Scheduler, StepReport};
 pub use selection::{OwnBox, Picked, Projector, Selection, pick};
 pub use session::{Session, SessionOptions, Stage};
 pub use settings::{SceneBookmarks, Settings, SettingsStore};

@@ -24,7 +24,7 @@ const HEADER_BYTES: u64 = 1 << 16;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Header {
+pub(super) struct RecordingHeader {
     pub(super) format: u32,
     /// Name and version.
     pub(super) program: String,
@@ -46,7 +46,7 @@ pub(super) enum SceneWord {
 
 /// Any other line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) enum Line {
+pub(super) enum RecordedLine {
     /// In which frame, at what time (seconds), what was asked for.
     Do(u64, f64, Command),
     /// A scene that was asked for took its place in this frame: its number, and its fingerprint.
@@ -95,11 +95,11 @@ pub fn record(
     if adopted.0 > recorder.adopted {
         recorder.adopted = adopted.0;
         let print = current.map_or_else(String::new, |current| current.0.content_fingerprint().to_string());
-        let line = Line::Opened(recorder.frame - 1, adopted.0, print);
+        let line = RecordedLine::Opened(recorder.frame - 1, adopted.0, print);
         recorder.write(&line);
     }
     for command in &queue.0 {
-        let line = Line::Do(recorder.frame, clock.0.as_secs_f64(), command.clone());
+        let line = RecordedLine::Do(recorder.frame, clock.0.as_secs_f64(), command.clone());
         recorder.write(&line);
     }
     if let Some(trouble) = recorder.trouble.take() {
@@ -123,14 +123,14 @@ pub fn check_recordable(path: &Path) -> Result<(), String> {
         .map_err(std::io::Error::other)
         .and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
     let text = String::from_utf8_lossy(&start);
-    let is_recording = text.lines().next().is_some_and(|line| ron::from_str::<Header>(line).is_ok());
+    let is_recording = text.lines().next().is_some_and(|line| ron::from_str::<RecordingHeader>(line).is_ok());
     match read {
         Ok(_) if is_recording => Ok(()),
         _ => Err(format!("{}: is there already and is no recording: name another file", path.display())),
     }
 }
 
-pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(Header, Vec<Line>), String> {
+pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHeader, Vec<RecordedLine>), String> {
     /// Bytes of one line; the longest that is written has the views of all bookmarks.
     const LONGEST_LINE: usize = 1 << 20;
     let failed = |reason: String| format!("{}: {reason}", path.display());
@@ -142,11 +142,11 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(Header, Vec<
     let is_bearable = |line: &&[u8]| line.len() <= LONGEST_LINE;
     let (_, first) = lines.next().ok_or_else(no_recording)?;
     let first = Some(first).filter(is_bearable).and_then(|line| str::from_utf8(line).ok()).ok_or_else(no_recording)?;
-    let header: Header = ron::from_str(first).map_err(|_| no_recording())?;
+    let header: RecordingHeader = ron::from_str(first).map_err(|_| no_recording())?;
     if header.format > FORMAT {
         return Err(failed(format!("was written by {}, in a way that this program does not know", header.program)));
     }
-    let Header { width, height, up, .. } = header;
+    let RecordingHeader { width, height, up, .. } = header;
     // A window that had no size yet has it in a command.
     check_film_size(width.max(1), height.max(1)).map_err(|bad| format!("{}:1: {bad}", path.display()))?;
     if let Some(up) = up.filter(|up| !matches!(up, 'y' | 'z')) {
@@ -167,7 +167,7 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(Header, Vec<
             }
             Ok(text) => match ron::from_str(text) {
                 // Written to its end, so nothing was lost, and it is wrong wherever it stands.
-                Ok(Line::Do(_, _, command)) if command.check().is_err() => {
+                Ok(RecordedLine::Do(_, _, command)) if command.check().is_err() => {
                     return Err(at(&command.check().map_or_else(|bad| bad.to_string(), |()| String::new())));
                 }
                 understood => understood.map_err(|error| at(&format!("cannot be understood: {error}"))),

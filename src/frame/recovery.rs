@@ -15,13 +15,13 @@ use std::thread::JoinHandle;
 pub struct Recovery {
     /// `None` where nothing can be kept.
     folder: Option<PathBuf>,
-    place: Option<Place>,
+    place: Option<RecoverySlot>,
     writer: Option<JoinHandle<Result<(), String>>>,
 }
 
 /// Where they are kept.
 #[derive(Debug)]
-struct Place {
+struct RecoverySlot {
     scene: PathBuf,
     /// Locked while it is open.
     _lock: File,
@@ -100,7 +100,7 @@ impl Recovery {
             let scene = folder.join(format!("{}-{number}.{SCENE}", std::process::id()));
             // What another process of this number has left behind stays.
             if let Some(lock) = lock(&scene).map_err(failed)?.filter(|_| !scene.exists()) {
-                self.place = Some(Place { scene: scene.clone(), _lock: lock });
+                self.place = Some(RecoverySlot { scene: scene.clone(), _lock: lock });
                 return Ok(Some(scene));
             }
         }

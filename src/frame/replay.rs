@@ -1,7 +1,7 @@
 //! Sessions that write down what they are asked for, and that are played again from it.
 
 use super::background::BackgroundTasks;
-use super::recording::{FORMAT, Header, Line, Recorder, SceneWord, check_recordable, read};
+use super::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
 use super::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
 use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
 use crate::render::{Film, Room};
@@ -30,7 +30,7 @@ impl Session {
             }
         };
         let PictureSize { width, height } = *self.world().resource();
-        let header = Header {
+        let header = RecordingHeader {
             format: FORMAT,
             program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene,
@@ -52,7 +52,7 @@ impl Session {
         let status = self.status();
         let spp = if status.divider == 1 { status.spp } else { 0 };
         let mut recorder = self.world_mut().resource_mut::<Recorder>();
-        let line = Line::End(recorder.frame, spp);
+        let line = RecordedLine::End(recorder.frame, spp);
         recorder.write(&line);
         recorder.out = None;
     }
@@ -116,9 +116,11 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
             return Err(failed("the replay was stopped".to_owned()));
         }
         match line {
-            Line::Do(frame, at, command) => player.command(frame, at, command),
-            Line::Opened(frame, number, print) => player.wait_for_scene(frame, number, &print, stop).map_err(failed)?,
-            Line::End(_, spp) => end = Some(spp),
+            RecordedLine::Do(frame, at, command) => player.command(frame, at, command),
+            RecordedLine::Opened(frame, number, print) => {
+                player.wait_for_scene(frame, number, &print, stop).map_err(failed)?
+            }
+            RecordedLine::End(_, spp) => end = Some(spp),
         }
     }
     player.update();
@@ -291,8 +293,8 @@ mod tests {
         use std::os::unix::ffi::OsStringExt;
         let path = PathBuf::from(std::ffi::OsString::from_vec(b"r\xffm.ron".to_vec()));
         for command in [Command::SaveScene { path: path.clone() }, Command::Open { path }] {
-            let line = ron::to_string(&Line::Do(1, 0.5, command.clone())).unwrap();
-            assert_eq!(ron::from_str::<Line>(&line).unwrap(), Line::Do(1, 0.5, command));
+            let line = ron::to_string(&RecordedLine::Do(1, 0.5, command.clone())).unwrap();
+            assert_eq!(ron::from_str::<RecordedLine>(&line).unwrap(), RecordedLine::Do(1, 0.5, command));
         }
     }
 }

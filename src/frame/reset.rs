@@ -12,7 +12,8 @@
 
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    CameraInput, LightInput, MaterialInput, ObjectInput, Part, SceneEnvironment, SceneInputs, Shape, View, origin_for,
+    CameraInput, LightInput, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape, SnapshotPart, View,
+    origin_for,
 };
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
@@ -64,12 +65,12 @@ impl Changes {
     }
 
     /// What of the snapshot has to be made anew.
-    pub fn part(&self) -> Option<Part> {
+    pub fn part(&self) -> Option<SnapshotPart> {
         let part = |level| match level {
             Level::Redraw | Level::Reschedule | Level::Resize => None,
-            Level::Restart => Some(Part::Camera),
-            Level::Shading => Some(Part::Shading),
-            Level::TopTree | Level::MeshTree => Some(Part::Geometry),
+            Level::Restart => Some(SnapshotPart::Camera),
+            Level::Shading => Some(SnapshotPart::Shading),
+            Level::TopTree | Level::MeshTree => Some(SnapshotPart::Geometry),
         };
         self.0.iter().filter_map(|change| part(change.level)).max()
     }

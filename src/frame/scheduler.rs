@@ -59,7 +59,7 @@ const GUESSED_RATE: f64 = 1e6;
 
 /// One thing to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
+pub enum RenderStep {
     /// Samples for a film whose sides are divided by `divider`; 1 is full resolution.
     ///
     /// A film of another divider than the one before, or the first after a restart, begins empty.
@@ -193,10 +193,10 @@ impl Scheduler {
         self.spent
     }
 
-    pub fn next(&mut self, now: Duration) -> Step {
+    pub fn next(&mut self, now: Duration) -> RenderStep {
         // A pause still shows what has changed, as sharp as it can be.
         if self.paused && self.phase == Phase::Full && self.spp > 0 {
-            return Step::Sleep;
+            return RenderStep::Sleep;
         }
         if let Phase::Coarse(divider) = self.phase
             && self.spp > 0
@@ -206,16 +206,16 @@ impl Scheduler {
         }
         match self.phase {
             Phase::Coarse(divider) | Phase::Sharpening(divider) if self.spp == 0 => {
-                Step::Render { divider, target_spp: 1, at_most: None }
+                RenderStep::Render { divider, target_spp: 1, at_most: None }
             }
             Phase::Coarse(divider) | Phase::Sharpening(divider) => {
                 let passes = (COARSE_SLICE * self.speed() / self.pixels(divider)).clamp(1.0, 65_536.0) as u32;
                 let at_most = Duration::from_secs_f64(1.5 * COARSE_SLICE);
-                Step::Render { divider, target_spp: self.spp.saturating_add(passes), at_most: Some(at_most) }
+                RenderStep::Render { divider, target_spp: self.spp.saturating_add(passes), at_most: Some(at_most) }
             }
-            Phase::Full if self.reached() => Step::Sleep,
+            Phase::Full if self.reached() => RenderStep::Sleep,
             // Nothing can be shown before every pixel has a sample.
-            Phase::Full if self.spp == 0 => Step::Render { divider: 1, target_spp: 1, at_most: None },
+            Phase::Full if self.spp == 0 => RenderStep::Render { divider: 1, target_spp: 1, at_most: None },
             Phase::Full => {
                 let n_pixels = self.region.map_or(self.pixels(1), |n| n.max(1) as f64);
                 let left = self.target.seconds.map_or(f64::INFINITY, |seconds| seconds - self.spent);
@@ -225,7 +225,7 @@ impl Scheduler {
                 let goal = self.target.spp.unwrap_or(u32::MAX);
                 // A pass that takes longer than a slice is shown unfinished.
                 let at_most = Duration::from_secs_f64(1.5 * slice);
-                Step::Render {
+                RenderStep::Render {
                     divider: 1,
                     target_spp: self.spp.saturating_add(passes).min(goal),
                     at_most: Some(at_most),
@@ -236,8 +236,8 @@ impl Scheduler {
 
     /// Takes note of a step that was not cut short by a restart, and tells whether its picture is worth showing: at full
     /// resolution not soon after another one.
-    pub fn finished(&mut self, step: Step, report: StepReport, now: Duration) -> bool {
-        let Step::Render { divider, .. } = step else { return false };
+    pub fn finished(&mut self, step: RenderStep, report: StepReport, now: Duration) -> bool {
+        let RenderStep::Render { divider, .. } = step else { return false };
         // Very short steps measure the start of the threads more than the speed of the rays.
         if report.paths >= 256 && report.seconds > 0.0 {
             let measured = report.paths as f64 / report.seconds;
@@ -344,7 +344,7 @@ mod tests {
         /// Does one step; false when there is nothing to do.
         fn step(&mut self) -> bool {
             let step = self.scheduler.next(Duration::from_secs_f64(self.now));
-            let Step::Render { divider, target_spp, at_most } = step else { return false };
+            let RenderStep::Render { divider, target_spp, at_most } = step else { return false };
             if self.film != Some(divider) {
                 (self.film, self.paths) = (Some(divider), 0.0);
             }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 /// Where a ladder ends: at the last power of two that both allow, but never before the first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct CurveLimits {
     /// Samples per pixel.
     pub spp: u32,
     /// Wall time; a step that would go past it is not begun.
@@ -56,7 +56,7 @@ pub fn measure_curve(
     prepared: &Prepared,
     settings: &RenderSettings,
     (width, height): (u32, u32),
-    limits: Limits,
+    limits: CurveLimits,
     progress: &mut dyn FnMut(f64),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<CurveStep> {

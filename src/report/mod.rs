@@ -17,7 +17,7 @@ mod reference;
 mod table;
 mod trees;
 
-pub use convergence::{ConvergenceCurve, CurveStep, Limits, Spent, Step, cpu_seconds, measure_curve};
+pub use convergence::{ConvergenceCurve, CurveLimits, CurveStep, Spent, Step, cpu_seconds, measure_curve};
 pub use curve::{Seconds, seconds_to, slope};
 pub use flip::flip;
 pub use metrics::{Distance, RELATIVE_FLOOR};

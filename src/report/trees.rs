@@ -133,7 +133,7 @@ impl TreeTable {
             };
             let (tree, build_seconds) = least_seconds(build);
             let tree = Arc::new(tree);
-            let stage = TestScene::new(&tree, mesh, world_from_mesh);
+            let stage = ModelScene::new(&tree, mesh, world_from_mesh);
             let mut view_seconds = [0.0; VIEWS];
             for (view, seconds) in view_seconds.iter_mut().enumerate() {
                 let prepared = stage.seen_from(view);
@@ -203,7 +203,7 @@ fn picture(prepared: &Prepared, side: u32) -> (Film, RayCounts) {
 }
 
 /// The model, the floor, the lights.
-struct TestScene {
+struct ModelScene {
     prepared: Prepared,
     center: Vec3,
     /// Longest side of the model.
@@ -214,7 +214,7 @@ const MODEL: u32 = 0;
 const FLOOR: u32 = 1;
 const LIGHT: u32 = 2;
 
-impl TestScene {
+impl ModelScene {
     fn new(tree: &Arc<MeshTree>, mesh: &Arc<Mesh>, world_from_mesh: Affine3A) -> Self {
         let bounds = SceneTree::build(vec![placed(tree, world_from_mesh)]).bounds();
         let center = 0.5 * (bounds.min + bounds.max);
@@ -302,7 +302,7 @@ struct SampleRays {
 const SAMPLES: u32 = 1 << 14;
 
 impl SampleRays {
-    fn of(tree: &Arc<MeshTree>, stage: &TestScene, world_from_mesh: Affine3A) -> Self {
+    fn of(tree: &Arc<MeshTree>, stage: &ModelScene, world_from_mesh: Affine3A) -> Self {
         let scene = SceneTree::build(vec![placed(tree, Affine3A::IDENTITY)]);
         let mesh_from_world = world_from_mesh.inverse();
         let camera: Vec<Ray> = (0..SAMPLES)
@@ -409,7 +409,7 @@ mod tests {
         let shown = |plan: TreePlan| {
             let limit = plan.leaf_limit.unwrap_or(1);
             let tree = MeshTree::build_limited(&mesh.positions, &mesh.triangles, plan.preset, limit);
-            picture(&TestScene::new(&Arc::new(tree), &mesh, turned).seen_from(2), SIDE).0.means()
+            picture(&ModelScene::new(&Arc::new(tree), &mesh, turned).seen_from(2), SIDE).0.means()
         };
         let plans = tree_plans();
         let first = shown(plans[0]);
@@ -443,7 +443,7 @@ mod tests {
         let points: Vec<DVec3> = std::iter::once(DVec3::ZERO).chain(rim).collect();
         let mesh = Mesh::from_f64(&points, (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect()).unwrap();
         let tree = MeshTree::build_limited(&mesh.positions, &mesh.triangles, BuildPreset::Median, 64);
-        let stage = TestScene::new(&Arc::new(tree), &Arc::new(mesh), Affine3A::IDENTITY);
+        let stage = ModelScene::new(&Arc::new(tree), &Arc::new(mesh), Affine3A::IDENTITY);
         let (side, rays, seconds) = timed_view(&stage.seen_from(0));
         assert!(side < SIDE && seconds > LONGEST_VIEW, "{side}: {seconds} s");
         // As many rays as a whole picture has, about.

@@ -1,7 +1,7 @@
 //! From the world to the flat snapshot that the workers read.
 //!
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
-//! rebuilt on its own ([`Part`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
+//! rebuilt on its own ([`SnapshotPart`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
 use super::components::{ColorParam, MAX_LOBES, Material, PHONG_LOBES, PointLight, ScalarParam, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 /// What of a snapshot is to be made anew; each includes the ones before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum SnapshotPart {
     Camera,
     /// Materials, textures, light table.
     Shading,
@@ -57,7 +57,7 @@ impl Extraction {
     /// Everything anew. Objects whose tree is missing in `trees` are left out.
     pub fn new(inputs: &SceneInputs, trees: &Trees) -> Self {
         let origin = origin_for(&camera_of(inputs).view);
-        let mut materials = MaterialTable::default();
+        let mut materials = MaterialIds::default();
         let mut problems = Vec::new();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
             problems.push(format!(
@@ -133,16 +133,16 @@ impl Extraction {
 
     /// Renews one part and keeps the rest. A camera that has gone far takes the origin along, which renews all;
     /// returns true then.
-    pub fn update(&mut self, part: Part, inputs: &SceneInputs, trees: &Trees) -> bool {
+    pub fn update(&mut self, part: SnapshotPart, inputs: &SceneInputs, trees: &Trees) -> bool {
         let camera = camera_of(inputs);
         let moved = origin_for(&camera.view) != self.origin;
-        if moved || part == Part::Geometry {
+        if moved || part == SnapshotPart::Geometry {
             *self = Self::new(inputs, trees);
             return moved;
         }
-        if part == Part::Shading {
+        if part == SnapshotPart::Shading {
             let mut materials =
-                MaterialTable { ids: std::mem::take(&mut self.ids), order: std::mem::take(&mut self.order) };
+                MaterialIds { ids: std::mem::take(&mut self.ids), order: std::mem::take(&mut self.order) };
             let shading = Arc::new(shading_of(inputs, &mut materials));
             self.prepared = self.prepared.with_shading(shading);
             (self.ids, self.order) = (materials.ids, materials.order);
@@ -263,12 +263,12 @@ fn about(world: DAffine3, center: DVec3, origin: DVec3) -> Affine3A {
 
 /// Which materials a snapshot needs, numbered in the order in which they are first asked for.
 #[derive(Default)]
-struct MaterialTable {
+struct MaterialIds {
     ids: HashMap<MaterialKey, MaterialId>,
     order: Vec<MaterialKey>,
 }
 
-impl MaterialTable {
+impl MaterialIds {
     fn id(&mut self, key: MaterialKey) -> MaterialId {
         *self.ids.entry(key).or_insert_with(|| {
             self.order.push(key);
@@ -278,7 +278,7 @@ impl MaterialTable {
 }
 
 /// The shading under the materials that `table` lists; what they blend is added to it.
-fn shading_of(inputs: &SceneInputs, table: &mut MaterialTable) -> Shading {
+fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds) -> Shading {
     let by_entity: HashMap<Entity, &Material> = inputs.materials.iter().map(|m| (m.entity, &m.material)).collect();
     let lights: HashMap<Entity, &PointLight> = inputs.lights.iter().map(|light| (light.entity, &light.light)).collect();
     let mut textures = TextureTable::default();
@@ -307,7 +307,7 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialTable) -> Shading {
 
 fn material_of(
     material: &Material,
-    table: &mut MaterialTable,
+    table: &mut MaterialIds,
     textures: &mut TextureTable,
     by_entity: &HashMap<Entity, &Material>,
 ) -> render::Material {

@@ -51,7 +51,7 @@ pub use components::{
 pub use describe::{Description, camera_part};
 pub use error::{Problem, SceneError, suggestion};
 pub use extent::{Extent, ExtentCache};
-pub use extract::{Extraction, Part, origin_for};
+pub use extract::{Extraction, SnapshotPart, origin_for};
 pub use fingerprint::{Fingerprint, SceneContent};
 pub use image_metadata::{ImageMetadata, ImageSamples, ImageScene};
 pub use input_file::{FileKind, InputFile, ReadError, plain_io};

@@ -4,7 +4,7 @@
 //! breaks: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at every
 //! level, both integrators, with and without SIMD. [`random`] has scenes that nobody thought of.
 
-use super::light::{Picture, camera, diffuse, grey, prepared};
+use super::light::{LightCase, camera, diffuse, grey, prepared};
 use super::random::Random;
 use crate::kdtree::{BuildPreset, MeshTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
@@ -67,7 +67,7 @@ fn furnace(
     view: Camera,
     index: f32,
     (integrator, simd): (Integrator, bool),
-) -> Picture {
+) -> LightCase {
     let (shapes, objects) =
         things.into_iter().map(|(shape, material, mesh)| (shape, Object { mesh, ..Object::plain(material) })).unzip();
     let mut settings = RenderSettings { integrator, ..RenderSettings::default() };
@@ -79,7 +79,7 @@ fn furnace(
         (_, true) => "",
         (_, false) => ", one path at a time",
     };
-    Picture {
+    LightCase {
         name: name + way,
         scene: prepared(shapes, objects, materials, Environment::Constant(Vec3::ONE), view),
         settings,
@@ -114,7 +114,7 @@ fn shells(n: usize, index: fn(usize) -> f32) -> (Vec<Thing>, Vec<Material>) {
 }
 
 /// See the [module](self).
-pub fn nested() -> Vec<Picture> {
+pub fn nested() -> Vec<LightCase> {
     let mut pictures = Vec::new();
     for way in WAYS {
         for n in [1, 2, 3, 4, 5, 6, 8, 12, 20, 50, 100] {
@@ -207,7 +207,7 @@ fn sheet(normal: Vec3) -> Thing {
 pub const N_RANDOM: u64 = 2000;
 
 /// Random lossless scenes: spheres, clouds, meshes and boxes, nested, overlapping and apart, of every material.
-pub fn random() -> Vec<Picture> {
+pub fn random() -> Vec<LightCase> {
     (0..N_RANDOM).map(random_scene).collect()
 }
 
@@ -242,7 +242,7 @@ impl Body {
     }
 }
 
-fn random_scene(seed: u64) -> Picture {
+fn random_scene(seed: u64) -> LightCase {
     let mut random = Random::new(0xF0_12AC, seed);
     let mut materials = Vec::new();
     for _ in 0..4 {

@@ -10,7 +10,7 @@ use crate::render::{
 use glam::{UVec2, Vec3, vec3};
 
 /// One small scene with a known picture.
-pub struct Picture {
+pub struct LightCase {
     pub name: String,
     pub scene: Prepared,
     pub settings: RenderSettings,
@@ -27,7 +27,7 @@ pub struct Picture {
     pub every_pixel: bool,
 }
 
-impl Picture {
+impl LightCase {
     /// Renders it, and counts samples that are not finite, and how far the light is off.
     pub fn run(&self, index: usize, spp: u32, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         let mut film = Film::new(self.width, self.height);
@@ -122,9 +122,9 @@ fn floor() -> Shape {
 }
 
 /// In an evenly bright world, things that lose no light cannot be seen.
-fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Material>, allowed: f64) -> Picture {
+fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Material>, allowed: f64) -> LightCase {
     let eye = camera(vec3(0.0, 0.4, 4.0), Vec3::ZERO, 40.0);
-    Picture {
+    LightCase {
         name: name.into(),
         settings: RenderSettings::default(),
         scene: plain(shapes, materials, Environment::Constant(Vec3::ONE), eye),
@@ -139,7 +139,7 @@ fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Ma
 }
 
 /// Nested glass, glass on glass, indices next to 1, and angles about that of total reflection.
-pub fn glass() -> Vec<Picture> {
+pub fn glass() -> Vec<LightCase> {
     let glass = |ior: f32| Material::Glass { ior, absorption: Vec3::ZERO };
     let mut pictures = vec![
         furnace(
@@ -191,7 +191,7 @@ pub fn glass() -> Vec<Picture> {
 }
 
 /// Microfacets from a mirror to as rough as can be: none may win light, and with compensation none may lose any.
-pub fn metal() -> Vec<Picture> {
+pub fn metal() -> Vec<LightCase> {
     let mut pictures = Vec::new();
     for alpha in [0.0, 1e-20, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0] {
         let metal = Material::Metal {
@@ -210,7 +210,7 @@ pub fn metal() -> Vec<Picture> {
 
 /// Ball lights over a floor: tiny and bright, huge, and touching it. A floor point at distance d from the centre of a ball of
 /// radius r sees albedo · L · (r/d)² · cos θ while all of the ball is above its horizon.
-pub fn lights() -> Vec<Picture> {
+pub fn lights() -> Vec<LightCase> {
     let cases: [(&str, f32, f32, f32); 9] = [
         ("a ball of 1 µm", 1e-6, 1.0, 0.3),
         ("a ball of 0.1 mm", 1e-4, 1.0, 0.3),
@@ -235,7 +235,7 @@ pub fn lights() -> Vec<Picture> {
             let materials = vec![diffuse(0.5), emissive(radiance)];
             let shapes = vec![(floor(), 0), (ball(vec3(0.0, height, 0.0), radius), 1)];
             let view = camera(eye, vec3(x, 0.0, 0.0), 0.01);
-            Picture {
+            LightCase {
                 name: name.to_owned(),
                 settings: RenderSettings::default(),
                 scene: plain(shapes, materials, Environment::Black, view),
@@ -253,7 +253,7 @@ pub fn lights() -> Vec<Picture> {
 
 /// Fields of view of 1° … 170°, focus from 0⁺ to ∞, and lenses larger than the scene: in a world of one colour, whatever
 /// a ray meets has radiance 1.
-pub fn cameras() -> Vec<Picture> {
+pub fn cameras() -> Vec<LightCase> {
     let mut pictures = Vec::new();
     for vfov in [1e-3, 1.0, 30.0, 120.0, 170.0, 179.9] {
         for focus in [f32::MIN_POSITIVE, 1e-30, 1e-21, 1e-6, 1.0, 1e6, 1e30, f32::MAX, f32::INFINITY] {
@@ -262,7 +262,7 @@ pub fn cameras() -> Vec<Picture> {
                 (view.focus_distance, view.lens_radius) = (focus, lens);
                 let shapes = vec![(ball(Vec3::ZERO, 1.0), 0), (ball(vec3(0.3, 0.2, 1.5), 0.1), 1)];
                 let materials = vec![Material::Mirror { reflectance: grey(1.0) }, emissive(1.0)];
-                pictures.push(Picture {
+                pictures.push(LightCase {
                     name: format!("{vfov}°, focus {focus:e} m, lens {lens:e} m"),
                     settings: RenderSettings::default(),
                     scene: plain(shapes, materials, Environment::Constant(Vec3::ONE), view),
@@ -284,7 +284,7 @@ pub fn cameras() -> Vec<Picture> {
 
 /// 10⁶ samples in one pixel of a room whose walls emit 1 − ρ and reflect ρ: its radiance is 1 everywhere, and a sum
 /// that loses digits drifts away from it.
-pub fn long_sums() -> Vec<Picture> {
+pub fn long_sums() -> Vec<LightCase> {
     [0.0f32, 0.5, 0.9]
         .into_iter()
         .map(|albedo| {
@@ -300,7 +300,7 @@ pub fn long_sums() -> Vec<Picture> {
                 (Shape::Plane { point: Vec3::NEG_Z, normal: Vec3::Z }, 2),
             ];
             let view = camera(vec3(0.1, 0.2, 0.3), vec3(1.0, 0.4, 0.2), 30.0);
-            Picture {
+            LightCase {
                 name: format!("a glowing room of albedo {albedo}, one pixel"),
                 settings: RenderSettings::default(),
                 scene: plain(shapes, materials, Environment::Black, view),
@@ -317,7 +317,7 @@ pub fn long_sums() -> Vec<Picture> {
         .collect()
 }
 
-impl Picture {
+impl LightCase {
     /// How many samples it has with `spp` of each pixel.
     pub fn samples(&self, spp: u32) -> u64 {
         u64::from(self.width) * u64::from(self.height) * u64::from(spp)

@@ -20,7 +20,7 @@ pub use reference::{CheckResult, ReferenceIntersector, TEST_ERROR};
 pub use replay::{Replay, ReplayError, Told};
 pub use tally::{Energy, Tally, Worst};
 
-use light::Picture;
+use light::LightCase;
 use surfaces::Plan;
 
 /// One hard case.
@@ -35,8 +35,8 @@ pub struct Case {
 
 #[derive(Clone, Copy)]
 enum Kind {
-    Rays(fn() -> Vec<Plan>),
-    Pictures(fn() -> Vec<Picture>),
+    RaySet(fn() -> Vec<Plan>),
+    Pictures(fn() -> Vec<LightCase>),
     Bounces,
     Anywhere,
     Georeferenced,
@@ -47,7 +47,7 @@ pub const CASES: &[Case] = &[
         name: "closed",
         about: "closed meshes hit at corners and edges from inside, sizes 10^-6 ... 10^6, 0 ... 10^7 sizes from the origin",
         share: 1.0,
-        kind: Kind::Rays(surfaces::closed),
+        kind: Kind::RaySet(surfaces::closed),
     },
     Case {
         name: "georeferenced",
@@ -59,31 +59,31 @@ pub const CASES: &[Case] = &[
         name: "slivers",
         about: "crossing triangles 10^3 ... 10^6 times longer than wide",
         share: 0.1,
-        kind: Kind::Rays(surfaces::slivers),
+        kind: Kind::RaySet(surfaces::slivers),
     },
     Case {
         name: "degenerate",
         about: "triangles without area, repeated and coplanar ones",
         share: 0.1,
-        kind: Kind::Rays(surfaces::degenerate),
+        kind: Kind::RaySet(surfaces::degenerate),
     },
     Case {
         name: "split-planes",
         about: "boxes and sheets along the axes, and rays within their planes, from corners, with -0, denormals, 10^±24",
         share: 0.1,
-        kind: Kind::Rays(surfaces::split_planes),
+        kind: Kind::RaySet(surfaces::split_planes),
     },
     Case {
         name: "leaving",
         about: "rays that leave every kind of surface, down to 10^-4 rad",
         share: 0.2,
-        kind: Kind::Rays(surfaces::leaving),
+        kind: Kind::RaySet(surfaces::leaving),
     },
     Case {
         name: "tangent",
         about: "balls that touch a floor, each other, and a floor that is a ball of 10 km",
         share: 0.2,
-        kind: Kind::Rays(surfaces::tangent),
+        kind: Kind::RaySet(surfaces::tangent),
     },
     Case {
         name: "white-box",
@@ -155,7 +155,7 @@ impl Case {
     pub fn run(&self, rays: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         let n = self.rays(rays);
         match self.kind {
-            Kind::Rays(plans) => {
+            Kind::RaySet(plans) => {
                 let plans = plans();
                 let each = rays_of_plan(n, &plans);
                 let stages = plans.iter().enumerate().filter_map(|(i, plan)| Some((i, (plan.build)()?)));
@@ -174,7 +174,7 @@ impl Case {
 
     /// Whether [`Self::replay`] knows the rays that a tally names.
     pub fn can_replay(&self) -> bool {
-        matches!(self.kind, Kind::Rays(_) | Kind::Pictures(_))
+        matches!(self.kind, Kind::RaySet(_) | Kind::Pictures(_))
     }
 
     /// Everything about one ray of the case.
@@ -186,7 +186,7 @@ impl Case {
         let check =
             |count: u64| if ray < count { Ok(()) } else { Err(ReplayError::NoRay { stage, ray, last: count - 1 }) };
         match self.kind {
-            Kind::Rays(plans) => {
+            Kind::RaySet(plans) => {
                 let plans = plans();
                 let plan = plans.get(stage).ok_or(no_stage(plans.len()))?;
                 check(rays_of_plan(n, &plans))?;
@@ -209,7 +209,7 @@ fn rays_of_plan(n: u64, plans: &[Plan]) -> u64 {
 }
 
 /// Of `n` samples of the case, those of each pixel of a picture.
-fn spp_of_picture(n: u64, pictures: &[Picture], i: usize) -> u32 {
+fn spp_of_picture(n: u64, pictures: &[LightCase], i: usize) -> u32 {
     let usual: u64 = pictures.iter().map(|picture| picture.samples(picture.spp)).sum();
     // More rays make the noise smaller; fewer than the usual number would let it decide.
     let spp = f64::from(pictures[i].spp);

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::reference::ReferenceIntersector;
-use super::test_scene::{Probe, Rays, TestScene, towards};
+use super::test_scene::{Probe, RaySet, TestScene, towards};
 use crate::geometry::Ray;
 use crate::kdtree::{BuildPreset, MeshTree, SceneTree, Shape, SphereTree};
 use crate::mesh::{Mesh, procedural};
@@ -16,12 +16,12 @@ pub struct Plan {
 
 /// Size of a scene, and its distance from the origin in units of that size.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct SurfaceCase {
     scale: f32,
     offset: f32,
 }
 
-impl Place {
+impl SurfaceCase {
     const HERE: Self = Self { scale: 1.0, offset: 0.0 };
 
     /// Sizes of 10⁻⁶ … 10⁶ at distances of 0 and 10⁰ … 10⁷.
@@ -80,7 +80,7 @@ impl Soup {
     }
 }
 
-fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: Rays) -> TestScene {
+fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: RaySet) -> TestScene {
     let scene = SceneTree::build(shapes);
     let judge = ReferenceIntersector::of(&scene);
     TestScene { name, scene, judge, rays, brute_every }
@@ -132,7 +132,7 @@ fn insides(judge: &ReferenceIntersector, soup: &Soup, seed: u64) -> Vec<Vec3> {
 }
 
 /// Rays from inside a closed mesh at its corners, its edges, its faces and anywhere.
-fn rays_from_inside(soup: Soup, origins: Vec<Vec3>) -> Rays {
+fn rays_from_inside(soup: Soup, origins: Vec<Vec3>) -> RaySet {
     Box::new(move |random| {
         let origin = *random.pick(&origins);
         let [a, b, c] = soup.corners(random.below(soup.triangles.len()));
@@ -151,7 +151,7 @@ fn rays_from_inside(soup: Soup, origins: Vec<Vec3>) -> Rays {
 /// Rays from inside closed meshes, with the corners at their place in `f32` or in a space of their own.
 pub fn closed() -> Vec<Plan> {
     let mut plans = Vec::new();
-    for place in Place::all() {
+    for place in SurfaceCase::all() {
         for (index, (shape, _)) in closed_meshes().into_iter().enumerate() {
             for placed in [false, true] {
                 let kind = if placed { "instance" } else { "mesh" };
@@ -180,7 +180,7 @@ pub fn closed() -> Vec<Plan> {
 }
 
 /// Rays at corners, along edges and axes, from corners and from afar, with both zeros, denormal and extreme directions.
-fn awkward_rays(soup: Soup) -> Rays {
+fn awkward_rays(soup: Soup) -> RaySet {
     let size = soup.size();
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z, vec3(-0.0, 1.0, -0.0), vec3(-0.0, -0.0, -1.0)];
     Box::new(move |random| {
@@ -220,7 +220,7 @@ fn awkward_rays(soup: Soup) -> Rays {
 }
 
 fn plans_of_soup(make: fn() -> Soup) -> Vec<Plan> {
-    let plan = |place: Place| {
+    let plan = |place: SurfaceCase| {
         let build = move || {
             let soup = make().mapped(|p| place.apply(p));
             let shape = mesh_shape(&soup.tree(), Affine3A::IDENTITY);
@@ -228,7 +228,7 @@ fn plans_of_soup(make: fn() -> Soup) -> Vec<Plan> {
         };
         Plan { build: Box::new(build) }
     };
-    Place::all().map(plan).collect()
+    SurfaceCase::all().map(plan).collect()
 }
 
 /// Needles a thousand to a million times longer than wide, many of them crossing.
@@ -291,9 +291,9 @@ pub fn split_planes() -> Vec<Plan> {
 }
 
 /// One of each shape, at a place.
-fn shapes_at(place: Place) -> Vec<(&'static str, Shape)> {
+fn shapes_at(place: SurfaceCase) -> Vec<(&'static str, Shape)> {
     let (a, b, c) = (vec3(-0.7, -0.2, 0.3), vec3(0.9, 0.1, -0.4), vec3(0.2, 0.8, 0.5));
-    let Place { scale, .. } = place;
+    let SurfaceCase { scale, .. } = place;
     let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 1.0, -0.5);
     let turned = Affine3A::from_scale_rotation_translation(vec3(2.0, 0.5, 1.0) * scale, turn, place.shift());
     let mirrored = Affine3A::from_scale_rotation_translation(vec3(-1.0, 1.0, 1.0) * scale, turn, place.shift());
@@ -323,13 +323,13 @@ fn shapes_at(place: Place) -> Vec<(&'static str, Shape)> {
 
 /// Rays that leave a surface, half of them within 10⁻¹ to 10⁻⁴ rad of it, do not meet it again.
 pub fn leaving() -> Vec<Plan> {
-    let plan = |(place, index): (Place, usize)| {
+    let plan = |(place, index): (SurfaceCase, usize)| {
         let shape = shapes_at(place).swap_remove(index);
         let name = format!("{}, {}", shape.0, place.name());
 
         let build = move || {
             let shape = shapes_at(place).swap_remove(index).1;
-            let rays: Rays = Box::new(move |random| {
+            let rays: RaySet = Box::new(move |random| {
                 let target = place.apply(random.point() * 0.8);
                 let distance = place.scale * 10f32.powf(2.0 * random.signed());
                 let origin = target + random.direction() * distance;
@@ -339,13 +339,13 @@ pub fn leaving() -> Vec<Plan> {
         };
         Plan { build: Box::new(build) }
     };
-    let n = shapes_at(Place::HERE).len();
-    Place::all().flat_map(|place| (0..n).map(move |index| (place, index))).map(plan).collect()
+    let n = shapes_at(SurfaceCase::HERE).len();
+    SurfaceCase::all().flat_map(|place| (0..n).map(move |index| (place, index))).map(plan).collect()
 }
 
 /// Balls that touch: the floor, each other, and a floor that is a ball of 10 km; seen from all around the contact.
 pub fn tangent() -> Vec<Plan> {
-    let kinds: [(&str, fn(Place) -> Vec<Shape>); 4] = [
+    let kinds: [(&str, fn(SurfaceCase) -> Vec<Shape>); 4] = [
         ("ball on a plane", |place| {
             vec![
                 Shape::Plane { point: place.shift(), normal: Vec3::Y },
@@ -371,11 +371,11 @@ pub fn tangent() -> Vec<Plan> {
             vec![ball(Vec3::Y, 1.0), ball(vec3(2.0, 1.0, 0.0), 1.0), ball(vec3(0.0, 0.5, 0.0), 0.5)]
         }),
     ];
-    let plan = |(place, (kind, shapes)): (Place, (&'static str, fn(Place) -> Vec<Shape>))| {
+    let plan = |(place, (kind, shapes)): (SurfaceCase, (&'static str, fn(SurfaceCase) -> Vec<Shape>))| {
         let name = format!("{kind}, {}", place.name());
 
         let build = move || {
-            let rays: Rays = Box::new(move |random| {
+            let rays: RaySet = Box::new(move |random| {
                 // Ever closer to the contact at the origin.
                 let near = 10f32.powf(-5.0 * random.unit());
                 let target = place.apply(random.point() * vec3(near, 0.5 * near * near, near));
@@ -386,5 +386,5 @@ pub fn tangent() -> Vec<Plan> {
         };
         Plan { build: Box::new(build) }
     };
-    Place::all().flat_map(|place| kinds.map(|kind| (place, kind))).map(plan).collect()
+    SurfaceCase::all().flat_map(|place| kinds.map(|kind| (place, kind))).map(plan).collect()
 }

@@ -15,12 +15,12 @@ pub struct TestScene {
     pub scene: SceneTree,
     pub judge: ReferenceIntersector,
     /// The ray of an index.
-    pub rays: Rays,
+    pub rays: RaySet,
     /// Of so many rays one is held against every primitive; 1 for all.
     pub brute_every: u64,
 }
 
-pub type Rays = Box<dyn Fn(&mut Random) -> Probe + Send + Sync>;
+pub type RaySet = Box<dyn Fn(&mut Random) -> Probe + Send + Sync>;
 
 /// One ray, and what is known of it beforehand.
 #[derive(Clone, Copy, Debug)]

@@ -16,7 +16,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// What the file is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum DialogPurpose {
     Open,
     AddMesh,
     /// In the place of the colour of this material.
@@ -25,7 +25,7 @@ pub enum Purpose {
     },
 }
 
-impl Purpose {
+impl DialogPurpose {
     fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a scene, a model or a picture",
@@ -66,14 +66,14 @@ impl Purpose {
     }
 }
 
-type Answer = Result<(Purpose, PathBuf), String>;
+type DialogAnswer = Result<(DialogPurpose, PathBuf), String>;
 
 pub struct Dialog {
     waker: Waker,
     /// One at a time is enough.
     open: Arc<AtomicBool>,
-    sender: Sender<Answer>,
-    receiver: Receiver<Answer>,
+    sender: Sender<DialogAnswer>,
+    receiver: Receiver<DialogAnswer>,
 }
 
 impl Dialog {
@@ -87,7 +87,7 @@ impl Dialog {
     ///
     /// # Errors
     /// When this system has none, in words for people.
-    pub fn ask(&self, purpose: Purpose, folder: &Path) -> Result<(), String> {
+    pub fn ask(&self, purpose: DialogPurpose, folder: &Path) -> Result<(), String> {
         let path = std::env::var_os("PATH").unwrap_or_default();
         let found = find(&path).ok_or("no file dialog here (zenity or kdialog): drop a file on the window")?;
         if self.open.swap(true, Ordering::AcqRel) {
@@ -112,37 +112,37 @@ impl Dialog {
     }
 
     /// What was chosen since the last call.
-    pub fn answers(&self) -> Vec<Answer> {
+    pub fn answers(&self) -> Vec<DialogAnswer> {
         self.receiver.try_iter().collect()
     }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum DialogKind {
     Zenity,
     Kdialog,
 }
 
 /// The first dialog in the folders of `path`.
-fn find(path: &std::ffi::OsStr) -> Option<(PathBuf, Kind)> {
-    [("zenity", Kind::Zenity), ("kdialog", Kind::Kdialog)].into_iter().find_map(|(name, kind)| {
+fn find(path: &std::ffi::OsStr) -> Option<(PathBuf, DialogKind)> {
+    [("zenity", DialogKind::Zenity), ("kdialog", DialogKind::Kdialog)].into_iter().find_map(|(name, kind)| {
         let file = std::env::split_paths(path).map(|folder| folder.join(name)).find(|file| file.is_file())?;
         Some((file, kind))
     })
 }
 
-fn arguments(kind: Kind, purpose: Purpose, folder: &Path) -> Vec<OsString> {
+fn arguments(kind: DialogKind, purpose: DialogPurpose, folder: &Path) -> Vec<OsString> {
     // Ends in a separator, or the folder itself would be offered.
     let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()).join("");
     match kind {
-        Kind::Zenity => {
+        DialogKind::Zenity => {
             let mut start = OsString::from("--filename=");
             start.push(folder);
             let title = format!("--title={}", purpose.title());
             let filter = format!("--file-filter={0} | {0}", purpose.patterns());
             vec!["--file-selection".into(), title.into(), start, filter.into(), "--file-filter=* | *".into()]
         }
-        Kind::Kdialog => {
+        DialogKind::Kdialog => {
             let title = ["--title".into(), purpose.title().into()];
             let rest = ["--getopenfilename".into(), folder.into(), purpose.patterns().into()];
             title.into_iter().chain(rest).collect()
@@ -170,12 +170,12 @@ mod tests {
         let words = |kind, purpose| {
             arguments(kind, purpose, folder).into_iter().map(|word| word.into_string().unwrap()).collect::<Vec<_>>()
         };
-        let zenity = words(Kind::Zenity, Purpose::Open);
+        let zenity = words(DialogKind::Zenity, DialogPurpose::Open);
         assert!(zenity.contains(&"--file-selection".to_owned()), "{zenity:?}");
         assert!(zenity.contains(&"--filename=/home/somebody/".to_owned()), "{zenity:?}");
         assert!(zenity.iter().any(|word| word.contains("*.ron")), "{zenity:?}");
         assert_eq!(
-            words(Kind::Kdialog, Purpose::AddMesh),
+            words(DialogKind::Kdialog, DialogPurpose::AddMesh),
             ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj"]
         );
     }
@@ -191,7 +191,7 @@ mod tests {
             std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
         };
         write("#!/bin/sh\necho '/tmp/my model.obj'\n");
-        assert_eq!(find(folder.path().as_os_str()), Some((program.clone(), Kind::Kdialog)));
+        assert_eq!(find(folder.path().as_os_str()), Some((program.clone(), DialogKind::Kdialog)));
         assert_eq!(run(&program, &[]), Ok(Some("/tmp/my model.obj".into())));
         write("#!/bin/sh\nexit 1\n");
         assert_eq!(run(&program, &[]), Ok(None));

@@ -4,7 +4,7 @@ use std::any::Any;
 
 /// What the environment offers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Display {
+pub enum DisplayServer {
     /// Let the window library choose.
     Default,
     /// Wayland is announced but nobody listens, and X11 is there too.
@@ -14,7 +14,7 @@ pub enum Display {
 
 /// Looks for a display.
 #[cfg(all(unix, not(target_os = "macos")))]
-pub fn find() -> Display {
+pub fn find() -> DisplayServer {
     use std::path::PathBuf;
     let var = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     // An absolute name counts as it is; `join` keeps it so.
@@ -29,8 +29,8 @@ pub fn find() -> Display {
 
 /// Every other desktop has a display by being one.
 #[cfg(not(all(unix, not(target_os = "macos"))))]
-pub fn find() -> Display {
-    Display::Default
+pub fn find() -> DisplayServer {
+    DisplayServer::Default
 }
 
 /// From now on, panics over a lost display print nothing: who catches them tells people what happened.
@@ -55,12 +55,12 @@ pub(super) fn is_loss(panic: &(dyn Any + Send)) -> bool {
 
 /// `wayland`: announced, and whether somebody listens; `x11`: announced.
 #[cfg_attr(not(all(unix, not(target_os = "macos"))), allow(dead_code))]
-fn choose(wayland: Option<bool>, x11: bool) -> Display {
+fn choose(wayland: Option<bool>, x11: bool) -> DisplayServer {
     match (wayland, x11) {
-        (Some(true), _) | (None, true) => Display::Default,
+        (Some(true), _) | (None, true) => DisplayServer::Default,
         // The window library would try Wayland alone and give up.
-        (Some(false), true) => Display::ForceX11,
-        (Some(false) | None, false) => Display::None,
+        (Some(false), true) => DisplayServer::ForceX11,
+        (Some(false) | None, false) => DisplayServer::None,
     }
 }
 
@@ -78,11 +78,11 @@ mod tests {
 
     #[test]
     fn a_dead_wayland_socket_leads_to_x11_or_to_none() {
-        assert_eq!(choose(None, false), Display::None);
-        assert_eq!(choose(None, true), Display::Default);
-        assert_eq!(choose(Some(true), false), Display::Default);
-        assert_eq!(choose(Some(true), true), Display::Default);
-        assert_eq!(choose(Some(false), true), Display::ForceX11);
-        assert_eq!(choose(Some(false), false), Display::None);
+        assert_eq!(choose(None, false), DisplayServer::None);
+        assert_eq!(choose(None, true), DisplayServer::Default);
+        assert_eq!(choose(Some(true), false), DisplayServer::Default);
+        assert_eq!(choose(Some(true), true), DisplayServer::Default);
+        assert_eq!(choose(Some(false), true), DisplayServer::ForceX11);
+        assert_eq!(choose(Some(false), false), DisplayServer::None);
     }
 }

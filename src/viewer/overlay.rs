@@ -1,6 +1,6 @@
 //! What is written over the picture: the status line, messages, and the list of keys.
 
-use super::keys::{BINDINGS, Binding, Group, finds};
+use super::keys::{BINDINGS, Binding, KeyGroup, finds};
 use super::toasts::{Toast, Tone};
 use crate::printable;
 use crate::render::{Legend, scale_color};
@@ -125,7 +125,7 @@ pub fn help(context: &Context, help: &mut Help) {
                 field.request_focus();
             }
             ui.add_space(4.0);
-            let found = |group: &Group| -> Vec<&'static Binding> {
+            let found = |group: &KeyGroup| -> Vec<&'static Binding> {
                 let is_found = |binding: &&Binding| finds(&binding.line(group.title), search);
                 group.bindings.iter().filter(is_found).collect()
             };

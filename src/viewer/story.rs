@@ -5,7 +5,7 @@
 
 mod table;
 
-use crate::frame::{End, PixelStory, Projector, Way, brightness};
+use crate::frame::{End, PathRecord, PixelStory, Projector, brightness};
 use egui::{Color32, Context, Pos2, Stroke};
 use glam::{DVec2, DVec3};
 
@@ -52,7 +52,7 @@ impl WaysShown {
     }
 
     /// How bright the part of a path is that was asked for.
-    fn strength(&self, way: &Way) -> f64 {
+    fn strength(&self, way: &PathRecord) -> f64 {
         let is_asked_for = |end: &End, bounces: usize| {
             let light = match end {
                 End::At { what, .. } => what.as_str(),
@@ -69,8 +69,8 @@ impl WaysShown {
     }
 
     /// The paths to draw, the strongest last so that nothing hides them.
-    fn of<'a>(&self, story: &'a PixelStory) -> Vec<&'a Way> {
-        let mut ways: Vec<(f64, &Way)> = story.ways.iter().map(|way| (self.strength(way), way)).collect();
+    fn of<'a>(&self, story: &'a PixelStory) -> Vec<&'a PathRecord> {
+        let mut ways: Vec<(f64, &PathRecord)> = story.ways.iter().map(|way| (self.strength(way), way)).collect();
         if self.is_filtered() {
             ways.retain(|(strength, _)| *strength > 0.0);
         }
@@ -134,7 +134,7 @@ mod tests {
     use crate::frame::Stop;
 
     /// A path that runs into `lamp` after its bounces, with this radiance.
-    fn way(lamp: &str, bounces: usize, radiance: f64) -> Way {
+    fn way(lamp: &str, bounces: usize, radiance: f64) -> PathRecord {
         let stop = |what: &str, radiance: f64| Stop {
             end: End::At { point: DVec3::ZERO, what: what.to_owned() },
             throughput: DVec3::ONE,
@@ -143,7 +143,7 @@ mod tests {
         };
         let mut stops: Vec<Stop> = (0..bounces).map(|_| stop("wall", 0.0)).collect();
         stops.push(stop(lamp, radiance));
-        Way { sample: 0, radiance: DVec3::splat(radiance), origin: DVec3::ZERO, stops }
+        PathRecord { sample: 0, radiance: DVec3::splat(radiance), origin: DVec3::ZERO, stops }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use firstlight::kdtree::Shape;
 use firstlight::render::{
     ColorInput, Display, Environment, Fresnel, Material, Prepared, RenderSettings, ScalarInput, Techniques,
 };
-use firstlight::report::{ConvergenceCurve, Key, Limits, LinearPicture, ReferenceStore, measure_curve};
+use firstlight::report::{ConvergenceCurve, CurveLimits, Key, LinearPicture, ReferenceStore, measure_curve};
 use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
@@ -77,7 +77,7 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
         &room,
         &settings,
         size,
-        Limits { spp: 48, seconds: None },
+        CurveLimits { spp: 48, seconds: None },
         &mut |share| told.push(share),
         &|| false,
     );
@@ -98,7 +98,9 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
     }
     assert!(ladder.last().distance.flip < ladder.steps[0].distance.flip);
     let short =
-        measure_curve(&room, &settings, size, Limits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| (), &|| false);
+        measure_curve(&room, &settings, size, CurveLimits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| (), &|| {
+            false
+        });
     assert_eq!(short.len(), 1, "the first step is always taken, and no other fits");
 }
 
@@ -250,8 +252,14 @@ fn estimated_error_is_the_true_error_where_no_rare_light_rules() {
         let mut sums = [(0.0, 0.0); 8];
         for seed in 0..6 {
             let settings = RenderSettings { seed, ..settings };
-            let rungs =
-                measure_curve(&prepared, &settings, size, Limits { spp: 128, seconds: None }, &mut |_| (), &|| false);
+            let rungs = measure_curve(
+                &prepared,
+                &settings,
+                size,
+                CurveLimits { spp: 128, seconds: None },
+                &mut |_| (),
+                &|| false,
+            );
             let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
             for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
                 sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));
@@ -283,7 +291,7 @@ fn the_interval_holds_the_true_error_from_few_samples_on() {
         let mut widths = [0.0; 4];
         for seed in 0..seeds {
             let settings = RenderSettings { seed, ..settings };
-            let limits = Limits { spp: 32, seconds: None };
+            let limits = CurveLimits { spp: 32, seconds: None };
             let rungs = measure_curve(&prepared, &settings, size, limits, &mut |_| (), &|| false);
             let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
             for step in ladder.steps.iter().filter(|step| step.spp >= 4) {

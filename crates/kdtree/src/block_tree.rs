@@ -6,7 +6,7 @@ use super::node8::{LEAF, Node8, widen};
 use super::nodes::{KdNode, KdNodes};
 use super::ray::Nearest;
 use super::reference::{BuildConfig, Primitives};
-use super::simd::Simd;
+use super::simd::KernelSimd;
 
 #[derive(Debug, PartialEq)]
 pub(super) struct BlockTree<B: LeafBlock> {
@@ -73,7 +73,7 @@ impl<B: LeafBlock> BlockTree<B> {
 
     /// Offers the hits of a leaf, which is a child of a wide node.
     #[inline(always)]
-    pub fn test_leaf<S: Simd>(&self, s: S, child: u32, ray: &B::Ray, nearest: &mut Nearest) {
+    pub fn test_leaf<S: KernelSimd>(&self, s: S, child: u32, ray: &B::Ray, nearest: &mut Nearest) {
         let first = (child & !(LEAF | COMPACT)) as usize;
         if child & COMPACT == 0 {
             test_blocks(s, &self.blocks, first, ray, nearest);
@@ -84,7 +84,7 @@ impl<B: LeafBlock> BlockTree<B> {
 
     /// Asks for the first `LINES` cache lines of a child of a wide node, whatever it is; 0 for all of a block.
     #[inline(always)]
-    pub fn prefetch<S: Simd, const LINES: usize>(&self, s: S, child: u32) {
+    pub fn prefetch<S: KernelSimd, const LINES: usize>(&self, s: S, child: u32) {
         let first = (child & !(LEAF | COMPACT)) as usize;
         let node = self.wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
         let block = self.blocks.as_ptr().wrapping_add(first).cast::<u8>();
@@ -162,7 +162,7 @@ fn check_count(n_blocks: usize) {
 }
 
 #[inline(always)]
-fn test_blocks<S: Simd, B: LeafBlock>(s: S, blocks: &[B], mut block: usize, ray: &B::Ray, nearest: &mut Nearest) {
+fn test_blocks<S: KernelSimd, B: LeafBlock>(s: S, blocks: &[B], mut block: usize, ray: &B::Ray, nearest: &mut Nearest) {
     loop {
         B::test(s, &blocks[block], ray, nearest);
         if !blocks[block].prims().is_followed() {

@@ -3,7 +3,7 @@
 use super::lanes::{LaneHits, may_hit, quad_hits, resolve, sphere_hits};
 use super::leaf::{BLOCK, LeafBlock, LeafRay, NoBlock, Prims, ShearedRay};
 use super::shared_block::SharedBlock;
-use super::simd::{Mask, Simd};
+use super::simd::{KernelSimd, Mask};
 use crate::geometry::{Ray, Shear};
 use glam::Vec3;
 
@@ -57,7 +57,7 @@ impl LeafBlock for TriangleBlock {
     }
 
     #[inline(always)]
-    fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
+    fn hits<S: KernelSimd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
         let [a, b, c] = &block.vertices;
         let (a, b, c) = (ray.shear(s, a), ray.shear(s, b), ray.shear(s, c));
         let mask = may_hit(s, &a, &b, &c);
@@ -96,7 +96,7 @@ impl LeafBlock for QuadBlock {
     }
 
     #[inline(always)]
-    fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
+    fn hits<S: KernelSimd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
         let [a, b, c, d] = &block.corners;
         let corners = [ray.shear(s, a), ray.shear(s, b), ray.shear(s, c), ray.shear(s, d)];
         quad_hits(s, Mask::MAX, corners.each_ref(), s.splat(ray.sz))
@@ -173,7 +173,7 @@ impl LeafBlock for SphereBlock {
     }
 
     #[inline(always)]
-    fn hits<S: Simd>(s: S, block: &Self, ray: &PreciseRay) -> LaneHits<S> {
+    fn hits<S: KernelSimd>(s: S, block: &Self, ray: &PreciseRay) -> LaneHits<S> {
         let [x, y, z] = &block.center;
         let to_center = [
             s.sub_d(s.widen(s.load(x)), s.splat_d(ray.origin[0])),

@@ -59,12 +59,12 @@ pub(super) fn build<M: LeafMaker>(
 }
 
 /// A finished part of the tree, before it gets its place in the arrays.
-enum Part<L> {
-    Fork { axis: usize, split: f32, children: Box<[Part<L>; 2]> },
+enum Subtree<L> {
+    Fork { axis: usize, split: f32, children: Box<[Subtree<L>; 2]> },
     Done(Arena<L>),
 }
 
-impl<L> Part<L> {
+impl<L> Subtree<L> {
     fn collect_leaves<'a>(&'a self, parts: &mut Vec<&'a L>) {
         match self {
             Self::Fork { children, .. } => children.iter().for_each(|child| child.collect_leaves(parts)),
@@ -126,7 +126,7 @@ fn flatten(part: &[ArenaNode], index: usize, slot: usize, nodes: &mut Vec<KdNode
 }
 
 /// Where one thread keeps what it works on.
-struct Room {
+struct BuildScratch {
     /// The references of nodes that wait, those of the next one on top.
     stack: Vec<Reference>,
     /// Lower parts of one node's references: no node has more than the first.
@@ -152,7 +152,7 @@ const FORK_ABOVE: usize = 1024;
 
 impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
     /// - `growth`: references that this subtree may add to those given.
-    fn subtree(&self, mut references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Part<M::Leaves> {
+    fn subtree(&self, mut references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Subtree<M::Leaves> {
         let count = references.len();
         let mut arena = Arena::default();
         let mut below = references.clone();
@@ -165,7 +165,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
             let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) else {
                 references.append(&mut below);
                 self.make_leaf(&references, &mut Vec::new(), &mut arena);
-                return Part::Done(arena);
+                return Subtree::Done(arena);
             };
             references.shrink_to_fit();
             below.shrink_to_fit();
@@ -174,17 +174,17 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
                 || self.subtree(below, cell_below, growth_below, depth + 1),
                 || self.subtree(references, cell_above, growth_above, depth + 1),
             );
-            return Part::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
+            return Subtree::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
         }
-        let mut room = Room { stack: references, below, prims: Vec::new() };
+        let mut room = BuildScratch { stack: references, below, prims: Vec::new() };
         self.sequential(&mut room, 0, cell, growth, depth, &mut arena);
-        Part::Done(arena)
+        Subtree::Done(arena)
     }
 
     /// Builds the subtree over `room.stack[start..]`, which it consumes.
     fn sequential(
         &self,
-        room: &mut Room,
+        room: &mut BuildScratch,
         start: usize,
         cell: Aabb,
         growth: usize,

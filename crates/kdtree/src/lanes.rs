@@ -2,7 +2,7 @@
 //!
 //! Every operation is that of the scalar test, in its order, so the bits are the same.
 
-use super::simd::{LANES, Mask, Simd};
+use super::simd::{KernelSimd, LANES, Mask};
 use crate::geometry::{TINY_EDGE, tiny_edges};
 use glam::Affine3A;
 
@@ -10,14 +10,14 @@ use glam::Affine3A;
 pub(super) type Sheared<S> = [<S as firstlight_simd::Simd>::F; 3];
 
 /// Lanes that hit, with their `t`, `u`, `v`; other lanes hold anything.
-pub(super) struct LaneHits<S: Simd> {
+pub(super) struct LaneHits<S: KernelSimd> {
     pub mask: Mask,
     pub t: S::F,
     pub u: S::F,
     pub v: S::F,
 }
 
-impl<S: Simd> LaneHits<S> {
+impl<S: KernelSimd> LaneHits<S> {
     #[inline(always)]
     pub fn none(s: S) -> Self {
         let zero = s.splat(0.0);
@@ -27,7 +27,7 @@ impl<S: Simd> LaneHits<S> {
 
 /// Lanes whose direction is longest along x, and those along y; all others along z. On ties the first axis, as in `geometry::Shear`.
 #[inline(always)]
-pub(super) fn longest_axis<S: Simd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask) {
+pub(super) fn longest_axis<S: KernelSimd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask) {
     let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
     let along_x = s.le(y, x) & s.le(z, x);
     (along_x, !along_x & s.le(z, y))
@@ -37,7 +37,7 @@ pub(super) fn longest_axis<S: Simd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask) {
 ///
 /// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.
 #[inline(always)]
-pub(super) fn shear<S: Simd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::F, sy: S::F) -> Sheared<S> {
+pub(super) fn shear<S: KernelSimd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::F, sy: S::F) -> Sheared<S> {
     let (x, y) = (s.sub(vertex[0], origin[0]), s.sub(vertex[1], origin[1]));
     let z = s.sub(vertex[2], origin[2]);
     [s.sub(x, s.mul(sx, z)), s.sub(y, s.mul(sy, z)), z]
@@ -45,19 +45,19 @@ pub(super) fn shear<S: Simd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::
 
 /// Lanes whose three numbers do not have both signs among them. False for NaN.
 #[inline(always)]
-pub(super) fn same_sign<S: Simd>(s: S, a: S::F, b: S::F, c: S::F) -> Mask {
+pub(super) fn same_sign<S: KernelSimd>(s: S, a: S::F, b: S::F, c: S::F) -> Mask {
     let zero = s.splat(0.0);
     s.le(zero, s.min(a, s.min(b, c))) | s.le(s.max(a, s.max(b, c)), zero)
 }
 
 /// The plain cross product in the plane, whose sign is never wrong but may be lost.
 #[inline(always)]
-pub(super) fn plain<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
+pub(super) fn plain<S: KernelSimd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
     s.sub(s.mul(p[0], q[1]), s.mul(p[1], q[0]))
 }
 
 #[inline(always)]
-fn exact<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
+fn exact<S: KernelSimd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
     let cd = s.mul(p[1], q[0]);
     let rounding = s.neg_mul_add(p[1], q[0], cd);
     s.add(s.mul_sub(p[0], q[1], cd), rounding)
@@ -65,13 +65,13 @@ fn exact<S: Simd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
 
 /// Lanes that may hit, by the plain edge functions.
 #[inline(always)]
-pub(super) fn may_hit<S: Simd>(s: S, a: &Sheared<S>, b: &Sheared<S>, c: &Sheared<S>) -> Mask {
+pub(super) fn may_hit<S: KernelSimd>(s: S, a: &Sheared<S>, b: &Sheared<S>, c: &Sheared<S>) -> Mask {
     same_sign(s, plain(s, c, b), plain(s, a, c), plain(s, b, a))
 }
 
 /// The rest of the triangle test, for lanes that may hit.
 #[inline(always)]
-pub(super) fn resolve<S: Simd>(
+pub(super) fn resolve<S: KernelSimd>(
     s: S,
     mut mask: Mask,
     a: &Sheared<S>,
@@ -97,7 +97,7 @@ pub(super) fn resolve<S: Simd>(
 ///
 /// - `corners`: `a`, `b`, `c`, `d` around the quad.
 #[inline(always)]
-pub(super) fn quad_hits<S: Simd>(s: S, lanes: Mask, [a, b, c, d]: [&Sheared<S>; 4], sz: S::F) -> LaneHits<S> {
+pub(super) fn quad_hits<S: KernelSimd>(s: S, lanes: Mask, [a, b, c, d]: [&Sheared<S>; 4], sz: S::F) -> LaneHits<S> {
     let diagonal = plain(s, a, c);
     let back = s.sub(s.splat(0.0), diagonal);
     let first = lanes & same_sign(s, plain(s, c, b), diagonal, plain(s, b, a));
@@ -125,7 +125,7 @@ pub(super) fn quad_hits<S: Simd>(s: S, lanes: Mask, [a, b, c, d]: [&Sheared<S>; 
 }
 
 #[inline(always)]
-fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
+fn choose<S: KernelSimd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<S> {
     [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
 }
 
@@ -134,7 +134,7 @@ fn choose<S: Simd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sheared<
 /// - `to_center`: from the origin of the ray.
 /// - `inv_dir_squared`: `1 / (dir · dir)`.
 #[inline(always)]
-pub(super) fn sphere_hits<S: Simd>(
+pub(super) fn sphere_hits<S: KernelSimd>(
     s: S,
     lanes: Mask,
     to_center: &[S::D; 3],
@@ -161,13 +161,13 @@ pub(super) fn sphere_hits<S: Simd>(
 }
 
 #[inline(always)]
-pub(super) fn dot<S: Simd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
+pub(super) fn dot<S: KernelSimd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
     s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
 }
 
 /// Does the lanes of `tiny` again in `f64`; returns the lanes that are still hit, all others included.
 #[inline(never)]
-fn resolve_tiny<S: Simd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&Sheared<S>; 3]) -> Mask {
+fn resolve_tiny<S: KernelSimd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&Sheared<S>; 3]) -> Mask {
     let mut stored = [[0.0; LANES]; 3];
     let mut points = [[[0.0; LANES]; 2]; 3];
     for k in 0..3 {
@@ -190,7 +190,7 @@ fn resolve_tiny<S: Simd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&She
 
 /// Origins and directions in the space of an object.
 #[inline(always)]
-pub(super) fn to_own_space<S: Simd>(s: S, map: &Affine3A, origin: &[S::F; 3], dir: &[S::F; 3]) -> [[S::F; 3]; 2] {
+pub(super) fn to_own_space<S: KernelSimd>(s: S, map: &Affine3A, origin: &[S::F; 3], dir: &[S::F; 3]) -> [[S::F; 3]; 2] {
     let turned = transform(s, map, origin);
     let origin = [
         s.add(turned[0], s.splat(map.translation[0])),
@@ -202,12 +202,12 @@ pub(super) fn to_own_space<S: Simd>(s: S, map: &Affine3A, origin: &[S::F; 3], di
 
 /// As `scene_tree::transform_vector`, rounding for rounding.
 #[inline(always)]
-fn transform<S: Simd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
+fn transform<S: KernelSimd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
     [transform_row(s, map, 0, v), transform_row(s, map, 1, v), transform_row(s, map, 2, v)]
 }
 
 #[inline(always)]
-fn transform_row<S: Simd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S::F {
+fn transform_row<S: KernelSimd>(s: S, map: &Affine3A, row: usize, v: &[S::F; 3]) -> S::F {
     let x = s.mul(s.splat(map.matrix3.x_axis[row]), v[0]);
     let y = s.mul(s.splat(map.matrix3.y_axis[row]), v[1]);
     let z = s.mul(s.splat(map.matrix3.z_axis[row]), v[2]);

@@ -2,7 +2,7 @@
 
 use super::lanes::{LaneHits, shear};
 use super::ray::Nearest;
-use super::simd::{LANES, Mask, Simd};
+use super::simd::{KernelSimd, LANES, Mask};
 use crate::geometry::{Ray, Shear};
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -29,11 +29,11 @@ pub(super) trait LeafBlock: Sized + Send {
     fn prims_mut(&mut self) -> &mut Prims;
 
     /// All lanes that the ray meets, whatever the sign of `t`.
-    fn hits<S: Simd>(s: S, block: &Self, ray: &Self::Ray) -> LaneHits<S>;
+    fn hits<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray) -> LaneHits<S>;
 
     /// Offers the nearest hit.
     #[inline(always)]
-    fn test<S: Simd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
+    fn test<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
         let hits = Self::hits(s, block, ray);
         let valid = hits.mask & s.lt(s.splat(0.0), hits.t) & s.le(hits.t, s.splat(nearest.t));
         if valid == 0 {
@@ -84,7 +84,7 @@ impl Prims {
 
     /// The lanes that hold a primitive.
     #[inline(always)]
-    pub fn lanes<S: Simd>(&self, s: S) -> Mask {
+    pub fn lanes<S: KernelSimd>(&self, s: S) -> Mask {
         s.lt_u(s.load_u(&self.0), s.splat_u(u32::MAX))
     }
 
@@ -115,7 +115,7 @@ impl<R: LeafRay> LeafBlock for NoBlock<R> {
     }
 
     #[inline(always)]
-    fn hits<S: Simd>(_: S, block: &Self, _: &R) -> LaneHits<S> {
+    fn hits<S: KernelSimd>(_: S, block: &Self, _: &R) -> LaneHits<S> {
         match block.0 {}
     }
 }
@@ -145,7 +145,7 @@ impl LeafRay for ShearedRay {
 impl ShearedRay {
     /// Brings sixteen points into the frame.
     #[inline(always)]
-    pub fn shear<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
+    pub fn shear<S: KernelSimd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
         let [kx, ky, kz] = self.axes;
         let origin = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
         let point = [s.load(&points[kx]), s.load(&points[ky]), s.load(&points[kz])];

@@ -12,10 +12,10 @@ use super::nodes::{MAX_DEPTH, Node};
 use super::objects::FrameF64;
 use super::ray::{Nearest, WIDEN};
 use super::shared_block::SharedBlock;
-use super::simd::{LANES, Mask, Simd};
+use super::simd::{KernelSimd, LANES, Mask};
 
 /// Sixteen rays in the mesh's own space, and what they have hit so far.
-pub(super) struct MeshPacket<S: Simd> {
+pub(super) struct MeshPacket<S: KernelSimd> {
     pub origin: [S::F; 3],
     pub dir: [S::F; 3],
     /// Lanes that hold a ray.
@@ -38,18 +38,18 @@ pub(super) struct NearestLanes {
 /// What packets test in leaves.
 pub(super) trait PacketBlock: LeafBlock {
     /// What the test of balls wants to know of the rays.
-    type Frame<S: Simd>: Copy;
+    type Frame<S: KernelSimd>: Copy;
 
     /// Whether a [`Footprint`] is of any use.
     const HAS_FOOTPRINT: bool;
 
-    fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> Self::Frame<S>;
+    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> Self::Frame<S>;
 
     /// The rays of `mask` against all of the leaf.
-    fn test_rays<S: Simd>(
+    fn test_rays<S: KernelSimd>(
         s: S,
         packet: &mut MeshPacket<S>,
-        common: (&Group<S>, &Self::Frame<S>),
+        common: (&PacketGroup<S>, &Self::Frame<S>),
         leaf: &Leaf<Self>,
         mask: Mask,
     );
@@ -60,7 +60,7 @@ trait Triangles: LeafBlock<Ray = ShearedRay> {
     fn corner(&self, lane: usize, corner: usize) -> [f32; 3];
 
     /// Where the three corners come to lie across, across and along the rays, at the least and at the most.
-    fn reach<S: Simd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3];
+    fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3];
 }
 
 impl Triangles for TriangleBlock {
@@ -71,7 +71,7 @@ impl Triangles for TriangleBlock {
     }
 
     #[inline(always)]
-    fn reach<S: Simd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
+    fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
         let [a, b, c] = &self.vertices;
         [footprint.reach(s, a, axes), footprint.reach(s, b, axes), footprint.reach(s, c, axes)]
     }
@@ -84,7 +84,7 @@ impl Triangles for SharedBlock {
     }
 
     #[inline(always)]
-    fn reach<S: Simd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
+    fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3] {
         let mut corners = [[[s.splat(0.0); 2]; 3]; 3];
         let vertices = footprint.reach(s, self.vertices(), axes);
         for axis in 0..3 {
@@ -98,18 +98,18 @@ impl Triangles for SharedBlock {
 }
 
 impl PacketBlock for TriangleBlock {
-    type Frame<S: Simd> = ();
+    type Frame<S: KernelSimd> = ();
 
     const HAS_FOOTPRINT: bool = true;
 
     #[inline(always)]
-    fn frame<S: Simd>(_: S, _: &MeshPacket<S>) {}
+    fn frame<S: KernelSimd>(_: S, _: &MeshPacket<S>) {}
 
     #[inline(always)]
-    fn test_rays<S: Simd>(
+    fn test_rays<S: KernelSimd>(
         s: S,
         packet: &mut MeshPacket<S>,
-        (group, ()): (&Group<S>, &()),
+        (group, ()): (&PacketGroup<S>, &()),
         leaf: &Leaf<Self>,
         mask: Mask,
     ) {
@@ -123,20 +123,20 @@ impl PacketBlock for TriangleBlock {
 }
 
 impl PacketBlock for SphereBlock {
-    type Frame<S: Simd> = FrameF64<S>;
+    type Frame<S: KernelSimd> = FrameF64<S>;
 
     const HAS_FOOTPRINT: bool = false;
 
     #[inline(always)]
-    fn frame<S: Simd>(s: S, packet: &MeshPacket<S>) -> FrameF64<S> {
+    fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> FrameF64<S> {
         FrameF64::new(s, &packet.origin, &packet.dir)
     }
 
     #[inline(always)]
-    fn test_rays<S: Simd>(
+    fn test_rays<S: KernelSimd>(
         s: S,
         packet: &mut MeshPacket<S>,
-        (_, frame): (&Group<S>, &FrameF64<S>),
+        (_, frame): (&PacketGroup<S>, &FrameF64<S>),
         leaf: &Leaf<Self>,
         mask: Mask,
     ) {
@@ -151,9 +151,9 @@ const FEW_RAYS: u32 = 2;
 
 /// What waits to be visited: node, lanes, and their intervals. Made once for many packets, for clearing it takes
 /// longer than tracing some of them.
-pub(super) struct PacketStack<S: Simd>([(u32, Mask, S::F, S::F); MAX_DEPTH]);
+pub(super) struct PacketStack<S: KernelSimd>([(u32, Mask, S::F, S::F); MAX_DEPTH]);
 
-impl<S: Simd> PacketStack<S> {
+impl<S: KernelSimd> PacketStack<S> {
     #[inline(always)]
     pub fn new(s: S) -> Self {
         Self([(0, 0, s.splat(0.0), s.splat(0.0)); MAX_DEPTH])
@@ -161,7 +161,7 @@ impl<S: Simd> PacketStack<S> {
 }
 
 /// What all rays of a group share, and their reciprocals.
-pub(super) struct Group<S: Simd> {
+pub(super) struct PacketGroup<S: KernelSimd> {
     inv_lo: [S::F; 3],
     inv_hi: [S::F; 3],
     slack: S::F,
@@ -191,7 +191,7 @@ impl Footprint {
     /// Rounding is monotone: the steps of the test done on intervals, in the order of the test, bound what it gets for every ray,
     /// and a triangle whose sheared vertices all lie on one side of the rays, or behind them, is missed by all of them.
     #[inline(always)]
-    fn may_hit<S: Simd>(&self, s: S, axes: [usize; 3], block: &impl Triangles) -> Mask {
+    fn may_hit<S: KernelSimd>(&self, s: S, axes: [usize; 3], block: &impl Triangles) -> Mask {
         let zero = s.splat(0.0);
         let [first, second, third] = block.reach(s, self, axes);
         let mut missed = 0;
@@ -209,7 +209,7 @@ impl Footprint {
 
     /// Where sixteen vertices come to lie, at the least and at the most.
     #[inline(always)]
-    fn reach<S: Simd>(&self, s: S, points: &[[f32; BLOCK]; 3], [x, y, z]: [usize; 3]) -> [[S::F; 2]; 3] {
+    fn reach<S: KernelSimd>(&self, s: S, points: &[[f32; BLOCK]; 3], [x, y, z]: [usize; 3]) -> [[S::F; 2]; 3] {
         let depth = less(s, s.load(&points[z]), self.origin[2]);
         [
             self.across(s, s.load(&points[x]), self.origin[0], self.sx, depth),
@@ -219,7 +219,7 @@ impl Footprint {
     }
 
     #[inline(always)]
-    fn across<S: Simd>(&self, s: S, at: S::F, origin: [f32; 2], slope: [f32; 2], depth: [S::F; 2]) -> [S::F; 2] {
+    fn across<S: KernelSimd>(&self, s: S, at: S::F, origin: [f32; 2], slope: [f32; 2], depth: [S::F; 2]) -> [S::F; 2] {
         let [flat, steep] = [s.splat(slope[0]), s.splat(slope[1])];
         let [a, b] = [s.mul(flat, depth[0]), s.mul(flat, depth[1])];
         let [c, d] = [s.mul(steep, depth[0]), s.mul(steep, depth[1])];
@@ -230,17 +230,17 @@ impl Footprint {
 }
 
 #[inline(always)]
-fn less<S: Simd>(s: S, at: S::F, from: [f32; 2]) -> [S::F; 2] {
+fn less<S: KernelSimd>(s: S, at: S::F, from: [f32; 2]) -> [S::F; 2] {
     [s.sub(at, s.splat(from[1])), s.sub(at, s.splat(from[0]))]
 }
 
 /// The least and the most of the lanes in the mask.
 #[inline(always)]
-fn interval<S: Simd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
+fn interval<S: KernelSimd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
     [s.least(mask, a), -s.least(mask, s.sub(s.splat(0.0), a))]
 }
 
-impl<S: Simd> MeshPacket<S> {
+impl<S: KernelSimd> MeshPacket<S> {
     /// Finds the nearest hits; with `ANY` a ray ends at its first hit, and looks for it from its far end as in streams.
     #[inline(always)]
     pub fn trace<B: PacketBlock, const ANY: bool>(&mut self, s: S, tree: &BlockTree<B>, stack: &mut PacketStack<S>) {
@@ -290,7 +290,7 @@ impl<S: Simd> MeshPacket<S> {
         } else {
             Footprint::NONE
         };
-        let group = Group::<S> {
+        let group = PacketGroup::<S> {
             inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
             inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
             slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
@@ -354,14 +354,14 @@ impl<S: Simd> MeshPacket<S> {
     }
 
     #[inline(always)]
-    fn crossing(&self, s: S, group: &Group<S>, axis: usize, split: f32) -> (S::F, S::F) {
+    fn crossing(&self, s: S, group: &PacketGroup<S>, axis: usize, split: f32) -> (S::F, S::F) {
         let distance = s.sub(s.splat(split), self.origin[axis]);
         let lo = s.sub(s.mul(distance, group.inv_lo[axis]), group.slack);
         (lo, s.add(s.mul(distance, group.inv_hi[axis]), group.slack))
     }
 
     #[inline(always)]
-    fn test_triangles(&mut self, s: S, group: &Group<S>, block: &impl Triangles, mask: Mask) {
+    fn test_triangles(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, mask: Mask) {
         let n_rays = mask.count_ones();
         if n_rays <= FEW_RAYS {
             return self.test_by_ray(s, group, block, mask);
@@ -378,7 +378,7 @@ impl<S: Simd> MeshPacket<S> {
 
     /// One ray after the other against all triangles.
     #[inline(always)]
-    fn test_by_ray(&mut self, s: S, group: &Group<S>, block: &impl Triangles, mut mask: Mask) {
+    fn test_by_ray(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, mut mask: Mask) {
         let [kx, ky, kz] = group.axes;
         let origin = [stored(s, self.origin[kx]), stored(s, self.origin[ky]), stored(s, self.origin[kz])];
         let (sx, sy, sz) = (stored(s, group.sx), stored(s, group.sy), stored(s, group.sz));
@@ -430,7 +430,7 @@ impl<S: Simd> MeshPacket<S> {
 
     /// One triangle against all rays.
     #[inline(always)]
-    fn test_triangle(&mut self, s: S, group: &Group<S>, block: &impl Triangles, lane: usize, mask: Mask) {
+    fn test_triangle(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, lane: usize, mask: Mask) {
         let lane = lane % BLOCK;
         let [kx, ky, kz] = group.axes;
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
@@ -472,7 +472,7 @@ impl<S: Simd> MeshPacket<S> {
 impl NearestLanes {
     /// One ray against all of a block.
     #[inline(always)]
-    fn offer_one<S: Simd, B: LeafBlock>(&mut self, s: S, block: &B, ray: &B::Ray, lane: usize) {
+    fn offer_one<S: KernelSimd, B: LeafBlock>(&mut self, s: S, block: &B, ray: &B::Ray, lane: usize) {
         let (t, prim) = (self.t[lane], self.prim[lane]);
         let mut nearest = Nearest { t, u: 0.0, v: 0.0, prim, found: false };
         B::test(s, block, ray, &mut nearest);
@@ -485,7 +485,7 @@ impl NearestLanes {
 }
 
 #[inline(always)]
-fn stored<S: Simd>(s: S, from: S::F) -> [f32; LANES] {
+fn stored<S: KernelSimd>(s: S, from: S::F) -> [f32; LANES] {
     let mut to = [0.0; LANES];
     s.store(from, &mut to);
     to

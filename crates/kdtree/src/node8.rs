@@ -44,7 +44,7 @@ impl Stack {
     pub const NEW: Self = Self { child: [0; STACK], t0: [0.0; STACK], t1: [0.0; STACK] };
 }
 
-/// A ray as [`super::simd::Simd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it, twice.
+/// A ray as [`super::simd::KernelSimd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it, twice.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct DescentRay {
@@ -157,7 +157,7 @@ fn octant_word(axes: u32, octant: usize) -> u64 {
     word
 }
 
-/// The plain version of [`super::simd::Simd::descend`].
+/// The plain version of [`super::simd::KernelSimd::descend`].
 ///
 /// Pushes the children that the ray meets within `t0..=t1`, farthest first (of a ray that goes far first: nearest), and returns the new
 /// height.
@@ -197,10 +197,10 @@ pub(super) fn descend_plain(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{InstructionSet, Simd, dispatch};
+    use crate::simd::{InstructionSet, KernelSimd, dispatch};
 
     #[inline(always)]
-    fn run<S: Simd>(s: S, cases: &[(Node8, DescentRay, f32, f32)], out: &mut Vec<u64>) {
+    fn run<S: KernelSimd>(s: S, cases: &[(Node8, DescentRay, f32, f32)], out: &mut Vec<u64>) {
         for (node, ray, t0, t1) in cases {
             let mut stack = Stack::NEW;
             let height = s.descend(node, ray, *t0, *t1, &mut stack, 3);

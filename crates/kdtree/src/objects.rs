@@ -8,12 +8,12 @@ use super::lanes::{LaneHits, Sheared, dot, longest_axis, may_hit, quad_hits, res
 use super::primitive_trees::MAX_SIMPLE;
 use super::quad_filter::{FilteredQuad, QuadFilterRays};
 use super::shape::Shape;
-use super::simd::{LANES, Mask, Simd};
+use super::simd::{KernelSimd, LANES, Mask};
 use super::sphere_tree::SphereTree;
 use crate::geometry::quad_corners;
 use glam::Vec3;
 
-/// A point that `Simd` can take axes from.
+/// A point that `KernelSimd` can take axes from.
 type Point = [f32; 4];
 
 fn point(p: Vec3) -> Point {
@@ -123,7 +123,7 @@ impl SimpleObjects {
 }
 
 /// Sixteen rays and the nearest hit of each so far.
-pub(super) struct Packet<S: Simd> {
+pub(super) struct Packet<S: KernelSimd> {
     pub origin: [S::F; 3],
     pub dir: [S::F; 3],
     /// Lanes that hold a ray.
@@ -137,7 +137,7 @@ pub(super) struct Packet<S: Simd> {
     pub found: Mask,
 }
 
-impl<S: Simd> Packet<S> {
+impl<S: KernelSimd> Packet<S> {
     /// Rays `first..first + 16`, or as many as there are.
     #[inline(always)]
     pub fn load(s: S, rays: &RayBatch, first: usize) -> Self {
@@ -364,7 +364,7 @@ impl<S: Simd> Packet<S> {
 }
 
 /// The rays' shears (`geometry::Shear`), each with axes of its own.
-pub(super) struct ShearFrame<S: Simd> {
+pub(super) struct ShearFrame<S: KernelSimd> {
     /// For each lane the axes across, across and along.
     axes: [S::U; 3],
     along_x: Mask,
@@ -376,7 +376,7 @@ pub(super) struct ShearFrame<S: Simd> {
     pub sz: S::F,
 }
 
-impl<S: Simd> ShearFrame<S> {
+impl<S: KernelSimd> ShearFrame<S> {
     #[inline(always)]
     fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let (along_x, along_y) = longest_axis(s, dir);
@@ -425,13 +425,13 @@ impl<S: Simd> ShearFrame<S> {
 
 /// What belongs to the longest axis of each lane.
 #[inline(always)]
-fn by_axis<S: Simd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: S::F, on_z: S::F) -> S::F {
+fn by_axis<S: KernelSimd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: S::F, on_z: S::F) -> S::F {
     s.select(along_x, on_x, s.select(along_y, on_y, on_z))
 }
 
 /// The first sixteen, or all and `idle` for the rest.
 #[inline(always)]
-fn load_some<S: Simd>(s: S, from: &[f32], idle: f32) -> S::F {
+fn load_some<S: KernelSimd>(s: S, from: &[f32], idle: f32) -> S::F {
     if let Some(all) = from.first_chunk() {
         return s.load(all);
     }
@@ -441,7 +441,7 @@ fn load_some<S: Simd>(s: S, from: &[f32], idle: f32) -> S::F {
 }
 
 #[inline(always)]
-fn store_some<S: Simd>(s: S, from: S::F, to: &mut [f32]) {
+fn store_some<S: KernelSimd>(s: S, from: S::F, to: &mut [f32]) {
     if let Some(all) = to.first_chunk_mut() {
         return s.store(from, all);
     }
@@ -451,7 +451,7 @@ fn store_some<S: Simd>(s: S, from: S::F, to: &mut [f32]) {
 }
 
 #[inline(always)]
-fn store_some_u<S: Simd>(s: S, from: S::U, to: &mut [u32]) {
+fn store_some_u<S: KernelSimd>(s: S, from: S::U, to: &mut [u32]) {
     if let Some(all) = to.first_chunk_mut() {
         return s.store_u(from, all);
     }
@@ -462,13 +462,13 @@ fn store_some_u<S: Simd>(s: S, from: S::U, to: &mut [u32]) {
 
 /// The rays in `f64`.
 #[derive(Clone, Copy)]
-pub(super) struct FrameF64<S: Simd> {
+pub(super) struct FrameF64<S: KernelSimd> {
     origin: [S::D; 3],
     pub dir: [S::D; 3],
     pub inv_dir_squared: S::D,
 }
 
-impl<S: Simd> FrameF64<S> {
+impl<S: KernelSimd> FrameF64<S> {
     #[inline(always)]
     pub fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let origin = [s.widen(origin[0]), s.widen(origin[1]), s.widen(origin[2])];

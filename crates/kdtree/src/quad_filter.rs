@@ -10,7 +10,7 @@
 //! (`kdtree::surface`); corners are rounded by `2u` of their size; a dot product of rounded numbers is off by `4u`
 //! of its largest terms, of differences by `5u`. Rays and quads of extreme sizes, and what is not a number, are left open.
 
-use super::simd::{Mask, Simd};
+use super::simd::{KernelSimd, Mask};
 use crate::geometry::robust::UNIT_ROUNDOFF;
 use glam::{DVec3, Vec3};
 
@@ -69,7 +69,7 @@ impl FilteredQuad {
 }
 
 /// Sixteen rays as the sieve wants them.
-pub(super) struct QuadFilterRays<S: Simd> {
+pub(super) struct QuadFilterRays<S: KernelSimd> {
     origin: [S::F; 3],
     dir: [S::F; 3],
     /// The largest component of the direction.
@@ -81,7 +81,7 @@ pub(super) struct QuadFilterRays<S: Simd> {
 }
 
 /// What can be said of a quad.
-pub(super) struct Filtered<S: Simd> {
+pub(super) struct Filtered<S: KernelSimd> {
     /// No hit in front of the origin comes before; ∞ where there is none, −∞ where nothing is known.
     pub earliest: S::F,
     /// Lanes in which there is one, and not after `latest`.
@@ -89,7 +89,7 @@ pub(super) struct Filtered<S: Simd> {
     pub latest: S::F,
 }
 
-impl<S: Simd> QuadFilterRays<S> {
+impl<S: KernelSimd> QuadFilterRays<S> {
     #[inline(always)]
     pub fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let size = s.max(s.abs(dir[0]), s.max(s.abs(dir[1]), s.abs(dir[2])));
@@ -151,7 +151,7 @@ impl<S: Simd> QuadFilterRays<S> {
 
 /// A dot product, however it rounds.
 #[inline(always)]
-fn about<S: Simd>(s: S, a: &[f32; 3], b: &[S::F; 3]) -> S::F {
+fn about<S: KernelSimd>(s: S, a: &[f32; 3], b: &[S::F; 3]) -> S::F {
     s.mul_add_about(s.splat(a[0]), b[0], s.mul_add_about(s.splat(a[1]), b[1], s.mul(s.splat(a[2]), b[2])))
 }
 
@@ -169,7 +169,7 @@ mod tests {
     type Answer = (bool, bool, f32, f32);
 
     #[inline(always)]
-    fn look_once<S: Simd>(s: S, quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer) {
+    fn look_once<S: KernelSimd>(s: S, quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer) {
         let [origin, dir] = ray.map(|v| [s.splat(v.x), s.splat(v.y), s.splat(v.z)]);
         let seen = QuadFilterRays::new(s, &origin, &dir).look::<true>(s, quad);
         let (mut earliest, mut latest) = ([0.0; LANES], [0.0; LANES]);

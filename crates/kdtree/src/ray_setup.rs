@@ -6,7 +6,7 @@ use super::lanes::{longest_axis, to_own_space};
 use super::leaf::LeafRay;
 use super::node8::DescentRay;
 use super::ray::{Nearest, WIDEN};
-use super::simd::{LANES, Mask, Simd};
+use super::simd::{KernelSimd, LANES, Mask};
 use crate::geometry::{Aabb, Ray, Shear};
 use firstlight_simd::three;
 use glam::{Affine3A, Vec3};
@@ -78,7 +78,7 @@ impl RaySetup {
     ///
     /// - `extent`: the largest side of the tree's bounds.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &mut impl Source) -> Option<usize> {
+    pub fn next<S: KernelSimd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &mut impl Source) -> Option<usize> {
         while self.waiting == 0 {
             let n = self.fetch(source);
             if n == 0 {
@@ -108,7 +108,7 @@ impl RaySetup {
 
     /// [`Shear::new`], `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
     #[inline(always)]
-    fn prepare<S: Simd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &impl Source) {
+    fn prepare<S: KernelSimd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &impl Source) {
         let mut origin = three!(|axis| s.load(&self.origin[axis]));
         let mut dir = three!(|axis| s.load(&self.dir[axis]));
         if let Some(map) = source.own_from_world() {

@@ -6,7 +6,7 @@
 
 use super::lanes::{LaneHits, may_hit, resolve};
 use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay};
-use super::simd::Simd;
+use super::simd::KernelSimd;
 use glam::Vec3;
 
 /// Up to sixteen triangles over up to sixteen vertices.
@@ -71,7 +71,7 @@ impl SharedBlock {
 
     /// What sixteen vertices have, for each of the three corners of sixteen triangles.
     #[inline(always)]
-    pub fn by_corner<S: Simd>(&self, s: S, of_vertices: S::F) -> [S::F; 3] {
+    pub fn by_corner<S: KernelSimd>(&self, s: S, of_vertices: S::F) -> [S::F; 3] {
         let corners = s.load_u(&self.corners);
         [
             s.lookup(of_vertices, corners),
@@ -132,7 +132,7 @@ impl LeafBlock for SharedBlock {
     }
 
     #[inline(always)]
-    fn hits<S: Simd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
+    fn hits<S: KernelSimd>(s: S, block: &Self, ray: &ShearedRay) -> LaneHits<S> {
         let [x, y, z] = ray.shear(s, &block.vertices);
         let ([ax, bx, cx], [ay, by, cy]) = (block.by_corner(s, x), block.by_corner(s, y));
         let mask = may_hit(s, &[ax, ay, z], &[bx, by, z], &[cx, cy, z]);
@@ -176,7 +176,11 @@ mod tests {
     type Answer = Vec<Option<(u32, [u32; 3])>>;
 
     #[inline(always)]
-    fn nearest_of<S: Simd, B: LeafBlock<Ray = ShearedRay>>(s: S, blocks: &[B], ray: &Ray) -> Option<(u32, [u32; 3])> {
+    fn nearest_of<S: KernelSimd, B: LeafBlock<Ray = ShearedRay>>(
+        s: S,
+        blocks: &[B],
+        ray: &Ray,
+    ) -> Option<(u32, [u32; 3])> {
         let sheared = ShearedRay::new(ray, &Shear::new(ray.dir));
         let mut nearest = Nearest::before(f32::INFINITY);
         for block in blocks {
@@ -186,7 +190,13 @@ mod tests {
     }
 
     #[inline(always)]
-    fn test_both<S: Simd>(s: S, shared: &[SharedBlock], plain: &[TriangleBlock], rays: &[Ray], out: &mut [Answer; 2]) {
+    fn test_both<S: KernelSimd>(
+        s: S,
+        shared: &[SharedBlock],
+        plain: &[TriangleBlock],
+        rays: &[Ray],
+        out: &mut [Answer; 2],
+    ) {
         for ray in rays {
             out[0].push(nearest_of(s, shared, ray));
             out[1].push(nearest_of(s, plain, ray));

@@ -5,7 +5,7 @@ use firstlight_simd::Portable;
 pub(super) use firstlight_simd::{InstructionSet, LANES, Mask, dispatch};
 
 /// See [`firstlight_simd::Simd`].
-pub(super) trait Simd: firstlight_simd::Simd {
+pub(super) trait KernelSimd: firstlight_simd::Simd {
     /// Visits a node: see `wide::descend_plain`.
     fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize;
 
@@ -13,7 +13,7 @@ pub(super) trait Simd: firstlight_simd::Simd {
     fn prefetch(self, at: *const u8);
 }
 
-impl Simd for Portable {
+impl KernelSimd for Portable {
     #[inline(always)]
     fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
         descend_plain(node, ray, t0, t1, stack, height)

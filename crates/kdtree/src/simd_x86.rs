@@ -1,11 +1,11 @@
-//! The x86 implementations of [`Simd`].
+//! The x86 implementations of [`KernelSimd`].
 
-use super::Simd;
+use super::KernelSimd;
 use crate::node8::{DescentRay, EMPTY, Node8, STACK, Stack};
 use firstlight_simd::{Avx2, Avx512, Mask};
 use std::arch::x86_64::*;
 
-impl Simd for Avx512 {
+impl KernelSimd for Avx512 {
     #[inline(always)]
     fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
         // SAFETY: `self` proves that the processor has the instructions; rays and nodes are aligned as they are read.
@@ -73,7 +73,7 @@ fn both_halves(far: u64) -> Mask {
     far | (far ^ 0xFF) << 8
 }
 
-impl Simd for Avx2 {
+impl KernelSimd for Avx2 {
     #[inline(always)]
     fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize {
         // SAFETY: `self` proves that the processor has the instructions; rays and nodes are aligned as they are read.

@@ -16,7 +16,7 @@ pub struct SphereTree {
     pub(super) tree: BlockTree<SphereBlock>,
 }
 
-struct Balls<'a> {
+struct BallPrimitives<'a> {
     centers: &'a [Vec3],
     radii: &'a [f32],
 }
@@ -45,13 +45,13 @@ pub(super) fn clip_ball(center: Vec3, radius: f32, axis: usize, limit: f32, belo
     bounds
 }
 
-impl Balls<'_> {
+impl BallPrimitives<'_> {
     fn ball(&self, prim: u32) -> (Vec3, f32) {
         (self.centers[prim as usize], self.radii[prim as usize])
     }
 }
 
-impl Primitives for Balls<'_> {
+impl Primitives for BallPrimitives<'_> {
     fn len(&self) -> usize {
         self.centers.len()
     }
@@ -79,7 +79,7 @@ impl SphereTree {
         assert_eq!(centers.len(), radii.len(), "each ball needs a centre and a radius");
         let (centers, radii) = (centers.to_vec(), radii.to_vec());
         assert!(centers.len() < MAX_PRIMS, "a cloud of more than 2^31 balls");
-        let balls = Balls { centers: &centers, radii: &radii };
+        let balls = BallPrimitives { centers: &centers, radii: &radii };
         let make_block = |prims: &[u32]| SphereBlock::new(prims, |prim| balls.ball(prim));
         let tree = BlockTree::build(&balls, &BuildPreset::Best.config(BLOCK), make_block, |_| Vec::new());
         Self { centers, radii, tree }

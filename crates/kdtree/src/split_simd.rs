@@ -4,7 +4,7 @@
 //! Every operation is that of the plain version, in its order, and so is the choice among equals: the split has the same bits.
 
 use super::reference::{BuildConfig, Reference};
-use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
+use super::simd::{InstructionSet, KernelSimd, LANES, Mask, dispatch};
 use super::split::{self, EMPTY_CUT, MAX_BINS, MAX_FACES, Split};
 use crate::geometry::Aabb;
 
@@ -25,8 +25,8 @@ pub(super) fn find_split(
 }
 
 #[inline(always)]
-fn search<S: Simd>(s: S, references: &[Reference], cell: &Aabb, config: &BuildConfig, into: &mut Option<Split>) {
-    let mut search = Search::new(s, references.len(), cell, config);
+fn search<S: KernelSimd>(s: S, references: &[Reference], cell: &Aabb, config: &BuildConfig, into: &mut Option<Split>) {
+    let mut search = SimdSearch::new(s, references.len(), cell, config);
     let flat =
         if references.len() <= config.exact_below { search.try_faces(references) } else { search.try_bins(references) };
     for (axis, is_flat) in flat.into_iter().enumerate() {
@@ -64,7 +64,7 @@ impl Candidates {
     }
 }
 
-struct Search<'a, S: Simd> {
+struct SimdSearch<'a, S: KernelSimd> {
     s: S,
     config: &'a BuildConfig,
     cell: &'a Aabb,
@@ -76,7 +76,7 @@ struct Search<'a, S: Simd> {
     best: Option<Split>,
 }
 
-impl<'a, S: Simd> Search<'a, S> {
+impl<'a, S: KernelSimd> SimdSearch<'a, S> {
     #[inline(always)]
     fn new(s: S, count: usize, cell: &'a Aabb, config: &'a BuildConfig) -> Self {
         assert!(config.block.is_power_of_two(), "blocks of {}", config.block);
@@ -95,7 +95,7 @@ impl<'a, S: Simd> Search<'a, S> {
         s.mul(block_cost, s.to_f(s.shr_u(full, self.log_block)))
     }
 
-    /// `split::Search::offer` for all candidates.
+    /// `split::SimdSearch::offer` for all candidates.
     #[inline(always)]
     fn weigh(&mut self, axis: usize, candidates: &Candidates) {
         let s = self.s;

@@ -12,7 +12,7 @@ use super::leaf::{LeafBlock, LeafRay, ShearedRay};
 use super::node8::{DescentRay, LEAF, Stack};
 use super::ray::Nearest;
 use super::ray_setup::{RaySetup, Source};
-use super::simd::Simd;
+use super::simd::KernelSimd;
 
 /// Rays in flight. Half as many bring 5 % less speed on bounces, twice as many 9 %.
 const SLOTS: usize = 64;
@@ -100,7 +100,7 @@ impl StreamRay for PreciseRay {
 /// A ray that leaves a surface first comes past everything around it, and most of that is not in its way. What is, in a room a wall, is as
 /// likely to be found from the other end.
 #[inline(always)]
-pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
+pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     source: &mut impl Source,
@@ -182,7 +182,7 @@ pub(super) fn run<S: Simd, B: LeafBlock, const ANY: bool>(
 
 /// Starts the next ray that meets the bounds; false if there are no more.
 #[inline(always)]
-fn refill<S: Simd, B: LeafBlock, const ANY: bool>(
+fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     slot: &mut Slot<B::Ray>,

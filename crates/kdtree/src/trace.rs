@@ -16,7 +16,7 @@ use super::primitive_trees::PrimitiveTrees;
 use super::ray::Nearest;
 use super::ray_setup::Source;
 use super::shape::{RayClass, Shape};
-use super::simd::{InstructionSet, LANES, Mask, Simd, dispatch};
+use super::simd::{InstructionSet, KernelSimd, LANES, Mask, dispatch};
 use super::stream::{self, StreamState};
 use super::surface::{Instance, PlacedShapes};
 use crate::geometry::{Aabb, Ray};
@@ -114,13 +114,13 @@ trait Answers {
     fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest);
 
     /// What a packet found for the rays from `first` on.
-    fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize);
+    fn store<S: KernelSimd>(&mut self, s: S, packet: &Packet<S>, first: usize);
 
     /// Packets by the instructions of `set`.
     fn packets(&mut self, set: InstructionSet, packets: &Packets);
 
     /// [`stream`] by the instructions of `set`.
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut StreamState);
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, flight: &mut StreamState);
 }
 
 impl Answers for HitBatch {
@@ -137,7 +137,7 @@ impl Answers for HitBatch {
     }
 
     #[inline(always)]
-    fn store<S: Simd>(&mut self, s: S, packet: &Packet<S>, first: usize) {
+    fn store<S: KernelSimd>(&mut self, s: S, packet: &Packet<S>, first: usize) {
         packet.store(s, self, first);
     }
 
@@ -146,9 +146,9 @@ impl Answers for HitBatch {
         dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut StreamState) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, flight: &mut StreamState) {
         let answers = self;
-        dispatch!(set, closest_stream(tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut StreamState));
+        dispatch!(set, closest_stream(tree: StreamTree, rays: QueuedRays, answers: &mut HitBatch, flight: &mut StreamState));
     }
 }
 
@@ -165,7 +165,7 @@ impl Answers for [bool] {
     }
 
     #[inline(always)]
-    fn store<S: Simd>(&mut self, _: S, packet: &Packet<S>, first: usize) {
+    fn store<S: KernelSimd>(&mut self, _: S, packet: &Packet<S>, first: usize) {
         for (lane, occluded) in self[first..].iter_mut().take(LANES).enumerate() {
             *occluded = packet.found >> lane & 1 != 0;
         }
@@ -176,9 +176,9 @@ impl Answers for [bool] {
         dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: Rays, flight: &mut StreamState) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, flight: &mut StreamState) {
         let answers = self;
-        dispatch!(set, any_stream(tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut StreamState));
+        dispatch!(set, any_stream(tree: StreamTree, rays: QueuedRays, answers: &mut [bool], flight: &mut StreamState));
     }
 }
 
@@ -194,19 +194,19 @@ fn trace<A: Answers + ?Sized>(
 }
 
 /// What tracing a batch takes besides it, kept from one to the next.
-struct Room {
+struct TraceScratch {
     flight: StreamState,
     rounds: Rounds,
     all: Vec<u32>,
 }
 
 thread_local! {
-    static ROOM: RefCell<Room> =
-        RefCell::new(Room { flight: StreamState::new(), rounds: Rounds::default(), all: Vec::new() });
+    static ROOM: RefCell<TraceScratch> =
+        RefCell::new(TraceScratch { flight: StreamState::new(), rounds: Rounds::default(), all: Vec::new() });
 }
 
 fn trace_in<A: Answers + ?Sized>(
-    Room { flight, rounds, all }: &mut Room,
+    TraceScratch { flight, rounds, all }: &mut TraceScratch,
     set: InstructionSet,
     (top, scene): (&TopLevel, &PlacedShapes),
     (rays, class): (&RayBatch, RayClass),
@@ -226,8 +226,11 @@ fn trace_in<A: Answers + ?Sized>(
     all.extend(0..rays.len() as u32);
     for queue in all.chunks(chunk) {
         answers.packets(set, &Packets { simple: &top.simple, instances: &in_packets, scene, rays, queue });
-        let own =
-            |instance: Option<u32>| Rays { rays, queue, instance: instance.map(|i| (i, &scene.instances[i as usize])) };
+        let own = |instance: Option<u32>| QueuedRays {
+            rays,
+            queue,
+            instance: instance.map(|i| (i, &scene.instances[i as usize])),
+        };
         if let Some(tree) = &top.loose.spheres {
             answers.stream(set, StreamTree::Spheres(tree), own(None), flight);
         }
@@ -269,17 +272,17 @@ struct Packets<'a> {
 }
 
 #[inline(always)]
-fn closest_packets<S: Simd>(s: S, packets: &Packets, answers: &mut HitBatch) {
+fn closest_packets<S: KernelSimd>(s: S, packets: &Packets, answers: &mut HitBatch) {
     trace_packets::<S, HitBatch, false>(s, packets, answers);
 }
 
 #[inline(always)]
-fn any_packets<S: Simd>(s: S, packets: &Packets, answers: &mut [bool]) {
+fn any_packets<S: KernelSimd>(s: S, packets: &Packets, answers: &mut [bool]) {
     trace_packets::<S, [bool], true>(s, packets, answers);
 }
 
 #[inline(always)]
-fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &Packets, answers: &mut A) {
+fn trace_packets<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &Packets, answers: &mut A) {
     let mut stack = PacketStack::new(s);
     for sixteen in packets.queue.chunks(LANES) {
         let first = sixteen[0] as usize;
@@ -307,7 +310,7 @@ fn trace_packets<S: Simd, A: Answers + ?Sized, const ANY: bool>(s: S, packets: &
 
 /// Takes a packet through one mesh or cloud of balls.
 #[inline(always)]
-fn trace_packet<S: Simd, B: PacketBlock, const ANY: bool>(
+fn trace_packet<S: KernelSimd, B: PacketBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     instance: &Instance,
@@ -338,20 +341,26 @@ fn trace_packet<S: Simd, B: PacketBlock, const ANY: bool>(
 }
 
 #[inline(always)]
-fn closest_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut HitBatch, flight: &mut StreamState) {
+fn closest_stream<S: KernelSimd>(
+    s: S,
+    tree: StreamTree,
+    rays: QueuedRays,
+    answers: &mut HitBatch,
+    flight: &mut StreamState,
+) {
     run_stream::<S, HitBatch, false>(s, tree, rays, answers, flight);
 }
 
 #[inline(always)]
-fn any_stream<S: Simd>(s: S, tree: StreamTree, rays: Rays, answers: &mut [bool], flight: &mut StreamState) {
+fn any_stream<S: KernelSimd>(s: S, tree: StreamTree, rays: QueuedRays, answers: &mut [bool], flight: &mut StreamState) {
     run_stream::<S, [bool], true>(s, tree, rays, answers, flight);
 }
 
 #[inline(always)]
-fn run_stream<S: Simd, A: Answers + ?Sized, const ANY: bool>(
+fn run_stream<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(
     s: S,
     tree: StreamTree,
-    rays: Rays,
+    rays: QueuedRays,
     answers: &mut A,
     flight: &mut StreamState,
 ) {
@@ -365,7 +374,7 @@ fn run_stream<S: Simd, A: Answers + ?Sized, const ANY: bool>(
 
 /// Rays of a batch on their way through one tree.
 #[derive(Clone, Copy)]
-struct Rays<'a> {
+struct QueuedRays<'a> {
     rays: &'a RayBatch,
     queue: &'a [u32],
     /// Whose tree it is; without one, the tree's primitives are themselves the objects.
@@ -373,7 +382,7 @@ struct Rays<'a> {
 }
 
 struct Queue<'a, A: ?Sized> {
-    rays: Rays<'a>,
+    rays: QueuedRays<'a>,
     answers: &'a mut A,
 }
 
@@ -493,7 +502,7 @@ impl Rounds {
                 let object = wish[0].0;
                 let instance = Some((object, &scene.instances[object as usize]));
                 if let Some(tree) = tree_of(scene, object) {
-                    answers.stream(set, tree, Rays { rays, queue: &self.together, instance }, flight);
+                    answers.stream(set, tree, QueuedRays { rays, queue: &self.together, instance }, flight);
                 }
             }
         }

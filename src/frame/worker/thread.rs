@@ -3,7 +3,7 @@
 use super::idle::IdleFilms;
 use super::views::Views;
 use super::{Answer, BESIDE, Job, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
-use crate::frame::scheduler::{Scheduler, Step, StepReport};
+use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
 use crate::frame::{Picture, Target};
 use crate::render::{Display, Film, Region, advance_region, explain};
 use glam::{DVec2, UVec2};
@@ -76,11 +76,11 @@ impl<'a> Loop<'a> {
         while self.read_inbox() {
             let step = match &self.job {
                 Some(_) => self.scheduler.next(self.clock.elapsed()),
-                None => Step::Sleep,
+                None => RenderStep::Sleep,
             };
             match step {
-                Step::Render { .. } => self.render(step),
-                Step::Sleep => self.sleep(),
+                RenderStep::Render { .. } => self.render(step),
+                RenderStep::Sleep => self.sleep(),
             }
         }
     }
@@ -231,8 +231,8 @@ impl<'a> Loop<'a> {
     }
 
     /// One step of the scheduler, and the picture that comes of it.
-    fn render(&mut self, step: Step) {
-        let Step::Render { divider, mut target_spp, mut at_most } = step else { return };
+    fn render(&mut self, step: RenderStep) {
+        let RenderStep::Render { divider, mut target_spp, mut at_most } = step else { return };
         let Some(job) = &self.job else { return };
         if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
             let size = (job.width.div_ceil(divider), job.height.div_ceil(divider));

@@ -107,7 +107,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     if !matches!(options.normals, ObjNormals::FileOrComputed { .. }) {
         parsed.normals.clear();
     }
-    let corners = Corners::of(&parsed);
+    let corners = MeshCorners::of(&parsed);
     let (triangles, slots, dropped) = corners.triangles(&parsed);
     if dropped > 0 {
         warnings.push(format!("{}: {dropped} triangles use a vertex twice and were left out", path.display()));
@@ -150,7 +150,7 @@ fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
 }
 
 /// One vertex for each different (position, texture coordinate, normal) that corners use.
-struct Corners {
+struct MeshCorners {
     /// The vertex of each corner, in file order.
     vertices: Vec<u32>,
     positions: Vec<DVec3>,
@@ -161,7 +161,7 @@ struct Corners {
     normals: Vec<Vec3>,
 }
 
-impl Corners {
+impl MeshCorners {
     /// What no corner uses is left out; the rest is in order of first use.
     fn of(parsed: &ParsedObj) -> Self {
         let (has_uvs, has_normals) = (!parsed.uvs.is_empty(), !parsed.normals.is_empty());

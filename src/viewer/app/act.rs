@@ -4,7 +4,7 @@ use super::App;
 use crate::console;
 use crate::frame::{Command, Edit, Explaining, Focus, FocusTarget, PictureFormat, Selection, ViewMode, gizmo};
 use crate::render::{Inspection, Integrator};
-use crate::viewer::dialog::Purpose;
+use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
 use crate::viewer::saver::{Larger, Saved, new_scene_file};
 use crate::viewer::toasts::Tone;
@@ -115,7 +115,7 @@ impl App {
                     _ => Command::FocusFollows { x, y },
                 });
             }
-            Action::OpenDialog => self.ask_for_file(Purpose::Open, now),
+            Action::OpenDialog => self.ask_for_file(DialogPurpose::Open, now),
             Action::TogglePanel => self.panel.shown = !self.panel.shown,
             Action::ToggleHelp => self.help.toggle(),
             Action::ToggleOverlays => self.overlays = !self.overlays,
@@ -175,7 +175,7 @@ impl App {
     }
 
     /// Shows a dialog; the answer comes to [`Self::take_files`].
-    fn ask_for_file(&mut self, purpose: Purpose, now: Instant) {
+    fn ask_for_file(&mut self, purpose: DialogPurpose, now: Instant) {
         let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
         let folder = folder.unwrap_or_else(|| self.options.folder.clone());
         if let Err(reason) = self.dialog.ask(purpose, &folder) {

@@ -22,7 +22,7 @@ mod leaving;
 mod memory;
 
 use super::dialog::Dialog;
-use super::display::{self, Display};
+use super::display::{self, DisplayServer};
 use super::handles::Handles;
 use super::input::Input;
 use super::overlay::{self, Help};
@@ -121,9 +121,9 @@ const GOOD_ENOUGH: Target = Target { spp: None, seconds: None, error: Some(0.005
 pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     let mut builder = EventLoop::<Wake>::with_user_event();
     match display::find() {
-        Display::Default => {}
-        Display::None => return Err(ViewerError::NoDisplay),
-        Display::ForceX11 => {
+        DisplayServer::Default => {}
+        DisplayServer::None => return Err(ViewerError::NoDisplay),
+        DisplayServer::ForceX11 => {
             #[cfg(all(unix, not(target_os = "macos")))]
             winit::platform::x11::EventLoopBuilderExtX11::with_x11(&mut builder);
         }

@@ -30,7 +30,7 @@ impl Binding {
 }
 
 /// A heading and its lines.
-pub struct Group {
+pub struct KeyGroup {
     pub title: &'static str,
     pub bindings: &'static [Binding],
 }

@@ -1,6 +1,6 @@
 //! The table of keys and gestures.
 
-use super::{Action, Binding, Chord, Group, Motion, Trigger, Typed};
+use super::{Action, Binding, Chord, KeyGroup, Motion, Trigger, Typed};
 use crate::frame::{Command, Edit};
 use crate::render::Inspection;
 use winit::keyboard::{KeyCode, NamedKey};
@@ -57,8 +57,8 @@ const DOLLY_OUT: Command = Command::Dolly { factor: ZOOM_STEP };
 const ZOOM_IN: Command = Command::Zoom { factor: 1.0 / ZOOM_STEP };
 const ZOOM_OUT: Command = Command::Zoom { factor: ZOOM_STEP };
 
-pub static BINDINGS: &[Group] = &[
-    Group {
+pub static BINDINGS: &[KeyGroup] = &[
+    KeyGroup {
         title: "Fly",
         bindings: &[
             Binding {
@@ -87,7 +87,7 @@ pub static BINDINGS: &[Group] = &[
             },
         ],
     },
-    Group {
+    KeyGroup {
         title: "Orbit",
         bindings: &[
             Binding {
@@ -118,7 +118,7 @@ pub static BINDINGS: &[Group] = &[
             },
         ],
     },
-    Group {
+    KeyGroup {
         title: "View",
         bindings: &[
             Binding {
@@ -174,7 +174,7 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[text("v", Action::PrintView)], effect: "print the view as a scene file's camera" },
         ],
     },
-    Group {
+    KeyGroup {
         title: "Lens",
         bindings: &[
             Binding { triggers: &[send("[", NEARER), send("]", FARTHER)], effect: "focal plane nearer, farther" },
@@ -202,7 +202,7 @@ pub static BINDINGS: &[Group] = &[
             },
         ],
     },
-    Group {
+    KeyGroup {
         title: "Select and edit",
         bindings: &[
             Binding { triggers: &[Trigger::Mouse("Click")], effect: "select what is under the mouse" },
@@ -225,7 +225,7 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "redo" },
         ],
     },
-    Group {
+    KeyGroup {
         title: "See what is going on",
         bindings: &[
             Binding { triggers: &[inspect("1", Inspection::Normals)], effect: "normals" },
@@ -247,7 +247,7 @@ pub static BINDINGS: &[Group] = &[
             },
         ],
     },
-    Group {
+    KeyGroup {
         title: "Picture",
         bindings: &[
             Binding {
@@ -304,7 +304,7 @@ pub static BINDINGS: &[Group] = &[
             },
         ],
     },
-    Group {
+    KeyGroup {
         title: "Window",
         bindings: &[
             Binding {
@@ -324,7 +324,7 @@ pub static BINDINGS: &[Group] = &[
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
     },
-    Group {
+    KeyGroup {
         title: "In the panel",
         bindings: &[
             Binding {
@@ -382,7 +382,7 @@ pub static BINDINGS: &[Group] = &[
             },
         ],
     },
-    Group {
+    KeyGroup {
         title: "Without the window",
         bindings: &[
             Binding {

@@ -30,7 +30,7 @@ mod texture;
 mod widgets;
 
 use super::change::PictureChange;
-use super::dialog::Purpose;
+use super::dialog::DialogPurpose;
 use super::reaction::Reaction;
 use crate::frame::{Command, Edit, Session, gizmo};
 use crate::scene::Inventory;
@@ -115,7 +115,7 @@ pub struct Asked {
     pub screenshot: Option<bool>,
     pub toggle_brush: bool,
     /// A dialog for a file, and what it is for.
-    pub dialog: Option<Purpose>,
+    pub dialog: Option<DialogPurpose>,
 }
 
 impl Asked {

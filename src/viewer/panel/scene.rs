@@ -7,7 +7,7 @@ use crate::frame::{Command, Edit, NewThing, Selection, Session};
 use crate::printable;
 use crate::scene::ObjectEntry;
 use crate::scene::file::MeshSourcePart;
-use crate::viewer::dialog::Purpose;
+use crate::viewer::dialog::DialogPurpose;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use std::path::Path;
@@ -44,7 +44,7 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
 /// A file by dialog, or what was opened before, which a click opens again.
 pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
     if ui.button("File …").on_hover_text("a scene, a model, or a picture that was kept (Ctrl+O)").clicked() {
-        asked.dialog = Some(Purpose::Open);
+        asked.dialog = Some(DialogPurpose::Open);
     }
     let mut others = recent.iter().filter(|name| **name != session.status().scene).take(8).peekable();
     if others.peek().is_none() {
@@ -84,7 +84,7 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
         let field = ui.add(egui::TextEdit::singleline(path).hint_text("model.obj").desired_width(72.0));
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if ui.button("…").on_hover_text("choose a file").clicked() {
-            asked.dialog = Some(Purpose::AddMesh);
+            asked.dialog = Some(DialogPurpose::AddMesh);
         }
         if (ui.button("Add").clicked() || entered) && !path.trim().is_empty() {
             asked.edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path.trim().to_owned()))));

@@ -5,7 +5,7 @@ use super::widgets::{color, number, row};
 use crate::frame::{Edit, Property, Session, paint_of};
 use crate::scene::ColorParam;
 use crate::scene::file::{Rgb, TexturePart, WrapPart};
-use crate::viewer::dialog::Purpose;
+use crate::viewer::dialog::DialogPurpose;
 use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
 
@@ -35,7 +35,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: 
             ui.close();
         }
         if ui.button("image …").clicked() {
-            asked.dialog = Some(Purpose::Texture { id });
+            asked.dialog = Some(DialogPurpose::Texture { id });
             ui.close();
         }
         if matches!(paint, ColorParam::Texture(_)) && ui.button("plain colour").clicked() {

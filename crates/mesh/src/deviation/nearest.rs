@@ -18,8 +18,8 @@ const LEAF: usize = 4;
 
 #[derive(Debug)]
 pub(super) struct NearestTree {
-    nodes: Vec<Node>,
-    frames: Vec<Frame>,
+    nodes: Vec<BoxNode>,
+    frames: Vec<BoxFrame>,
     /// In the order of the leaves.
     triangles: Vec<[DVec3; 3]>,
     /// Metres: by how much distances to triangles and to boxes may be off.
@@ -34,7 +34,7 @@ const PATIENCE: usize = 1024;
 const ROUGHLY: f64 = 2e-3;
 
 #[derive(Clone, Copy, Debug)]
-struct Node {
+struct BoxNode {
     min: DVec3,
     max: DVec3,
     /// Inner node: index of the second child (the first is the next node). Leaf: first triangle.
@@ -49,7 +49,7 @@ const NONE: u32 = u32::MAX;
 
 /// A box in a direction of its own.
 #[derive(Clone, Copy, Debug)]
-struct Frame {
+struct BoxFrame {
     /// Rows are the unit axes.
     axes: DMat3,
     center: DVec3,
@@ -87,7 +87,7 @@ impl NearestTree {
         const DEPTH_FIRST: usize = 128;
         let Some(root) = self.nodes.first() else { return f64::INFINITY };
         let best = guess.map_or(f64::INFINITY, |t| distance2_to_triangle(point, &self.triangles[t as usize]));
-        let mut found = Found { best, precision: PRECISION, limit: self.worthwhile(best, PRECISION), guess };
+        let mut found = NearestSoFar { best, precision: PRECISION, limit: self.worthwhile(best, PRECISION), guess };
         // Splits halve the count, so 64 levels hold any mesh.
         let mut stack = [Open { bound: 0.0, node: 0 }; 64];
         stack[0] = Open { bound: distance2_to_box(point, root), node: 0 };
@@ -113,7 +113,7 @@ impl NearestTree {
 
     /// The nearest box first.
     #[cold]
-    fn search_on(&self, point: DVec3, mut open: BinaryHeap<Open>, found: &mut Found, look: &mut impl FnMut()) {
+    fn search_on(&self, point: DVec3, mut open: BinaryHeap<Open>, found: &mut NearestSoFar, look: &mut impl FnMut()) {
         let mut steps = 0;
         while let Some(next) = open.pop()
             && next.bound < found.limit
@@ -129,7 +129,7 @@ impl NearestTree {
 
     /// Looks at the triangles of a leaf, or answers with the children of an inner node, the nearer one first.
     #[inline(always)]
-    fn step(&self, point: DVec3, index: u32, found: &mut Found, look: &mut impl FnMut()) -> Option<[Open; 2]> {
+    fn step(&self, point: DVec3, index: u32, found: &mut NearestSoFar, look: &mut impl FnMut()) -> Option<[Open; 2]> {
         let node = &self.nodes[index as usize];
         if node.count == 0 {
             let child = |node: u32| Open { bound: self.bound(point, &self.nodes[node as usize]), node };
@@ -149,7 +149,7 @@ impl NearestTree {
 }
 
 /// The nearest so far.
-struct Found<'a> {
+struct NearestSoFar<'a> {
     /// Squared distance.
     best: f64,
     /// The share of it by which it may be off.
@@ -196,7 +196,7 @@ impl NearestTree {
 
     /// The squared distance of a point to what holds all that lies below a node.
     #[inline(always)]
-    fn bound(&self, point: DVec3, node: &Node) -> f64 {
+    fn bound(&self, point: DVec3, node: &BoxNode) -> f64 {
         let straight = distance2_to_box(point, node);
         if node.frame == NONE { straight } else { straight.max(self.frames[node.frame as usize].distance2(point)) }
     }
@@ -204,8 +204,8 @@ impl NearestTree {
 
 /// Part of the tree: what lies below one node, depth first.
 struct Branch {
-    nodes: Vec<Node>,
-    frames: Vec<Frame>,
+    nodes: Vec<BoxNode>,
+    frames: Vec<BoxFrame>,
     /// Of all triangles, doubled.
     area: f64,
 }
@@ -215,7 +215,7 @@ fn build(triangles: &mut [[DVec3; 3]], first: u32) -> Branch {
     let corners = triangles.iter().flatten();
     let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), &p| (min.min(p), max.max(p)));
     let count = triangles.len();
-    let node = Node { min, max, link: first, count: count as u32, frame: NONE };
+    let node = BoxNode { min, max, link: first, count: count as u32, frame: NONE };
     let mut branch = if count <= LEAF {
         let area = triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).sum();
         Branch { nodes: vec![node], frames: Vec::new(), area }
@@ -240,7 +240,7 @@ fn build(triangles: &mut [[DVec3; 3]], first: u32) -> Branch {
     let DVec3 { x, y, z } = max - min;
     let (face, area) = ((x * y).max(y * z).max(z * x), 0.5 * branch.area);
     if !(0.25 * face..=2.0 * face).contains(&area)
-        && let Some(frame) = Frame::around(triangles, 0.5 * (min + max))
+        && let Some(frame) = BoxFrame::around(triangles, 0.5 * (min + max))
         && (frame.area() < 0.5 * (x * y + y * z + z * x) || frame.volume() < 0.25 * x * y * z)
     {
         branch.nodes[0].frame = branch.frames.len() as u32;
@@ -256,18 +256,18 @@ fn extent_of_centers(triangles: &[[DVec3; 3]]) -> DVec3 {
     max - min
 }
 
-fn join(node: Node, left: Branch, right: Branch) -> Branch {
+fn join(node: BoxNode, left: Branch, right: Branch) -> Branch {
     let shift = left.nodes.len() as u32 + 1;
     let shift_frames = left.frames.len() as u32;
     let moved = |by: u32, frames: u32| {
-        move |node: Node| Node {
+        move |node: BoxNode| BoxNode {
             link: if node.count == 0 { node.link + by } else { node.link },
             frame: if node.frame == NONE { NONE } else { node.frame + frames },
             ..node
         }
     };
     let mut nodes = Vec::with_capacity(left.nodes.len() + right.nodes.len() + 1);
-    nodes.push(Node { link: shift, count: 0, ..node });
+    nodes.push(BoxNode { link: shift, count: 0, ..node });
     nodes.extend(left.nodes.into_iter().map(moved(1, 0)));
     nodes.extend(right.nodes.into_iter().map(moved(shift, shift_frames)));
     let mut frames = left.frames;
@@ -275,7 +275,7 @@ fn join(node: Node, left: Branch, right: Branch) -> Branch {
     Branch { nodes, frames, area: left.area + right.area }
 }
 
-impl Frame {
+impl BoxFrame {
     /// Along the longest edge of the middle triangle, and in its plane; `None` if that has neither.
     fn around(triangles: &[[DVec3; 3]], center: DVec3) -> Option<Self> {
         let [a, b, c] = triangles[triangles.len() / 2];
@@ -311,7 +311,7 @@ impl Frame {
 }
 
 #[inline]
-fn distance2_to_box(point: DVec3, node: &Node) -> f64 {
+fn distance2_to_box(point: DVec3, node: &BoxNode) -> f64 {
     (point - point.clamp(node.min, node.max)).length_squared()
 }
 

@@ -72,7 +72,7 @@ pub(super) struct Greedy {
 
 /// When to stop, besides the face count.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
+pub(super) struct CollapseLimits {
     /// Stop when no more than this many triangles are left.
     pub faces: usize,
     /// Stop when the cheapest edge costs more.
@@ -106,7 +106,7 @@ impl Greedy {
     }
 
     /// Collapses edges in order of cost until a limit is reached or no edge is left.
-    pub fn run(&mut self, limits: Limits) {
+    pub fn run(&mut self, limits: CollapseLimits) {
         while self.surface.face_count > limits.faces {
             if self.queue.least_key().is_none_or(|key| key > limits.cost) {
                 break;

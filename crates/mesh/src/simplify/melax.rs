@@ -6,12 +6,12 @@
 
 use super::greedy::{Collapse, Log};
 use super::heap::IndexedHeap;
-use super::prepare::Prepared;
+use super::prepare::PreparedMesh;
 use super::surface::{Kind, Surface};
 use glam::DVec3;
 
 /// Simplifies in place until `faces` are left or no collapse is allowed; vertices keep their numbers and places.
-pub(super) fn simplify(prepared: &mut Prepared, faces: usize, max_cost: f32) -> Log {
+pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32) -> Log {
     let mut melax = Melax::new(prepared);
     let mut log = Log::default();
     while melax.surface.face_count > faces {
@@ -46,7 +46,7 @@ struct Melax {
 }
 
 impl Melax {
-    fn new(prepared: &Prepared) -> Self {
+    fn new(prepared: &PreparedMesh) -> Self {
         let surface = Surface::new(
             &prepared.triangles,
             prepared.positions.clone(),

@@ -30,8 +30,8 @@ pub use order::CollapseOrder;
 
 use super::{Deviation, Mesh};
 use assemble::{Original, Remaining, assemble};
-use greedy::{Limits, Log};
-use prepare::Prepared;
+use greedy::{CollapseLimits, Log};
+use prepare::PreparedMesh;
 
 /// What an edge costs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,25 +105,27 @@ pub fn collapse_order(mesh: &Mesh, method: Method, faces: usize) -> Result<Colla
     Ok(CollapseOrder::new(mesh, start, log))
 }
 
-fn prepare(mesh: &Mesh, method: Method) -> Result<Prepared, SimplifyError> {
-    let prepared = Prepared::of(mesh, method == Method::Quadric);
+fn prepare(mesh: &Mesh, method: Method) -> Result<PreparedMesh, SimplifyError> {
+    let prepared = PreparedMesh::of(mesh, method == Method::Quadric);
     if prepared.triangles.is_empty() { Err(SimplifyError::Degenerate) } else { Ok(prepared) }
 }
 
 /// - `error`: metres; what it limits is an estimate, the root of an edge's mean squared distance (quadric) or its
 ///   cost (Melax).
-fn run(prepared: &mut Prepared, method: Method, faces: usize, error: f64, keep_log: bool) -> Log {
+fn run(prepared: &mut PreparedMesh, method: Method, faces: usize, error: f64, keep_log: bool) -> Log {
     let error = error * f64::from(prepared.scale);
     match method {
-        Method::Quadric => {
-            parts::simplify(prepared, Limits { faces, cost: f32::INFINITY, mean_square: error * error }, keep_log)
-        }
+        Method::Quadric => parts::simplify(
+            prepared,
+            CollapseLimits { faces, cost: f32::INFINITY, mean_square: error * error },
+            keep_log,
+        ),
         Method::Melax => melax::simplify(prepared, faces, error as f32),
     }
 }
 
-fn finish(mesh: &Mesh, prepared: Prepared) -> Mesh {
-    let Prepared { triangles, sources, corner_wedges, positions, wedges, scale, .. } = prepared;
+fn finish(mesh: &Mesh, prepared: PreparedMesh) -> Mesh {
+    let PreparedMesh { triangles, sources, corner_wedges, positions, wedges, scale, .. } = prepared;
     let original = Original {
         scale,
         center: mesh.center,
@@ -171,8 +173,9 @@ mod tests {
     fn many_parts_are_as_accurate_as_one_queue() {
         let mesh = displaced_sphere(&DisplacedSphere { frequency: 50, ..DisplacedSphere::default() });
         let rms = |parts: usize| {
-            let mut prepared = Prepared::of(&mesh, true);
-            let limits = Limits { faces: mesh.triangles.len() / 5, cost: f32::INFINITY, mean_square: f64::INFINITY };
+            let mut prepared = PreparedMesh::of(&mesh, true);
+            let limits =
+                CollapseLimits { faces: mesh.triangles.len() / 5, cost: f32::INFINITY, mean_square: f64::INFINITY };
             parts::simplify_in(mesh.triangles.len() / parts, &mut prepared, limits, false);
             let result = finish(&mesh, prepared);
             assert!(result.triangles.len() <= limits.faces && result.triangles.len() + 2 > limits.faces);

@@ -2,14 +2,14 @@
 
 use super::assemble::{Original, Remaining, assemble};
 use super::greedy::Log;
-use super::prepare::Prepared;
+use super::prepare::PreparedMesh;
 use crate::Mesh;
 use glam::DVec3;
 
 /// A mesh and the order in which its edges collapse. A slider is a prefix of it.
 #[derive(Debug)]
 pub struct CollapseOrder {
-    start: Prepared,
+    start: PreparedMesh,
     log: Log,
     center: DVec3,
     has_normals: bool,
@@ -18,7 +18,7 @@ pub struct CollapseOrder {
 }
 
 impl CollapseOrder {
-    pub(super) fn new(mesh: &Mesh, start: Prepared, log: Log) -> Self {
+    pub(super) fn new(mesh: &Mesh, start: PreparedMesh, log: Log) -> Self {
         let (has_normals, has_uvs) = (!mesh.normals.is_empty(), !mesh.uvs.is_empty());
         Self { start, log, center: mesh.center, has_normals, has_uvs, slots: mesh.slots.clone() }
     }

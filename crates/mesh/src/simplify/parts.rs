@@ -5,8 +5,8 @@
 //! that the first rims lie inside of parts, and these finish. Parts depend on the mesh alone, so any number of threads
 //! gives the same result.
 
-use super::greedy::{Collapse, Greedy, Limits, Log};
-use super::prepare::Prepared;
+use super::greedy::{Collapse, CollapseLimits, Greedy, Log};
+use super::prepare::PreparedMesh;
 use super::quadric::Quadric;
 use super::surface::{Kind, NONE, Surface, WedgeJoin};
 use firstlight_kdtree::geometry::Aabb;
@@ -19,13 +19,18 @@ const PART_TRIANGLES: usize = 8_192;
 const LEFT_TO_SECOND: usize = 64;
 
 /// Simplifies in place: afterwards `prepared` holds what is left, and vertices keep their numbers.
-pub(super) fn simplify(prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
+pub(super) fn simplify(prepared: &mut PreparedMesh, limits: CollapseLimits, keep_log: bool) -> Log {
     simplify_in(PART_TRIANGLES, prepared, limits, keep_log)
 }
 
 /// With as many triangles a part as the mesh has, this is the plain method with one queue, against which the other is
 /// tested.
-pub(super) fn simplify_in(part_triangles: usize, prepared: &mut Prepared, limits: Limits, keep_log: bool) -> Log {
+pub(super) fn simplify_in(
+    part_triangles: usize,
+    prepared: &mut PreparedMesh,
+    limits: CollapseLimits,
+    keep_log: bool,
+) -> Log {
     let mut log = Log::default();
     let mut threshold = None;
     for cut in [Cut::First, Cut::Second] {
@@ -41,7 +46,7 @@ pub(super) fn simplify_in(part_triangles: usize, prepared: &mut Prepared, limits
     // Small meshes, and what rims have kept from being done.
     if prepared.triangles.len() > limits.faces {
         let whole: Vec<u32> = (0..prepared.triangles.len() as u32).collect();
-        let mut part = Part::new(prepared, whole, &prepared.valences(), &mut Numbering::of(prepared));
+        let mut part = MeshPart::new(prepared, whole, &prepared.valences(), &mut Numbering::of(prepared));
         part.greedy.run(limits);
         log.append(join(prepared, vec![part], keep_log));
     }
@@ -56,7 +61,7 @@ enum Cut {
 }
 
 /// Some triangles with a numbering of their own.
-struct Part {
+struct MeshPart {
     greedy: Greedy,
     /// The whole mesh's numbers of triangles, vertices, wedges.
     triangles: Vec<u32>,
@@ -71,14 +76,14 @@ struct Numbering {
 }
 
 impl Numbering {
-    fn of(prepared: &Prepared) -> Self {
+    fn of(prepared: &PreparedMesh) -> Self {
         Self { vertices: vec![NONE; prepared.positions.len()], wedges: vec![NONE; prepared.wedges.len()] }
     }
 }
 
-impl Part {
+impl MeshPart {
     /// - `valences`: how many triangles of the whole mesh each vertex has.
-    fn new(prepared: &Prepared, triangles: Vec<u32>, valences: &[u32], numbering: &mut Numbering) -> Self {
+    fn new(prepared: &PreparedMesh, triangles: Vec<u32>, valences: &[u32], numbering: &mut Numbering) -> Self {
         // In the order in which the triangles use them: neighbours lie together in memory.
         let mut vertices = Vec::with_capacity(triangles.len() * 3 / 4);
         let numbers = &mut numbering.vertices;
@@ -120,7 +125,7 @@ fn number(item: u32, numbers: &mut [u32], items: &mut Vec<u32>) -> u32 {
     *number
 }
 
-fn split(prepared: &Prepared, count: usize, cut: Cut) -> Vec<Part> {
+fn split(prepared: &PreparedMesh, count: usize, cut: Cut) -> Vec<MeshPart> {
     let bounds = Aabb::from_points(prepared.positions.iter().copied());
     let codes: Vec<(u32, u32)> = prepared
         .triangles
@@ -137,7 +142,7 @@ fn split(prepared: &Prepared, count: usize, cut: Cut) -> Vec<Part> {
         .with_max_len(1)
         .map_init(
             || Numbering::of(prepared),
-            |numbering, chunk| Part::new(prepared, chunk.iter().map(|&(_, t)| t).collect(), &valences, numbering),
+            |numbering, chunk| MeshPart::new(prepared, chunk.iter().map(|&(_, t)| t).collect(), &valences, numbering),
         )
         .collect()
 }
@@ -146,7 +151,13 @@ fn split(prepared: &Prepared, count: usize, cut: Cut) -> Vec<Part> {
 /// cut at it. Returns the threshold.
 ///
 /// - `threshold`: where to begin; without it at what half of the edges cost.
-fn run_together(parts: &mut [Part], limits: Limits, triangles: usize, cut: Cut, threshold: Option<f32>) -> f32 {
+fn run_together(
+    parts: &mut [MeshPart],
+    limits: CollapseLimits,
+    triangles: usize,
+    cut: Cut,
+    threshold: Option<f32>,
+) -> f32 {
     let excess = triangles - limits.faces;
     let done_at = match cut {
         Cut::First => {
@@ -175,7 +186,7 @@ fn run_together(parts: &mut [Part], limits: Limits, triangles: usize, cut: Cut, 
                 let share = (excess as u128 * faces as u128 / total as u128) as usize;
                 // A step takes two triangles: one less, so that it cannot take more than the share.
                 let least = faces - share.saturating_sub(1);
-                part.greedy.run(Limits { faces: least, cost: threshold, ..limits });
+                part.greedy.run(CollapseLimits { faces: least, cost: threshold, ..limits });
                 usize::from(part.greedy.surface.face_count <= least)
             })
             .sum();
@@ -203,7 +214,7 @@ fn run_together(parts: &mut [Part], limits: Limits, triangles: usize, cut: Cut, 
 }
 
 /// The last few steps, which are fewer than parts to share them, wherever they cost least.
-fn finish_one_by_one(parts: &mut [Part], limits: Limits) {
+fn finish_one_by_one(parts: &mut [MeshPart], limits: CollapseLimits) {
     loop {
         let total: usize = parts.iter().map(|part| part.greedy.surface.face_count).sum();
         let costs = parts.iter_mut().enumerate().filter_map(|(p, part)| Some((part.greedy.next_cost()?, p)));
@@ -212,7 +223,7 @@ fn finish_one_by_one(parts: &mut [Part], limits: Limits) {
             Some((cost, p)) if total > limits.faces && cost <= limits.cost => {
                 let faces = parts[p].greedy.surface.face_count - 1;
                 // Another part's turn, when this one's next would cost more.
-                parts[p].greedy.run(Limits { faces, cost, ..limits });
+                parts[p].greedy.run(CollapseLimits { faces, cost, ..limits });
             }
             _ => break,
         }
@@ -220,7 +231,7 @@ fn finish_one_by_one(parts: &mut [Part], limits: Limits) {
 }
 
 /// Brings the parts' results back into the whole, and their steps into one order.
-fn join(prepared: &mut Prepared, parts: Vec<Part>, keep_log: bool) -> Log {
+fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>, keep_log: bool) -> Log {
     let left: Vec<(Vec<[u32; 3]>, Vec<u32>, Vec<u32>)> = parts
         .par_iter()
         .with_max_len(1)
@@ -263,7 +274,7 @@ fn join(prepared: &mut Prepared, parts: Vec<Part>, keep_log: bool) -> Log {
 
 /// Steps by cost; each part's own are in order of cost already, and parts do not touch each other. Of equal cost, as
 /// whole levels of the queue are, parts take turns.
-fn merge_logs(parts: Vec<Part>) -> Log {
+fn merge_logs(parts: Vec<MeshPart>) -> Log {
     let mut steps: Vec<(u32, usize, usize, usize, usize)> = Vec::new();
     for (p, part) in parts.iter().enumerate() {
         let (mut first_join, mut turn, mut last) = (0, 0, 0.0);

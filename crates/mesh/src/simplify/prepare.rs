@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// A mesh taken apart. Vertices here are places: seams are welded and live on as wedges.
 #[derive(Clone, Debug)]
-pub(super) struct Prepared {
+pub(super) struct PreparedMesh {
     /// Relative to the mesh's centre, times `scale`.
     pub positions: Vec<Vec3>,
     pub kinds: Vec<Kind>,
@@ -28,7 +28,7 @@ pub(super) struct Prepared {
 /// Triangles at a vertex that are looked through one by one.
 const FEW: usize = 32;
 
-impl Prepared {
+impl PreparedMesh {
     /// - `with_quadrics`: false leaves them empty.
     pub fn of(mesh: &Mesh, with_quadrics: bool) -> Self {
         let size = mesh.bounds().size().max_element();
@@ -54,10 +54,10 @@ impl Prepared {
             scale,
         };
         prepared.add_wedges(mesh);
-        let mut around = Around::of(&prepared.triangles, prepared.positions.len());
+        let mut around = Neighborhood::of(&prepared.triangles, prepared.positions.len());
         let (mut kinds, has_duplicates) = prepared.find_kinds(&around);
         if has_duplicates && prepared.drop_duplicates() {
-            around = Around::of(&prepared.triangles, prepared.positions.len());
+            around = Neighborhood::of(&prepared.triangles, prepared.positions.len());
             kinds = prepared.find_kinds(&around).0;
         }
         prepared.kinds = kinds;
@@ -102,7 +102,7 @@ impl Prepared {
     }
 
     /// The kind of each vertex, and whether any triangle is there twice.
-    fn find_kinds(&self, around: &Around) -> (Vec<Kind>, bool) {
+    fn find_kinds(&self, around: &Neighborhood) -> (Vec<Kind>, bool) {
         let found: Vec<(Kind, bool)> = (0..self.positions.len())
             .into_par_iter()
             .map_init(Default::default, |memory, vertex| self.kind_of(around.corners(vertex), memory))
@@ -217,7 +217,7 @@ impl Prepared {
     }
 
     /// The planes of the triangles around each vertex, and at borders and seams planes that stand on the edge.
-    fn find_quadrics(&self, around: &Around) -> Vec<Quadric> {
+    fn find_quadrics(&self, around: &Neighborhood) -> Vec<Quadric> {
         let normals: Vec<(DVec3, f64)> = self
             .triangles
             .par_iter()
@@ -246,7 +246,7 @@ impl Prepared {
 
     /// For each triangle side at `vertex` that ends at another vertex on a line, and is itself border or seam, the
     /// line through it: the triangle's plane and the one that stands on it there.
-    fn add_edge_planes(&self, around: &Around, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
+    fn add_edge_planes(&self, around: &Neighborhood, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
         let here = self.positions[vertex].as_dvec3();
         // To look for each side among all others would take quadratic time at a hub.
         let sides = (around.corners(vertex).len() > FEW).then(|| self.sorted_sides(around.corners(vertex)));
@@ -274,7 +274,7 @@ impl Prepared {
     }
 
     /// Whether the side from `corner` to `other` (corners of one triangle) is border, seam or non-manifold.
-    fn is_line(&self, around: &Around, corner: u32, other: u32) -> bool {
+    fn is_line(&self, around: &Neighborhood, corner: u32, other: u32) -> bool {
         let vertex_of = |c: u32| self.triangles[c as usize / 3][c as usize % 3];
         let end = vertex_of(other);
         let mut matching = 0;
@@ -335,12 +335,12 @@ fn ring(corner: u32) -> [u32; 2] {
 }
 
 /// The corners at each vertex, in order.
-struct Around {
+struct Neighborhood {
     start: Vec<u32>,
     corners: Vec<u32>,
 }
 
-impl Around {
+impl Neighborhood {
     fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
         let flat = triangles.as_flattened();
         let mut start = vec![0_u32; vertices + 1];

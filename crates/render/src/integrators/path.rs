@@ -12,9 +12,9 @@ use crate::core::material::{Material, MaterialId};
 use crate::core::settings::RenderSettings;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::caustics::weight::Bounce;
+use crate::integrators::caustics::weight::MisBounce;
 use crate::integrators::record::Record;
-use crate::integrators::simd::shade::Group;
+use crate::integrators::simd::shade::KindHits;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::integrators::simd::{emitters, misses, shade};
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
@@ -153,7 +153,7 @@ impl PathWave {
             if order.is_empty() {
                 continue;
             }
-            let group = Group {
+            let group = KindHits {
                 scene,
                 techniques: &settings.techniques,
                 caustics,
@@ -239,7 +239,7 @@ impl PathWave {
         if depth == settings.max_depth {
             return;
         }
-        let step = Step {
+        let step = PathStep {
             scene,
             techniques,
             path: &path,
@@ -263,17 +263,17 @@ impl PathWave {
 
     /// With hints, where there are any, of where gathered light comes from.
     #[inline]
-    fn scatter_told(&mut self, step: Step, bsdf: &impl Scatter) {
-        let Step { path, vertex, depth, .. } = step;
+    fn scatter_told(&mut self, step: PathStep, bsdf: &impl Scatter) {
+        let PathStep { path, vertex, depth, .. } = step;
         let hints = step.caustics.filter(|_| bsdf.has_non_specular());
         match hints.and_then(|pass| pass.hints(&path.track, depth, vertex.position)) {
-            Some(hints) => self.scatter(Step { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
+            Some(hints) => self.scatter(PathStep { is_told: true, ..step }, &Guided { surface: bsdf, hints }),
             None => self.scatter(step, bsdf),
         }
     }
 
     #[inline]
-    fn scatter(&mut self, step: Step, bsdf: &impl Scatter) {
+    fn scatter(&mut self, step: PathStep, bsdf: &impl Scatter) {
         if step.scene.tables.features.light_sampling && step.techniques.light_sampling && bsdf.has_non_specular() {
             self.sample_light(&step, bsdf);
         }
@@ -282,8 +282,8 @@ impl PathWave {
 
     /// Next-event estimation: one point on one light, and a shadow ray to it.
     #[inline]
-    fn sample_light(&mut self, step: &Step, bsdf: &impl Scatter) {
-        let &Step { scene, techniques, path, vertex, .. } = step;
+    fn sample_light(&mut self, step: &PathStep, bsdf: &impl Scatter) {
+        let &PathStep { scene, techniques, path, vertex, .. } = step;
         let (sampler, dimension) = (&path.sampler, step.dimension());
         let tables = &*scene.tables;
         let found = choose_light_point(scene, techniques, vertex.position, vertex.normal, sampler, dimension);
@@ -316,8 +316,8 @@ impl PathWave {
 
     /// Chooses how the path goes on, and whether.
     #[inline]
-    fn bounce(&mut self, step: &Step, bsdf: &impl Scatter) {
-        let &Step { scene, techniques, vertex, material, depth, .. } = step;
+    fn bounce(&mut self, step: &PathStep, bsdf: &impl Scatter) {
+        let &PathStep { scene, techniques, vertex, material, depth, .. } = step;
         let mut path = *step.path;
         let (sampler, dimension) = (path.sampler, step.dimension());
         let u = sampler.pair(dimension + DIM_DIRECTION);
@@ -333,7 +333,7 @@ impl PathWave {
             path.media = through.beyond;
         }
         if let Some(pass) = step.caustics {
-            let bounce = Bounce {
+            let bounce = MisBounce {
                 vertex,
                 hit: step.hit,
                 eye: (depth == 1).then_some(path.position),
@@ -371,7 +371,7 @@ impl PathWave {
 }
 
 /// One vertex of one path.
-struct Step<'a> {
+struct PathStep<'a> {
     scene: &'a Prepared,
     techniques: &'a Techniques,
     path: &'a Path,
@@ -385,7 +385,7 @@ struct Step<'a> {
     is_told: bool,
 }
 
-impl Step<'_> {
+impl PathStep<'_> {
     /// The first sample dimension of this vertex.
     fn dimension(&self) -> u32 {
         first_dimension(self.depth)

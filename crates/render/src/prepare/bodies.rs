@@ -16,15 +16,15 @@ use std::f64::consts::PI;
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub(crate) struct Bodies {
-    rows: Vec<Row>,
+    rows: Vec<BodyRow>,
     /// Of each object.
-    of_object: Vec<Surface>,
+    of_object: Vec<BodySurface>,
     deepest: u32,
 }
 
 /// One transparent part of one body.
 #[derive(Clone, Copy, Debug)]
-struct Row {
+struct BodyRow {
     ior: f32,
     absorption: Vec3,
     /// How many rows the body has.
@@ -33,7 +33,7 @@ struct Row {
 
 /// The bodies whose surfaces an object is, by their first rows.
 #[derive(Clone, Debug, Default)]
-enum Surface {
+enum BodySurface {
     #[default]
     Opaque,
     /// All of the object.
@@ -60,10 +60,10 @@ struct Candidate {
     volume: f64,
     low: DVec3,
     high: DVec3,
-    of: Part,
+    of: BodyPart,
 }
 
-enum Part {
+enum BodyPart {
     Object(u32),
     Primitive(u32, u32),
     Slot(u32),
@@ -80,7 +80,7 @@ const MOST_HITS: usize = 4096;
 impl Bodies {
     pub fn build(geometry: &Geometry, materials: &[Material]) -> Self {
         let n_leaves: Vec<u32> = (0..materials.len() as u32).map(|id| leaves_of(materials, id).len() as u32).collect();
-        let mut of_object = vec![Surface::Opaque; geometry.objects.len()];
+        let mut of_object = vec![BodySurface::Opaque; geometry.objects.len()];
         if n_leaves.iter().all(|&n| n == 0) {
             return Self { rows: Vec::new(), of_object, deepest: 0 };
         }
@@ -92,25 +92,25 @@ impl Bodies {
             let first = rows.len() as u32;
             let leaves = leaves_of(materials, *material);
             let n_leaves = leaves.len() as u32;
-            rows.extend(leaves.into_iter().map(|(ior, absorption)| Row { ior, absorption, n_leaves }));
+            rows.extend(leaves.into_iter().map(|(ior, absorption)| BodyRow { ior, absorption, n_leaves }));
             match of {
-                Part::Object(object) => of_object[*object as usize] = Surface::One(first),
-                Part::Open(objects) => {
-                    objects.iter().for_each(|&object| of_object[object as usize] = Surface::One(first));
+                BodyPart::Object(object) => of_object[*object as usize] = BodySurface::One(first),
+                BodyPart::Open(objects) => {
+                    objects.iter().for_each(|&object| of_object[object as usize] = BodySurface::One(first));
                 }
-                Part::Primitive(object, prim) => {
+                BodyPart::Primitive(object, prim) => {
                     let surface = &mut of_object[*object as usize];
-                    if !matches!(surface, Surface::Cloud(_)) {
+                    if !matches!(surface, BodySurface::Cloud(_)) {
                         let Shape::Spheres { tree, .. } = &geometry.tree.shapes()[*object as usize] else { continue };
-                        *surface = Surface::Cloud(vec![0; tree.len()]);
+                        *surface = BodySurface::Cloud(vec![0; tree.len()]);
                     }
-                    if let Surface::Cloud(bodies) = surface {
+                    if let BodySurface::Cloud(bodies) = surface {
                         bodies[*prim as usize] = first;
                     }
                 }
-                Part::Slot(object) => match &mut of_object[*object as usize] {
-                    Surface::Parts(parts) => parts.push((*material, first)),
-                    surface => *surface = Surface::Parts(vec![(*material, first)]),
+                BodyPart::Slot(object) => match &mut of_object[*object as usize] {
+                    BodySurface::Parts(parts) => parts.push((*material, first)),
+                    surface => *surface = BodySurface::Parts(vec![(*material, first)]),
                 },
             }
         }
@@ -125,7 +125,7 @@ impl Bodies {
 
     /// Whether some surface of an object is that of a body.
     pub fn is_transparent(&self, object: u32) -> bool {
-        !matches!(self.of_object[object as usize], Surface::Opaque)
+        !matches!(self.of_object[object as usize], BodySurface::Opaque)
     }
 
     /// The boundary that a hit is on.
@@ -134,10 +134,10 @@ impl Bodies {
     #[inline]
     pub fn boundary(&self, object: u32, prim: u32, material: MaterialId, front: bool) -> Boundary {
         let body = match &self.of_object[object as usize] {
-            Surface::One(body) => *body,
-            Surface::Cloud(bodies) => bodies[prim as usize],
-            Surface::Parts(parts) => parts.iter().find(|(id, _)| *id == material).map_or(0, |(_, body)| *body),
-            Surface::Opaque => 0,
+            BodySurface::One(body) => *body,
+            BodySurface::Cloud(bodies) => bodies[prim as usize],
+            BodySurface::Parts(parts) => parts.iter().find(|(id, _)| *id == material).map_or(0, |(_, body)| *body),
+            BodySurface::Opaque => 0,
         };
         Boundary { body, front }
     }
@@ -149,7 +149,7 @@ impl Bodies {
 
     /// Index of refraction, and absorption per metre.
     pub fn medium(&self, row: u32) -> (f32, Vec3) {
-        let Row { ior, absorption, .. } = self.rows[row as usize];
+        let BodyRow { ior, absorption, .. } = self.rows[row as usize];
         (ior, absorption)
     }
 
@@ -172,19 +172,19 @@ impl Bodies {
         for (object, surface) in self.of_object.iter().enumerate() {
             let shape = &geometry.tree.shapes()[object];
             match (surface, shape) {
-                (Surface::Opaque, _) => {}
-                (Surface::One(body), Shape::Sphere { center, radius }) => {
+                (BodySurface::Opaque, _) => {}
+                (BodySurface::One(body), Shape::Sphere { center, radius }) => {
                     let inside = is_inside(point.as_dvec3(), center.as_dvec3(), f64::from(*radius));
                     rows.extend(inside.then_some(*body));
                 }
-                (Surface::Cloud(bodies), Shape::Spheres { tree, world_from_object }) => {
+                (BodySurface::Cloud(bodies), Shape::Spheres { tree, world_from_object }) => {
                     let local = world_from_object.inverse().transform_point3(point).as_dvec3();
                     rows.extend((0..tree.len() as u32).filter_map(|prim| {
                         let (center, radius) = tree.sphere(prim);
                         is_inside(local, center.as_dvec3(), f64::from(radius)).then_some(bodies[prim as usize])
                     }));
                 }
-                (Surface::Parts(parts), Shape::Mesh { tree, world_from_object }) => {
+                (BodySurface::Parts(parts), Shape::Mesh { tree, world_from_object }) => {
                     let local = world_from_object.inverse().transform_point3(point);
                     let bounds = tree.bounds();
                     if local.cmplt(bounds.min).any() || local.cmpgt(bounds.max).any() {
@@ -197,7 +197,7 @@ impl Bodies {
                         rows.extend((0..winding).map(|_| *body));
                     }
                 }
-                (Surface::One(body), _) => match open.iter_mut().find(|(other, _)| other == body) {
+                (BodySurface::One(body), _) => match open.iter_mut().find(|(other, _)| other == body) {
                     Some((_, shapes)) => shapes.push(shape.clone()),
                     None => open.push((*body, vec![shape.clone()])),
                 },
@@ -268,7 +268,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
         let material = object.materials[0];
         match shape {
             Shape::Sphere { center, radius } => {
-                bodies.push(of_sphere(material, center.as_dvec3(), f64::from(*radius), Part::Object(i)));
+                bodies.push(of_sphere(material, center.as_dvec3(), f64::from(*radius), BodyPart::Object(i)));
             }
             Shape::Spheres { tree, world_from_object } => {
                 let map = world_from_object.matrix3.as_dmat3();
@@ -276,7 +276,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
                 bodies.extend((0..tree.len() as u32).map(|prim| {
                     let (center, radius) = tree.sphere(prim);
                     let center = map * center.as_dvec3() + Vec3::from(world_from_object.translation).as_dvec3();
-                    of_sphere(material, center, f64::from(radius) * scale, Part::Primitive(i, prim))
+                    of_sphere(material, center, f64::from(radius) * scale, BodyPart::Primitive(i, prim))
                 }));
             }
             Shape::Mesh { tree, world_from_object } => {
@@ -286,7 +286,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
                 distinct.sort_unstable();
                 distinct.dedup();
                 for material in distinct.into_iter().filter(|&id| is_clear(id)) {
-                    let mut body = Candidate::empty(material, Part::Slot(i));
+                    let mut body = Candidate::empty(material, BodyPart::Slot(i));
                     for prim in (0..tree.n_triangles() as u32).filter(|&prim| object.material_of(prim) == material) {
                         body.add(tree.vertices(prim).map(|p| map * p.as_dvec3() + offset));
                     }
@@ -295,11 +295,11 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
             }
             Shape::Plane { .. } | Shape::Quad { .. } | Shape::Triangle { .. } => {
                 let at = open.iter().position(|body| body.material == material).unwrap_or_else(|| {
-                    open.push(Candidate::empty(material, Part::Open(Vec::new())));
+                    open.push(Candidate::empty(material, BodyPart::Open(Vec::new())));
                     open.len() - 1
                 });
                 let body = &mut open[at];
-                if let Part::Open(objects) = &mut body.of {
+                if let BodyPart::Open(objects) = &mut body.of {
                     objects.push(i);
                 }
                 match shape {
@@ -323,7 +323,7 @@ fn candidates(geometry: &Geometry, n_leaves: &[u32]) -> Vec<Candidate> {
 }
 
 impl Candidate {
-    fn empty(material: MaterialId, of: Part) -> Self {
+    fn empty(material: MaterialId, of: BodyPart) -> Self {
         Self { material, volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, of }
     }
 

@@ -61,7 +61,7 @@ enum Pairs {
 }
 
 /// A line from a lamp.
-pub(crate) struct Line {
+pub(crate) struct LightLine {
     pub ray: Ray,
     /// What it has to hit first.
     pub caster: u32,
@@ -118,7 +118,7 @@ impl CasterTable {
     }
 
     /// A line from some lamp towards some caster; `None` if it points into the lamp.
-    pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<Line> {
+    pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<LightLine> {
         let (light_id, caster, _) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
         let light = lights.light(light_id);
         let Caster { center, radius } = self.casters[caster as usize];
@@ -149,7 +149,7 @@ impl CasterTable {
         }
         let radiance = light.radiance(textures, point.normal, point.uv);
         let origin = robust::offset_ray_origin(point.position, point.error, point.normal, dir);
-        Some(Line { ray: Ray::new(origin, dir), caster, density, radiance })
+        Some(LightLine { ray: Ray::new(origin, dir), caster, density, radiance })
     }
 
     /// Density of [`Self::sample`] to start at `position` of a lamp in a direction of cosine `cos` with its normal, on

@@ -59,13 +59,13 @@ impl Inputs {
 
 /// A material in parts.
 #[derive(Default)]
-struct Row {
+struct ClassicRow {
     /// Albedo, weight and share of ambient light.
     matte: Option<(ColorInput, f32, f32)>,
-    shiny: Option<Shiny>,
+    shiny: Option<ShinyRow>,
 }
 
-struct Shiny {
+struct ShinyRow {
     kind: u32,
     tint: ColorInput,
     weight: f32,
@@ -77,7 +77,7 @@ impl ClassicTable {
     pub fn build(materials: &[Material]) -> Self {
         let mut table = Self::default();
         for id in 0..materials.len() as u32 {
-            let mut row = Row::default();
+            let mut row = ClassicRow::default();
             let known = row.add(materials, id, 1.0).is_some();
             let kind = match (&row.shiny, known) {
                 (_, false) => ONE_BY_ONE,
@@ -90,7 +90,7 @@ impl ClassicTable {
             let (albedo, weight, ambient) = row.matte.unwrap_or((black, 0.0, 0.0));
             table.matte.push(albedo, weight);
             table.ambient.push(ambient);
-            let nothing = Shiny { kind, tint: black, weight: 0.0, exponent: 0.0, fresnel: Fresnel::Constant };
+            let nothing = ShinyRow { kind, tint: black, weight: 0.0, exponent: 0.0, fresnel: Fresnel::Constant };
             let shiny = row.shiny.unwrap_or(nothing);
             table.shiny.push(shiny.tint, shiny.weight);
             table.exponent.push(shiny.exponent);
@@ -112,13 +112,13 @@ impl ClassicTable {
     }
 }
 
-impl Row {
+impl ClassicRow {
     /// `None` where there is no room, or no place at all, for a part.
     fn add(&mut self, materials: &[Material], id: MaterialId, weight: f32) -> Option<()> {
         match &materials[id as usize] {
             _ if weight == 0.0 => Some(()),
             Material::Diffuse { albedo } => self.set_matte(*albedo, weight, 1.0),
-            Material::Mirror { reflectance } => self.set_shiny(Shiny {
+            Material::Mirror { reflectance } => self.set_shiny(ShinyRow {
                 kind: PLAIN_MIRROR,
                 tint: *reflectance,
                 weight,
@@ -128,7 +128,7 @@ impl Row {
             Material::Metal { alpha: ScalarInput::Constant(alpha), reflectance, fresnel, .. } => {
                 let alpha = alpha.clamp(0.0, 1.0);
                 let rough = alpha >= SMALLEST_ALPHA;
-                self.set_shiny(Shiny {
+                self.set_shiny(ShinyRow {
                     kind: if rough { ROUGH } else { PLAIN_MIRROR },
                     tint: *reflectance,
                     weight,
@@ -147,7 +147,7 @@ impl Row {
                 let specular = specular.clamp(0.0, 1.0);
                 self.set_matte(*diffuse, weight * (1.0 - specular), *ambient)?;
                 if weight * specular > 0.0 {
-                    self.set_shiny(Shiny {
+                    self.set_shiny(ShinyRow {
                         kind: GLOSS,
                         tint: ColorInput::Constant(Vec3::ONE),
                         weight: weight * specular,
@@ -170,7 +170,7 @@ impl Row {
         self.matte.replace((albedo, weight, ambient)).is_none().then_some(())
     }
 
-    fn set_shiny(&mut self, shiny: Shiny) -> Option<()> {
+    fn set_shiny(&mut self, shiny: ShinyRow) -> Option<()> {
         self.shiny.replace(shiny).is_none().then_some(())
     }
 }

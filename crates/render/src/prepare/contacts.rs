@@ -28,7 +28,7 @@ pub(crate) struct Contacts {
 }
 
 /// What the surfaces in one place belong to.
-pub(crate) struct Touched<'a> {
+pub(crate) struct ContactScene<'a> {
     pub geometry: &'a Geometry,
     pub materials: &'a [Material],
     pub bodies: &'a Bodies,
@@ -44,7 +44,7 @@ struct Other {
 
 /// What of several surfaces in one place is met: the greatest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+enum ContactKind {
     Glass,
     /// A blend with transparent parts.
     PartlyClear,
@@ -71,7 +71,7 @@ impl Contacts {
 
     /// Puts what is met in the place of each hit that has an opaque surface, or the first of several transparent ones, where
     /// it is.
-    pub fn settle(&self, touched: &Touched, rays: &RayBatch, hits: &mut HitBatch) {
+    pub fn settle(&self, touched: &ContactScene, rays: &RayBatch, hits: &mut HitBatch) {
         if self.of_object.is_empty() {
             return;
         }
@@ -84,10 +84,10 @@ impl Contacts {
         }
     }
 
-    fn met(&self, touched: &Touched, ray: &Ray, hit: &Hit) -> Hit {
+    fn met(&self, touched: &ContactScene, ray: &Ray, hit: &Hit) -> Hit {
         let rank = |hit: &Hit| (kind_of(touched, hit), size_rank(touched, hit.object), std::cmp::Reverse(hit.object));
         let (mut met, mut greatest) = (*hit, rank(hit));
-        if greatest.0 == Kind::Opaque {
+        if greatest.0 == ContactKind::Opaque {
             return met;
         }
         self.in_place_of(touched, ray, hit, |other, _| {
@@ -101,12 +101,12 @@ impl Contacts {
 
     /// The boundaries of glass that coincide with that of a hit, which is one of [`Self::settle`].
     #[inline]
-    pub fn along_with(&self, touched: &Touched, hit: &Hit, ray: impl FnOnce() -> Ray) -> Vec<Boundary> {
+    pub fn along_with(&self, touched: &ContactScene, hit: &Hit, ray: impl FnOnce() -> Ray) -> Vec<Boundary> {
         let mut found = Vec::new();
         if !self.of_object.is_empty() && !self.of_object[hit.object as usize].is_empty() {
             let ray = ray();
             self.in_place_of(touched, &ray, hit, |other, at| {
-                if kind_of(touched, &other) == Kind::Glass {
+                if kind_of(touched, &other) == ContactKind::Glass {
                     let front = ray.dir.dot(at.geometric_normal) <= 0.0;
                     found.push(touched.bodies.boundary(
                         other.object,
@@ -121,7 +121,7 @@ impl Contacts {
     }
 
     /// Calls `f` with each other hit that a path through this one would skip.
-    fn in_place_of(&self, touched: &Touched, ray: &Ray, hit: &Hit, mut f: impl FnMut(Hit, &SurfacePoint)) {
+    fn in_place_of(&self, touched: &ContactScene, ray: &Ray, hit: &Hit, mut f: impl FnMut(Hit, &SurfacePoint)) {
         let own = touched.geometry.tree.surface_point(ray, hit);
         let onwards =
             if own.geometric_normal.dot(ray.dir) < 0.0 { -own.geometric_normal } else { own.geometric_normal };
@@ -137,19 +137,19 @@ impl Contacts {
     }
 }
 
-fn kind_of(touched: &Touched, hit: &Hit) -> Kind {
+fn kind_of(touched: &ContactScene, hit: &Hit) -> ContactKind {
     match &touched.materials[touched.geometry.material_of(hit) as usize] {
-        Material::Glass { .. } => Kind::Glass,
+        Material::Glass { .. } => ContactKind::Glass,
         Material::Blend { .. } | Material::Phong { .. } if touched.bodies.is_transparent(hit.object) => {
-            Kind::PartlyClear
+            ContactKind::PartlyClear
         }
-        _ => Kind::Opaque,
+        _ => ContactKind::Opaque,
     }
 }
 
 /// Of equal surfaces that one is met whose errors are the largest, so that a path that starts behind it is behind the others
 /// too; by what does not depend on the side that a path comes from.
-fn size_rank(touched: &Touched, object: u32) -> u32 {
+fn size_rank(touched: &ContactScene, object: u32) -> u32 {
     match &touched.geometry.tree.shapes()[object as usize] {
         Shape::Mesh { tree, world_from_object } => {
             let bounds = tree.bounds();

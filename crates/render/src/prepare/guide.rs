@@ -36,7 +36,7 @@ pub(crate) struct Guide {
     splits: Vec<f32>,
     /// The axis or [`LEAF`], and from the third bit on the upper child or the leaf.
     links: Vec<u32>,
-    leaves: Vec<Leaf>,
+    leaves: Vec<GuideLeaf>,
     blocks: Vec<ExitBlock>,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Guide {
 const LEAF: u32 = 3;
 
 #[derive(Debug)]
-struct Leaf {
+struct GuideLeaf {
     /// Nothing is known outside.
     min: Vec3,
     max: Vec3,
@@ -106,7 +106,7 @@ impl Guide {
             }
             self.splits.push(0.0);
             self.links.push((self.leaves.len() as u32) << 2 | LEAF);
-            self.leaves.push(Leaf {
+            self.leaves.push(GuideLeaf {
                 min: min - margin,
                 max: max + margin,
                 blocks: first_block..self.blocks.len() as u32,
@@ -169,7 +169,7 @@ impl Guide {
 
     #[inline(always)]
     pub fn in_leaf(&self, leaf: u32, position: Vec3) -> Option<Hints<'_>> {
-        let Leaf { min, max, ref blocks, n_exits } = self.leaves[leaf as usize];
+        let GuideLeaf { min, max, ref blocks, n_exits } = self.leaves[leaf as usize];
         let inside = position.cmpge(min).all() && position.cmple(max).all();
         let blocks = &self.blocks[blocks.start as usize..blocks.end as usize];
         inside.then_some(Hints { blocks, n_exits, position })

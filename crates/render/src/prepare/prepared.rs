@@ -9,7 +9,7 @@ use crate::prepare::bodies::{Bodies, Boundary};
 use crate::prepare::bound::radiance_bound;
 use crate::prepare::casters::CasterTable;
 use crate::prepare::classic_table::ClassicTable;
-use crate::prepare::contacts::{Contacts, Touched};
+use crate::prepare::contacts::{ContactScene, Contacts};
 use crate::prepare::light::LightTable;
 use crate::prepare::material_table::MaterialTable;
 use crate::prepare::surface_table::SurfaceTable;
@@ -133,8 +133,8 @@ impl Prepared {
         self.tables.bodies.around(&self.geometry, self.camera.eye)
     }
 
-    fn touched(&self) -> Touched<'_> {
-        Touched { geometry: &self.geometry, materials: &self.shading.materials, bodies: &self.tables.bodies }
+    fn touched(&self) -> ContactScene<'_> {
+        ContactScene { geometry: &self.geometry, materials: &self.shading.materials, bodies: &self.tables.bodies }
     }
 
     /// See [`Contacts::settle`].

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// From one size to the other, pixels wide and high; both sides are in bytes, four a pixel.
 pub fn scale(set: InstructionSet, from: &[u8], from_size: [u32; 2], to_size: [u32; 2], to: &mut [u8]) {
     let ([from_width, from_height], [width, height]) = (from_size, to_size);
-    let columns = Columns::new(width, from_width);
+    let columns = PixelColumns::new(width, from_width);
     let stride = 4 * from_width as usize;
     to.par_chunks_exact_mut(4 * width as usize).enumerate().for_each_init(Vec::new, |mixed, (y, to)| {
         let tap = Tap::new(y as u32, height, from_height);
@@ -50,13 +50,13 @@ fn mix(a: u32, b: u32, weight: u32) -> u32 {
 }
 
 /// The taps of a row, a list for each part with room up to a multiple of sixteen.
-struct Columns {
+struct PixelColumns {
     low: Vec<u32>,
     high: Vec<u32>,
     weight: Vec<u32>,
 }
 
-impl Columns {
+impl PixelColumns {
     fn new(n: u32, n_source: u32) -> Self {
         let list = |of: fn(Tap) -> u32| padded((0..n).map(|i| of(Tap::new(i, n, n_source))).collect());
         Self { low: list(|tap| tap.low), high: list(|tap| tap.high), weight: list(|tap| tap.weight) }
@@ -65,12 +65,12 @@ impl Columns {
     /// - `from`: pixels, with room up to a multiple of sixteen.
     fn scale_row(&self, set: InstructionSet, from: &[u32], to: &mut [u8]) {
         let columns = self;
-        dispatch!(set, scale_row(columns: &Columns, from: &[u32], to: &mut [u8]));
+        dispatch!(set, scale_row(columns: &PixelColumns, from: &[u32], to: &mut [u8]));
     }
 }
 
 #[inline(always)]
-fn scale_row<S: Simd>(s: S, columns: &Columns, from: &[u32], to: &mut [u8]) {
+fn scale_row<S: Simd>(s: S, columns: &PixelColumns, from: &[u32], to: &mut [u8]) {
     let lists = columns.low.chunks_exact(LANES).zip(columns.high.chunks_exact(LANES));
     for (((low, high), weight), to) in lists.zip(columns.weight.chunks_exact(LANES)).zip(to.chunks_mut(4 * LANES)) {
         let [low, high, weight] = [load(s, low), load(s, high), load(s, weight)];

@@ -27,7 +27,7 @@ use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, 
 use glam::{Vec2, Vec3};
 
 /// Hits of one kind of material, and where their light and their paths go on.
-pub(crate) struct Group<'a> {
+pub(crate) struct LightHits<'a> {
     pub pass: &'a CausticPass<'a>,
     /// Up to and with these.
     pub n_vertices: u32,
@@ -52,44 +52,44 @@ pub(crate) fn know(kind: usize, surfaces: &SurfaceTable, hit: &Hit) -> bool {
 }
 
 /// Joins the vertices to the lens, and lets the paths go on.
-pub(crate) fn scatter(set: InstructionSet, kind: usize, group: Group) {
+pub(crate) fn scatter(set: InstructionSet, kind: usize, group: LightHits) {
     match kind {
-        DIFFUSE => dispatch!(set, scatter_diffuse(group: Group)),
-        MIRROR => dispatch!(set, scatter_mirror(group: Group)),
-        GLASS => dispatch!(set, scatter_glass(group: Group)),
-        METAL => dispatch!(set, scatter_metal(group: Group)),
-        _ => dispatch!(set, scatter_coated(group: Group)),
+        DIFFUSE => dispatch!(set, scatter_diffuse(group: LightHits)),
+        MIRROR => dispatch!(set, scatter_mirror(group: LightHits)),
+        GLASS => dispatch!(set, scatter_glass(group: LightHits)),
+        METAL => dispatch!(set, scatter_metal(group: LightHits)),
+        _ => dispatch!(set, scatter_coated(group: LightHits)),
     }
 }
 
 #[inline(always)]
-fn scatter_diffuse<S: Simd>(s: S, group: Group) {
+fn scatter_diffuse<S: Simd>(s: S, group: LightHits) {
     scatter_kind::<S, DIFFUSE>(s, group);
 }
 
 #[inline(always)]
-fn scatter_mirror<S: Simd>(s: S, group: Group) {
+fn scatter_mirror<S: Simd>(s: S, group: LightHits) {
     scatter_kind::<S, MIRROR>(s, group);
 }
 
 #[inline(always)]
-fn scatter_glass<S: Simd>(s: S, group: Group) {
+fn scatter_glass<S: Simd>(s: S, group: LightHits) {
     scatter_kind::<S, GLASS>(s, group);
 }
 
 #[inline(always)]
-fn scatter_metal<S: Simd>(s: S, group: Group) {
+fn scatter_metal<S: Simd>(s: S, group: LightHits) {
     scatter_kind::<S, METAL>(s, group);
 }
 
 #[inline(always)]
-fn scatter_coated<S: Simd>(s: S, group: Group) {
+fn scatter_coated<S: Simd>(s: S, group: LightHits) {
     scatter_kind::<S, COATED>(s, group);
 }
 
 #[inline(always)]
-fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
-    let Group { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals, sets, camera } = group;
+fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
+    let LightHits { pass, n_vertices, dimension, paths, hits, materials, order, next, arrivals, sets, camera } = group;
     let scene = pass.scene;
     for some in order.chunks(LANES) {
         let chunk = LaneGroup::of(some);
@@ -104,7 +104,8 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
             throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
         }
         let (ratio, sampler) = (Float::gather(&paths.pdf, index), paths.sampler_lanes(index));
-        let step = Step { pass, at: &at, place: &place, media: &media, throughput, ratio, sampler, dimension };
+        let step =
+            LightPathLanes { pass, at: &at, place: &place, media: &media, throughput, ratio, sampler, dimension };
         if scatters(KIND) && n_vertices > 1 {
             step.join::<KIND>(s, sets, camera, arrivals);
         }
@@ -115,7 +116,7 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
 }
 
 /// One vertex of each of sixteen paths.
-struct Step<'a, S: Simd> {
+struct LightPathLanes<'a, S: Simd> {
     pass: &'a CausticPass<'a>,
     at: &'a HitGroup<'a, S>,
     /// As seen from the lamp's side.
@@ -127,7 +128,7 @@ struct Step<'a, S: Simd> {
     dimension: u32,
 }
 
-impl<S: Simd> Step<'_, S> {
+impl<S: Simd> LightPathLanes<'_, S> {
     /// Shadow rays to points of the lens, where in the film they end and the light that they bring.
     #[inline(always)]
     fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut LensConnections) {

@@ -12,8 +12,8 @@ use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, VERTEX_DI
 use crate::integrators::caustics::lens_connections::{LensConnections, Splat};
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::simd;
-use crate::integrators::caustics::simd::Group;
-use crate::integrators::caustics::weight::{Bounce, etendue_gain, is_reversible};
+use crate::integrators::caustics::simd::LightHits;
+use crate::integrators::caustics::weight::{MisBounce, etendue_gain, is_reversible};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
@@ -78,7 +78,7 @@ pub(crate) struct LightWave {
 }
 
 /// One of the two kinds of scattering of a surface.
-enum Surface {
+enum LightPathSurface {
     Lobe(Lobe),
     Blend(Box<Blend>),
 }
@@ -151,7 +151,15 @@ impl LightWave {
                 if n_vertices > 1 && surface.has_non_specular() {
                     traces.push(Trace { at: vertex.position, from: ray.origin });
                 }
-                let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: true };
+                let step = LightPathStep {
+                    pass,
+                    path: &path,
+                    vertex: &vertex,
+                    hit: &hit,
+                    material,
+                    n_vertices,
+                    is_scout: true,
+                };
                 if let Some((ray, path, true)) = step.go_on(&surface) {
                     self.next.push(&ray, &path.into());
                 }
@@ -205,7 +213,7 @@ impl LightWave {
                 if has_lanes { &mut self.together } else { &mut self.apart }.push(i);
             }
             if !self.together.is_empty() {
-                let group = Group {
+                let group = LightHits {
                     pass,
                     n_vertices,
                     dimension: first_dimension(n_vertices),
@@ -235,7 +243,8 @@ impl LightWave {
         }
         let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, path.media);
         let Some((vertex, material, surface)) = found else { return };
-        let step = Step { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
+        let step =
+            LightPathStep { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
         if n_vertices > 1
             && surface.has_non_specular()
             && path.media == self.camera
@@ -263,7 +272,7 @@ fn surface_at(
     ray: &Ray,
     hit: &Hit,
     media: MediumId,
-) -> Option<(Vertex, MaterialId, Surface)> {
+) -> Option<(Vertex, MaterialId, LightPathSurface)> {
     let scene = pass.scene;
     let material = material_of(scene, hit);
     let vertex = Vertex::new(scene, ray, hit, material);
@@ -272,15 +281,15 @@ fn surface_at(
     let glass = scene.tables.features.glass;
     let mut sides = glass.then(|| Sides::new(scene, sets, media, ray, hit, material, vertex.front));
     let surface = if is_blend {
-        Surface::Blend(Box::new(blend_at(scene, material, &vertex, sides.as_mut())?))
+        LightPathSurface::Blend(Box::new(blend_at(scene, material, &vertex, sides.as_mut())?))
     } else {
-        Surface::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?)
+        LightPathSurface::Lobe(lobe_at(scene, material, &vertex, sides.as_mut())?)
     };
     Some((vertex, material, surface))
 }
 
 /// One vertex of one path.
-struct Step<'a> {
+struct LightPathStep<'a> {
     pass: &'a CausticPass<'a>,
     path: &'a LightPath,
     /// As seen from the lamp's side.
@@ -292,13 +301,13 @@ struct Step<'a> {
     is_scout: bool,
 }
 
-impl Step<'_> {
+impl LightPathStep<'_> {
     fn dimension(&self) -> u32 {
         first_dimension(self.n_vertices)
     }
 
     /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
-    fn join(&self, surface: &Surface, sets: &MediumSets) -> Option<(Ray, Vec2, Vec3)> {
+    fn join(&self, surface: &LightPathSurface, sets: &MediumSets) -> Option<(Ray, Vec2, Vec3)> {
         let &Self { pass, path, .. } = self;
         let (scene, camera) = (pass.scene, &pass.scene.camera);
         let lens = if camera.lens_radius > 0.0 {
@@ -341,7 +350,7 @@ impl Step<'_> {
     }
 
     /// Chooses how the path goes on, and whether; and tells whether it does so off something specular.
-    fn go_on(&self, surface: &Surface) -> Option<(Ray, LightPath, bool)> {
+    fn go_on(&self, surface: &LightPathSurface) -> Option<(Ray, LightPath, bool)> {
         let &Self { pass, vertex, material, n_vertices, .. } = self;
         let scene = pass.scene;
         let mut path = *self.path;
@@ -368,7 +377,7 @@ impl Step<'_> {
         if let Some(through) = sample.through {
             path.media = through.beyond;
         }
-        let bounce = Bounce {
+        let bounce = MisBounce {
             vertex,
             hit: self.hit,
             eye: None,
@@ -416,7 +425,7 @@ impl Step<'_> {
     }
 }
 
-impl Surface {
+impl LightPathSurface {
     fn has_non_specular(&self) -> bool {
         match self {
             Self::Lobe(lobe) => lobe.has_non_specular(),

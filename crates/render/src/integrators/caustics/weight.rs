@@ -24,7 +24,7 @@ use firstlight_kdtree::Hit;
 use glam::Vec3;
 
 /// How a path from the eye goes on at a vertex.
-pub(crate) struct Bounce<'a> {
+pub(crate) struct MisBounce<'a> {
     pub vertex: &'a Vertex,
     pub hit: &'a Hit,
     /// Of the camera ray, if this is its hit.
@@ -42,8 +42,8 @@ pub(crate) struct Bounce<'a> {
 impl CausticPass<'_> {
     /// - `reverse_pdf`: density with which the vertex, reached from `wi`, would have scattered towards `wo`.
     #[inline]
-    pub fn follow(&self, track: MisState, bounce: &Bounce, reverse_pdf: impl FnOnce() -> f32) -> MisState {
-        let Bounce { vertex, wi, .. } = *bounce;
+    pub fn follow(&self, track: MisState, bounce: &MisBounce, reverse_pdf: impl FnOnce() -> f32) -> MisState {
+        let MisBounce { vertex, wi, .. } = *bounce;
         let is_specular = bounce.pdf.is_infinite();
         if track.ratio.is_nan() && bounce.eye.is_none() || !is_reversible(bounce) {
             return MisState { gain: track.gain, ..MisState::default() };
@@ -115,7 +115,7 @@ impl CausticPass<'_> {
 /// Reflection must be seen from the front of the true surface on both ends, and glass that is left must have been
 /// entered: an eye or a lamp inside of glass does not know that it is.
 #[inline]
-pub(crate) fn is_reversible(bounce: &Bounce) -> bool {
+pub(crate) fn is_reversible(bounce: &MisBounce) -> bool {
     if bounce.transmitted {
         !bounce.blended && bounce.before != bounce.after
     } else {

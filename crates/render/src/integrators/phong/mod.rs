@@ -198,7 +198,7 @@ impl PhongWave {
         if is_last {
             return;
         }
-        let step = Step { scene, path: &path, vertex: &vertex, depth };
+        let step = PhongStep { scene, path: &path, vertex: &vertex, depth };
         let glass = tables.features.glass;
         let mut sides =
             glass.then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
@@ -214,8 +214,8 @@ impl PhongWave {
     }
 
     /// Ambient light, returned at once; direct light waits for its shadow rays.
-    fn light(&mut self, step: &Step, finish: &Finish) -> Vec3 {
-        let Step { scene, path, vertex, .. } = *step;
+    fn light(&mut self, step: &PhongStep, finish: &Finish) -> Vec3 {
+        let PhongStep { scene, path, vertex, .. } = *step;
         let tables = &*scene.tables;
         let mirrored = vertex.mirrored();
         let sets = &self.sets;
@@ -257,8 +257,8 @@ impl PhongWave {
     }
 
     /// The rays of a mirror or of glass.
-    fn send(&mut self, step: &Step, shiny: &Shiny, dimension: u32) {
-        let Step { path, vertex, .. } = *step;
+    fn send(&mut self, step: &PhongStep, shiny: &Shiny, dimension: u32) {
+        let PhongStep { path, vertex, .. } = *step;
         match *shiny {
             Shiny::Mirror { tint } => {
                 self.follow(step, path.throughput * tint, vertex.mirrored(), None, f32::INFINITY, dimension);
@@ -295,14 +295,14 @@ impl PhongWave {
     /// - `through`: what is passed through, if anything is; `pdf`: see [`DIRECT_ALREADY_SAMPLED`].
     fn follow(
         &mut self,
-        step: &Step,
+        step: &PhongStep,
         mut weight: Vec3,
         wi: Vec3,
         through: Option<Interface>,
         pdf: f32,
         dimension: u32,
     ) {
-        let Step { scene, path, vertex, depth } = *step;
+        let PhongStep { scene, path, vertex, depth } = *step;
         // The true surface decides which side a direction leads to.
         let reached =
             if through.is_some() { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) };
@@ -328,7 +328,7 @@ impl PhongWave {
 
 /// One hit of one ray.
 #[derive(Clone, Copy)]
-struct Step<'a> {
+struct PhongStep<'a> {
     scene: &'a Prepared,
     path: &'a Path,
     vertex: &'a Vertex,
@@ -336,7 +336,7 @@ struct Step<'a> {
     depth: u32,
 }
 
-impl Step<'_> {
+impl PhongStep<'_> {
     /// The first sample dimension of this vertex.
     fn dimension(&self) -> u32 {
         first_dimension(self.depth)

@@ -35,7 +35,7 @@ struct Arriving {
 #[derive(Default)]
 pub(crate) struct Shadows {
     /// Of each light, and then of the surroundings; those behind the first `n` are not in use.
-    asked: Vec<Asked>,
+    asked: Vec<LightRays>,
     n: usize,
     with_targets: bool,
     rays: RayBatch,
@@ -46,7 +46,7 @@ pub(crate) struct Shadows {
 }
 
 #[derive(Default)]
-struct Asked {
+struct LightRays {
     batch: ShadowBatch,
     /// Where rays end, for those that go on behind glass.
     targets: [Vec<f32>; 3],
@@ -63,7 +63,7 @@ impl Shadows {
         self.n = n;
         self.with_targets = scene.tables.features.glass;
         if self.asked.len() < n {
-            self.asked.resize_with(n, Asked::default);
+            self.asked.resize_with(n, LightRays::default);
         }
         for asked in &mut self.asked[..n] {
             asked.batch.start(n_hits);
@@ -78,7 +78,7 @@ impl Shadows {
     /// Light for a path that comes from `target` on light `k`, or from outside along `wi`, to `origin`.
     #[inline]
     pub fn push(&mut self, k: usize, path: &Path, light: Vec3, origin: Vec3, wi: Vec3, target: Option<Vec3>) {
-        let Asked { batch, targets, media } = &mut self.asked[k];
+        let LightRays { batch, targets, media } = &mut self.asked[k];
         if self.with_targets {
             media.push(path.media);
             let target = target.unwrap_or(wi);
@@ -101,7 +101,7 @@ impl Shadows {
         target: Vector<S>,
         path_media: &[MediumId; LANES],
     ) {
-        let Asked { batch, targets, media } = &mut self.asked[k];
+        let LightRays { batch, targets, media } = &mut self.asked[k];
         if self.with_targets {
             media.extend(lanes_of(mask).map(|lane| path_media[lane]));
             let at = batch.rays.len();
@@ -138,7 +138,7 @@ impl Shadows {
         class: RayClass,
         radiance: &mut [Vec3],
     ) -> u64 {
-        let Asked { batch, targets, media } = &mut self.asked[k];
+        let LightRays { batch, targets, media } = &mut self.asked[k];
         std::mem::swap(&mut self.rays, &mut batch.rays);
         self.lights.clear();
         self.lights.extend((0..self.rays.len()).map(|i| Arriving {

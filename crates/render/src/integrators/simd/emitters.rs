@@ -1,7 +1,7 @@
 //! Hits on what shines, sixteen at a time.
 
 use crate::integrators::caustics::pass::CausticPass;
-use crate::integrators::simd::shade::Group;
+use crate::integrators::simd::shade::KindHits;
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{lanes_of, transmittance};
 use crate::shading::simd::lights::light_weight;
@@ -13,13 +13,13 @@ use glam::Vec3;
 ///
 /// Only where [`crate::prepare::light::LightTable::has_lanes`] and no emission is textured, see [`crate::prepare::material_table::MaterialTable`]; `dimension`, `survival`, `next` and
 /// `shadows` of the group are not used.
-pub(crate) fn shade_emitters(set: InstructionSet, group: Group, radiance: &mut [Vec3]) {
-    dispatch!(set, shade_emissive(group: Group, radiance: &mut [Vec3]));
+pub(crate) fn shade_emitters(set: InstructionSet, group: KindHits, radiance: &mut [Vec3]) {
+    dispatch!(set, shade_emissive(group: KindHits, radiance: &mut [Vec3]));
 }
 
 #[inline(always)]
-fn shade_emissive<S: Simd>(s: S, group: Group, radiance: &mut [Vec3]) {
-    let Group { scene, techniques, caustics, paths, hits, materials, order, sets, .. } = group;
+fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
+    let KindHits { scene, techniques, caustics, paths, hits, materials, order, sets, .. } = group;
     let tables = &*scene.tables;
     for chunk in order.chunks(LANES) {
         let LaneGroup { indices, mask } = LaneGroup::of(chunk);

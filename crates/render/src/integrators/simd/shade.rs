@@ -21,7 +21,7 @@ use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch
 use glam::Vec3;
 
 /// Hits of one kind of material, and where their light and their paths go on.
-pub(crate) struct Group<'a> {
+pub(crate) struct KindHits<'a> {
     pub scene: &'a Prepared,
     pub techniques: &'a Techniques,
     pub caustics: Option<&'a CausticPass<'a>>,
@@ -56,45 +56,45 @@ pub(crate) fn scatters(kind: usize) -> bool {
 }
 
 /// Shades hits on materials of one [`Material::kind`].
-pub(crate) fn shade(set: InstructionSet, kind: usize, group: Group) {
+pub(crate) fn shade(set: InstructionSet, kind: usize, group: KindHits) {
     match kind {
-        DIFFUSE => dispatch!(set, shade_diffuse(group: Group)),
-        MIRROR => dispatch!(set, shade_mirror(group: Group)),
-        GLASS => dispatch!(set, shade_glass(group: Group)),
-        METAL => dispatch!(set, shade_metal(group: Group)),
-        _ => dispatch!(set, shade_coated(group: Group)),
+        DIFFUSE => dispatch!(set, shade_diffuse(group: KindHits)),
+        MIRROR => dispatch!(set, shade_mirror(group: KindHits)),
+        GLASS => dispatch!(set, shade_glass(group: KindHits)),
+        METAL => dispatch!(set, shade_metal(group: KindHits)),
+        _ => dispatch!(set, shade_coated(group: KindHits)),
     }
 }
 
 #[inline(always)]
-fn shade_diffuse<S: Simd>(s: S, group: Group) {
+fn shade_diffuse<S: Simd>(s: S, group: KindHits) {
     shade_kind::<S, DIFFUSE>(s, group);
 }
 
 #[inline(always)]
-fn shade_mirror<S: Simd>(s: S, group: Group) {
+fn shade_mirror<S: Simd>(s: S, group: KindHits) {
     shade_kind::<S, MIRROR>(s, group);
 }
 
 #[inline(always)]
-fn shade_glass<S: Simd>(s: S, group: Group) {
+fn shade_glass<S: Simd>(s: S, group: KindHits) {
     shade_kind::<S, GLASS>(s, group);
 }
 
 #[inline(always)]
-fn shade_metal<S: Simd>(s: S, group: Group) {
+fn shade_metal<S: Simd>(s: S, group: KindHits) {
     shade_kind::<S, METAL>(s, group);
 }
 
 #[inline(always)]
-fn shade_coated<S: Simd>(s: S, group: Group) {
+fn shade_coated<S: Simd>(s: S, group: KindHits) {
     shade_kind::<S, COATED>(s, group);
 }
 
 #[inline(always)]
-fn shade_kind<S: Simd, const KIND: usize>(s: S, group: Group) {
-    let Group { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
-    let Group { next, shadows, sets, .. } = group;
+fn shade_kind<S: Simd, const KIND: usize>(s: S, group: KindHits) {
+    let KindHits { scene, techniques, caustics, depth, dimension, survival, paths, hits, materials, order, .. } = group;
+    let KindHits { next, shadows, sets, .. } = group;
     let features = &scene.tables.features;
     for chunk in order.chunks(LANES) {
         let chunk = LaneGroup::of(chunk);

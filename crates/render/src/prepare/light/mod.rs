@@ -19,7 +19,7 @@ use crate::core::techniques::Techniques;
 use crate::core::texture::Texture;
 use crate::prepare::light::arrays::LightArrays;
 use crate::prepare::light::emitter::{Light, LightSample};
-use crate::prepare::light::selection::Selection;
+use crate::prepare::light::selection::LightSelection;
 use crate::prepare::light::shape::{LightShape, sphere_as_point};
 use crate::sampling::Sampler;
 use firstlight_kdtree::Shape;
@@ -34,7 +34,7 @@ pub struct LightTable {
     pub(crate) lights: Vec<Light>,
     /// For each object: where its primitives stand among the lights.
     by_object: Vec<ObjectLights>,
-    pub(crate) selection: Selection,
+    pub(crate) selection: LightSelection,
     pub(crate) lanes: Option<LightArrays>,
 }
 
@@ -124,7 +124,7 @@ impl LightTable {
                 }
             })
             .collect();
-        let selection = Selection::build(&lights);
+        let selection = LightSelection::build(&lights);
         let lanes = LightArrays::build(&lights);
         Self { lights, by_object, selection, lanes }
     }

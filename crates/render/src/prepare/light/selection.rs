@@ -13,7 +13,7 @@ use glam::Vec3;
 pub const MAX_ESTIMATED: usize = 16;
 
 #[derive(Debug, Default)]
-pub(crate) struct Selection {
+pub(crate) struct LightSelection {
     /// Bounds for the estimate; empty when there are too many lights.
     bounds: Vec<LightBounds>,
     /// When there are many.
@@ -33,7 +33,7 @@ pub(crate) struct LightBounds {
     intensity: f32,
 }
 
-impl Selection {
+impl LightSelection {
     pub fn build(lights: &[Light]) -> Self {
         if lights.len() <= MAX_ESTIMATED {
             return Self { bounds: lights.iter().map(LightBounds::new).collect(), ..Self::default() };

@@ -20,13 +20,13 @@ const BINS: usize = 12;
 #[derive(Debug, Default)]
 pub(crate) struct LightTree {
     /// Children lie side by side.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<LightNode>,
     /// For each light the way to it from the root: bit k says which child on level k.
     pub(crate) ways: Vec<u64>,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Node {
+pub(crate) struct LightNode {
     pub center: Vec3,
     pub radius: f32,
     /// Mean direction of the normals, unit.
@@ -43,7 +43,7 @@ pub(crate) const LEAF: u32 = 1 << 31;
 
 /// A light as the builder sees it.
 #[derive(Clone, Copy)]
-struct Item {
+struct LightItem {
     bounds: Aabb,
     cone: Cone,
     power: f32,
@@ -60,14 +60,14 @@ struct Cone {
 impl LightTree {
     /// At least two lights.
     pub fn build(lights: &[Light]) -> Self {
-        let mut items: Vec<Item> = (0..).zip(lights).map(|(id, light)| Item::new(id, light)).collect();
+        let mut items: Vec<LightItem> = (0..).zip(lights).map(|(id, light)| LightItem::new(id, light)).collect();
         let mut tree = Self { nodes: Vec::with_capacity(2 * lights.len()), ways: vec![0; lights.len()] };
-        tree.nodes.push(Node::new(&items));
+        tree.nodes.push(LightNode::new(&items));
         tree.split(0, &mut items, 0, 0);
         tree
     }
 
-    fn split(&mut self, at: usize, items: &mut [Item], depth: u32, way: u64) {
+    fn split(&mut self, at: usize, items: &mut [LightItem], depth: u32, way: u64) {
         if let [only] = items {
             self.nodes[at].link = LEAF | only.id;
             self.ways[only.id as usize] = way;
@@ -76,7 +76,7 @@ impl LightTree {
         let middle = match (depth < MAX_UNEVEN_DEPTH).then(|| best_split(items)).flatten() {
             Some((axis, limit)) => partition(items, |item| item.middle()[axis] < limit),
             None => {
-                let all = Aabb::from_points(items.iter().map(Item::middle));
+                let all = Aabb::from_points(items.iter().map(LightItem::middle));
                 let axis = (all.max - all.min).max_position();
                 items.sort_unstable_by(|a, b| a.middle()[axis].total_cmp(&b.middle()[axis]).then(a.id.cmp(&b.id)));
                 items.len() / 2
@@ -85,7 +85,7 @@ impl LightTree {
         let (below, above) = items.split_at_mut(middle);
         let first = self.nodes.len();
         self.nodes[at].link = first as u32;
-        self.nodes.extend([Node::new(below), Node::new(above)]);
+        self.nodes.extend([LightNode::new(below), LightNode::new(above)]);
         self.split(first, below, depth + 1, way);
         self.split(first + 1, above, depth + 1, way | 1 << depth);
     }
@@ -131,8 +131,8 @@ impl LightTree {
     }
 }
 
-impl Node {
-    fn new(items: &[Item]) -> Self {
+impl LightNode {
+    fn new(items: &[LightItem]) -> Self {
         let bounds = items.iter().fold(Aabb::EMPTY, |all, item| all.union(item.bounds));
         let cone = items[1..].iter().fold(items[0].cone, |all, item| all.union(item.cone));
         let center = 0.5 * (bounds.min + bounds.max);
@@ -169,7 +169,7 @@ impl Node {
     }
 }
 
-impl Item {
+impl LightItem {
     fn new(id: u32, light: &Light) -> Self {
         let everywhere = Cone { axis: Vec3::Z, spread: PI };
         let (bounds, cone, facing) = match light.shape {
@@ -249,8 +249,8 @@ impl Half {
 }
 
 /// Axis and limit of the middles; `None` where all middles are one, or where no bound tells a difference.
-fn best_split(items: &[Item]) -> Option<(usize, f32)> {
-    let middles = Aabb::from_points(items.iter().map(Item::middle));
+fn best_split(items: &[LightItem]) -> Option<(usize, f32)> {
+    let middles = Aabb::from_points(items.iter().map(LightItem::middle));
     let size = middles.max - middles.min;
     let mut best: Option<(f32, usize, f32)> = None;
     for axis in 0..3 {
@@ -288,7 +288,7 @@ fn best_split(items: &[Item]) -> Option<(usize, f32)> {
 }
 
 /// Those that `is_below` come first, in their order; how many there are.
-fn partition(items: &mut [Item], is_below: impl Fn(&Item) -> bool) -> usize {
+fn partition(items: &mut [LightItem], is_below: impl Fn(&LightItem) -> bool) -> usize {
     items.sort_by_key(|item| !is_below(item));
     items.partition_point(is_below)
 }

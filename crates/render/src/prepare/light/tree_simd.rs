@@ -18,7 +18,7 @@ pub(crate) struct LightTreeArrays {
 /// How many nodes are looked up in registers.
 const TOP: usize = 2 * LANES;
 
-/// One entry a node; see `Node` of the tree.
+/// One entry a node; see `LightNode` of the tree.
 #[derive(Debug, Default)]
 struct Rows {
     center: [Vec<f32>; 3],
@@ -145,7 +145,7 @@ impl Rows {
         }
     }
 
-    /// See `Node::bound` of the tree.
+    /// See `LightNode::bound` of the tree.
     #[inline(always)]
     fn bounds<S: Simd>(&self, node: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
         let offset = Vector::gather(&self.center, node) - position;

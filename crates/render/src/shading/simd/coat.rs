@@ -13,9 +13,9 @@ use std::f32::consts::FRAC_1_PI;
 
 /// The parts of the surface of each lane, by what they do; of each kind there is one at most.
 pub(crate) struct Coat<S: Simd> {
-    matte: Part<S>,
-    rough: Part<S>,
-    mirror: Part<S>,
+    matte: CoatPart<S>,
+    rough: CoatPart<S>,
+    mirror: CoatPart<S>,
     /// The rough parts; `None` where no lane has one.
     metal: Option<MetalLanes<S>>,
     /// In the order of choice.
@@ -24,7 +24,7 @@ pub(crate) struct Coat<S: Simd> {
 }
 
 #[derive(Clone, Copy)]
-struct Part<S: Simd> {
+struct CoatPart<S: Simd> {
     /// Lanes that have it.
     here: Mask,
     color: Vector<S>,
@@ -46,7 +46,7 @@ impl<S: Simd> Coat<S> {
         let strengths = two!(|k| luminance(colors[k]) * weights[k]);
         let sum = strengths[0] + strengths[1];
         let pmfs = two!(|k| select(sum.is_positive(), strengths[k] / sum, sum.all(0.5)));
-        let all = Parts { kinds, colors, weights, pmfs };
+        let all = CoatParts { kinds, colors, weights, pmfs };
         let matte = all.of_kind(at.mask, DIFFUSE);
         let (rough, mirror) = (all.of_kind(at.mask, METAL), all.of_kind(at.mask, MIRROR));
         let mut metal = None;
@@ -119,18 +119,18 @@ impl<S: Simd> Coat<S> {
 }
 
 /// In the order of choice.
-struct Parts<S: Simd> {
+struct CoatParts<S: Simd> {
     kinds: [Bits<S>; 2],
     colors: [Vector<S>; 2],
     weights: [Float<S>; 2],
     pmfs: [Float<S>; 2],
 }
 
-impl<S: Simd> Parts<S> {
+impl<S: Simd> CoatParts<S> {
     #[inline(always)]
-    fn of_kind(&self, mask: Mask, kind: usize) -> Part<S> {
+    fn of_kind(&self, mask: Mask, kind: usize) -> CoatPart<S> {
         let (first, second) = (self.kinds[0].equals(kind as u32), self.kinds[1].equals(kind as u32));
-        Part {
+        CoatPart {
             here: mask & (first | second),
             color: select_vector(first, self.colors[0], self.colors[1]),
             weight: select(first, self.weights[0], self.weights[1]),

@@ -6,7 +6,7 @@ use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::simd::bounce::Bounce;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::simd::scatter::{Surface, eval};
+use crate::shading::simd::scatter::{SurfaceScatter, eval};
 use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Simd, Vector, select, select_vector};
 use glam::Vec2;
@@ -17,7 +17,7 @@ impl HintLanes<'_> {
     pub fn follow<S: Simd, const KIND: usize>(
         &self,
         s: S,
-        surface: &Surface<S>,
+        surface: &SurfaceScatter<S>,
         place: &SurfaceLanes<S>,
         sampler: &SamplerLanes<S>,
         dimension: u32,

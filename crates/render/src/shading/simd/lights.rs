@@ -12,7 +12,7 @@ use firstlight_simd::{Float, Kernel, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
 /// A point on a light for each lane.
-pub(crate) struct Points<S: Simd> {
+pub(crate) struct FoundLights<S: Simd> {
     pub found: Mask,
     /// Lanes whose light comes from outside the scene.
     pub infinite: Mask,
@@ -33,16 +33,16 @@ pub(crate) struct LightPoints<'a, S: Simd> {
 }
 
 impl<S: Simd> Kernel<S> for LightPoints<'_, S> {
-    type Output = Points<S>;
+    type Output = FoundLights<S>;
 
     #[inline(always)]
-    fn run(self, s: S) -> Points<S> {
+    fn run(self, s: S) -> FoundLights<S> {
         light_points(s, &self)
     }
 }
 
 #[inline(always)]
-fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> Points<S> {
+fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
     let &LightPoints { scene, techniques, mask, place, sampler, dimension } = asked;
     let tables = &*scene.tables;
     if tables.environment_sampler.is_none() {
@@ -53,7 +53,7 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> Points<S> {
         }
         let found = tables.lights.sample_lanes(techniques, mask, place.position, place.normal, u_select, u);
         if let Some(LightLanes { found, target, wi, pdf, radiance }) = found {
-            return Points { found, infinite: 0, target, wi, pdf, radiance };
+            return FoundLights { found, infinite: 0, target, wi, pdf, radiance };
         }
     }
     let (positions, normals) = (place.position.to_arrays(), place.normal.to_arrays());
@@ -73,7 +73,7 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> Points<S> {
         }
     }
     let [a, b, c, d, e, f, g, h, i, pdf] = arrays;
-    Points {
+    FoundLights {
         found,
         infinite,
         target: Vector::from_arrays(s, &[a, b, c]),

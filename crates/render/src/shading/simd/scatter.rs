@@ -21,7 +21,7 @@ use glam::Vec2;
 use std::f32::consts::FRAC_1_PI;
 
 /// How the surface of each lane scatters.
-pub(crate) struct Surface<S: Simd> {
+pub(crate) struct SurfaceScatter<S: Simd> {
     /// Albedo or reflectance.
     pub color: Vector<S>,
     pub metal: Option<MetalLanes<S>>,
@@ -41,12 +41,12 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
     place: &SurfaceLanes<S>,
     sets: &mut MediumSets,
     media: &[MediumId; LANES],
-) -> Surface<S> {
+) -> SurfaceScatter<S> {
     let table = &at.scene.tables.materials;
     if KIND == COATED {
         let coat = Coat::new(s, at, place);
         let (non_specular, zero) = (coat.non_specular(), Float::splat(s, 0.0));
-        return Surface {
+        return SurfaceScatter {
             color: Vector { x: zero, y: zero, z: zero },
             metal: None,
             coat: Some(coat),
@@ -71,16 +71,16 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
         }
         let metal = MetalLanes::new(s, at.mask, place.normal, place.wo, alpha, color, flags);
         let non_specular = Float::splat(s, SMALLEST_ALPHA).le(alpha);
-        return Surface { color, metal: Some(metal), coat: None, glass: None, non_specular };
+        return SurfaceScatter { color, metal: Some(metal), coat: None, glass: None, non_specular };
     }
     let glass = (KIND == GLASS).then(|| GlassLanes::of(s, at, place.front, sets, media));
-    Surface { color, metal: None, coat: None, glass, non_specular: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
+    SurfaceScatter { color, metal: None, coat: None, glass, non_specular: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
 }
 
 /// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.
 #[inline(always)]
 pub(crate) fn eval<S: Simd, const KIND: usize>(
-    surface: &Surface<S>,
+    surface: &SurfaceScatter<S>,
     place: &SurfaceLanes<S>,
     wi: Vector<S>,
 ) -> (Vector<S>, Float<S>) {
@@ -108,7 +108,7 @@ pub(crate) fn eval<S: Simd, const KIND: usize>(
 #[inline(always)]
 pub(crate) fn sample<S: Simd, const KIND: usize>(
     at: &HitGroup<S>,
-    surface: &Surface<S>,
+    surface: &SurfaceScatter<S>,
     place: &SurfaceLanes<S>,
     hints: &HintLanes,
     sampler: &SamplerLanes<S>,
