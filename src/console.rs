@@ -45,7 +45,7 @@ impl Message for Vec<String> {
 /// For machines: one line, in which the format itself escapes what would end it.
 impl Message for serde_json::Value {
     fn text(&self) -> String {
-        self.to_string()
+        printable::json(&self.to_string()).into_owned()
     }
 }
 

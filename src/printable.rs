@@ -70,6 +70,24 @@ pub fn escape(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// JSON in which characters that do not print are escaped: they stand in strings alone, where the format has escapes of its
+/// own (RFC 8259, section 7).
+pub fn json(text: &str) -> Cow<'_, str> {
+    if text.chars().all(prints) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if prints(c) {
+            out.push(c);
+        } else {
+            let mut units = [0; 2];
+            out.extend(c.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    Cow::Owned(out)
+}
+
 /// At most so many characters: the first and the last of them, `…` between, and no escape in two.
 fn cut(text: &str, most: usize) -> Cow<'_, str> {
     // As many bytes or fewer can only be as many characters or fewer.
@@ -121,6 +139,16 @@ fn prints(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn json_means_the_same_with_escapes() {
+        let odd = "a\u{9b}31m\u{202e}x\u{7f}\u{feff}\u{e0001}é\u{3000}\n";
+        let text = serde_json::json!({ "name": odd }).to_string();
+        let fit = json(&text);
+        assert!(fit.chars().all(prints), "{fit}");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&fit).unwrap()["name"], odd);
+        assert_eq!(json("{\"a\":1}"), "{\"a\":1}");
+    }
 
     #[test]
     fn nothing_that_acts_on_a_terminal_is_left() {

@@ -51,6 +51,10 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         }
         files.write(path)?;
     }
+    if args.error_picture.is_some() && args.spp == Some(1) && !args.resume {
+        let message = "--error-picture needs at least two samples per pixel: use --spp 2 or more";
+        return Err(Failure::Usage(message.to_owned()));
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
@@ -241,11 +245,11 @@ fn replaced(paths: &[PathBuf], output: &Path) -> String {
     }
 }
 
-/// One line for machines.
 fn is_black(film: &Film) -> bool {
     (0..film.height()).all(|y| (0..film.width()).all(|x| film.mean(x, y) == Vec3::ZERO))
 }
 
+/// One line for machines.
 fn json(
     job: &RenderJob,
     report: &OfflineReport,

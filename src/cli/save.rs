@@ -26,6 +26,9 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let saved = save_scene(&mut world, Some(&scene), &args.output).map_err(Failure::Failed)?;
+    if !files.replaced().is_empty() {
+        remark(format_args!("{}: written in place of the file that was there", args.output.display()));
+    }
     for note in &saved.notes {
         remark(format_args!("note: {note}"));
     }

@@ -124,7 +124,11 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let samples = ImageSamples { first: 0, spp: film.spp(), uneven: false };
     let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
     let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
-    print.write(&args.output, files.replace()).map_err(Failure::Failed)
+    print.write(&args.output, files.replace()).map_err(Failure::Failed)?;
+    if files.replaced().contains(&args.output) {
+        remark(format_args!("{}: written in place of the file that was there", args.output.display()));
+    }
+    Ok(())
 }
 
 fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {

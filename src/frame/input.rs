@@ -83,6 +83,10 @@ impl CommandParams<'_, '_> {
         if let Some(rig) = self.rig()
             && let Some(steered) = navigation::steer(&rig, &command, &surroundings)
         {
+            // Whatever a recording asks for: no further than a picture can be taken from.
+            if steered.check().is_err() {
+                return;
+            }
             // Whoever moves the focal plane by hand wants it there.
             if steered.lens.focus_distance != rig.lens.focus_distance {
                 self.focus.set_if_neq(Focus::default());

@@ -128,6 +128,9 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     session.send(Command::Pause);
     session.update(Duration::MAX);
     let spp = options.spp.or(end).unwrap_or(0);
+    if end.is_none() {
+        warnings.push("the recording breaks off: its last line is not the end of a session".to_owned());
+    }
     if spp == 0 {
         warnings.push("the recording does not say how many samples its picture had: one each is taken".to_owned());
     }

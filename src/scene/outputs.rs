@@ -197,6 +197,15 @@ mod tests {
             files.write(spelling).unwrap();
             assert!(files.read(&root.join("in.obj")).unwrap_err().to_string().contains("is read by the same command"));
         }
+        // A slash at the end makes no other file of it.
+        for folder_like in ["in.obj/", "in.obj/.", "new.obj/"] {
+            let path = PathBuf::from(format!("{}/{folder_like}", root.display()));
+            let mut files = Files::new(Replace::Anything);
+            files.read(&root.join("in.obj")).unwrap();
+            let refused =
+                [files.write(&path), files.claim(&path, Replace::Anything).map(drop), files.write_all([path])];
+            assert!(refused.iter().all(Result::is_err), "{folder_like}: {refused:?}");
+        }
         // What is not there yet.
         let mut files = Files::default();
         files.write(&root.join("new.png")).unwrap();

@@ -111,6 +111,17 @@ pub fn is_film(path: &Path) -> bool {
     read.is_ok() && start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) && start.windows(name.len()).any(|part| part == name)
 }
 
+/// Whether a path ends in `/` or `/.`: paths leave that out when they are compared, the system does not.
+fn is_named_as_folder(path: &Path) -> bool {
+    let name = path.as_os_str().as_encoded_bytes();
+    let is_separator = |byte: &u8| std::path::is_separator(char::from(*byte));
+    match name {
+        [.., last] if is_separator(last) => true,
+        [.., before, b'.'] => is_separator(before),
+        _ => false,
+    }
+}
+
 impl WholeFile {
     /// # Errors
     /// As [`check_writable`].
@@ -246,6 +257,9 @@ fn busy(path: &Path) -> String {
 
 /// Whether what is there may be replaced.
 fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), String> {
+    if is_named_as_folder(path) {
+        return Err(format!("{}: is the name of a folder, by its end: name a file", path.display()));
+    }
     // All links have been followed.
     if target.is_symlink() {
         return Err(cannot_be_written(path, &"its links lead nowhere"));

@@ -261,13 +261,15 @@ fn touching(geometry: &Geometry, is_clear: &[bool]) -> Vec<(u32, u32)> {
             list.push(i);
         }
     }
-    for (i, face) in (0u32..).zip(&faces) {
+    for face in &faces {
         let at = place(face.normal, face.offset);
         for corner in 0..16u32 {
             // The two cells on each axis that are nearest.
             let cell: Cell = std::array::from_fn(|k| (at[k] - 0.5).floor() as i64 + i64::from(corner >> k & 1));
             let Some(list) = cells.get(&cell) else { continue };
-            let others = list.iter().filter(|&&j| j > i && faces[j as usize].object != face.object);
+            // Those of later objects: faces are in the order of their objects.
+            let first = list.partition_point(|&j| faces[j as usize].object <= face.object);
+            let others = list[first..].iter();
             for (n, &j) in others.enumerate() {
                 let other = &faces[j as usize];
                 let pair = (face.object.min(other.object), face.object.max(other.object));
