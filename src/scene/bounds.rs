@@ -18,6 +18,10 @@ pub const LEAST_VFOV_DEG: f64 = 1e-6;
 /// By how much the length of an axis, or the cosine between two, may be off: whatever moves a camera keeps them to rounding.
 const AXIS_SLACK: f64 = 1e-3;
 
+/// Metres. `f32` knows a point further from the axis no better than to 6 cm, and where such rays pass is less certain still:
+/// they have to be tested against all of a mesh.
+const MOST_LENS_RADIUS: f64 = 1e6;
+
 /// Stops of exposure, up or down. Beyond this, everything is black or white.
 pub const MOST_STOPS: f32 = 64.0;
 
@@ -142,7 +146,7 @@ impl CameraPart {
                 let radius = lens_radius_of(self.vfov, stop);
                 note(check_lens_radius("f_stop", radius).map_err(|_| {
                     let opens = format!("`f_stop` is {}, which opens the lens to {} m", number(stop), number(radius));
-                    BadValue::unfit("f_stop", format!("{opens}: use at most {:e} m", SceneFile::MAX_COORDINATE))
+                    BadValue::unfit("f_stop", format!("{opens}: use at most {MOST_LENS_RADIUS:e} m"))
                 }));
             }
             (None, _) => {}
@@ -161,10 +165,10 @@ fn check_angle(field: &'static str, angle_deg: f64) -> Result<(), BadValue> {
 }
 
 fn check_lens_radius(field: &'static str, radius: f64) -> Result<(), BadValue> {
-    if (0.0..=SceneFile::MAX_COORDINATE).contains(&radius) {
+    if (0.0..=MOST_LENS_RADIUS).contains(&radius) {
         return Ok(());
     }
-    let rule = format!("be 0 or positive, and at most {:e} m", SceneFile::MAX_COORDINATE);
+    let rule = format!("be 0 or positive, and at most {MOST_LENS_RADIUS:e} m");
     Err(BadValue::out_of_range(field, number(radius), rule))
 }
 
@@ -319,7 +323,8 @@ mod tests {
 
     #[test]
     fn what_a_part_gives_passes_the_checks_of_its_components() {
-        let lenses = [None, Some(0.0), Some(0.3), Some(1e12)];
+        assert!(CameraPart { lens_radius: Some(1e7), ..good() }.components().is_err());
+        let lenses = [None, Some(0.0), Some(0.3), Some(1e6)];
         for (lens_radius, vfov) in lenses.into_iter().flat_map(|lens| [1e-6, 0.1, 40.0, 179.99].map(|v| (lens, v))) {
             let (view, projection, lens) = CameraPart { lens_radius, vfov, ..good() }.components().unwrap();
             assert_eq!((view.check(), projection.check(), lens.check()), (Ok(()), Ok(()), Ok(())));
