@@ -3,9 +3,9 @@
 use super::console::remark;
 use super::failure::Failure;
 use clap::{Args, ValueEnum};
-use firstlight::frame::read_film_file;
+use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
-use firstlight::scene::whole_file::{Replace, is_film};
+use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{Files, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 use std::ffi::OsString;
 use std::path::Path;
@@ -84,10 +84,7 @@ impl SceneArgs {
         let source = self.source()?;
         if let Some(path) = source.path() {
             files.read(path)?;
-            // A picture is opened by its note alone, but that of a film is under the checksum of all of it.
-            if matches!(source, SceneSource::Picture(_)) && is_film(path) {
-                read_film_file(path).map_err(Failure::Failed)?;
-            }
+            check_film_source(&source).map_err(Failure::Failed)?;
         }
         let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;

@@ -40,6 +40,7 @@ impl RenderJob {
         if let Some(announcement) = &args.announcement {
             progress.suspend(|| remark(announcement));
         }
+        progress.stage("preparing the scene".to_owned());
         let mut world = bevy_ecs::world::World::new();
         scene.spawn(&mut world);
         let start = Instant::now();

@@ -30,7 +30,8 @@ use failure::Failure;
 use firstlight::console::LogWriter;
 use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
-use firstlight::scene::BUILTIN_SCENES;
+use firstlight::scene::{BUILTIN_SCENES, Limits};
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use stop::Stop;
 
@@ -106,6 +107,9 @@ impl CliCommand {
 pub fn main() -> ExitCode {
     firstlight::console::tell_panics();
     start_log();
+    if let Some(warning) = Limits::misunderstood() {
+        remark(format_args!("warning: {warning}"));
+    }
     let line = match CommandLine::try_parse() {
         Ok(line) => line,
         Err(error) => return not_understood(error),
@@ -134,9 +138,14 @@ pub fn main() -> ExitCode {
 /// option.
 fn not_understood(error: clap::Error) -> ExitCode {
     if !error.use_stderr() {
-        // The program's own words. Whoever closed the pipe has read enough.
-        let _ = error.print();
-        return ExitCode::SUCCESS;
+        // The program's own words. Whoever closed the pipe has read enough; a full disk has not.
+        return match error.print().and_then(|()| std::io::stdout().flush()) {
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                remark(format_args!("error: the help cannot be written: {error}"));
+                ExitCode::FAILURE
+            }
+            _ => ExitCode::SUCCESS,
+        };
     }
     // It quotes what was typed, and a line end in that would begin a line of its own: asked again with words that are fit
     // to be printed, it says the same of those.

@@ -1,6 +1,7 @@
 //! Work beside the picture: reading scenes and building trees on threads of their own, while the old picture stays.
 
 use super::Waker;
+use super::film_file::check_film_source;
 use super::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
 use crate::scene::file::TexturePart;
@@ -90,8 +91,13 @@ impl BackgroundTasks {
                 this.wake();
             };
             let options = LoadOptions { up, aspect: Some(aspect), hasty: true, progress: Some(&say), known: None };
-            let result = guarded(|| pool.install(|| load(&source, &options)))
-                .unwrap_or_else(|panic| Err(SceneError::in_file(source.title(), panic)));
+            let result = guarded(|| {
+                pool.install(|| {
+                    check_film_source(&source).map_err(SceneError::new)?;
+                    load(&source, &options)
+                })
+            })
+            .unwrap_or_else(|panic| Err(SceneError::in_file(source.title(), panic)));
             this.with(|board| {
                 if board.newest_load == number {
                     board.progress = None;

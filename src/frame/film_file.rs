@@ -11,7 +11,7 @@ use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
-use crate::scene::{FileKind, Fingerprint, ImageMetadata, InputFile, Limits, ReadError};
+use crate::scene::{FileKind, Fingerprint, ImageMetadata, InputFile, Limits, ReadError, SceneSource};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
     ReadLayers, Text, WritableImage,
@@ -131,6 +131,18 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), S
         return Err(refused(format!("of another {what}")));
     }
     if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
+}
+
+/// Refuses a picture that is a damaged film. A picture is opened by its note alone, but the note of a film is under the
+/// checksum of all of it.
+///
+/// # Errors
+/// As [`read_film_file`].
+pub fn check_film_source(source: &SceneSource) -> Result<(), String> {
+    match source {
+        SceneSource::Picture(path) if is_film(path) => read_film_file(path).map(|_| ()),
+        _ => Ok(()),
+    }
 }
 
 /// Reads a film back, to the last bit.

@@ -52,7 +52,8 @@ pub use command::Command;
 pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use film_file::{
-    FilmFile, check_replaced_film, read_film_file, read_film_file_within, write_film_file, write_film_into,
+    FilmFile, check_film_source, check_replaced_film, read_film_file, read_film_file_within, write_film_file,
+    write_film_into,
 };
 pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;

@@ -1,5 +1,7 @@
 //! How much a file of unknown origin may ask for, and where one number raises all of it.
 
+use crate::printable::name;
+
 /// Bytes of a picture file beside its pixels and its note: profiles, thumbnails, tables.
 const BESIDE: u64 = 64 << 20;
 
@@ -42,13 +44,21 @@ impl Limits {
 
     /// The usual limits times the number in [`Self::VARIABLE`], where there is one.
     pub fn of_this_process() -> Self {
-        let factor = std::env::var(Self::VARIABLE).ok().and_then(|text| text.trim().parse().ok());
-        Self::USUAL.times(factor.unwrap_or(1.0))
+        Self::USUAL.times(std::env::var(Self::VARIABLE).ok().and_then(|text| factor_of(&text)).unwrap_or(1.0))
+    }
+
+    /// What is wrong with [`Self::VARIABLE`], where it says something that is no factor.
+    pub fn misunderstood() -> Option<String> {
+        let text = std::env::var_os(Self::VARIABLE)?;
+        let text = text.to_string_lossy();
+        factor_of(&text).is_none().then(|| {
+            format!("{} is `{}`, which is no positive number: the usual limits hold", Self::VARIABLE, name(&text))
+        })
     }
 
     /// - `factor`: positive and finite; anything else counts as 1.
     pub fn times(self, factor: f64) -> Self {
-        let factor = if factor > 0.0 && factor.is_finite() { factor } else { 1.0 };
+        let factor = if is_factor(factor) { factor } else { 1.0 };
         // The conversion saturates.
         let scaled = |limit: u64| (limit as f64 * factor) as u64;
         Self {
@@ -80,6 +90,14 @@ impl Limits {
     pub(crate) fn advice() -> String {
         format!("set {}=2 in the environment to double all limits", Self::VARIABLE)
     }
+}
+
+fn is_factor(factor: f64) -> bool {
+    factor > 0.0 && factor.is_finite()
+}
+
+fn factor_of(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|&factor| is_factor(factor))
 }
 
 #[cfg(test)]

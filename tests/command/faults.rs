@@ -37,6 +37,26 @@ fn a_full_disk_leaves_the_old_picture_and_nothing_else() {
 
 #[cfg(target_os = "linux")]
 #[test]
+fn help_that_cannot_be_written_is_a_failure() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = Command::new(PROGRAM).arg("--help").stdout(full).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("the help cannot be written"), "{said}");
+}
+
+#[test]
+fn limits_that_are_no_number_are_told() {
+    for (text, is_wrong) in [("2", false), (" 0.5 ", false), ("0", true), ("-1", true), ("two", true), ("NaN", true)] {
+        let output = Command::new(PROGRAM).args(["info", "cornell"]).env("FIRSTLIGHT_LIMITS", text).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{text}: {said}");
+        assert_eq!(said.contains("FIRSTLIGHT_LIMITS"), is_wrong, "{text}: {said}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 fn a_folder_that_takes_no_files_is_named_before_anything_is_rendered() {
     let output = Command::new(PROGRAM).args(["render", "cornell", "-o", "/proc/out.png"]).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);

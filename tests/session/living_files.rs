@@ -91,6 +91,29 @@ impl Driver {
 }
 
 #[test]
+fn a_film_opens_as_its_scene_only_if_it_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = folder.path().join("film.exr");
+    let render = ["render", "cornell", "-o", "a.png", "--film", "film.exr", "--size", "16x16", "--spp", "2"];
+    let program = env!("CARGO_BIN_EXE_firstlight");
+    let done = std::process::Command::new(program).args(render).current_dir(folder.path()).output().unwrap();
+    assert!(done.status.success(), "{done:?}");
+    let whole = std::fs::read(&film).unwrap();
+    let place = whole.windows(7).position(|part| part == b"seed: 0").expect("the note has the seed");
+    let mut edited = whole.clone();
+    edited[place + 6] = b'1';
+    std::fs::write(&film, edited).unwrap();
+    let mut driver = Driver::open(SceneSource::Builtin("gallery".to_owned()), 2, 1);
+    driver.settle();
+    let open = || Command::Open { path: film.clone() };
+    driver.session.send(open());
+    driver.run_until_said(MessageKind::Error, "its checksum is wrong");
+    std::fs::write(&film, whole).unwrap();
+    driver.session.send(open());
+    driver.run_until(|session| session.status().scene.contains("cornell"));
+}
+
+#[test]
 fn what_changes_on_disk_is_read_again_and_nothing_else_is() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
