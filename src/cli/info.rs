@@ -6,7 +6,7 @@ use super::failure::Failure;
 use clap::Args;
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
-use firstlight::render::{Environment, Film, Material};
+use firstlight::render::{Environment, Film};
 use firstlight::scene::{
     self, Extraction, FilmSize, Lens, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
 };
@@ -152,7 +152,7 @@ impl Told<'_> {
     }
 
     fn materials(&self) -> BTreeMap<&'static str, usize> {
-        counts(self.extraction.prepared.shading.materials.iter().map(kind_of_material))
+        counts(self.extraction.prepared.shading.materials.iter().map(|material| material.kind().name()))
     }
 
     fn emitters(&self) -> usize {
@@ -209,18 +209,6 @@ fn kind_of_shape(shape: &Shape) -> &'static str {
     }
 }
 
-fn kind_of_material(material: &Material) -> &'static str {
-    match material {
-        Material::Diffuse { .. } => "diffuse",
-        Material::Mirror { .. } => "mirror",
-        Material::Metal { .. } => "metal",
-        Material::Glass { .. } => "glass",
-        Material::Blend { .. } => "blend",
-        Material::Phong { .. } => "phong",
-        Material::Emissive { .. } => "emissive",
-    }
-}
-
 fn environment(environment: &Environment) -> String {
     match environment {
         Environment::Black => "black".to_owned(),
@@ -235,7 +223,7 @@ const FEATURES: [&str; 8] =
 
 fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
     let (shading, features) = (&extraction.prepared.shading, extraction.prepared.features());
-    let has = |kind: &str| shading.materials.iter().any(|material| kind_of_material(material) == kind);
+    let has = |kind: &str| shading.materials.iter().any(|material| material.kind().name() == kind);
     [
         lens.enabled && lens.radius > 0.0,
         !shading.textures.is_empty(),

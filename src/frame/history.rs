@@ -11,8 +11,8 @@ use super::rig::Rig;
 use super::selection::Selection;
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    DisplaySettings, Lens, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection, Rendering,
-    SceneEnvironment, Shape, View,
+    DisplaySettings, Lens, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection, Rendering,
+    SceneEnvironment, Shape, SurfaceMaterial, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{
@@ -30,7 +30,7 @@ struct EntityState {
     shape: Option<Shape>,
     placement: Option<Placement>,
     slots: Option<MaterialSlots>,
-    material: Option<Material>,
+    material: Option<SurfaceMaterial>,
     light: Option<PointLight>,
     origin: Option<MeshOrigin>,
 }
@@ -224,7 +224,7 @@ type UndoParts = Or<(
     Changed<Shape>,
     Changed<Placement>,
     Changed<MaterialSlots>,
-    Changed<Material>,
+    Changed<SurfaceMaterial>,
     Changed<PointLight>,
     Changed<MeshOrigin>,
 )>;
@@ -237,7 +237,7 @@ pub fn notice(
     parts: Query<(), UndoParts>,
     camera: Query<(), Or<(Changed<View>, Changed<Projection>, Changed<Lens>)>>,
     mut shapes: RemovedComponents<Shape>,
-    mut materials: RemovedComponents<Material>,
+    mut materials: RemovedComponents<SurfaceMaterial>,
     mut lights: RemovedComponents<PointLight>,
     mut names: RemovedComponents<Name>,
     environment: Option<Res<SceneEnvironment>>,
@@ -299,7 +299,7 @@ fn read_entities(
     world: &mut World,
     old: &Arc<BTreeMap<Entity, Arc<EntityState>>>,
 ) -> Arc<BTreeMap<Entity, Arc<EntityState>>> {
-    type UndoPart = Or<(With<Shape>, With<Material>, With<PointLight>)>;
+    type UndoPart = Or<(With<Shape>, With<SurfaceMaterial>, With<PointLight>)>;
     let entities: Vec<Entity> = world.query_filtered::<Entity, UndoPart>().iter(world).collect();
     let read = |entity: Entity| {
         let state = EntityState {

@@ -49,7 +49,7 @@ mod worker;
 
 pub use camera_path::{along, turntable};
 pub use command::Command;
-pub use edit::{Edit, Id, MaterialKind, NewThing, Property, paint_of, sky_strength, textures};
+pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use film_file::{
     FilmFile, check_film_source, check_replaced_film, read_film_file, read_film_file_within, write_film_file,

@@ -16,8 +16,8 @@ use super::views::ViewTrail;
 use super::worker::{Job, Orders};
 use crate::render::RenderSettings;
 use crate::scene::{
-    CameraInput, DisplaySettings, Extraction, Lens, LoadedScene, Material, MaterialSlots, Ordinal, Placement,
-    PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, Trees, View,
+    CameraInput, DisplaySettings, Extraction, Lens, LoadedScene, MaterialSlots, Ordinal, Placement, PointLight,
+    Projection, Rendering, SceneInputs, SceneQueries, Shape, SurfaceMaterial, Trees, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
@@ -37,7 +37,7 @@ pub struct Touched<'w, 's> {
             Changed<Shape>,
             Changed<Placement>,
             Changed<MaterialSlots>,
-            Changed<Material>,
+            Changed<SurfaceMaterial>,
             Changed<PointLight>,
             Changed<View>,
             Changed<Projection>,
@@ -49,7 +49,7 @@ pub struct Touched<'w, 's> {
     shapes: RemovedComponents<'w, 's, Shape>,
     placements: RemovedComponents<'w, 's, Placement>,
     slots: RemovedComponents<'w, 's, MaterialSlots>,
-    materials: RemovedComponents<'w, 's, Material>,
+    materials: RemovedComponents<'w, 's, SurfaceMaterial>,
     lights: RemovedComponents<'w, 's, PointLight>,
     views: RemovedComponents<'w, 's, View>,
     projections: RemovedComponents<'w, 's, Projection>,

@@ -3,7 +3,7 @@
 //! | entity | components |
 //! |---|---|
 //! | object | [`Shape`], [`Placement`], [`MaterialSlots`] |
-//! | material | [`Material`] |
+//! | material | [`SurfaceMaterial`] |
 //! | point light | [`PointLight`], [`Placement`] |
 //! | camera | [`View`](super::View), [`Projection`](super::Projection), [`Lens`](super::Lens) |
 //!
@@ -11,8 +11,8 @@
 
 use super::placement::Placement;
 use crate::mesh::Mesh;
-use crate::render::{self, Display, Fresnel, RenderSettings};
-use bevy_ecs::prelude::{Component, Entity, Resource};
+use crate::render::{self, Display, Param, Params, RenderSettings};
+use bevy_ecs::prelude::{Component, Entity, Resource, World};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
@@ -102,43 +102,29 @@ impl Balls {
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
 pub struct MaterialSlots(pub Vec<Entity>);
 
-/// What a surface does to light; see [`render::Material`] for the meaning of each number.
+/// By entity, and by the texture itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InWorld;
+
+impl Params for InWorld {
+    type Color = ColorParam;
+    type Scalar = ScalarParam;
+    type Rgb = Vec3;
+    type Material = Entity;
+}
+
+/// A material whose textures and parts are in the world.
+pub type Material = render::Material<InWorld>;
+
+/// What the surfaces that use this entity do to light.
 #[derive(Component, Clone, Debug, PartialEq)]
-pub enum Material {
-    Diffuse {
-        albedo: ColorParam,
-    },
-    Mirror {
-        reflectance: ColorParam,
-    },
-    Metal {
-        alpha: ScalarParam,
-        reflectance: ColorParam,
-        fresnel: Fresnel,
-        compensate: bool,
-    },
-    Glass {
-        ior: f32,
-        absorption: Vec3,
-    },
-    Phong {
-        diffuse: ColorParam,
-        ambient: f32,
-        specular: ScalarParam,
-        shininess: f32,
-        transparency: f32,
-        ior: f32,
-        absorption: Vec3,
-    },
-    /// Of material entities; at most one part is emissive, and then `weight` is a number.
-    Blend {
-        weight: ScalarParam,
-        a: Entity,
-        b: Entity,
-    },
-    Emissive {
-        radiance: ColorParam,
-    },
+pub struct SurfaceMaterial(pub Material);
+
+impl SurfaceMaterial {
+    /// The material of an entity; `None` for one that is no material.
+    pub fn of(world: &World, entity: Entity) -> Option<&Material> {
+        world.get::<Self>(entity).map(|Self(material)| material)
+    }
 }
 
 /// Plain materials that a blend may come to, however it is nested.
@@ -147,31 +133,17 @@ pub const MAX_LOBES: usize = 8;
 /// For how many of them a Phong surface counts.
 pub const PHONG_LOBES: usize = 3;
 
-impl Material {
-    /// The one of surfaces that have none.
-    pub const GREY: Self = Self::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) };
+/// The material of surfaces that have none.
+pub const GREY: Material = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) };
 
-    /// What it looks up.
-    pub fn textures(&self) -> impl Iterator<Item = &Arc<SurfaceTexture>> {
-        let (amount, paint) = match self {
-            Self::Diffuse { albedo: paint }
-            | Self::Mirror { reflectance: paint }
-            | Self::Emissive { radiance: paint } => (None, Some(paint)),
-            Self::Metal { alpha, reflectance, .. } => (Some(alpha), Some(reflectance)),
-            Self::Phong { specular, diffuse, .. } => (Some(specular), Some(diffuse)),
-            Self::Blend { weight, .. } => (Some(weight), None),
-            Self::Glass { .. } => (None, None),
-        };
-        let of_amount = amount.and_then(|amount| match amount {
-            ScalarParam::Texture(texture) => Some(texture),
-            ScalarParam::Number(_) => None,
-        });
-        let of_paint = paint.and_then(|paint| match paint {
-            ColorParam::Texture(texture) => Some(texture),
-            ColorParam::Rgb(_) => None,
-        });
-        of_amount.into_iter().chain(of_paint)
-    }
+/// The textures that a material looks up.
+pub fn textures_of(material: &Material) -> impl Iterator<Item = &Arc<SurfaceTexture>> {
+    material.params().into_iter().filter_map(|(_, param)| match param {
+        Param::Reflectance(ColorParam::Texture(texture))
+        | Param::Radiance(ColorParam::Texture(texture))
+        | Param::Share(ScalarParam::Texture(texture)) => Some(texture),
+        _ => None,
+    })
 }
 
 /// A colour, linear Rec. 709, or a texture.
@@ -179,6 +151,12 @@ impl Material {
 pub enum ColorParam {
     Rgb(Vec3),
     Texture(Arc<SurfaceTexture>),
+}
+
+impl From<Vec3> for ColorParam {
+    fn from(rgb: Vec3) -> Self {
+        Self::Rgb(rgb)
+    }
 }
 
 impl PartialEq for ColorParam {
@@ -197,6 +175,12 @@ impl PartialEq for ColorParam {
 pub enum ScalarParam {
     Number(f32),
     Texture(Arc<SurfaceTexture>),
+}
+
+impl From<f32> for ScalarParam {
+    fn from(number: f32) -> Self {
+        Self::Number(number)
+    }
 }
 
 impl PartialEq for ScalarParam {

@@ -7,12 +7,12 @@
 
 use super::camera::camera;
 use super::components::{
-    Balls, ColorParam, DisplaySettings, FilmSize, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
-    SceneEnvironment, Shape, SurfaceTexture,
+    Balls, ColorParam, DisplaySettings, FilmSize, GREY, InWorld, Material, MeshOrigin, Ordinal, Rendering, ScalarParam,
+    SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use super::file::{
-    self, CameraPart, DisplayPart, EnvironmentPart, FilmPart, LightPart, MaterialPart, MeshShadingPart, MeshSourcePart,
-    Named, ObjectPart, RadiiPart, Rgb, SceneFile, TexturePart, TransformPart,
+    self, CameraPart, DisplayPart, EnvironmentPart, FilmPart, InFile, LightPart, MaterialPart, MeshShadingPart,
+    MeshSourcePart, Named, ObjectPart, RadiiPart, Rgb, SceneFile, TexturePart, TransformPart,
 };
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
@@ -22,7 +22,7 @@ use super::relative::path_to_text;
 use super::units::radians;
 use super::view::{Lens, Projection, View};
 use crate::mesh::Mesh;
-use crate::render::{Environment, Fresnel};
+use crate::render::{Environment, MapParams, MaterialKind, Param};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
@@ -179,7 +179,7 @@ impl<'a> Writer<'a> {
         let Shape::Mesh(mesh) = shape else { return false };
         let Some(loaded) = self.loaded else { return false };
         let Some(known) = self.loaded_meshes.get(&address(mesh)) else { return false };
-        let paint = |written: &file::ColorParam, now: &ColorParam| match (written, now) {
+        let color = |written: &file::ColorParam, now: &ColorParam| match (written, now) {
             (file::ColorParam::Rgb(a), ColorParam::Rgb(b)) => a == b,
             (file::ColorParam::Texture(name), ColorParam::Texture(texture)) => *name == texture.name,
             // Its picture could not be had.
@@ -188,19 +188,26 @@ impl<'a> Writer<'a> {
             }
             (file::ColorParam::Rgb(_), ColorParam::Texture(_)) => false,
         };
-        let same = |written: &MaterialPart, now: &Material| match (written, now) {
-            (MaterialPart::Diffuse { albedo: a }, Material::Diffuse { albedo: b }) => paint(a, b),
-            (MaterialPart::Mirror { reflectance: a }, Material::Mirror { reflectance: b }) => paint(a, b),
-            (MaterialPart::Emissive { radiance: a }, Material::Emissive { radiance: b }) => paint(a, b),
-            (MaterialPart::Glass { ior: a, absorption: b }, Material::Glass { ior, absorption }) => {
-                a == ior && b.0 == *absorption
-            }
-            // An MTL file gives no others.
-            _ => false,
+        let same = |written: &MaterialPart, now: &Material| {
+            // The file of a mesh has no metals, whose Fresnel term is no parameter.
+            written.kind() == now.kind()
+                && written.kind() != MaterialKind::Metal
+                && written.params().into_iter().zip(now.params()).all(|((_, written), (_, now))| match (written, now) {
+                    (Param::Reflectance(a), Param::Reflectance(b)) | (Param::Radiance(a), Param::Radiance(b)) => {
+                        color(a, b)
+                    }
+                    (Param::Share(file::ScalarParam::Number(a)), Param::Share(ScalarParam::Number(b))) => a == b,
+                    (Param::ConstantShare(a), Param::ConstantShare(b))
+                    | (Param::Ior(a), Param::Ior(b))
+                    | (Param::Exponent(a), Param::Exponent(b)) => a == b,
+                    (Param::Absorption(a), Param::Absorption(b)) => a.0 == *b,
+                    // The file of a mesh has no blends, and no textures for numbers.
+                    _ => false,
+                })
         };
         known.slots.len() == slots.len()
             && known.slots.iter().zip(slots).all(|((name, part), slot)| {
-                world.get::<Material>(*slot).is_some_and(|now| same(part, now))
+                world.get::<SurfaceMaterial>(*slot).is_some_and(|now| same(part, &now.0))
                     && world.get::<Name>(*slot).is_some_and(|now| now.as_str() == name)
             })
     }
@@ -211,11 +218,11 @@ impl<'a> Writer<'a> {
         let mut needed: HashSet<Entity> =
             objects.iter().filter(|item| !item.own).flat_map(|item| item.slots.clone()).collect();
         let mut all: Vec<_> = world
-            .query::<(Entity, Option<&Ordinal>, Option<&Name>, &Material)>()
+            .query::<(Entity, Option<&Ordinal>, Option<&Name>, &SurfaceMaterial)>()
             .iter(world)
             .map(|(entity, rank, name, material)| {
                 let name = name.map_or_else(String::new, |name| name.as_str().to_owned());
-                (rank.map_or(u32::MAX, |rank| rank.0), entity, name, material.clone())
+                (rank.map_or(u32::MAX, |rank| rank.0), entity, name, material.0.clone())
             })
             .collect();
         all.sort_by_key(|(rank, entity, ..)| (*rank, *entity));
@@ -248,56 +255,11 @@ impl<'a> Writer<'a> {
     fn materials(&mut self) -> Named<MaterialPart> {
         let named = std::mem::take(&mut self.named);
         let mut parts: Vec<(String, MaterialPart)> =
-            named.into_iter().map(|(_, name, material)| (name, self.material(&material))).collect();
+            named.into_iter().map(|(_, name, material)| (name, material.map(self))).collect();
         if let Some(grey) = self.grey.clone() {
-            parts.push((grey, self.material(&Material::GREY)));
+            parts.push((grey, GREY.map(self)));
         }
         Named(parts)
-    }
-
-    fn material(&mut self, material: &Material) -> MaterialPart {
-        match material {
-            Material::Diffuse { albedo } => MaterialPart::Diffuse { albedo: self.paint(albedo) },
-            Material::Mirror { reflectance } => MaterialPart::Mirror { reflectance: self.paint(reflectance) },
-            Material::Metal { alpha, reflectance, fresnel, compensate } => MaterialPart::Metal {
-                alpha: self.amount(alpha),
-                reflectance: self.paint(reflectance),
-                fresnel: Fresnel::into(*fresnel),
-                compensate: *compensate,
-            },
-            Material::Glass { ior, absorption } => MaterialPart::Glass { ior: *ior, absorption: Rgb(*absorption) },
-            Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
-                MaterialPart::Phong {
-                    diffuse: self.paint(diffuse),
-                    ambient: *ambient,
-                    specular: self.amount(specular),
-                    shininess: *shininess,
-                    transparency: *transparency,
-                    ior: *ior,
-                    absorption: Rgb(*absorption),
-                }
-            }
-            Material::Blend { weight, a, b } => MaterialPart::Blend {
-                weight: self.amount(weight),
-                a: self.material_name(Some(*a)),
-                b: self.material_name(Some(*b)),
-            },
-            Material::Emissive { radiance } => MaterialPart::Emissive { radiance: self.paint(radiance) },
-        }
-    }
-
-    fn paint(&mut self, paint: &ColorParam) -> file::ColorParam {
-        match paint {
-            ColorParam::Rgb(rgb) => file::ColorParam::Rgb(*rgb),
-            ColorParam::Texture(texture) => file::ColorParam::Texture(self.texture_name(texture)),
-        }
-    }
-
-    fn amount(&mut self, amount: &ScalarParam) -> file::ScalarParam {
-        match amount {
-            ScalarParam::Number(value) => file::ScalarParam::Number(*value),
-            ScalarParam::Texture(texture) => file::ScalarParam::Texture(self.texture_name(texture)),
-        }
     }
 
     fn texture_name(&mut self, texture: &Arc<SurfaceTexture>) -> String {
@@ -440,6 +402,26 @@ impl<'a> Writer<'a> {
         };
         let (name, transform) = (item.name.clone(), item.placement.to_part());
         ObjectPart::Mesh { name, source, shading, simplify, material, materials, transform }
+    }
+}
+
+impl MapParams<InWorld, InFile> for Writer<'_> {
+    fn color(&mut self, color: &ColorParam) -> file::ColorParam {
+        match color {
+            ColorParam::Rgb(rgb) => file::ColorParam::Rgb(*rgb),
+            ColorParam::Texture(texture) => file::ColorParam::Texture(self.texture_name(texture)),
+        }
+    }
+
+    fn scalar(&mut self, scalar: &ScalarParam) -> file::ScalarParam {
+        match scalar {
+            ScalarParam::Number(value) => file::ScalarParam::Number(*value),
+            ScalarParam::Texture(texture) => file::ScalarParam::Texture(self.texture_name(texture)),
+        }
+    }
+
+    fn material(&mut self, material: &Entity) -> String {
+        self.material_name(Some(*material))
     }
 }
 

@@ -3,7 +3,9 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`SnapshotPart`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{ColorParam, MAX_LOBES, Material, PHONG_LOBES, PointLight, ScalarParam, Shape, SurfaceTexture};
+use super::components::{
+    ColorParam, GREY, InWorld, MAX_LOBES, Material, PHONG_LOBES, PointLight, ScalarParam, Shape, SurfaceTexture,
+};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
 use super::placement::Placement;
 use super::trees::{Trees, address};
@@ -12,7 +14,8 @@ use super::view::{Lens, Projection, View};
 use crate::kdtree::{self};
 use crate::mesh::Mesh;
 use crate::render::{
-    self, Camera, ColorInput, Geometry, MaterialId, Object, Prepared, ScalarInput, Shading, Snapshot, TextureId,
+    self, Camera, ColorInput, Geometry, InSnapshot, MapParams, MaterialId, Object, Prepared, ScalarInput, Shading,
+    Snapshot, TextureId,
 };
 use bevy_ecs::prelude::Entity;
 use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
@@ -287,9 +290,9 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds) -> Shading {
     while materials.len() < table.order.len() {
         let key = table.order[materials.len()];
         materials.push(match key {
-            MaterialKey::Grey => material_of(&Material::GREY, table, &mut textures, &by_entity),
+            MaterialKey::Grey => material_of(&GREY, table, &mut textures, &by_entity),
             MaterialKey::Material(entity) => {
-                let material = by_entity.get(&entity).copied().unwrap_or(&Material::GREY);
+                let material = by_entity.get(&entity).copied().unwrap_or(&GREY);
                 material_of(material, table, &mut textures, &by_entity)
             }
             MaterialKey::Light(entity) => render::Material::Emissive {
@@ -311,37 +314,35 @@ fn material_of(
     textures: &mut TextureTable,
     by_entity: &HashMap<Entity, &Material>,
 ) -> render::Material {
-    match material {
-        Material::Diffuse { albedo } => render::Material::Diffuse { albedo: textures.color(albedo) },
-        Material::Mirror { reflectance } => render::Material::Mirror { reflectance: textures.color(reflectance) },
-        Material::Metal { alpha, reflectance, fresnel, compensate } => render::Material::Metal {
-            alpha: textures.scalar(alpha),
-            reflectance: textures.color(reflectance),
-            fresnel: *fresnel,
-            compensate: *compensate,
-        },
-        Material::Glass { ior, absorption } => render::Material::Glass { ior: *ior, absorption: *absorption },
-        Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
-            render::Material::Phong {
-                diffuse: textures.color(diffuse),
-                ambient: *ambient,
-                specular: textures.scalar(specular),
-                shininess: *shininess,
-                transparency: *transparency,
-                ior: *ior,
-                absorption: *absorption,
-            }
+    // What blends itself, or too much, is grey.
+    let is_unfit = matches!(material, Material::Blend { .. }) && !is_fit(material, by_entity);
+    let material = if is_unfit { &GREY } else { material };
+    material.map(&mut WorldToSnapshot { materials: table, textures })
+}
+
+/// The tables of a snapshot, which get what a material refers to.
+struct WorldToSnapshot<'a> {
+    materials: &'a mut MaterialIds,
+    textures: &'a mut TextureTable,
+}
+
+impl MapParams<InWorld, InSnapshot> for WorldToSnapshot<'_> {
+    fn color(&mut self, color: &ColorParam) -> ColorInput {
+        match color {
+            ColorParam::Rgb(rgb) => ColorInput::Constant(*rgb),
+            ColorParam::Texture(texture) => ColorInput::Texture(self.textures.id(texture)),
         }
-        // What blends itself, or too much, is grey.
-        Material::Blend { .. } if !is_fit(material, by_entity) => {
-            render::Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) }
+    }
+
+    fn scalar(&mut self, scalar: &ScalarParam) -> ScalarInput {
+        match scalar {
+            ScalarParam::Number(value) => ScalarInput::Constant(*value),
+            ScalarParam::Texture(texture) => ScalarInput::Texture(self.textures.id(texture)),
         }
-        Material::Blend { weight, a, b } => render::Material::Blend {
-            weight: textures.scalar(weight),
-            a: table.id(MaterialKey::Material(*a)),
-            b: table.id(MaterialKey::Material(*b)),
-        },
-        Material::Emissive { radiance } => render::Material::Emissive { radiance: textures.color(radiance) },
+    }
+
+    fn material(&mut self, material: &Entity) -> MaterialId {
+        self.materials.id(MaterialKey::Material(*material))
     }
 }
 
@@ -378,19 +379,5 @@ impl TextureTable {
             self.textures.push(texture.texture.clone());
             (self.textures.len() - 1) as TextureId
         })
-    }
-
-    fn color(&mut self, paint: &ColorParam) -> ColorInput {
-        match paint {
-            ColorParam::Rgb(rgb) => ColorInput::Constant(*rgb),
-            ColorParam::Texture(texture) => ColorInput::Texture(self.id(texture)),
-        }
-    }
-
-    fn scalar(&mut self, amount: &ScalarParam) -> ScalarInput {
-        match amount {
-            ScalarParam::Number(value) => ScalarInput::Constant(*value),
-            ScalarParam::Texture(texture) => ScalarInput::Texture(self.id(texture)),
-        }
     }
 }

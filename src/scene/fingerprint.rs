@@ -1,6 +1,6 @@
 //! A number that tells whether two loaded scenes show the same thing.
 
-use super::components::{Shape, SurfaceTexture};
+use super::components::{Shape, SurfaceTexture, textures_of};
 use super::describe::Description;
 use super::file::{
     CameraPart, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MeshSourcePart, ObjectPart, SceneFile,
@@ -136,7 +136,7 @@ impl SceneContent {
             }
         };
         for material in &inputs.materials {
-            for texture in material.material.textures() {
+            for texture in textures_of(&material.material) {
                 add(texture);
             }
         }

@@ -1,7 +1,7 @@
 //! What the picture depends on, copied out of the world in a fixed order.
 
 use super::bad_value::BadValue;
-use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape};
+use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape, SurfaceMaterial};
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
 use bevy_ecs::name::Name;
@@ -69,7 +69,7 @@ type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
 #[derive(SystemParam)]
 pub struct SceneQueries<'w, 's> {
     objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
-    materials: Query<'w, 's, Ranked<'static, &'static Material>>,
+    materials: Query<'w, 's, Ranked<'static, &'static SurfaceMaterial>>,
     lights: Query<'w, 's, Ranked<'static, (&'static PointLight, &'static Placement)>>,
     cameras: Query<'w, 's, Ranked<'static, (&'static View, &'static Projection, &'static Lens)>>,
     environment: Option<Res<'w, SceneEnvironment>>,
@@ -91,7 +91,7 @@ impl SceneQueries<'_, '_> {
             materials: in_order(materials, |entity, name, material| MaterialInput {
                 entity,
                 name: text(name),
-                material: material.clone(),
+                material: material.0.clone(),
             }),
             objects,
             lights: in_order(self.lights.iter(), |entity, name, (light, placement)| LightInput {
@@ -123,7 +123,7 @@ impl SceneQueries<'_, '_> {
         let mut open: Vec<Entity> = objects.iter().flat_map(|object| object.slots.iter().copied()).collect();
         while let Some(entity) = open.pop() {
             if used.insert(entity)
-                && let Ok((.., Material::Blend { a, b, .. })) = self.materials.get(entity)
+                && let Ok((.., SurfaceMaterial(Material::Blend { a, b, .. }))) = self.materials.get(entity)
             {
                 open.extend([*a, *b]);
             }

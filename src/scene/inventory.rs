@@ -3,7 +3,7 @@
 //! Made when somebody looks at a list, and only again when the scene has changed; numbers and colours are read from the
 //! world when they are shown, since they change more often than what there is.
 
-use super::components::{Material, Ordinal, Shape};
+use super::components::{Material, Ordinal, Shape, SurfaceMaterial};
 use super::inputs::SceneInputs;
 use crate::printable;
 use bevy_ecs::name::Name;
@@ -64,7 +64,7 @@ impl Inventory {
             }
             for &material in &of_object {
                 users.entry(material).or_default().push(object.entity);
-                if let Some(Material::Emissive { .. }) = world.get(material) {
+                if let Some(SurfaceMaterial(Material::Emissive { .. })) = world.get(material) {
                     let kind = light_kind(&object.shape);
                     let (entity, label) = (object.entity, label.clone());
                     lights.push(LightEntry { entity, label, kind, material: Some(material) });
@@ -82,7 +82,7 @@ impl Inventory {
         let mut blends: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
         let all = materials_of(world);
         for (entity, _) in &all {
-            if let Some(Material::Blend { a, b, .. }) = world.get(*entity) {
+            if let Some(SurfaceMaterial(Material::Blend { a, b, .. })) = world.get(*entity) {
                 blends.entry(*a).or_default().push(*entity);
                 blends.entry(*b).or_default().push(*entity);
             }
@@ -120,7 +120,7 @@ fn parts_of(world: &World, material: Entity) -> BTreeSet<Entity> {
     let (mut found, mut open) = (BTreeSet::new(), vec![material]);
     while let Some(entity) = open.pop() {
         if found.insert(entity)
-            && let Some(Material::Blend { a, b, .. }) = world.get(entity)
+            && let Some(SurfaceMaterial(Material::Blend { a, b, .. })) = world.get(entity)
         {
             open.extend([*a, *b]);
         }
@@ -131,7 +131,7 @@ fn parts_of(world: &World, material: Entity) -> BTreeSet<Entity> {
 /// All materials of the world with their names, in the order of the scene file.
 fn materials_of(world: &World) -> Vec<(Entity, Option<String>)> {
     // Before the first frame of a session nothing is known of any component, and there is nothing to list.
-    let Some(mut query) = world.try_query::<(Entity, Option<&Ordinal>, Option<&Name>, &Material)>() else {
+    let Some(mut query) = world.try_query::<(Entity, Option<&Ordinal>, Option<&Name>, &SurfaceMaterial)>() else {
         return Vec::new();
     };
     let mut all: Vec<_> = (query.iter(world))

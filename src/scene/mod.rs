@@ -45,8 +45,8 @@ pub use bad_value::BadValue;
 pub use bounds::{check_film_size, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use components::{
-    Balls, ColorParam, DisplaySettings, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, PointLight, Rendering,
-    ScalarParam, SceneEnvironment, Shape, SurfaceTexture,
+    Balls, ColorParam, DisplaySettings, FilmSize, GREY, InWorld, Material, MaterialSlots, MeshOrigin, Ordinal,
+    PointLight, Rendering, ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 pub use describe::{Description, camera_part};
 pub use error::{Problem, SceneError, suggestion};

@@ -2,15 +2,15 @@
 
 use super::camera::{camera, unit};
 use super::components::{
-    ColorParam, DisplaySettings, FilmSize, Material, MaterialSlots, MeshOrigin, Ordinal, PointLight, Rendering,
-    ScalarParam, SceneEnvironment, Shape, SurfaceTexture,
+    ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, PointLight, Rendering,
+    ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
-use super::file::{self, EnvironmentPart, LightPart, MaterialPart, ObjectPart, TexturePart};
+use super::file::{self, EnvironmentPart, InFile, LightPart, MaterialPart, ObjectPart, TexturePart};
 use super::loaded::LoadedScene;
 use super::placement::Placement;
 use super::units::radians;
 use super::view::View;
-use crate::render::{Display, Environment, ImageTexture, RenderSettings, Texture, TexturePattern};
+use crate::render::{Display, Environment, ImageTexture, MapParams, RenderSettings, Texture, TexturePattern};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Or, With, World};
 use glam::{DVec2, DVec3, Mat2, Vec2};
@@ -166,56 +166,52 @@ pub fn texture_of(part: &TexturePart, picture: impl FnOnce(&str) -> Option<Arc<I
 
 /// Removes whatever belongs to a scene.
 fn clear(world: &mut World) {
-    type OfAScene = Or<(With<Shape>, With<Material>, With<PointLight>, With<View>)>;
+    type OfAScene = Or<(With<Shape>, With<SurfaceMaterial>, With<PointLight>, With<View>)>;
     let old: Vec<Entity> = world.query_filtered::<Entity, OfAScene>().iter(world).collect();
     for entity in old {
         world.despawn(entity);
     }
 }
 
+/// The material of a file, for the world.
 pub(super) fn material(
     part: &MaterialPart,
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
     materials: &HashMap<&str, Entity>,
-) -> Material {
-    let paint = |paint: &file::ColorParam| match paint {
-        file::ColorParam::Rgb(rgb) => ColorParam::Rgb(*rgb),
-        // Only a mesh's own picture can be missing, and that was said in a warning.
-        file::ColorParam::Texture(name) => textures
-            .get(name.as_str())
-            .map_or(ColorParam::Rgb(glam::Vec3::splat(0.5)), |texture| ColorParam::Texture(texture.clone())),
-    };
-    let amount = |amount: &file::ScalarParam| match amount {
-        file::ScalarParam::Number(value) => ScalarParam::Number(*value),
-        file::ScalarParam::Texture(name) => textures
-            .get(name.as_str())
-            .map_or(ScalarParam::Number(0.5), |texture| ScalarParam::Texture(texture.clone())),
-    };
-    match part {
-        MaterialPart::Diffuse { albedo } => Material::Diffuse { albedo: paint(albedo) },
-        MaterialPart::Mirror { reflectance } => Material::Mirror { reflectance: paint(reflectance) },
-        MaterialPart::Metal { alpha, reflectance, fresnel, compensate } => Material::Metal {
-            alpha: amount(alpha),
-            reflectance: paint(reflectance),
-            fresnel: (*fresnel).into(),
-            compensate: *compensate,
-        },
-        MaterialPart::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: absorption.0 },
-        MaterialPart::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
-            Material::Phong {
-                diffuse: paint(diffuse),
-                ambient: *ambient,
-                specular: amount(specular),
-                shininess: *shininess,
-                transparency: *transparency,
-                ior: *ior,
-                absorption: absorption.0,
-            }
+) -> SurfaceMaterial {
+    SurfaceMaterial(part.map(&mut FileToWorld { textures, materials }))
+}
+
+/// The textures and materials of a file by their names.
+struct FileToWorld<'a> {
+    textures: &'a HashMap<&'a str, Arc<SurfaceTexture>>,
+    materials: &'a HashMap<&'a str, Entity>,
+}
+
+impl MapParams<InFile, InWorld> for FileToWorld<'_> {
+    fn color(&mut self, color: &file::ColorParam) -> ColorParam {
+        match color {
+            file::ColorParam::Rgb(rgb) => ColorParam::Rgb(*rgb),
+            // Only a mesh's own picture can be missing, and that was said in a warning.
+            file::ColorParam::Texture(name) => self
+                .textures
+                .get(name.as_str())
+                .map_or(ColorParam::Rgb(glam::Vec3::splat(0.5)), |texture| ColorParam::Texture(texture.clone())),
         }
-        MaterialPart::Blend { weight, a, b } => {
-            Material::Blend { weight: amount(weight), a: materials[a.as_str()], b: materials[b.as_str()] }
+    }
+
+    fn scalar(&mut self, scalar: &file::ScalarParam) -> ScalarParam {
+        match scalar {
+            file::ScalarParam::Number(value) => ScalarParam::Number(*value),
+            file::ScalarParam::Texture(name) => self
+                .textures
+                .get(name.as_str())
+                .map_or(ScalarParam::Number(0.5), |texture| ScalarParam::Texture(texture.clone())),
         }
-        MaterialPart::Emissive { radiance } => Material::Emissive { radiance: paint(radiance) },
+    }
+
+    fn material(&mut self, name: &String) -> Entity {
+        self.materials[name.as_str()]
     }
 }
 

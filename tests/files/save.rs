@@ -5,7 +5,7 @@ use firstlight::frame::{Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::{
     BUILTIN_SCENES, Description, DisplaySettings, Extraction, Lens, LoadOptions, LoadedScene, Material, Placement,
-    PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, View, load, save_scene,
+    PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, SurfaceMaterial, View, load, save_scene,
 };
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
@@ -117,8 +117,8 @@ proptest! {
         }
         let glass = SceneInputs::of(&mut world).materials.into_iter();
         for material in glass {
-            if let Some(mut material) = world.get_mut::<Material>(material.entity)
-                && let Material::Glass { ior: old, absorption } = &mut *material
+            if let Some(mut material) = world.get_mut::<SurfaceMaterial>(material.entity)
+                && let Material::Glass { ior: old, absorption } = &mut material.0
             {
                 (*old, *absorption) = (ior, Vec3::splat(intensity));
             }
@@ -188,7 +188,7 @@ fn files_that_a_scene_points_at_are_found_from_its_new_place() {
 
     // A material of the mesh's own file is edited: all of them are then written, one for each slot.
     let slots = SceneInputs::of(&mut world).objects[0].slots.clone();
-    world.entity_mut(slots[1]).insert(Material::Glass { ior: 1.7, absorption: Vec3::ZERO });
+    world.entity_mut(slots[1]).insert(SurfaceMaterial(Material::Glass { ior: 1.7, absorption: Vec3::ZERO }));
     let (mut again, loaded) = through_a_file(&mut world, &scene, &path.join("new/edited.ron"));
     assert_same(&mut world, &mut again, "edited slots");
     assert_eq!(picture(&mut world, &scene), picture(&mut again, &loaded));

@@ -3,12 +3,14 @@
 use bevy_ecs::component::Component;
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{
-    Bookmarks, Command, Edit, Focus, FocusTarget, MaterialKind, MeshMeasure, NewThing, Projector, Property, Selection,
-    Session, SessionOptions, Target, wanted_mesh,
+    Bookmarks, Command, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection, Session,
+    SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::Inspection;
+use firstlight::render::{Inspection, MaterialKind};
 use firstlight::scene::file::{MeshShadingPart, MeshSourcePart, Rgb, TexturePart, WrapPart};
-use firstlight::scene::{ColorParam, Material, MaterialSlots, MeshOrigin, Placement, PointLight, SceneSource, Shape};
+use firstlight::scene::{
+    ColorParam, Material, MaterialSlots, MeshOrigin, Placement, PointLight, SceneSource, Shape, SurfaceMaterial,
+};
 use glam::{DVec2, DVec3, Vec3};
 use std::time::{Duration, Instant};
 
@@ -182,13 +184,13 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     driver.edit([Edit::Set { id, property: Property::Intensity, value: DVec3::new(3.0, 2.0, 1.0) }]);
     assert_eq!(driver.get::<PointLight>("point light").intensity, Vec3::new(3.0, 2.0, 1.0));
     // Nonsense is refused, and nothing changes.
-    let (material, id): (Material, u64) = (driver.get("red"), driver.named("red").to_bits());
+    let (material, id): (SurfaceMaterial, u64) = (driver.get("red"), driver.named("red").to_bits());
     for (property, value) in
         [(Property::Color, DVec3::NAN), (Property::Ior, DVec3::ONE), (Property::Radius, DVec3::ONE)]
     {
         driver.edit([Edit::Set { id, property, value }]);
     }
-    assert_eq!(driver.get::<Material>("red"), material);
+    assert_eq!(driver.get::<SurfaceMaterial>("red"), material);
 }
 
 /// Each stands on something, in sight, and within nothing that was there before, not even when many were added.
@@ -399,14 +401,14 @@ fn colours_become_textures_and_textures_change() {
         offset: DVec2::ZERO,
         rotate: 0.0,
     };
-    let texture = |driver: &Driver| match driver.get::<Material>("red") {
+    let texture = |driver: &Driver| match driver.get::<SurfaceMaterial>("red").0 {
         Material::Diffuse { albedo: ColorParam::Texture(texture) }
         | Material::Phong { diffuse: ColorParam::Texture(texture), .. } => {
             Some((texture.name.clone(), texture.part.clone()))
         }
         _ => None,
     };
-    let plain: Material = driver.get("red");
+    let plain: SurfaceMaterial = driver.get("red");
     driver.edit([Edit::Paint { id, part: checker(8.0) }]);
     assert_eq!(texture(&driver), Some(("checker".to_owned(), checker(8.0))));
     let restarts = driver.session.status().restarts;
@@ -431,7 +433,7 @@ fn colours_become_textures_and_textures_change() {
     let text = std::fs::read_to_string(folder.path().join("painted.ron")).unwrap();
     assert!(text.contains("\"stripes.png\""), "{text}");
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
-    assert_eq!(driver.get::<Material>("red"), plain);
+    assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
     // What cannot be read is told, and changes nothing.
     let missing = TexturePart::Image {
         file: "nowhere.png".to_owned(),
@@ -443,5 +445,5 @@ fn colours_become_textures_and_textures_change() {
     };
     driver.edit([Edit::Paint { id, part: missing }]);
     driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));
-    assert_eq!(driver.get::<Material>("red"), plain);
+    assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
 }

@@ -3,7 +3,7 @@
 use bevy_ecs::entity::Entity;
 use firstlight::frame::{Command, Edit, History, Property, Selection, Session, SessionOptions, Target, sky_strength};
 use firstlight::render::Environment;
-use firstlight::scene::{ColorParam, Inventory, Material, SceneSource};
+use firstlight::scene::{ColorParam, Inventory, Material, SceneSource, SurfaceMaterial};
 use glam::{DVec3, Vec3};
 use std::time::{Duration, Instant};
 
@@ -110,7 +110,7 @@ fn a_shared_material_changes_on_all_that_share_it_and_they_can_be_selected() {
     let restarts = driver.session.status().restarts;
     let value = DVec3::new(0.1, 0.8, 0.1);
     driver.edit(Edit::Set { id: clay.to_bits(), property: Property::Color, value });
-    let color = |driver: &Driver| match driver.session.world().get::<Material>(clay) {
+    let color = |driver: &Driver| match SurfaceMaterial::of(driver.session.world(), clay) {
         Some(Material::Diffuse { albedo: ColorParam::Rgb(rgb) }) => *rgb,
         other => panic!("{other:?}"),
     };

@@ -1,7 +1,7 @@
 //! Files of a running session: saved, read again when they change, recorded and played.
 
 use firstlight::frame::{Command, MessageKind, Session, SessionOptions, Target};
-use firstlight::scene::{ColorParam, LoadOptions, Material, SceneInputs, SceneSource, Shape, load};
+use firstlight::scene::{ColorParam, LoadOptions, Material, SceneInputs, SceneSource, Shape, SurfaceMaterial, load};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 use std::sync::Arc;
@@ -167,7 +167,9 @@ fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
     let paint = |driver: &mut Driver, red: f32| {
         let world = driver.session.world_mut();
         let object = SceneInputs::of(world).objects[0].slots[0];
-        world.entity_mut(object).insert(Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(red, 0.2, 0.1)) });
+        world
+            .entity_mut(object)
+            .insert(SurfaceMaterial(Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(red, 0.2, 0.1)) }));
     };
     paint(&mut driver, 0.25);
     driver.settle();

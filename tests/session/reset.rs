@@ -6,8 +6,8 @@ use firstlight::frame::{Command, FrameChanges, Level, Paused, Session, SessionOp
 use firstlight::mesh::procedural;
 use firstlight::render::{Environment, Integrator, ToneCurve};
 use firstlight::scene::{
-    Balls, ColorParam, Lens, Material, MaterialSlots, Placement, PointLight, Projection, Rendering, SceneEnvironment,
-    Shape, View,
+    Balls, ColorParam, GREY, Lens, Material, MaterialSlots, Placement, PointLight, Projection, Rendering,
+    SceneEnvironment, Shape, SurfaceMaterial, View,
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -33,8 +33,8 @@ impl Stage {
         let options = SessionOptions { width: 16, height: 12, threads: Some(1), target, ..SessionOptions::default() };
         let mut session = Session::new(options).unwrap();
         let world = session.world_mut();
-        let [red, blue, unused] =
-            [Vec3::X, Vec3::Z, Vec3::Y].map(|rgb| world.spawn(Material::Diffuse { albedo: ColorParam::Rgb(rgb) }).id());
+        let [red, blue, unused] = [Vec3::X, Vec3::Z, Vec3::Y]
+            .map(|rgb| world.spawn(SurfaceMaterial(Material::Diffuse { albedo: ColorParam::Rgb(rgb) })).id());
         let ball = world.spawn((Shape::Sphere { radius: 1.0 }, MaterialSlots(vec![red]))).id();
         let cube = Arc::new(procedural::cuboid(DVec3::ONE));
         let mesh = world.spawn((Shape::Mesh(cube), MaterialSlots(vec![blue]))).id();
@@ -94,7 +94,7 @@ fn each_component_has_its_level() {
     assert_eq!(stage.cause(), "focus");
     assert_eq!(stage.set(camera, |lens: &mut Lens| lens.blades = 6), [Restart]);
 
-    assert_eq!(stage.set(red, |material: &mut Material| *material = Material::GREY), [Shading]);
+    assert_eq!(stage.set(red, |material: &mut SurfaceMaterial| material.0 = GREY), [Shading]);
     assert!(stage.cause().starts_with("material "), "{}", stage.cause());
     assert_eq!(stage.set(light, |light: &mut PointLight| light.intensity = Vec3::splat(2.0)), [Shading]);
     assert_eq!(
@@ -183,11 +183,11 @@ fn nothing_restarts_while_nothing_changes() {
     let Stage { ball, red, unused, camera, .. } = stage;
     // Touched, marked as changed by the ECS, but equal.
     assert_eq!(stage.set(ball, |placement: &mut Placement| *placement = Placement::default()), []);
-    assert_eq!(stage.set(red, |material: &mut Material| *material = material.clone()), []);
+    assert_eq!(stage.set(red, |material: &mut SurfaceMaterial| *material = material.clone()), []);
     assert_eq!(stage.set(camera, |view: &mut View| view.eye.x += 0.0), []);
     // Not in the picture.
-    assert_eq!(stage.set(unused, |material: &mut Material| *material = Material::GREY), []);
-    assert_eq!(stage.edit(|world| _ = world.spawn(Material::GREY)), []);
+    assert_eq!(stage.set(unused, |material: &mut SurfaceMaterial| material.0 = GREY), []);
+    assert_eq!(stage.edit(|world| _ = world.spawn(SurfaceMaterial(GREY))), []);
     assert_eq!(stage.set(camera, |view: &mut View| view.pivot_distance = 4.0), []);
     stage.session.send(Command::ToggleDepthOfField);
     assert_eq!(stage.frame(), [Level::Restart]);

@@ -6,7 +6,7 @@ use firstlight::frame::{
 use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::render::Film;
 use firstlight::scene::{
-    Extraction, LoadOptions, Material, Rendering, SceneInputs, SceneSource, Shape, UpAxis, View, load,
+    Extraction, LoadOptions, Material, Rendering, SceneInputs, SceneSource, Shape, SurfaceMaterial, UpAxis, View, load,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -356,7 +356,11 @@ fn broken_components_are_left_out_with_a_message_and_never_a_panic() {
     world.spawn(Shape::Quad { edge_u: DVec3::X, edge_v: DVec3::X });
     let mut circle = world.spawn_empty();
     let id = circle.id();
-    circle.insert(Material::Blend { weight: firstlight::scene::ScalarParam::Number(0.5), a: id, b: id });
+    circle.insert(SurfaceMaterial(Material::Blend {
+        weight: firstlight::scene::ScalarParam::Number(0.5),
+        a: id,
+        b: id,
+    }));
     world.spawn((Shape::Sphere { radius: 0.1 }, firstlight::scene::MaterialSlots(vec![id])));
     driver.run_until(|session| session.status().done && session.is_idle());
     assert_eq!(driver.say(MessageKind::Warning).len(), 6, "{:?}", driver.say(MessageKind::Warning));

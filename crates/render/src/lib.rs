@@ -19,7 +19,10 @@ pub use crate::core::camera::{Camera, CameraError};
 pub use crate::core::counts::RayCounts;
 pub use crate::core::environment::Environment;
 pub use crate::core::filter::PixelFilter;
-pub use crate::core::material::{ColorInput, Emission, Fresnel, Material, MaterialId, ScalarInput};
+pub use crate::core::material::{
+    ColorInput, Emission, Fresnel, InSnapshot, MapParams, Material, MaterialId, MaterialKind, Param, ParamMut,
+    ParamRef, Params, ScalarInput,
+};
 pub use crate::core::settings::{Integrator, RenderSettings, SettingsError};
 pub use crate::core::snapshot::{Geometry, Object, Shading, Snapshot};
 pub use crate::core::techniques::Techniques;

@@ -7,7 +7,9 @@ use super::spot::{self, Spot};
 use crate::frame::selection::Selection;
 use crate::mesh::procedural;
 use crate::scene::file::{MeshShadingPart, MeshSourcePart};
-use crate::scene::{ColorParam, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Shape};
+use crate::scene::{
+    ColorParam, GREY, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Shape, SurfaceMaterial,
+};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
@@ -105,12 +107,12 @@ pub fn spawn(world: &mut World, name: &str, bundle: impl bevy_ecs::bundle::Bundl
 
 pub fn new_material(world: &mut World, name: &str, material: Material) -> Entity {
     let (name, ordinal) = (free_name(world, name, true), next_ordinal(world));
-    world.spawn((material, Name::new(name), ordinal)).id()
+    world.spawn((SurfaceMaterial(material), Name::new(name), ordinal)).id()
 }
 
 /// `name`, or the first of `name 2`, `name 3`, … that is free among the materials or among all else.
 fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
-    let mut named = world.query::<(&Name, Has<Material>)>();
+    let mut named = world.query::<(&Name, Has<SurfaceMaterial>)>();
     let taken: std::collections::HashSet<String> = (named.iter(world))
         .filter(|(_, is_material)| *is_material == of_materials)
         .map(|(name, _)| name.as_str().to_owned())
@@ -133,7 +135,7 @@ pub fn delete(world: &mut World) {
 /// Takes all that makes the entity a part of the scene.
 pub fn bury(world: &mut World, entity: Entity) {
     if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.remove::<(Shape, Placement, MaterialSlots, Material, PointLight, MeshOrigin, Ordinal, Name)>();
+        entity.remove::<(Shape, Placement, MaterialSlots, SurfaceMaterial, PointLight, MeshOrigin, Ordinal, Name)>();
     }
 }
 
@@ -175,7 +177,7 @@ fn plain_name(name: &str) -> &str {
 /// Gives `object` a copy of its first material; plain grey if it has none.
 pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
     let old = world.get::<MaterialSlots>(object).and_then(|slots| slots.0.first().copied());
-    let material = old.and_then(|old| world.get::<Material>(old)).cloned().unwrap_or(Material::GREY);
+    let material = old.and_then(|old| SurfaceMaterial::of(world, old)).cloned().unwrap_or(GREY);
     let name = old.and_then(|old| world.get::<Name>(old)).map(|name| plain_name(name.as_str()).to_owned());
     let material = new_material(world, &name.unwrap_or_else(|| "material".to_owned()), material);
     let mut slots = world.get_mut::<MaterialSlots>(object).ok_or("this has no material")?;

@@ -23,8 +23,7 @@ mod texture;
 
 pub use add::NewThing;
 pub(super) use add::{clay, spawn};
-pub use property::{MaterialKind, Property};
-pub use set::paint_of;
+pub use property::Property;
 pub use sky::strength as sky_strength;
 pub(super) use texture::take as take_picture;
 pub use texture::textures;
@@ -33,6 +32,7 @@ use super::history::History;
 use super::resources::{Clock, PictureSize, RenderState};
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
+use crate::render::MaterialKind;
 use crate::scene::file::{MeshShadingPart, TexturePart};
 use crate::scene::{MaterialSlots, users_of};
 use bevy_ecs::name::Name;

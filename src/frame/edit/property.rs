@@ -1,6 +1,5 @@
 //! What can be set one value at a time.
 
-use crate::scene::Material;
 use serde::{Deserialize, Serialize};
 
 /// What [`super::Edit::Set`] sets. A number is the first of the three values, and `x` is all that counts.
@@ -42,48 +41,25 @@ pub enum Property {
 }
 
 impl Property {
+    /// What sets a parameter of a material, by the parameter's name in a scene file.
+    pub fn of_param(name: &str) -> Option<Self> {
+        Some(match name {
+            "albedo" | "reflectance" | "diffuse" | "radiance" => Self::Color,
+            "alpha" => Self::Alpha,
+            "ior" => Self::Ior,
+            "absorption" => Self::Absorption,
+            "ambient" => Self::Ambient,
+            "specular" => Self::Specular,
+            "shininess" => Self::Shininess,
+            "transparency" => Self::Transparency,
+            "weight" => Self::Weight,
+            _ => return None,
+        })
+    }
+
     /// Of the surroundings, which are no entity.
     pub(super) fn is_of_sky(self) -> bool {
         use Property::{Ground, Horizon, Sky, SkyRotation, SkyStrength, Zenith};
         matches!(self, Sky | Zenith | Horizon | Ground | SkyStrength | SkyRotation)
-    }
-}
-
-/// The kinds of [`Material`] that one can be turned into.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum MaterialKind {
-    Diffuse,
-    Mirror,
-    Metal,
-    Glass,
-    Phong,
-    Emissive,
-}
-
-impl MaterialKind {
-    pub const ALL: [Self; 6] = [Self::Diffuse, Self::Mirror, Self::Metal, Self::Glass, Self::Phong, Self::Emissive];
-
-    /// `None` for a blend.
-    pub fn of(material: &Material) -> Option<Self> {
-        Some(match material {
-            Material::Diffuse { .. } => Self::Diffuse,
-            Material::Mirror { .. } => Self::Mirror,
-            Material::Metal { .. } => Self::Metal,
-            Material::Glass { .. } => Self::Glass,
-            Material::Phong { .. } => Self::Phong,
-            Material::Emissive { .. } => Self::Emissive,
-            Material::Blend { .. } => return None,
-        })
-    }
-
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Diffuse => "matte",
-            Self::Mirror => "mirror",
-            Self::Metal => "metal",
-            Self::Glass => "glass",
-            Self::Phong => "Phong",
-            Self::Emissive => "light",
-        }
     }
 }

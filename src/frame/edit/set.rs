@@ -1,34 +1,11 @@
 //! The numbers and colours of materials, lights and shapes, one at a time; those of the sky are in [`super::sky`].
 
-use super::property::{MaterialKind, Property};
+use super::property::Property;
 use super::sky;
-use crate::render::Fresnel;
-use crate::scene::{ColorParam, Linear, Material, Placement, PointLight, ScalarParam, Shape};
+use crate::render::{Fresnel, MaterialKind, Param};
+use crate::scene::{ColorParam, Linear, Material, Placement, PointLight, Shape, SurfaceMaterial};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
-
-/// The colour of a material, if it has one.
-pub fn paint_of(material: &Material) -> Option<&ColorParam> {
-    match material {
-        Material::Diffuse { albedo: paint }
-        | Material::Mirror { reflectance: paint }
-        | Material::Metal { reflectance: paint, .. }
-        | Material::Phong { diffuse: paint, .. }
-        | Material::Emissive { radiance: paint } => Some(paint),
-        Material::Glass { .. } | Material::Blend { .. } => None,
-    }
-}
-
-pub(super) fn paint_mut(material: &mut Material) -> Option<&mut ColorParam> {
-    match material {
-        Material::Diffuse { albedo: paint }
-        | Material::Mirror { reflectance: paint }
-        | Material::Metal { reflectance: paint, .. }
-        | Material::Phong { diffuse: paint, .. }
-        | Material::Emissive { radiance: paint } => Some(paint),
-        Material::Glass { .. } | Material::Blend { .. } => None,
-    }
-}
 
 /// Sets one property; the sky needs no entity.
 pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value: DVec3) -> Result<(), String> {
@@ -64,8 +41,8 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
         set_if_different(world, entity, light);
         return Ok(());
     }
-    let mut material = world.get::<Material>(entity).cloned().ok_or_else(wrong)?;
-    set_in_material(&mut material, property, value).ok_or_else(wrong)?;
+    let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or_else(wrong)?;
+    set_in_material(&mut material.0, property, value).ok_or_else(wrong)?;
     set_if_different(world, entity, material);
     Ok(())
 }
@@ -99,65 +76,46 @@ fn with_placement(placement: Placement, property: Property, value: DVec3) -> Opt
 fn set_in_material(material: &mut Material, property: Property, value: DVec3) -> Option<()> {
     let number = value.x as f32;
     let share = number.clamp(0.0, 1.0);
-    match (property, material) {
-        (Property::Color, Material::Emissive { radiance }) => {
-            *radiance = ColorParam::Rgb(value.max(DVec3::ZERO).as_vec3());
-        }
-        (Property::Color, material) => {
-            *paint_mut(material)? = ColorParam::Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3());
-        }
-        (Property::Alpha, Material::Metal { alpha, .. }) => *alpha = ScalarParam::Number(number.clamp(1e-3, 1.0)),
-        (Property::Schlick, Material::Metal { fresnel, .. }) => {
-            *fresnel = if number == 0.0 { Fresnel::Constant } else { Fresnel::Schlick };
-        }
-        (Property::Ior, Material::Glass { ior, .. } | Material::Phong { ior, .. }) => *ior = number.clamp(0.1, 10.0),
-        (Property::Absorption, Material::Glass { absorption, .. } | Material::Phong { absorption, .. }) => {
-            *absorption = value.max(DVec3::ZERO).as_vec3();
-        }
-        (Property::Ambient, Material::Phong { ambient, .. }) => *ambient = share,
-        (Property::Specular, Material::Phong { specular, .. }) => *specular = ScalarParam::Number(share),
-        (Property::Shininess, Material::Phong { shininess, .. }) => *shininess = number.clamp(1.0, 1e5),
-        (Property::Transparency, Material::Phong { transparency, .. }) => *transparency = share,
-        (Property::Weight, Material::Blend { weight, .. }) => *weight = ScalarParam::Number(share),
-        _ => return None,
+    if property == Property::Color {
+        let is_light = material.kind() == MaterialKind::Emissive;
+        let most = if is_light { DVec3::INFINITY } else { DVec3::ONE };
+        *material.color_mut()? = ColorParam::Rgb(value.clamp(DVec3::ZERO, most).as_vec3());
+        return Some(());
+    }
+    if let (Property::Schlick, Material::Metal { fresnel, .. }) = (property, &mut *material) {
+        *fresnel = if number == 0.0 { Fresnel::Constant } else { Fresnel::Schlick };
+        return Some(());
+    }
+    let mut params = material.params_mut().into_iter();
+    let (_, param) = params.find(|(name, _)| Property::of_param(name) == Some(property))?;
+    match param {
+        // A narrower lobe is a mirror to the eye.
+        Param::Share(width) if property == Property::Alpha => *width = number.clamp(1e-3, 1.0).into(),
+        Param::Share(scalar) => *scalar = share.into(),
+        Param::ConstantShare(old) => *old = share,
+        Param::Ior(ior) => *ior = number.clamp(0.1, 10.0),
+        Param::Exponent(exponent) => *exponent = number.clamp(1.0, 1e5),
+        Param::Absorption(absorption) => *absorption = value.max(DVec3::ZERO).as_vec3(),
+        Param::Reflectance(_) | Param::Radiance(_) | Param::Part(_) => return None,
     }
     Some(())
 }
 
 /// Keeps the colour, where both have one.
 pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result<(), String> {
-    let old = world.get::<Material>(entity).ok_or("this is not a material")?;
-    if MaterialKind::of(old) == Some(kind) {
+    let old = SurfaceMaterial::of(world, entity).ok_or("this is not a material")?;
+    if old.kind() == kind {
         return Ok(());
     }
-    let was_light = matches!(old, Material::Emissive { .. });
-    let paint = paint_of(old).cloned().unwrap_or(ColorParam::Rgb(Vec3::splat(0.7)));
+    let was_light = old.kind() == MaterialKind::Emissive;
+    let color = old.color().cloned().unwrap_or(ColorParam::Rgb(Vec3::splat(0.7)));
     // A light is brighter than white, and a surface is not.
-    let color = match paint {
+    let color = match color {
         ColorParam::Rgb(rgb) if was_light => ColorParam::Rgb(rgb / rgb.max_element().max(1.0)),
         ColorParam::Rgb(rgb) if kind == MaterialKind::Emissive => ColorParam::Rgb(rgb * 5.0),
-        paint => paint,
+        color => color,
     };
-    world.entity_mut(entity).insert(match kind {
-        MaterialKind::Diffuse => Material::Diffuse { albedo: color },
-        MaterialKind::Mirror => Material::Mirror { reflectance: color },
-        MaterialKind::Metal => Material::Metal {
-            alpha: ScalarParam::Number(0.04),
-            reflectance: color,
-            fresnel: Fresnel::Schlick,
-            compensate: true,
-        },
-        MaterialKind::Glass => Material::Glass { ior: 1.5, absorption: Vec3::ZERO },
-        MaterialKind::Phong => Material::Phong {
-            diffuse: color,
-            ambient: 1.0,
-            specular: ScalarParam::Number(0.2),
-            shininess: 50.0,
-            transparency: 0.0,
-            ior: 1.5,
-            absorption: Vec3::ZERO,
-        },
-        MaterialKind::Emissive => Material::Emissive { radiance: color },
-    });
+    let new = Material::of_kind(kind, color).ok_or("a blend is made of two materials")?;
+    world.entity_mut(entity).insert(SurfaceMaterial(new));
     Ok(())
 }

@@ -1,12 +1,12 @@
 //! Textures in the place of a material's colour: those that the scene has, a new checker, a picture from a file.
 
-use super::set::{paint_mut, paint_of, set_if_different};
+use super::set::set_if_different;
 use crate::frame::background::BackgroundTasks;
 use crate::frame::resources::{Clock, CurrentScene};
 use crate::frame::status::{MessageKind, Status};
 use crate::render::{ImageTexture, TexturePattern};
 use crate::scene::file::TexturePart;
-use crate::scene::{ColorParam, Material, SurfaceTexture, texture_of};
+use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, texture_of};
 use bevy_ecs::prelude::{Entity, World};
 use std::path::Path;
 use std::sync::Arc;
@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// All textures that materials of the world use, by name.
 pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
     let mut found: Vec<Arc<SurfaceTexture>> = Vec::new();
-    for material in world.query::<&Material>().iter(world) {
-        if let Some(ColorParam::Texture(texture)) = paint_of(material)
+    for SurfaceMaterial(material) in world.query::<&SurfaceMaterial>().iter(world) {
+        if let Some(ColorParam::Texture(texture)) = material.color()
             && !found.iter().any(|known| Arc::ptr_eq(known, texture))
         {
             found.push(texture.clone());
@@ -34,7 +34,7 @@ pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), 
 
 /// One of this description. A picture that the scene has is shared, another one is read beside the picture.
 pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(), String> {
-    let colored = world.get::<Material>(entity).is_some_and(|material| paint_of(material).is_some());
+    let colored = SurfaceMaterial::of(world, entity).is_some_and(|material| material.color().is_some());
     if !colored {
         return Err("this has no colour".to_owned());
     }
@@ -72,7 +72,7 @@ fn make(
 ) -> Result<(), String> {
     let texture = texture_of(&part, |_| picture).ok_or("the picture is not there")?;
     // A texture that is only changed keeps its name.
-    let old = world.get::<Material>(entity).and_then(paint_of);
+    let old = SurfaceMaterial::of(world, entity).and_then(Material::color);
     let name = match (old, &part) {
         (Some(ColorParam::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
         (_, TexturePart::Checker { .. }) => free_name(world, "checker"),
@@ -93,8 +93,8 @@ fn same_source(a: &TexturePart, b: &TexturePart) -> bool {
 }
 
 fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
-    let mut material = world.get::<Material>(entity).cloned().ok_or("this is not a material")?;
-    *paint_mut(&mut material).ok_or("this material has no colour")? = ColorParam::Texture(texture);
+    let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or("this is not a material")?;
+    *material.0.color_mut().ok_or("this material has no colour")? = ColorParam::Texture(texture);
     set_if_different(world, entity, material);
     Ok(())
 }

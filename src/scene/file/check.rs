@@ -5,6 +5,7 @@ use super::parts::{
     TexturePart, TransformPart,
 };
 use super::value::{ColorParam, Rgb, ScalarParam};
+use crate::render::Param;
 use crate::scene::bounds::{
     check_film_size, check_max_depth, coordinate_rule, is_coordinate, is_size, number, size_rule, triple,
 };
@@ -136,37 +137,25 @@ impl Check<'_> {
 
     fn material(&mut self, name: &str, material: &MaterialPart) {
         let path = format!("materials/{name}");
-        match material {
-            MaterialPart::Diffuse { albedo } => self.share(&path, "albedo", albedo),
-            MaterialPart::Mirror { reflectance } => self.share(&path, "reflectance", reflectance),
-            MaterialPart::Metal { alpha, reflectance, .. } => {
-                self.amount(&path, "alpha", alpha);
-                self.share(&path, "reflectance", reflectance);
-            }
-            MaterialPart::Glass { ior, absorption } => {
-                self.ior(&path, *ior);
-                self.light(&format!("{path}/absorption"), *absorption);
-            }
-            MaterialPart::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => {
-                self.share(&path, "diffuse", diffuse);
-                self.amount(&path, "specular", specular);
-                for (field, value) in [("ambient", ambient), ("transparency", transparency)] {
-                    if !(0.0..=1.0).contains(value) {
-                        self.wrong(&format!("{path}/{field}"), format!("`{field}` is {value}, but must lie in 0..1"));
-                    }
+        for (field, param) in material.params() {
+            let path = format!("{path}/{field}");
+            match param {
+                Param::Reflectance(color) => self.share(&path, field, color),
+                Param::Radiance(ColorParam::Rgb(rgb)) => self.light(&path, Rgb(*rgb)),
+                Param::Radiance(ColorParam::Texture(texture)) => self.texture_name(&path, texture),
+                Param::Share(scalar) => self.scalar(&path, field, scalar),
+                Param::ConstantShare(value) if !(0.0..=1.0).contains(value) => {
+                    self.wrong(&path, format!("`{field}` is {value}, but must lie in 0..1"));
                 }
-                if !(shininess.is_finite() && *shininess >= 0.0) {
-                    let message =
-                        format!("`shininess` is {shininess}, but must be 0 or positive: 20 is dull, 200 sharp");
-                    self.wrong(&format!("{path}/shininess"), message);
+                Param::Exponent(value) if !(value.is_finite() && *value >= 0.0) => {
+                    let message = format!("`{field}` is {value}, but must be 0 or positive: 20 is dull, 200 sharp");
+                    self.wrong(&path, message);
                 }
-                self.ior(&path, *ior);
-                self.light(&format!("{path}/absorption"), *absorption);
-            }
-            MaterialPart::Blend { weight, a, b } => {
-                self.amount(&path, "weight", weight);
-                for (field, part) in [("a", a), ("b", b)] {
-                    let path = format!("{path}/{field}");
+                Param::Ior(ior) if !(ior.is_finite() && *ior > 0.0) => {
+                    self.wrong(&path, format!("`{field}` is {ior}, but must be positive: 1.5 is glass"));
+                }
+                Param::Absorption(absorption) => self.light(&path, *absorption),
+                Param::Part(part) => {
                     self.material_name(&path, part);
                     if self.reaches(part, name) {
                         let message = format!("material `{name}` blends itself: a blend must end in plain materials");
@@ -174,25 +163,18 @@ impl Check<'_> {
                         return;
                     }
                 }
-                let (lobes, glowing) = self.lobes(name);
-                if lobes > MAX_LOBES {
-                    self.wrong(&path, format!("the blend has more than {MAX_LOBES} plain materials: nest fewer"));
-                } else if glowing > 1 {
-                    self.wrong(&path, "the blend has more than one emissive part: keep one of them");
-                } else if glowing == 1 && matches!(weight, ScalarParam::Texture(_)) {
-                    self.wrong(&format!("{path}/weight"), "with an emissive part, `weight` must be a number");
-                }
+                Param::ConstantShare(_) | Param::Exponent(_) | Param::Ior(_) => {}
             }
-            MaterialPart::Emissive { radiance } => match radiance {
-                ColorParam::Rgb(rgb) => self.light(&format!("{path}/radiance"), Rgb(*rgb)),
-                ColorParam::Texture(texture) => self.texture_name(&format!("{path}/radiance"), texture),
-            },
         }
-    }
-
-    fn ior(&mut self, path: &str, ior: f32) {
-        if !(ior.is_finite() && ior > 0.0) {
-            self.wrong(&format!("{path}/ior"), format!("`ior` is {ior}, but must be positive: 1.5 is glass"));
+        if let MaterialPart::Blend { weight, .. } = material {
+            let (lobes, glowing) = self.lobes(name);
+            if lobes > MAX_LOBES {
+                self.wrong(&path, format!("the blend has more than {MAX_LOBES} plain materials: nest fewer"));
+            } else if glowing > 1 {
+                self.wrong(&path, "the blend has more than one emissive part: keep one of them");
+            } else if glowing == 1 && matches!(weight, ScalarParam::Texture(_)) {
+                self.wrong(&format!("{path}/weight"), "with an emissive part, `weight` must be a number");
+            }
         }
     }
 
@@ -366,24 +348,22 @@ impl Check<'_> {
     }
 
     /// A share of the light in each channel: 0..1.
-    fn share(&mut self, path: &str, field: &str, paint: &ColorParam) {
-        let path = format!("{path}/{field}");
-        match paint {
-            ColorParam::Texture(name) => self.texture_name(&path, name),
+    fn share(&mut self, path: &str, field: &str, color: &ColorParam) {
+        match color {
+            ColorParam::Texture(name) => self.texture_name(path, name),
             ColorParam::Rgb(rgb) if !(rgb.cmpge(Vec3::ZERO).all() && rgb.cmple(Vec3::ONE).all()) => {
                 let Vec3 { x, y, z } = rgb;
-                self.wrong(&path, format!("`{field}` is ({x}, {y}, {z}), but is a share of light: between 0 and 1"));
+                self.wrong(path, format!("`{field}` is ({x}, {y}, {z}), but is a share of light: between 0 and 1"));
             }
             ColorParam::Rgb(_) => {}
         }
     }
 
-    fn amount(&mut self, path: &str, field: &str, amount: &ScalarParam) {
-        let path = format!("{path}/{field}");
-        match amount {
-            ScalarParam::Texture(name) => self.texture_name(&path, name),
+    fn scalar(&mut self, path: &str, field: &str, scalar: &ScalarParam) {
+        match scalar {
+            ScalarParam::Texture(name) => self.texture_name(path, name),
             ScalarParam::Number(value) if !(0.0..=1.0).contains(value) => {
-                self.wrong(&path, format!("`{field}` is {value}, but must lie between 0 and 1"));
+                self.wrong(path, format!("`{field}` is {value}, but must lie between 0 and 1"));
             }
             ScalarParam::Number(_) => {}
         }

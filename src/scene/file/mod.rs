@@ -13,9 +13,9 @@ mod value;
 pub use super::bounds::check_film_size;
 pub use locate::locate;
 pub use parts::{
-    CameraPart, DisplayPart, EnvironmentPart, FilmPart, FilterPart, FresnelPart, IntegratorPart, LightPart,
-    MaterialPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart,
-    ToneCurvePart, TransformPart, WrapPart, ball_grid,
+    CameraPart, DisplayPart, EnvironmentPart, FilmPart, FilterPart, InFile, IntegratorPart, LightPart, MaterialPart,
+    MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart, ToneCurvePart,
+    TransformPart, WrapPart, ball_grid,
 };
 pub use value::{ColorParam, Named, Rgb, ScalarParam};
 

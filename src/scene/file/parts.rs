@@ -1,7 +1,7 @@
 //! The parts of a scene file, as written. Meaning and limits are checked in `check`.
 
 use super::value::{ColorParam, Named, Rgb, ScalarParam};
-use crate::render::{Display, Fresnel, Integrator, PixelFilter, ToneCurve, Wrap};
+use crate::render::{Display, Integrator, Material, Params, PixelFilter, ToneCurve, Wrap};
 use glam::{DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -294,88 +294,19 @@ impl From<WrapPart> for Wrap {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum MaterialPart {
-    Diffuse {
-        albedo: ColorParam,
-    },
-    Mirror {
-        #[serde(default = "white_paint")]
-        reflectance: ColorParam,
-    },
-    Metal {
-        /// GGX width: the square of the roughness that other programs ask for.
-        alpha: ScalarParam,
-        reflectance: ColorParam,
-        #[serde(default, skip_serializing_if = "is_default")]
-        fresnel: FresnelPart,
-        #[serde(default, skip_serializing_if = "is_default")]
-        compensate: bool,
-    },
-    Glass {
-        #[serde(default = "default_ior")]
-        ior: f32,
-        /// Per metre.
-        #[serde(default, skip_serializing_if = "is_default")]
-        absorption: Rgb,
-    },
-    /// The classic local model. Path tracing takes it for shares of matte, mirror and glass.
-    Phong {
-        diffuse: ColorParam,
-        /// Of the ambient light, the share of `diffuse` that comes back.
-        #[serde(default = "one")]
-        ambient: f32,
-        /// Share that is mirrored; lights appear in it as highlights.
-        #[serde(default = "no_amount", skip_serializing_if = "is_no_amount")]
-        specular: ScalarParam,
-        /// Exponent of the highlights.
-        #[serde(default = "default_shininess")]
-        shininess: f32,
-        /// Share that is glass.
-        #[serde(default, skip_serializing_if = "is_default")]
-        transparency: f32,
-        #[serde(default = "default_ior")]
-        ior: f32,
-        /// Per metre.
-        #[serde(default, skip_serializing_if = "is_default")]
-        absorption: Rgb,
-    },
-    Blend {
-        weight: ScalarParam,
-        a: String,
-        b: String,
-    },
-    Emissive {
-        radiance: ColorParam,
-    },
+/// By name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InFile;
+
+impl Params for InFile {
+    type Color = ColorParam;
+    type Scalar = ScalarParam;
+    type Rgb = Rgb;
+    type Material = String;
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FresnelPart {
-    #[default]
-    Constant,
-    Schlick,
-}
-
-impl From<FresnelPart> for Fresnel {
-    fn from(part: FresnelPart) -> Self {
-        match part {
-            FresnelPart::Constant => Self::Constant,
-            FresnelPart::Schlick => Self::Schlick,
-        }
-    }
-}
-
-impl From<Fresnel> for FresnelPart {
-    fn from(value: Fresnel) -> Self {
-        match value {
-            Fresnel::Constant => Self::Constant,
-            Fresnel::Schlick => Self::Schlick,
-        }
-    }
-}
+/// A material as a scene file writes it.
+pub type MaterialPart = Material<InFile>;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -632,36 +563,12 @@ fn default_vfov() -> f64 {
     40.0
 }
 
-fn one() -> f32 {
-    1.0
-}
-
-fn default_shininess() -> f32 {
-    20.0
-}
-
-fn no_amount() -> ScalarParam {
-    ScalarParam::Number(0.0)
-}
-
-fn is_no_amount(value: &ScalarParam) -> bool {
-    *value == no_amount()
-}
-
-fn default_ior() -> f32 {
-    1.5
-}
-
 fn default_light_radius() -> f64 {
     0.01
 }
 
 fn white() -> Rgb {
     Rgb(Vec3::ONE)
-}
-
-fn white_paint() -> ColorParam {
-    ColorParam::grey(1.0)
 }
 
 fn one_by_one() -> DVec2 {

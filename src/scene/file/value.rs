@@ -35,6 +35,30 @@ impl ColorParam {
     }
 }
 
+impl From<Vec3> for ColorParam {
+    fn from(rgb: Vec3) -> Self {
+        Self::Rgb(rgb)
+    }
+}
+
+impl From<f32> for ScalarParam {
+    fn from(number: f32) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<Vec3> for Rgb {
+    fn from(rgb: Vec3) -> Self {
+        Self(rgb)
+    }
+}
+
+impl From<Rgb> for Vec3 {
+    fn from(Rgb(rgb): Rgb) -> Self {
+        rgb
+    }
+}
+
 /// Reads whatever stands there and lets the types below take what they know.
 struct AnyValue {
     textures: bool,

@@ -6,7 +6,7 @@ use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::Environment;
 use crate::scene::file::EnvironmentPart;
-use crate::scene::{ColorParam, LightEntry, Material, PointLight};
+use crate::scene::{ColorParam, LightEntry, Material, PointLight, SurfaceMaterial};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -72,7 +72,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
         return;
     }
     let Some(material) = entry.material else { return };
-    match world.get::<Material>(material) {
+    match SurfaceMaterial::of(world, material) {
         Some(Material::Emissive { radiance: ColorParam::Rgb(rgb) }) => {
             if let Some(value) = color(ui, *rgb, true) {
                 asked.edit(Edit::Set { id: material.to_bits(), property: Property::Color, value });

@@ -6,9 +6,9 @@
 use super::Asked;
 use super::texture;
 use super::widgets::{color, row, row_with_hint, rows, slider, vector};
-use crate::frame::{Edit, MaterialKind, Property, Session, paint_of};
-use crate::render::Fresnel;
-use crate::scene::{ColorParam, Inventory, Material, MaterialEntry, ObjectInput, ScalarParam};
+use crate::frame::{Edit, Property, Session};
+use crate::render::{Fresnel, MaterialKind, Param};
+use crate::scene::{ColorParam, Inventory, Material, MaterialEntry, ObjectInput, ScalarParam, SurfaceMaterial};
 use crate::viewer::status::thousands;
 use bevy_ecs::prelude::Entity;
 use egui::Ui;
@@ -62,21 +62,21 @@ pub fn shared_by(entry: &MaterialEntry) -> String {
 
 /// Kind, colour and numbers of a material, under the rows of the same width.
 pub fn editor(ui: &mut Ui, session: &Session, inventory: &Inventory, entity: Entity, asked: &mut Asked) {
-    let Some(material) = session.world().get::<Material>(entity) else { return };
+    let Some(material) = SurfaceMaterial::of(session.world(), entity) else { return };
     let id = entity.to_bits();
     ui.push_id(id, |ui| {
         rows(ui, "material", |ui| {
-            row(ui, "kind", |ui| match MaterialKind::of(material) {
-                Some(kind) => {
-                    egui::ComboBox::from_id_salt("kind").selected_text(kind.label()).width(104.0).show_ui(ui, |ui| {
-                        for other in MaterialKind::ALL {
-                            if ui.selectable_label(kind == other, other.label()).clicked() {
+            row(ui, "kind", |ui| match material.kind() {
+                MaterialKind::Blend => drop(ui.label(MaterialKind::Blend.name())),
+                kind => {
+                    egui::ComboBox::from_id_salt("kind").selected_text(kind.name()).width(104.0).show_ui(ui, |ui| {
+                        for other in MaterialKind::PLAIN {
+                            if ui.selectable_label(kind == other, other.name()).clicked() {
                                 asked.edit(Edit::SetKind { id, kind: other });
                             }
                         }
                     });
                 }
-                None => drop(ui.label("blend")),
             });
             paint(ui, session, id, material, asked);
             numbers(ui, inventory, id, material, asked);
@@ -85,7 +85,7 @@ pub fn editor(ui: &mut Ui, session: &Session, inventory: &Inventory, entity: Ent
 }
 
 fn paint(ui: &mut Ui, session: &Session, id: u64, material: &Material, asked: &mut Asked) {
-    let Some(paint) = paint_of(material) else { return };
+    let Some(paint) = material.color() else { return };
     let is_light = matches!(material, Material::Emissive { .. });
     row(ui, if is_light { "radiance" } else { "colour" }, |ui| {
         ui.horizontal(|ui| {
@@ -114,8 +114,21 @@ struct Scale {
 }
 
 impl Scale {
-    const fn new(name: &'static str, hint: &'static str, property: Property, range: RangeInclusive<f64>) -> Self {
-        Self { name, hint, property, range }
+    /// `None` for what has no number.
+    fn of(property: Property) -> Option<Self> {
+        let (name, hint, range) = match property {
+            Property::Alpha => {
+                ("roughness", "0: a mirror, 1: diffuse; its square is the width α of the GGX lobe", 0.032..=1.0)
+            }
+            Property::Ior => ("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", 1.0..=2.5),
+            Property::Ambient => ("ambient", "share of the ambient light", 0.0..=1.0),
+            Property::Specular => ("specular", "share of mirrored light", 0.0..=1.0),
+            Property::Shininess => ("shininess", "exponent of the highlight", 1.0..=10_000.0),
+            Property::Transparency => ("transparency", "share of light that passes through", 0.0..=1.0),
+            Property::Weight => ("weight", "0: the first of the two alone, 1: the second alone", 0.0..=1.0),
+            _ => return None,
+        };
+        Some(Self { name, hint, property, range })
     }
 
     fn show(self, ui: &mut Ui, id: u64, value: f64, asked: &mut Asked) {
@@ -132,62 +145,43 @@ impl Scale {
     }
 }
 
-const IOR: Scale =
-    Scale::new("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", Property::Ior, 1.0..=2.5);
-
 fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, asked: &mut Asked) {
-    let number =
-        |amount: &ScalarParam| if let ScalarParam::Number(value) = amount { Some(f64::from(*value)) } else { None };
-    match material {
-        Material::Metal { alpha, fresnel, .. } => {
-            if let Some(alpha) = number(alpha) {
-                let hint = "0: a mirror, 1: matte; its square is the width α of the GGX lobe";
-                Scale::new("roughness", hint, Property::Alpha, 0.032..=1.0).show(ui, id, alpha, asked);
+    if let Material::Blend { a, b, .. } = material {
+        let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
+        row(ui, "of", |ui| {
+            let text = format!("{} and {}", name(a), name(b));
+            ui.add(egui::Label::new(text).truncate()).on_hover_text("each has an editor in the list of materials");
+        });
+    }
+    for (name, param) in material.params() {
+        let value = match param {
+            Param::Share(ScalarParam::Number(value))
+            | Param::ConstantShare(value)
+            | Param::Ior(value)
+            | Param::Exponent(value) => *value,
+            Param::Absorption(absorption) => {
+                row_with_hint(ui, "absorption", "red, green and blue, per metre (Beer–Lambert)", |ui| {
+                    if let Some(value) = vector(ui, absorption.as_dvec3(), 0.02) {
+                        asked.edit(Edit::Set { id, property: Property::Absorption, value });
+                    }
+                });
+                continue;
             }
-            row(ui, "Fresnel", |ui| {
-                let mut schlick = *fresnel == Fresnel::Schlick;
-                let hint = "brighter at grazing angles, by Schlick's approximation";
-                if ui.checkbox(&mut schlick, "Schlick").on_hover_text(hint).changed() {
-                    let value = DVec3::splat(f64::from(u8::from(schlick)));
-                    asked.edit(Edit::Set { id, property: Property::Schlick, value });
-                }
-            });
+            // Colours have a row of their own; textures of numbers and parts are not changed here.
+            _ => continue,
+        };
+        if let Some(scale) = Property::of_param(name).and_then(Scale::of) {
+            scale.show(ui, id, f64::from(value), asked);
         }
-        Material::Glass { ior, absorption } => {
-            IOR.show(ui, id, f64::from(*ior), asked);
-            row_with_hint(ui, "absorption", "red, green and blue, per metre (Beer–Lambert)", |ui| {
-                if let Some(value) = vector(ui, absorption.as_dvec3(), 0.02) {
-                    asked.edit(Edit::Set { id, property: Property::Absorption, value });
-                }
-            });
-        }
-        Material::Phong { ambient, specular, shininess, transparency, ior, .. } => {
-            let share = |name, hint, property| Scale::new(name, hint, property, 0.0..=1.0);
-            share("ambient", "share of the ambient light", Property::Ambient).show(ui, id, f64::from(*ambient), asked);
-            if let Some(specular) = number(specular) {
-                share("specular", "share of mirrored light", Property::Specular).show(ui, id, specular, asked);
+    }
+    if let Material::Metal { fresnel, .. } = material {
+        row(ui, "Fresnel", |ui| {
+            let mut schlick = *fresnel == Fresnel::Schlick;
+            let hint = "brighter at grazing angles, by Schlick's approximation";
+            if ui.checkbox(&mut schlick, "Schlick").on_hover_text(hint).changed() {
+                let value = DVec3::splat(f64::from(u8::from(schlick)));
+                asked.edit(Edit::Set { id, property: Property::Schlick, value });
             }
-            Scale::new("shininess", "exponent of the highlight", Property::Shininess, 1.0..=10_000.0).show(
-                ui,
-                id,
-                f64::from(*shininess),
-                asked,
-            );
-            let hint = "share of light that passes through";
-            share("transparency", hint, Property::Transparency).show(ui, id, f64::from(*transparency), asked);
-            IOR.show(ui, id, f64::from(*ior), asked);
-        }
-        Material::Blend { weight, a, b } => {
-            let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
-            row(ui, "of", |ui| {
-                let text = format!("{} and {}", name(a), name(b));
-                ui.add(egui::Label::new(text).truncate()).on_hover_text("each has an editor in the list of materials");
-            });
-            if let Some(weight) = number(weight) {
-                let hint = "0: the first of the two alone, 1: the second alone";
-                Scale::new("weight", hint, Property::Weight, 0.0..=1.0).show(ui, id, weight, asked);
-            }
-        }
-        Material::Diffuse { .. } | Material::Mirror { .. } | Material::Emissive { .. } => {}
+        });
     }
 }

@@ -5,8 +5,8 @@ use super::material::{editor, shared_by};
 use super::swatch::swatch;
 use super::widgets::{choice, name_field};
 use super::{Asked, PanelState};
-use crate::frame::{Edit, MaterialKind, Selection, Session};
-use crate::scene::{Inventory, Material, MaterialEntry};
+use crate::frame::{Edit, Selection, Session};
+use crate::scene::{Inventory, MaterialEntry, SurfaceMaterial};
 use crate::viewer::status::thousands;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::Entity;
@@ -85,8 +85,7 @@ fn open(ui: &mut Ui, session: &Session, inventory: &Inventory, entry: &MaterialE
 }
 
 fn kind_of(session: &Session, entity: Entity) -> &'static str {
-    let material = session.world().get::<Material>(entity);
-    material.and_then(MaterialKind::of).map_or("blend", MaterialKind::label)
+    SurfaceMaterial::of(session.world(), entity).map_or("", |material| material.kind().name())
 }
 
 fn uses(n: usize) -> String {

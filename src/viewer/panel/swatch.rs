@@ -1,8 +1,7 @@
 //! The colour that a material is known by, in a list.
 
-use crate::frame::paint_of;
 use crate::scene::file::TexturePart;
-use crate::scene::{ColorParam, Material};
+use crate::scene::{ColorParam, Material, SurfaceMaterial};
 use bevy_ecs::prelude::{Entity, World};
 use egui::{Color32, Sense, Stroke, Ui, vec2};
 use glam::Vec3;
@@ -26,14 +25,14 @@ pub fn swatch(ui: &mut Ui, world: &World, material: Entity) {
 }
 
 fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
-    let Some(material) = world.get::<Material>(entity) else { return [Vec3::splat(0.5); 2] };
+    let Some(material) = SurfaceMaterial::of(world, entity) else { return [Vec3::splat(0.5); 2] };
     match material {
         Material::Blend { a, b, .. } if nesting < MAX_NESTING => {
             [colors(world, *a, nesting + 1)[0], colors(world, *b, nesting + 1)[0]]
         }
         // What a metre of it lets through.
         Material::Glass { absorption, .. } => [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2],
-        material => match paint_of(material) {
+        material => match material.color() {
             // Of a light, the hue.
             Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
             Some(ColorParam::Texture(texture)) => match &texture.part {

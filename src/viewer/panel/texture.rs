@@ -2,7 +2,7 @@
 
 use super::Asked;
 use super::widgets::{color, number, row};
-use crate::frame::{Edit, Property, Session, paint_of};
+use crate::frame::{Edit, Property, Session};
 use crate::scene::ColorParam;
 use crate::scene::file::{Rgb, TexturePart, WrapPart};
 use crate::viewer::dialog::DialogPurpose;
@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3, Vec3};
 /// What can take the place of a colour.
 pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: &mut Asked) {
     let mut names: Vec<&str> = (session.inputs().materials.iter())
-        .filter_map(|material| match paint_of(&material.material)? {
+        .filter_map(|material| match material.material.color()? {
             ColorParam::Texture(texture) => Some(texture.name.as_str()),
             ColorParam::Rgb(_) => None,
         })

@@ -1,13 +1,43 @@
-//! What a surface does to light.
+//! What a surface does to light: one enum for the scene file, the world and the snapshot.
+//!
+//! [`Material`] is the same in all three but for what it refers to ([`Params`]): a texture and another material are names
+//! in a file, entities in the world and indices in a snapshot. [`Material::map`] goes from one to the next. A new kind of
+//! material begins here: its variant, its [`kind`](Material::kind), its rows in `map`, `params_of` and
+//! [`of_kind`](Material::of_kind).
 
 use crate::core::texture::TextureId;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
 
 /// Below it a GGX surface is a mirror: its highlight is narrower than directions in `f32` can tell apart.
 pub(crate) const SMALLEST_ALPHA: f32 = 1e-4;
 
 /// Index into the materials of a snapshot.
 pub type MaterialId = u32;
+
+/// How a material refers to what it uses.
+pub trait Params {
+    /// A colour, linear Rec. 709, the same everywhere or looked up.
+    type Color: Clone + Debug + PartialEq + From<Vec3>;
+    /// A number without unit, the same everywhere or looked up.
+    type Scalar: Clone + Debug + PartialEq + From<f32>;
+    /// A colour that cannot be looked up.
+    type Rgb: Copy + Debug + Default + PartialEq + From<Vec3> + Into<Vec3>;
+    /// Another material.
+    type Material: Clone + Debug + PartialEq;
+}
+
+/// By index into the tables of a snapshot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InSnapshot;
+
+impl Params for InSnapshot {
+    type Color = ColorInput;
+    type Scalar = ScalarInput;
+    type Rgb = Vec3;
+    type Material = MaterialId;
+}
 
 /// A colour, linear Rec. 709, the same everywhere or looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,50 +53,334 @@ pub enum ScalarInput {
     Texture(TextureId),
 }
 
+impl From<Vec3> for ColorInput {
+    fn from(rgb: Vec3) -> Self {
+        Self::Constant(rgb)
+    }
+}
+
+impl From<f32> for ScalarInput {
+    fn from(value: f32) -> Self {
+        Self::Constant(value)
+    }
+}
+
 /// How the reflectance of a metal grows towards grazing angles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Fresnel {
+    #[default]
     Constant,
     Schlick,
 }
 
 /// A closed set of surfaces; all are two-sided but for emission.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Material {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[serde(bound(
+    serialize = "P::Color: Serialize, P::Scalar: Serialize, P::Rgb: Serialize, P::Material: Serialize",
+    deserialize = "P::Color: Deserialize<'de>, P::Scalar: Deserialize<'de>, P::Rgb: Deserialize<'de>, \
+                   P::Material: Deserialize<'de>"
+))]
+pub enum Material<P: Params = InSnapshot> {
     /// Lambert: f = albedo / π.
-    Diffuse { albedo: ColorInput },
+    Diffuse { albedo: P::Color },
     /// Perfect mirror, the same reflectance at every angle.
-    Mirror { reflectance: ColorInput },
-    /// Isotropic GGX microfacets; `alpha` is the square of what users call roughness.
+    Mirror {
+        #[serde(default = "white")]
+        reflectance: P::Color,
+    },
+    /// Isotropic GGX microfacets.
     Metal {
-        alpha: ScalarInput,
-        reflectance: ColorInput,
+        /// Width of the lobe, 0..1: the square of what other programs call roughness.
+        alpha: P::Scalar,
+        reflectance: P::Color,
+        #[serde(default, skip_serializing_if = "is_default")]
         fresnel: Fresnel,
         /// Give back the energy that single scattering loses (Turquin 2019).
+        #[serde(default, skip_serializing_if = "is_default")]
         compensate: bool,
     },
-    /// Smooth dielectric with exact Fresnel; `absorption` per metre inside (Beer–Lambert).
-    Glass { ior: f32, absorption: Vec3 },
-    /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
-    /// is constant: see [`Emission::of`].
-    Blend { weight: ScalarInput, a: MaterialId, b: MaterialId },
-    /// The classic local model. For paths it is matte, mirror and glass in shares that sum to 1: `transparency`, of
+    /// Smooth dielectric with exact Fresnel.
+    Glass {
+        /// Index of refraction.
+        #[serde(default = "glass_ior")]
+        ior: f32,
+        /// Per metre inside (Beer–Lambert).
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: P::Rgb,
+    },
+    /// The classic local model. For paths it is diffuse, mirror and glass in shares that sum to 1: `transparency`, of
     /// the rest `specular`, of the rest `diffuse`.
     Phong {
-        diffuse: ColorInput,
+        diffuse: P::Color,
         /// Of the ambient light, the share of `diffuse` that comes back.
+        #[serde(default = "one")]
         ambient: f32,
         /// Share that is mirrored; lights appear in it as highlights.
-        specular: ScalarInput,
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        specular: P::Scalar,
         /// Exponent of the highlights.
+        #[serde(default = "dull")]
         shininess: f32,
+        /// Share that is glass.
+        #[serde(default, skip_serializing_if = "is_default")]
         transparency: f32,
         /// Of the transparent part, as for glass.
+        #[serde(default = "glass_ior")]
         ior: f32,
-        absorption: Vec3,
+        /// Of the transparent part, as for glass.
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: P::Rgb,
     },
+    /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
+    /// is constant: see [`Emission::of`].
+    Blend { weight: P::Scalar, a: P::Material, b: P::Material },
     /// A black body: emits on its front (a sphere outwards, a face along its normal), reflects nothing.
-    Emissive { radiance: ColorInput },
+    Emissive {
+        /// W·sr⁻¹·m⁻².
+        radiance: P::Color,
+    },
+}
+
+/// The kinds of [`Material`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum MaterialKind {
+    Emissive,
+    Diffuse,
+    Mirror,
+    Glass,
+    Metal,
+    Phong,
+    Blend,
+}
+
+impl MaterialKind {
+    /// The kinds that a material can be turned into; a blend needs two others.
+    pub const PLAIN: [Self; 6] = [Self::Diffuse, Self::Mirror, Self::Metal, Self::Glass, Self::Phong, Self::Emissive];
+
+    pub(crate) const N: usize = Self::Blend as usize + 1;
+
+    /// As in a scene file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Emissive => "emissive",
+            Self::Diffuse => "diffuse",
+            Self::Mirror => "mirror",
+            Self::Glass => "glass",
+            Self::Metal => "metal",
+            Self::Phong => "phong",
+            Self::Blend => "blend",
+        }
+    }
+}
+
+/// A parameter of a material, by what may stand in it.
+#[derive(Clone, Copy, Debug)]
+pub enum Param<Color, Scalar, Number, Rgb, Part> {
+    /// Share of light per channel, 0..1.
+    Reflectance(Color),
+    /// W·sr⁻¹·m⁻².
+    Radiance(Color),
+    /// 0..1.
+    Share(Scalar),
+    /// 0..1, the same everywhere.
+    ConstantShare(Number),
+    /// Index of refraction, above 0.
+    Ior(Number),
+    /// 0 or more.
+    Exponent(Number),
+    /// Per metre.
+    Absorption(Rgb),
+    Part(Part),
+}
+
+/// To be read.
+pub type ParamRef<'a, P> = Param<
+    &'a <P as Params>::Color,
+    &'a <P as Params>::Scalar,
+    &'a f32,
+    &'a <P as Params>::Rgb,
+    &'a <P as Params>::Material,
+>;
+
+/// To be changed.
+pub type ParamMut<'a, P> = Param<
+    &'a mut <P as Params>::Color,
+    &'a mut <P as Params>::Scalar,
+    &'a mut f32,
+    &'a mut <P as Params>::Rgb,
+    &'a mut <P as Params>::Material,
+>;
+
+/// Names as in a scene file; of a reference to a material, or of a mutable one.
+macro_rules! params_of {
+    ($material:expr) => {
+        match $material {
+            Material::Diffuse { albedo } => vec![("albedo", Param::Reflectance(albedo))],
+            Material::Mirror { reflectance } => vec![("reflectance", Param::Reflectance(reflectance))],
+            Material::Metal { alpha, reflectance, fresnel: _, compensate: _ } => {
+                vec![("alpha", Param::Share(alpha)), ("reflectance", Param::Reflectance(reflectance))]
+            }
+            Material::Glass { ior, absorption } => {
+                vec![("ior", Param::Ior(ior)), ("absorption", Param::Absorption(absorption))]
+            }
+            Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => vec![
+                ("specular", Param::Share(specular)),
+                ("diffuse", Param::Reflectance(diffuse)),
+                ("ambient", Param::ConstantShare(ambient)),
+                ("shininess", Param::Exponent(shininess)),
+                ("transparency", Param::ConstantShare(transparency)),
+                ("ior", Param::Ior(ior)),
+                ("absorption", Param::Absorption(absorption)),
+            ],
+            Material::Blend { weight, a, b } => {
+                vec![("weight", Param::Share(weight)), ("a", Param::Part(a)), ("b", Param::Part(b))]
+            }
+            Material::Emissive { radiance } => vec![("radiance", Param::Radiance(radiance))],
+        }
+    };
+}
+
+/// Of a reference to a material, or of a mutable one.
+macro_rules! color_of {
+    ($material:expr) => {
+        match $material {
+            Material::Diffuse { albedo: color }
+            | Material::Mirror { reflectance: color }
+            | Material::Metal { reflectance: color, .. }
+            | Material::Phong { diffuse: color, .. }
+            | Material::Emissive { radiance: color } => Some(color),
+            Material::Glass { .. } | Material::Blend { .. } => None,
+        }
+    };
+}
+
+/// What a material refers to, looked up for another place; see [`Material::map`].
+pub trait MapParams<From: Params, To: Params> {
+    fn color(&mut self, color: &From::Color) -> To::Color;
+    fn scalar(&mut self, scalar: &From::Scalar) -> To::Scalar;
+    fn material(&mut self, material: &From::Material) -> To::Material;
+}
+
+impl<P: Params> Material<P> {
+    /// The same material with other references.
+    pub fn map<Q: Params>(&self, to: &mut impl MapParams<P, Q>) -> Material<Q> {
+        let rgb = |rgb: &P::Rgb| Q::Rgb::from((*rgb).into());
+        match self {
+            Self::Diffuse { albedo } => Material::Diffuse { albedo: to.color(albedo) },
+            Self::Mirror { reflectance } => Material::Mirror { reflectance: to.color(reflectance) },
+            Self::Metal { alpha, reflectance, fresnel, compensate } => Material::Metal {
+                alpha: to.scalar(alpha),
+                reflectance: to.color(reflectance),
+                fresnel: *fresnel,
+                compensate: *compensate,
+            },
+            Self::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: rgb(absorption) },
+            Self::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => Material::Phong {
+                diffuse: to.color(diffuse),
+                ambient: *ambient,
+                specular: to.scalar(specular),
+                shininess: *shininess,
+                transparency: *transparency,
+                ior: *ior,
+                absorption: rgb(absorption),
+            },
+            Self::Blend { weight, a, b } => {
+                Material::Blend { weight: to.scalar(weight), a: to.material(a), b: to.material(b) }
+            }
+            Self::Emissive { radiance } => Material::Emissive { radiance: to.color(radiance) },
+        }
+    }
+
+    /// Its parameters with their names in a scene file; those that are no quantity are left out.
+    pub fn params(&self) -> Vec<(&'static str, ParamRef<'_, P>)> {
+        params_of!(self)
+    }
+
+    pub fn params_mut(&mut self) -> Vec<(&'static str, ParamMut<'_, P>)> {
+        params_of!(self)
+    }
+
+    #[inline]
+    pub fn kind(&self) -> MaterialKind {
+        match self {
+            Self::Emissive { .. } => MaterialKind::Emissive,
+            Self::Diffuse { .. } => MaterialKind::Diffuse,
+            Self::Mirror { .. } => MaterialKind::Mirror,
+            Self::Glass { .. } => MaterialKind::Glass,
+            Self::Metal { .. } => MaterialKind::Metal,
+            Self::Phong { .. } => MaterialKind::Phong,
+            Self::Blend { .. } => MaterialKind::Blend,
+        }
+    }
+
+    /// A plain material of a kind, with usual parameters; `None` for a blend.
+    ///
+    /// - `color`: what the material is known by, see [`Self::color`].
+    pub fn of_kind(kind: MaterialKind, color: P::Color) -> Option<Self> {
+        Some(match kind {
+            MaterialKind::Diffuse => Self::Diffuse { albedo: color },
+            MaterialKind::Mirror => Self::Mirror { reflectance: color },
+            MaterialKind::Metal => Self::Metal {
+                alpha: P::Scalar::from(0.04),
+                reflectance: color,
+                fresnel: Fresnel::Schlick,
+                compensate: true,
+            },
+            MaterialKind::Glass => Self::Glass { ior: glass_ior(), absorption: P::Rgb::default() },
+            MaterialKind::Phong => Self::Phong {
+                diffuse: color,
+                ambient: 1.0,
+                specular: P::Scalar::from(0.2),
+                shininess: 50.0,
+                transparency: 0.0,
+                ior: glass_ior(),
+                absorption: P::Rgb::default(),
+            },
+            MaterialKind::Emissive => Self::Emissive { radiance: color },
+            MaterialKind::Blend => return None,
+        })
+    }
+
+    /// What the material is known by: albedo, reflectance, diffuse colour or radiance; `None` where it has no colour.
+    #[inline]
+    pub fn color(&self) -> Option<&P::Color> {
+        color_of!(self)
+    }
+
+    /// See [`Self::color`].
+    pub fn color_mut(&mut self) -> Option<&mut P::Color> {
+        color_of!(self)
+    }
+}
+
+fn white<C: From<Vec3>>() -> C {
+    Vec3::ONE.into()
+}
+
+fn zero<S: From<f32>>() -> S {
+    0.0.into()
+}
+
+fn is_zero<S: From<f32> + PartialEq>(scalar: &S) -> bool {
+    *scalar == zero()
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn glass_ior() -> f32 {
+    1.5
+}
+
+fn dull() -> f32 {
+    20.0
 }
 
 impl Material {
@@ -112,36 +426,12 @@ impl Material {
 
     /// Whether it, or a part of it, looks up a texture.
     pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
-        let color = |input: &ColorInput| matches!(input, ColorInput::Texture(_));
-        let scalar = |input: &ScalarInput| matches!(input, ScalarInput::Texture(_));
-        match self {
-            Self::Diffuse { albedo } => color(albedo),
-            Self::Mirror { reflectance } => color(reflectance),
-            Self::Metal { alpha, reflectance, .. } => scalar(alpha) || color(reflectance),
-            Self::Glass { .. } => false,
-            Self::Phong { diffuse, specular, .. } => color(diffuse) || scalar(specular),
-            Self::Blend { weight, a, b } => {
-                let part = |id: MaterialId| materials[id as usize].is_textured(materials);
-                scalar(weight) || part(*a) || part(*b)
-            }
-            Self::Emissive { radiance } => color(radiance),
-        }
-    }
-
-    pub(crate) const KINDS: usize = 7;
-
-    /// A number below [`Self::KINDS`] for each kind, to sort by.
-    #[inline]
-    pub(crate) fn kind(&self) -> usize {
-        match self {
-            Self::Emissive { .. } => 0,
-            Self::Diffuse { .. } => 1,
-            Self::Mirror { .. } => 2,
-            Self::Glass { .. } => 3,
-            Self::Metal { .. } => 4,
-            Self::Phong { .. } => 5,
-            Self::Blend { .. } => 6,
-        }
+        self.params().into_iter().any(|(_, param)| match param {
+            Param::Reflectance(color) | Param::Radiance(color) => matches!(color, ColorInput::Texture(_)),
+            Param::Share(scalar) => matches!(scalar, ScalarInput::Texture(_)),
+            Param::Part(part) => materials[*part as usize].is_textured(materials),
+            Param::ConstantShare(_) | Param::Ior(_) | Param::Exponent(_) | Param::Absorption(_) => false,
+        })
     }
 }
 

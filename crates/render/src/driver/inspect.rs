@@ -288,11 +288,6 @@ fn range_of(values: &[f32], share: f32) -> (f32, f32) {
 
 fn albedo(snapshot: &Prepared, vertex: &Vertex, material: MaterialId, depth: u32) -> Vec3 {
     match &snapshot.shading.materials[material as usize] {
-        Material::Diffuse { albedo: color }
-        | Material::Mirror { reflectance: color }
-        | Material::Metal { reflectance: color, .. }
-        | Material::Phong { diffuse: color, .. } => color.eval(snapshot, vertex.uv),
-        Material::Glass { .. } => Vec3::ONE,
         Material::Emissive { .. } => Vec3::ZERO,
         // Extraction lets no deeper ones through.
         Material::Blend { .. } if depth > 16 => Vec3::ZERO,
@@ -300,6 +295,7 @@ fn albedo(snapshot: &Prepared, vertex: &Vertex, material: MaterialId, depth: u32
             let part = |id| albedo(snapshot, vertex, id, depth + 1);
             part(*a).lerp(part(*b), weight.eval(snapshot, vertex.uv).clamp(0.0, 1.0))
         }
+        plain => plain.color().map_or(Vec3::ONE, |color| color.eval(snapshot, vertex.uv)),
     }
 }
 

@@ -30,8 +30,7 @@ fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
     let at_most_one = |input: &ColorInput| matches!(input, ColorInput::Constant(c) if c.max_element() <= 1.0);
     match &materials[id as usize] {
         Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => at_most_one(color),
-        // Compensation gives back on some ways what is lost on others.
-        Material::Metal { reflectance, compensate, .. } => at_most_one(reflectance) && !compensate,
+        Material::Metal { reflectance, compensate: false, .. } => at_most_one(reflectance),
         Material::Glass { .. } => true,
         Material::Emissive { .. } => true,
         Material::Phong { diffuse, specular, .. } => {
@@ -42,6 +41,8 @@ fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
             let part = |id: MaterialId| returns_at_most_all(materials, id) && is_even_part(materials, id);
             matches!(weight, ScalarInput::Constant(_)) && part(*a) && part(*b)
         }
+        // Compensation gives back on some ways what is lost on others.
+        _ => false,
     }
 }
 

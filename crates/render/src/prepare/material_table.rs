@@ -1,12 +1,12 @@
 //! What shading looks up by material, as arrays that sixteen lanes read at once.
 
-use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, MaterialKind, SMALLEST_ALPHA, ScalarInput};
 use crate::core::snapshot::Geometry;
 use crate::prepare::arrays::push;
 use firstlight_simd::padded;
 use glam::Vec3;
 
-/// What materials are sorted by: numbers below [`Material::KINDS`] + 1.
+/// What materials are sorted by: numbers of [`MaterialKind`], and [`COATED`].
 #[derive(Debug, Default)]
 pub(crate) struct Kinds {
     /// Ready to be gathered from.
@@ -29,7 +29,7 @@ pub(crate) struct MaterialTable {
     pub inputs: Vec<ColorInput>,
     pub alpha: Vec<f32>,
     pub flags: Vec<u32>,
-    /// See [`Material::kind`]; [`COATED`] for materials of two parts.
+    /// See [`MaterialKind`]; [`COATED`] for materials of two parts.
     pub kinds: Kinds,
     /// Rows of the parts, with their weights; the parts of a classic material have rows behind those of all materials.
     pub parts: [Vec<u32>; 2],
@@ -43,7 +43,7 @@ pub(crate) struct MaterialTable {
 pub(crate) const SEVERAL: MaterialId = MaterialId::MAX;
 
 /// Two parts of different kinds, each matte, rough metal or mirror.
-pub(crate) const COATED: usize = Material::KINDS;
+pub(crate) const COATED: usize = MaterialKind::N;
 
 impl MaterialTable {
     pub fn build(geometry: &Geometry, materials: &[Material]) -> Self {
@@ -73,7 +73,7 @@ impl MaterialTable {
                 }
                 _ => {}
             }
-            let kind = if parts[0].1 > 0.0 { COATED } else { material.kind() };
+            let kind = if parts[0].1 > 0.0 { COATED } else { material.kind() as usize };
             table.kinds.of_material.push(kind as u32);
             table.kinds.present |= 1 << kind;
             for (k, (row, weight)) in parts.into_iter().enumerate() {
@@ -133,9 +133,9 @@ fn is_textured_emitter(material: &Material) -> bool {
 /// `None` for what cannot be a part of a [`COATED`] material.
 fn kind_of_part(material: &Material) -> Option<usize> {
     match material {
-        Material::Diffuse { .. } | Material::Mirror { .. } => Some(material.kind()),
+        Material::Diffuse { .. } | Material::Mirror { .. } => Some(material.kind() as usize),
         Material::Metal { alpha: ScalarInput::Constant(alpha), .. } => {
-            (*alpha >= SMALLEST_ALPHA).then(|| material.kind())
+            (*alpha >= SMALLEST_ALPHA).then(|| material.kind() as usize)
         }
         _ => None,
     }

@@ -74,11 +74,6 @@ impl Finish {
             }
             _ if weight == 0.0 => {}
             Material::Emissive { .. } => {}
-            Material::Diffuse { albedo } => {
-                let albedo = weight * albedo.eval(scene, uv);
-                self.diffuse += albedo;
-                self.ambient += albedo;
-            }
             Material::Mirror { reflectance } => {
                 self.push(Shiny::Mirror { tint: weight * reflectance.eval(scene, uv) });
             }
@@ -109,6 +104,12 @@ impl Finish {
                 if *transparency > 0.0 {
                     self.push(pane(weight * transparency));
                 }
+            }
+            // What has no look of its own in the classic model is diffuse in its colour.
+            other => {
+                let albedo = weight * other.color().map_or(Vec3::ONE, |color| color.eval(scene, uv));
+                self.diffuse += albedo;
+                self.ambient += albedo;
             }
         }
     }

@@ -1,6 +1,5 @@
 //! Hits on one kind of material: light from lights, and how paths go on.
 
-use crate::core::material::Material;
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::simd::track::BounceMisStates;
@@ -18,7 +17,6 @@ use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select, select_vector};
-use glam::Vec3;
 
 /// Hits of one kind of material, and where their light and their paths go on.
 pub(crate) struct KindHits<'a> {
@@ -43,11 +41,7 @@ pub(crate) struct KindHits<'a> {
 
 /// Whether [`shade`] knows what to do with hits on materials of a kind.
 pub(crate) fn knows(kind: usize) -> bool {
-    debug_assert_eq!(
-        Material::Mirror { reflectance: crate::core::material::ColorInput::Constant(Vec3::ONE) }.kind(),
-        MIRROR
-    );
-    (DIFFUSE..=METAL).contains(&kind) || kind == COATED
+    [DIFFUSE, MIRROR, GLASS, METAL, COATED].contains(&kind)
 }
 
 /// Whether light sampling finds something for hits on materials of a kind.
@@ -55,7 +49,7 @@ pub(crate) fn scatters(kind: usize) -> bool {
     [DIFFUSE, METAL, COATED].contains(&kind)
 }
 
-/// Shades hits on materials of one [`Material::kind`].
+/// Shades hits on materials of one [`MaterialKind`](crate::core::material::MaterialKind).
 pub(crate) fn shade(set: InstructionSet, kind: usize, group: KindHits) {
     match kind {
         DIFFUSE => dispatch!(set, shade_diffuse(group: KindHits)),

@@ -1,6 +1,6 @@
 //! Hits by kind of material, so that the processor finds those that follow each other all alike.
 
-use crate::core::material::{Material, MaterialId};
+use crate::core::material::{MaterialId, MaterialKind};
 use crate::prepare::material_table::{Kinds, SEVERAL};
 use crate::prepare::prepared::Prepared;
 use crate::shading::surface::material_of;
@@ -8,7 +8,7 @@ use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 
 /// Kinds of hits: misses, then those of materials, and the one of two parts.
-pub(crate) const KINDS: usize = Material::KINDS + 2;
+pub(crate) const KINDS: usize = MaterialKind::N + 2;
 
 /// The hits of a wave, sorted.
 #[derive(Default)]

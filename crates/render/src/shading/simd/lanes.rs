@@ -1,14 +1,14 @@
 //! What the files on sixteen hits share.
 
+use crate::core::material::MaterialKind;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use firstlight_simd::{Float, LANES, Mask, Simd, Vector};
 
-/// Kinds of materials; see [`crate::core::material::Material::kind`].
-pub(crate) const DIFFUSE: usize = 1;
-pub(crate) const MIRROR: usize = 2;
-pub(crate) const GLASS: usize = 3;
-pub(crate) const METAL: usize = 4;
+pub(crate) const DIFFUSE: usize = MaterialKind::Diffuse as usize;
+pub(crate) const MIRROR: usize = MaterialKind::Mirror as usize;
+pub(crate) const GLASS: usize = MaterialKind::Glass as usize;
+pub(crate) const METAL: usize = MaterialKind::Metal as usize;
 
 #[inline(always)]
 pub(crate) fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {
