@@ -7,10 +7,10 @@
 use bevy_ecs::world::World;
 use firstlight::frame::read_film_file_within;
 use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, Prepared, RenderSettings, advance};
-use firstlight::scene::file::{MeshSourcePart, ObjectPart, SceneFile};
+use firstlight::scene::file::{ObjectPart, SceneFile};
 use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
 use firstlight::scene::{
-    Extraction, ImageMetadata, ImageScene, Limits, LoadOptions, Rendering, SceneInputs, SceneSource, load,
+    Extraction, ImageMetadata, ImageScene, Limits, LoadOptions, MeshSource, Rendering, SceneInputs, SceneSource, load,
     read_picture_within,
 };
 use std::path::{Path, PathBuf};
@@ -182,7 +182,7 @@ pub fn shot(bytes: &[u8]) {
 /// Meshes that the program makes, and clouds of millions, are sound but take their time.
 fn is_quick(object: &ObjectPart) -> bool {
     match object {
-        ObjectPart::Mesh { source: MeshSourcePart::Builtin(name), .. } => name == "cube",
+        ObjectPart::Mesh { source: MeshSource::Builtin(name), .. } => name == "cube",
         ObjectPart::BallGrid { steps, .. } => {
             steps.iter().map(|step| u64::from(step.0)).try_fold(1, u64::checked_mul).is_some_and(|n| n < 1000)
         }

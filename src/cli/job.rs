@@ -53,15 +53,13 @@ impl RenderJob {
         let Rendering(of_scene) = *world.resource();
         let settings = RenderSettings {
             integrator: (args.integrator.map(Into::into))
-                .or(kept.map(|kept| kept.integrator.into()))
+                .or(kept.map(|kept| kept.integrator))
                 .unwrap_or(of_scene.integrator),
             max_depth: (args.max_depth)
                 .or(kept.map(|kept| kept.max_depth.unwrap_or(u32::MAX)))
                 .unwrap_or(of_scene.max_depth),
             seed: args.seed.or(kept.map(|kept| kept.seed)).unwrap_or(of_scene.seed),
-            filter: (args.filter.map(Into::into))
-                .or(kept.map(|kept| kept.film.filter.into()))
-                .unwrap_or(of_scene.filter),
+            filter: (args.filter.map(Into::into)).or(kept.map(|kept| kept.film.filter)).unwrap_or(of_scene.filter),
             ..of_scene
         };
         let FilmSize { width, height } = *world.resource();

@@ -4,9 +4,9 @@ use super::Waker;
 use super::film_file::check_film_source;
 use super::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
-use crate::scene::file::TexturePart;
 use crate::scene::{
-    LoadOptions, LoadedScene, MeshBase, SceneError, SceneSource, Shape, Trees, UpAxis, load, read_picture,
+    LoadOptions, LoadedScene, MeshBase, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis, load,
+    read_picture,
 };
 use bevy_ecs::prelude::{Entity, Resource};
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub enum Finished {
     /// For a material.
     Picture {
         entity: Entity,
-        part: TexturePart,
+        part: TextureSource,
         result: Result<ImageTexture, String>,
     },
 }
@@ -189,7 +189,7 @@ impl BackgroundTasks {
     }
 
     /// Reads a picture for a material.
-    pub fn read_picture(&self, entity: Entity, part: TexturePart, path: PathBuf) {
+    pub fn read_picture(&self, entity: Entity, part: TextureSource, path: PathBuf) {
         self.with(|board| board.reading += 1);
         let this = self.clone();
         let work = move || {

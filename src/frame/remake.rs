@@ -1,8 +1,7 @@
 //! A mesh to be made anew, and what comes of it.
 
 use crate::mesh::{Deviation, Mesh};
-use crate::scene::file::{MeshShadingPart, MeshSourcePart};
-use crate::scene::{MeshBase, SceneError};
+use crate::scene::{MeshBase, MeshShading, MeshSource, SceneError};
 use bevy_ecs::prelude::{Component, Entity};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -24,8 +23,8 @@ const SAMPLES: usize = 20_000;
 #[derive(Clone, Debug)]
 pub struct Remake {
     pub for_whom: ForWhom,
-    pub source: MeshSourcePart,
-    pub shading: MeshShadingPart,
+    pub source: MeshSource,
+    pub shading: MeshShading,
     pub ratio: f64,
     /// The state of the history that it was asked for in.
     pub revision: u64,
@@ -69,7 +68,7 @@ impl Remake {
 
     /// For people.
     pub fn title(&self) -> String {
-        let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = &self.source;
+        let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = &self.source;
         match self.for_whom {
             ForWhom::Object(_) => format!("simplifying {name}"),
             ForWhom::NewObject { .. } => format!("reading {name}"),

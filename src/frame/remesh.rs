@@ -9,13 +9,12 @@ use super::remake::{ForWhom, Remade, Remake};
 use super::resources::{Clock, CurrentScene, Renderer};
 use super::selection::Selection;
 use super::status::{MessageKind, Status};
-use crate::scene::file::{MeshShadingPart, MeshSourcePart};
-use crate::scene::{Linear, MaterialSlots, MeshOrigin, Placement, Shape};
+use crate::scene::{Linear, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 
 /// Begins to make an object's mesh anew. An earlier one of the same object that is not done yet is forgotten.
-pub fn start(world: &mut World, entity: Entity, shading: MeshShadingPart, ratio: f64) -> Result<(), String> {
+pub fn start(world: &mut World, entity: Entity, shading: MeshShading, ratio: f64) -> Result<(), String> {
     if !(ratio > 0.0 && ratio <= 1.0) {
         return Err(format!("the share of faces to keep is above 0 and at most 1, not {ratio}"));
     }
@@ -29,11 +28,11 @@ pub fn start(world: &mut World, entity: Entity, shading: MeshShadingPart, ratio:
 }
 
 /// Begins to read a mesh that will become a new object.
-pub fn start_new(world: &mut World, source: MeshSourcePart, place: DVec3, size: f64) {
-    run(world, ForWhom::NewObject { place, size }, source, MeshShadingPart::Auto, 1.0);
+pub fn start_new(world: &mut World, source: MeshSource, place: DVec3, size: f64) {
+    run(world, ForWhom::NewObject { place, size }, source, MeshShading::Auto, 1.0);
 }
 
-fn run(world: &mut World, for_whom: ForWhom, source: MeshSourcePart, shading: MeshShadingPart, ratio: f64) {
+fn run(world: &mut World, for_whom: ForWhom, source: MeshSource, shading: MeshShading, ratio: f64) {
     let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
     let revision = History::revision(world);
     let job = Remake { for_whom, source, shading, ratio, revision, folder };
@@ -43,7 +42,7 @@ fn run(world: &mut World, for_whom: ForWhom, source: MeshSourcePart, shading: Me
 
 /// How the mesh of an object is to be shaded and what share of its faces is to be kept, also while that is still being made; `None`
 /// where it is not known where it came from.
-pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShadingPart, f64)> {
+pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShading, f64)> {
     let origin = world.get::<MeshOrigin>(entity)?;
     let pending = world.resource::<BackgroundTasks>().wanted(entity);
     Some(pending.map_or((origin.shading, origin.simplify.unwrap_or(1.0)), |job| (job.shading, job.ratio)))
@@ -89,7 +88,7 @@ pub fn take(world: &mut World, remade: Remade) {
             let placement = Placement { translation: place - factor * foot, linear };
             let origin =
                 MeshOrigin { source: job.source.clone(), shading: job.shading, simplify, own_materials: false };
-            let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = &job.source;
+            let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = &job.source;
             let stem = std::path::Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
             let bundle = (Shape::Mesh(mesh), placement, MaterialSlots(vec![material]), origin, measure);
             let entity = super::edit::spawn(world, &stem.unwrap_or_else(|| name.clone()), bundle);

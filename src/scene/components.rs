@@ -10,6 +10,7 @@
 //! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the picture follows.
 
 use super::placement::Placement;
+use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use crate::mesh::Mesh;
 use crate::render::{self, Display, Param, Params, RenderSettings};
 use bevy_ecs::prelude::{Component, Entity, Resource, World};
@@ -127,12 +128,6 @@ impl SurfaceMaterial {
     }
 }
 
-/// Plain materials that a blend may come to, however it is nested.
-pub const MAX_LOBES: usize = 8;
-
-/// For how many of them a Phong surface counts.
-pub const PHONG_LOBES: usize = 3;
-
 /// The material of surfaces that have none.
 pub const GREY: Material = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::splat(0.5)) };
 
@@ -198,7 +193,7 @@ impl PartialEq for ScalarParam {
 #[derive(Clone, Debug)]
 pub struct SurfaceTexture {
     pub name: String,
-    pub part: super::file::TexturePart,
+    pub part: TextureSource,
     pub texture: render::Texture,
 }
 
@@ -215,8 +210,8 @@ pub struct PointLight {
 /// Where the mesh of an object came from, for saving and reloading it.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct MeshOrigin {
-    pub source: super::file::MeshSourcePart,
-    pub shading: super::file::MeshShadingPart,
+    pub source: MeshSource,
+    pub shading: MeshShading,
     /// Share of the faces that were kept, 0..1.
     pub simplify: Option<f64>,
     /// Materials come from the mesh's own file.
@@ -234,7 +229,7 @@ pub struct Ordinal(pub u32);
 pub struct SceneEnvironment {
     pub light: render::Environment,
     /// What the scene file says, for saving.
-    pub part: super::file::EnvironmentPart,
+    pub part: EnvironmentSource,
     /// What the air absorbs, per metre; `light` has passed it already.
     pub air: Vec3,
 }

@@ -1,14 +1,14 @@
 //! A scene around a lone model: ground, sky, key light, and a camera that sees all of it.
 
-use super::file::{
-    CameraPart, ColorParam, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MaterialPart, MeshShadingPart,
-    MeshSourcePart, Named, ObjectPart, Rgb, SceneFile, TransformPart,
-};
+use super::file::{CameraPart, DisplayPart, FilmPart, MaterialPart, Named, ObjectPart, SceneFile, TransformPart};
 use super::meshes::LoadedMesh;
 use super::orientation::faces_away;
 use super::source::UpAxis;
+use super::sources::{EnvironmentSource, MeshShading, MeshSource};
 use super::up_axis::guess_up;
+use super::value::{ColorValue, Rgb};
 use crate::mesh::Mesh;
+use crate::render::Integrator;
 use glam::{DVec3, Vec3};
 
 /// Names of the parts, as a saved scene shows them.
@@ -18,7 +18,7 @@ const CLAY: &str = "clay";
 ///
 /// All sizes follow from the model's box, so that a model of any unit looks the same. The camera stands in front of it,
 /// with the key light at its side.
-pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, aspect: f64) -> SceneFile {
+pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspect: f64) -> SceneFile {
     let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
     let (min, max) = bounds(&loaded.mesh, up);
     let center = 0.5 * (min + max);
@@ -29,12 +29,12 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
     };
     let material = |albedo| MaterialPart::Diffuse { albedo };
     let mut materials = vec![
-        ("ground".to_owned(), material(ColorParam::rgb(0.45, 0.45, 0.43))),
+        ("ground".to_owned(), material(ColorValue::rgb(0.45, 0.45, 0.43))),
         // As large as the model and five radii away: about three times the light of the sky.
-        ("key light".to_owned(), MaterialPart::Emissive { radiance: ColorParam::rgb(26.0, 24.0, 21.0) }),
+        ("key light".to_owned(), MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }),
     ];
     if loaded.slots.is_empty() {
-        materials.push((CLAY.to_owned(), material(ColorParam::rgb(0.72, 0.56, 0.45))));
+        materials.push((CLAY.to_owned(), material(ColorValue::rgb(0.72, 0.56, 0.45))));
     }
     // Half a turn about the vertical, if the model looks the other way.
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
@@ -42,10 +42,10 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
     SceneFile {
         camera: camera(min, max, side, aspect),
         film: FilmPart::default(),
-        integrator: IntegratorPart::default(),
+        integrator: Integrator::default(),
         max_depth: None,
         display: DisplayPart::default(),
-        environment: EnvironmentPart::Gradient {
+        environment: EnvironmentSource::Gradient {
             zenith: Rgb(Vec3::new(0.35, 0.5, 0.8)),
             horizon: Rgb(Vec3::new(0.85, 0.9, 0.95)),
             ground: Rgb(Vec3::splat(0.3)),
@@ -57,7 +57,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSourcePart, up: Option<UpAxis>, 
             ObjectPart::Mesh {
                 name: Some("model".to_owned()),
                 source: source.clone(),
-                shading: MeshShadingPart::Auto,
+                shading: MeshShading::Auto,
                 simplify: None,
                 material: loaded.slots.is_empty().then(|| CLAY.to_owned()),
                 materials: None,

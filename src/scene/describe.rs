@@ -11,15 +11,17 @@ use super::components::{
     SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use super::file::{
-    self, CameraPart, DisplayPart, EnvironmentPart, FilmPart, InFile, LightPart, MaterialPart, MeshShadingPart,
-    MeshSourcePart, Named, ObjectPart, RadiiPart, Rgb, SceneFile, TexturePart, TransformPart,
+    CameraPart, DisplayPart, FilmPart, InFile, LightPart, MaterialPart, Named, ObjectPart, RadiiPart, SceneFile,
+    TransformPart,
 };
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::meshes::LoadedMesh;
 use super::placement::Placement;
 use super::relative::path_to_text;
+use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::units::radians;
+use super::value::{ColorValue, Rgb, ScalarValue};
 use super::view::{Lens, Projection, View};
 use crate::mesh::Mesh;
 use crate::render::{Environment, MapParams, MaterialKind, Param};
@@ -65,10 +67,10 @@ impl Description {
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {
             camera: camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
-            film: FilmPart { width, height, filter: rendering.filter.into() },
-            integrator: rendering.integrator.into(),
+            film: FilmPart { width, height, filter: rendering.filter },
+            integrator: rendering.integrator,
             max_depth: (rendering.max_depth < u32::MAX).then_some(rendering.max_depth),
-            display: DisplayPart { exposure: display.exposure_stops, tone_curve: display.tone_curve.into() },
+            display: DisplayPart { exposure: display.exposure_stops, tone_curve: display.tone_curve },
             environment,
             air: Rgb(inputs.environment.air),
             textures: writer.textures(),
@@ -125,7 +127,7 @@ struct Writer<'a> {
     /// What was loaded, by the address of the mesh and of the balls, and by the name of the texture.
     loaded_meshes: HashMap<usize, &'a LoadedMesh>,
     loaded_balls: HashMap<usize, &'a ObjectPart>,
-    loaded_textures: HashMap<&'a str, &'a TexturePart>,
+    loaded_textures: HashMap<&'a str, &'a TextureSource>,
     /// Every material that gets a name, in order.
     named: Vec<(Entity, String, Material)>,
     names: HashMap<Entity, String>,
@@ -179,14 +181,14 @@ impl<'a> Writer<'a> {
         let Shape::Mesh(mesh) = shape else { return false };
         let Some(loaded) = self.loaded else { return false };
         let Some(known) = self.loaded_meshes.get(&address(mesh)) else { return false };
-        let color = |written: &file::ColorParam, now: &ColorParam| match (written, now) {
-            (file::ColorParam::Rgb(a), ColorParam::Rgb(b)) => a == b,
-            (file::ColorParam::Texture(name), ColorParam::Texture(texture)) => *name == texture.name,
+        let color = |written: &ColorValue, now: &ColorParam| match (written, now) {
+            (ColorValue::Rgb(a), ColorParam::Rgb(b)) => a == b,
+            (ColorValue::Texture(name), ColorParam::Texture(texture)) => *name == texture.name,
             // Its picture could not be had.
-            (file::ColorParam::Texture(name), ColorParam::Rgb(rgb)) => {
+            (ColorValue::Texture(name), ColorParam::Rgb(rgb)) => {
                 !loaded.pictures.contains_key(name) && *rgb == Vec3::splat(0.5)
             }
-            (file::ColorParam::Rgb(_), ColorParam::Texture(_)) => false,
+            (ColorValue::Rgb(_), ColorParam::Texture(_)) => false,
         };
         let same = |written: &MaterialPart, now: &Material| {
             // The file of a mesh has no metals, whose Fresnel term is no parameter.
@@ -196,7 +198,7 @@ impl<'a> Writer<'a> {
                     (Param::Reflectance(a), Param::Reflectance(b)) | (Param::Radiance(a), Param::Radiance(b)) => {
                         color(a, b)
                     }
-                    (Param::Share(file::ScalarParam::Number(a)), Param::Share(ScalarParam::Number(b))) => a == b,
+                    (Param::Share(ScalarValue::Number(a)), Param::Share(ScalarParam::Number(b))) => a == b,
                     (Param::ConstantShare(a), Param::ConstantShare(b))
                     | (Param::Ior(a), Param::Ior(b))
                     | (Param::Exponent(a), Param::Exponent(b)) => a == b,
@@ -277,7 +279,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Those of the file in its order, whether used or not, then all others.
-    fn textures(&self) -> Named<TexturePart> {
+    fn textures(&self) -> Named<TextureSource> {
         let of_file = self.loaded.map(|loaded| loaded.file.textures.0.clone()).unwrap_or_default();
         let mut textures = of_file;
         for (texture, name) in &self.textures {
@@ -289,9 +291,9 @@ impl<'a> Writer<'a> {
     }
 
     /// Pictures that materials of a mesh name are found from the folder that the program runs in.
-    fn with_path_from_folder(&self, texture: &SurfaceTexture) -> TexturePart {
+    fn with_path_from_folder(&self, texture: &SurfaceTexture) -> TextureSource {
         let mut part = texture.part.clone();
-        if let TexturePart::Image { file, .. } = &mut part {
+        if let TextureSource::Image { file, .. } = &mut part {
             let from_mesh = self.loaded.and_then(|loaded| {
                 let textures = loaded.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
                 textures.clone().find(|(name, ..)| name == file).map(|(.., path)| path.clone())
@@ -303,22 +305,22 @@ impl<'a> Writer<'a> {
         part
     }
 
-    fn environment(&mut self, environment: &SceneEnvironment) -> EnvironmentPart {
+    fn environment(&mut self, environment: &SceneEnvironment) -> EnvironmentSource {
         match (&environment.light, &environment.part) {
-            (Environment::Black, part @ EnvironmentPart::Image { .. }) => part.clone(),
-            (Environment::Black, _) => EnvironmentPart::Black,
-            (Environment::Constant(radiance), _) => EnvironmentPart::Constant(Rgb(*radiance)),
+            (Environment::Black, part @ EnvironmentSource::Image { .. }) => part.clone(),
+            (Environment::Black, _) => EnvironmentSource::Black,
+            (Environment::Constant(radiance), _) => EnvironmentSource::Constant(Rgb(*radiance)),
             (Environment::Gradient { zenith, horizon, ground }, _) => {
-                EnvironmentPart::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
+                EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
             }
-            (Environment::Image { scale, rotation, .. }, EnvironmentPart::Image { file, rotate, .. }) => {
+            (Environment::Image { scale, rotation, .. }, EnvironmentSource::Image { file, rotate, .. }) => {
                 let kept = radians(*rotate) == *rotation;
                 let rotate = if kept { *rotate } else { f64::from(*rotation).to_degrees() };
-                EnvironmentPart::Image { file: file.clone(), scale: Rgb(*scale), rotate }
+                EnvironmentSource::Image { file: file.clone(), scale: Rgb(*scale), rotate }
             }
             (Environment::Image { .. }, _) => {
                 self.losses.push("the picture around the scene came from no file and is left out".to_owned());
-                EnvironmentPart::Black
+                EnvironmentSource::Black
             }
         }
     }
@@ -397,7 +399,7 @@ impl<'a> Writer<'a> {
             Some(origin) => (origin.source.clone(), origin.shading, origin.simplify),
             None => {
                 self.loose_meshes.push((index, mesh.clone()));
-                (MeshSourcePart::Obj(String::new()), MeshShadingPart::Auto, None)
+                (MeshSource::Obj(String::new()), MeshShading::Auto, None)
             }
         };
         let (name, transform) = (item.name.clone(), item.placement.to_part());
@@ -406,17 +408,17 @@ impl<'a> Writer<'a> {
 }
 
 impl MapParams<InWorld, InFile> for Writer<'_> {
-    fn color(&mut self, color: &ColorParam) -> file::ColorParam {
+    fn color(&mut self, color: &ColorParam) -> ColorValue {
         match color {
-            ColorParam::Rgb(rgb) => file::ColorParam::Rgb(*rgb),
-            ColorParam::Texture(texture) => file::ColorParam::Texture(self.texture_name(texture)),
+            ColorParam::Rgb(rgb) => ColorValue::Rgb(*rgb),
+            ColorParam::Texture(texture) => ColorValue::Texture(self.texture_name(texture)),
         }
     }
 
-    fn scalar(&mut self, scalar: &ScalarParam) -> file::ScalarParam {
+    fn scalar(&mut self, scalar: &ScalarParam) -> ScalarValue {
         match scalar {
-            ScalarParam::Number(value) => file::ScalarParam::Number(*value),
-            ScalarParam::Texture(texture) => file::ScalarParam::Texture(self.texture_name(texture)),
+            ScalarParam::Number(value) => ScalarValue::Number(*value),
+            ScalarParam::Texture(texture) => ScalarValue::Texture(self.texture_name(texture)),
         }
     }
 

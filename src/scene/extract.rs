@@ -3,9 +3,7 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`SnapshotPart`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{
-    ColorParam, GREY, InWorld, MAX_LOBES, Material, PHONG_LOBES, PointLight, ScalarParam, Shape, SurfaceTexture,
-};
+use super::components::{ColorParam, GREY, InWorld, Material, PointLight, ScalarParam, Shape, SurfaceTexture};
 use super::inputs::{CameraInput, ObjectInput, SceneInputs};
 use super::placement::Placement;
 use super::trees::{Trees, address};
@@ -14,8 +12,8 @@ use super::view::{Lens, Projection, View};
 use crate::kdtree::{self};
 use crate::mesh::Mesh;
 use crate::render::{
-    self, Camera, ColorInput, Geometry, InSnapshot, MapParams, MaterialId, Object, Prepared, ScalarInput, Shading,
-    Snapshot, TextureId,
+    self, Camera, ColorInput, Geometry, InSnapshot, MAX_LOBES, MapParams, MaterialId, Object, Prepared, ScalarInput,
+    Shading, Snapshot, TextureId,
 };
 use bevy_ecs::prelude::Entity;
 use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
@@ -358,8 +356,7 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
                 open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
             }
             Some(Some(Material::Emissive { .. })) => (lobes, glowing) = (lobes + 1, glowing + 1),
-            Some(Some(Material::Phong { .. })) => lobes += PHONG_LOBES,
-            Some(_) => lobes += 1,
+            Some(plain) => lobes += plain.map_or(1, Material::n_lobes),
             None => break,
         }
     }

@@ -2,14 +2,12 @@
 
 use super::components::{Shape, SurfaceTexture, textures_of};
 use super::describe::Description;
-use super::file::{
-    CameraPart, DisplayPart, EnvironmentPart, FilmPart, IntegratorPart, MeshSourcePart, ObjectPart, SceneFile,
-    TexturePart,
-};
+use super::file::{CameraPart, DisplayPart, FilmPart, ObjectPart, SceneFile};
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
+use super::sources::{EnvironmentSource, MeshSource, TextureSource};
 use crate::mesh::Mesh;
-use crate::render::{Environment, ImageTexture, TexturePattern};
+use crate::render::{Environment, ImageTexture, Integrator, TexturePattern};
 use bevy_ecs::prelude::World;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -108,18 +106,18 @@ impl SceneContent {
         let mut file = description.file.clone();
         file.camera = CameraPart::looking_at(DVec3::Z, DVec3::ZERO);
         (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
-        (file.integrator, file.max_depth) = (IntegratorPart::default(), None);
+        (file.integrator, file.max_depth) = (Integrator::default(), None);
         for object in &mut file.objects {
-            if let ObjectPart::Mesh { source: MeshSourcePart::Obj(path), .. } = object {
+            if let ObjectPart::Mesh { source: MeshSource::Obj(path), .. } = object {
                 path.clear();
             }
         }
         for (_, texture) in &mut file.textures.0 {
-            if let TexturePart::Image { file, .. } = texture {
+            if let TextureSource::Image { file, .. } = texture {
                 file.clear();
             }
         }
-        if let EnvironmentPart::Image { file, .. } = &mut file.environment {
+        if let EnvironmentSource::Image { file, .. } = &mut file.environment {
             file.clear();
         }
         let inputs = SceneInputs::of(world);

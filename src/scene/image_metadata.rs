@@ -7,12 +7,12 @@
 
 use super::bounds::{check_film_size, check_max_depth};
 use super::camera::camera;
-use super::file::{CameraPart, DisplayPart, FilmPart, IntegratorPart, SceneFile};
+use super::file::{CameraPart, DisplayPart, FilmPart, SceneFile};
 use super::input_file::{FileKind, InputFile, ReadError};
 use super::limits::Limits;
 use super::relative::{absolute, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
-use crate::render::Film;
+use crate::render::{Film, Integrator};
 use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
@@ -39,7 +39,7 @@ pub struct ImageMetadata {
     pub fingerprint: String,
     pub camera: CameraPart,
     pub film: FilmPart,
-    pub integrator: IntegratorPart,
+    pub integrator: Integrator,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
     pub display: DisplayPart,

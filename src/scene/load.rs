@@ -4,9 +4,7 @@ use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::components::{Balls, Shape};
 use super::default_scene;
 use super::error::{Problem, SceneError, suggestion};
-use super::file::{
-    EnvironmentPart, MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile, TexturePart, ball_grid, locate,
-};
+use super::file::{ObjectPart, RadiiPart, SceneFile, ball_grid, locate};
 use super::image_metadata::ImageMetadata;
 use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
@@ -14,6 +12,7 @@ use super::meshes::{LoadedMesh, load_mesh};
 use super::picture::read_picture;
 use super::relative::{path_to_text, text_to_path};
 use super::source::{SceneSource, UpAxis};
+use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::stamp::stamp;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
@@ -67,9 +66,9 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
         SceneSource::Model(path) => {
             let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-            let mesh_source = MeshSourcePart::Obj(file);
+            let mesh_source = MeshSource::Obj(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
-            let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShadingPart::Auto, None, &folder), Ok)?;
+            let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder), Ok)?;
             let file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
@@ -157,7 +156,7 @@ fn resolve(
         match object {
             ObjectPart::Mesh { source, shading, simplify, .. } => {
                 let read = || {
-                    let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = source;
+                    let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = source;
                     options.say(&format!("reading {name}"));
                     let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
                     let loaded = kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok);
@@ -192,11 +191,11 @@ fn resolve(
     }
     let mut wanted: Vec<(String, String)> = Vec::new();
     for (name, texture) in scene.file.textures.iter() {
-        if let TexturePart::Image { file, .. } = texture {
+        if let TextureSource::Image { file, .. } = texture {
             wanted.push((format!("textures/{name}/file"), file.clone()));
         }
     }
-    if let EnvironmentPart::Image { file, .. } = &scene.file.environment {
+    if let EnvironmentSource::Image { file, .. } = &scene.file.environment {
         wanted.push(("environment/file".to_owned(), file.clone()));
     }
     for (place, file) in wanted {
@@ -291,7 +290,7 @@ impl LoadedScene {
 }
 
 /// What tells one mesh from another: where it comes from, and what is made of it.
-type MeshKey = (MeshSourcePart, MeshShadingPart, Option<u64>);
+type MeshKey = (MeshSource, MeshShading, Option<u64>);
 
 /// What was read before, by what it was read for.
 struct Known<'a> {
@@ -351,7 +350,7 @@ impl<'a> Known<'a> {
     /// The mesh of an object that asks for the same, if its files are still the same.
     fn fresh_mesh(&self, folder: &Path, wanted: &ObjectPart) -> Option<LoadedMesh> {
         let key = Self::mesh_key(wanted)?;
-        let is_builtin = matches!(key.0, MeshSourcePart::Builtin(_));
+        let is_builtin = matches!(key.0, MeshSource::Builtin(_));
         let mesh = self.scene.meshes[*self.meshes.get(&key)?].as_ref()?;
         ((is_builtin || self.scene.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
     }

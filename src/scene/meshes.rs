@@ -1,11 +1,14 @@
 //! The meshes that a scene names: from OBJ files or made by the program, shaded as asked, with their own materials.
 
 use super::error::SceneError;
-use super::file::{ColorParam, MaterialPart, MeshShadingPart, MeshSourcePart, Rgb, ScalarParam, TexturePart, WrapPart};
+use super::file::MaterialPart;
 use super::obj::{ImportedMaterial, ImportedObj, ObjNormals, ObjOptions, load_obj_with};
 use super::relative::text_to_path;
+use super::sources::{MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
+use super::value::{ColorValue, Rgb, ScalarValue};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
+use crate::render::Wrap;
 use glam::{DVec2, DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -50,7 +53,7 @@ pub struct LoadedMesh {
     /// One a slot; empty when the file has none.
     pub slots: Vec<(String, MaterialPart)>,
     /// Textures that `slots` name, and where their pictures lie.
-    pub textures: Vec<(String, TexturePart, PathBuf)>,
+    pub textures: Vec<(String, TextureSource, PathBuf)>,
     pub warnings: Vec<String>,
     /// About `slots`, for those who use them.
     pub material_warnings: Vec<String>,
@@ -60,14 +63,14 @@ pub struct LoadedMesh {
 
 /// Reads or makes a mesh, then simplifies and shades it as asked.
 pub fn load_mesh(
-    source: &MeshSourcePart,
-    shading: MeshShadingPart,
+    source: &MeshSource,
+    shading: MeshShading,
     simplify: Option<f64>,
     folder: &Path,
 ) -> Result<LoadedMesh, SceneError> {
     match source {
-        MeshSourcePart::Obj(file) => read_obj(source, &folder.join(text_to_path(file)), shading, simplify),
-        MeshSourcePart::Builtin(_) => {
+        MeshSource::Obj(file) => read_obj(source, &folder.join(text_to_path(file)), shading, simplify),
+        MeshSource::Builtin(_) => {
             let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
             Ok(LoadedMesh {
                 mesh: Arc::new(mesh),
@@ -84,9 +87,9 @@ pub fn load_mesh(
 /// A mesh before it is simplified and shaded, for making it anew in another way without reading it again.
 #[derive(Clone, Debug)]
 pub struct MeshBase {
-    source: MeshSourcePart,
+    source: MeshSource,
     /// Of the file, normals are kept or not.
-    shading: MeshShadingPart,
+    shading: MeshShading,
     simplified: bool,
     folder: PathBuf,
     mesh: Mesh,
@@ -97,17 +100,17 @@ pub struct MeshBase {
 impl MeshBase {
     /// Reads or makes what [`load_mesh`] would begin with.
     pub fn read(
-        source: &MeshSourcePart,
-        shading: MeshShadingPart,
+        source: &MeshSource,
+        shading: MeshShading,
         simplify: Option<f64>,
         folder: &Path,
     ) -> Result<Self, SceneError> {
         let (mesh, crease) = match source {
-            MeshSourcePart::Obj(file) => {
+            MeshSource::Obj(file) => {
                 let (imported, crease) = read_obj_base(&folder.join(text_to_path(file)), shading, simplify.is_some())?;
                 (imported.mesh, crease)
             }
-            MeshSourcePart::Builtin(name) => {
+            MeshSource::Builtin(name) => {
                 builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?
             }
         };
@@ -116,18 +119,12 @@ impl MeshBase {
     }
 
     /// Whether this is what would be read.
-    pub fn serves(
-        &self,
-        source: &MeshSourcePart,
-        shading: MeshShadingPart,
-        simplify: Option<f64>,
-        folder: &Path,
-    ) -> bool {
+    pub fn serves(&self, source: &MeshSource, shading: MeshShading, simplify: Option<f64>, folder: &Path) -> bool {
         (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
     }
 
     /// Simplified and shaded, as [`load_mesh`] ends.
-    pub fn finish(&self, shading: MeshShadingPart, simplify: Option<f64>) -> Result<Mesh, SceneError> {
+    pub fn finish(&self, shading: MeshShading, simplify: Option<f64>) -> Result<Mesh, SceneError> {
         finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
     }
 
@@ -138,22 +135,21 @@ impl MeshBase {
 
 fn finish(
     mesh: Mesh,
-    source: &MeshSourcePart,
-    shading: MeshShadingPart,
+    source: &MeshSource,
+    shading: MeshShading,
     simplify: Option<f64>,
     crease: Option<f32>,
 ) -> Result<Mesh, SceneError> {
     let mesh = simplified(mesh, simplify)?;
     // Normals that reading gave are those that were asked for.
-    let keeps =
-        shading != MeshShadingPart::Flat && matches!(source, MeshSourcePart::Obj(_)) && !mesh.normals.is_empty();
+    let keeps = shading != MeshShading::Flat && matches!(source, MeshSource::Obj(_)) && !mesh.normals.is_empty();
     Ok(if keeps { mesh } else { shaded(mesh, shading, crease) })
 }
 
 fn read_obj(
-    source: &MeshSourcePart,
+    source: &MeshSource,
     path: &Path,
-    shading: MeshShadingPart,
+    shading: MeshShading,
     simplify: Option<f64>,
 ) -> Result<LoadedMesh, SceneError> {
     // Before it is read: what changes in the meantime is read again.
@@ -181,11 +177,7 @@ fn read_obj(
 }
 
 /// The file as simplification wants it, and the crease angle of normals that are still to be computed.
-fn read_obj_base(
-    path: &Path,
-    shading: MeshShadingPart,
-    simplify: bool,
-) -> Result<(ImportedObj, Option<f32>), SceneError> {
+fn read_obj_base(path: &Path, shading: MeshShading, simplify: bool) -> Result<(ImportedObj, Option<f32>), SceneError> {
     let read = |normals| {
         load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() })
             .map_err(|error| SceneError::new(error.to_string()))
@@ -193,12 +185,12 @@ fn read_obj_base(
     let computed = ObjOptions::default().normals;
     let ObjNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
     let mut imported = read(match shading {
-        MeshShadingPart::Auto => computed,
-        MeshShadingPart::Smooth if !simplify => ObjNormals::OfPositions,
-        MeshShadingPart::Smooth | MeshShadingPart::Flat => ObjNormals::Ignore,
+        MeshShading::Auto => computed,
+        MeshShading::Smooth if !simplify => ObjNormals::OfPositions,
+        MeshShading::Smooth | MeshShading::Flat => ObjNormals::Ignore,
     })?;
     // Normals that were computed would hold simplification back at every crease; they are computed after it.
-    if shading == MeshShadingPart::Auto && simplify && !imported.normals_from_file {
+    if shading == MeshShading::Auto && simplify && !imported.normals_from_file {
         imported.mesh = read(ObjNormals::Ignore)?.mesh;
     }
     Ok((imported, Some(crease_angle)))
@@ -215,11 +207,11 @@ fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
 }
 
 /// `crease`: radians beyond which an edge is hard in automatic shading; `None` smooths every edge.
-fn shaded(mesh: Mesh, shading: MeshShadingPart, crease: Option<f32>) -> Mesh {
+fn shaded(mesh: Mesh, shading: MeshShading, crease: Option<f32>) -> Mesh {
     match shading {
-        MeshShadingPart::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
-        MeshShadingPart::Smooth => mesh.with_vertex_normals(),
-        MeshShadingPart::Flat => mesh.flat(),
+        MeshShading::Auto => mesh.with_smooth_normals(NormalWeight::Angle, crease),
+        MeshShading::Smooth => mesh.with_vertex_normals(),
+        MeshShading::Flat => mesh.flat(),
     }
 }
 
@@ -232,11 +224,11 @@ impl LoadedMesh {
     /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
     /// matte, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
-        let share = |color: Vec3| ColorParam::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
+        let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
         let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);
         if glows || material.emission_texture.is_some() {
             let radiance = material.emission.unwrap_or(Vec3::ONE).max(Vec3::ZERO);
-            let radiance = self.texture(material.emission_texture.as_ref()).unwrap_or(ColorParam::Rgb(radiance));
+            let radiance = self.texture(material.emission_texture.as_ref()).unwrap_or(ColorValue::Rgb(radiance));
             return MaterialPart::Emissive { radiance };
         }
         match material.illumination_model {
@@ -252,7 +244,7 @@ impl LoadedMesh {
                     Some((share, shininess)) => MaterialPart::Phong {
                         diffuse: albedo,
                         ambient: 1.0,
-                        specular: ScalarParam::Number(share),
+                        specular: ScalarValue::Number(share),
                         shininess,
                         transparency: 0.0,
                         ior: 1.5,
@@ -264,19 +256,19 @@ impl LoadedMesh {
         }
     }
 
-    fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorParam> {
+    fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorValue> {
         let file = file?;
         let name = file.display().to_string();
-        let part = TexturePart::Image {
+        let part = TextureSource::Image {
             file: name.clone(),
             repeat: DVec2::ONE,
             offset: DVec2::ZERO,
             rotate: 0.0,
-            wrap: WrapPart::Repeat,
+            wrap: Wrap::Repeat,
             smooth: true,
         };
         self.textures.push((name.clone(), part, file.clone()));
-        Some(ColorParam::Texture(name))
+        Some(ColorValue::Texture(name))
     }
 }
 
@@ -302,8 +294,8 @@ mod tests {
     #[test]
     fn every_builtin_mesh_can_be_had() {
         for name in BUILTIN_NAMES {
-            let source = MeshSourcePart::Builtin((*name).to_owned());
-            let loaded = load_mesh(&source, MeshShadingPart::Flat, None, Path::new("")).unwrap();
+            let source = MeshSource::Builtin((*name).to_owned());
+            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new("")).unwrap();
             loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         }
         assert!(BUILTIN_NAMES.is_sorted());

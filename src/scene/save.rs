@@ -1,11 +1,12 @@
 //! Scenes to disk: the world as a scene file that reads back as exactly this world.
 
 use super::describe::Description;
-use super::file::{EnvironmentPart, MeshSourcePart, ObjectPart, SceneFile, TexturePart};
+use super::file::{ObjectPart, SceneFile};
 use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::obj::{NewObj, ObjExtras, save_new_obj};
 use super::relative::{absolute, path_to_text, relative_path, text_to_path};
+use super::sources::{EnvironmentSource, MeshSource, TextureSource};
 use super::whole_file::write_whole;
 use bevy_ecs::prelude::World;
 use std::path::Path;
@@ -59,7 +60,7 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
             break name;
         };
         if let Some(ObjectPart::Mesh { source, .. }) = description.file.objects.get_mut(*object) {
-            *source = MeshSourcePart::Obj(name);
+            *source = MeshSource::Obj(name);
         }
     }
     description.file.check().map_err(|error| failed(&error))?;
@@ -88,16 +89,16 @@ fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
         }
     };
     for object in &mut file.objects {
-        if let ObjectPart::Mesh { source: MeshSourcePart::Obj(path), .. } = object {
+        if let ObjectPart::Mesh { source: MeshSource::Obj(path), .. } = object {
             moved(path);
         }
     }
     for (_, texture) in &mut file.textures.0 {
-        if let TexturePart::Image { file, .. } = texture {
+        if let TextureSource::Image { file, .. } = texture {
             moved(file);
         }
     }
-    if let EnvironmentPart::Image { file, .. } = &mut file.environment {
+    if let EnvironmentSource::Image { file, .. } = &mut file.environment {
         moved(file);
     }
 }

@@ -5,10 +5,12 @@ use super::components::{
     ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, PointLight, Rendering,
     ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
-use super::file::{self, EnvironmentPart, InFile, LightPart, MaterialPart, ObjectPart, TexturePart};
+use super::file::{InFile, LightPart, MaterialPart, ObjectPart};
 use super::loaded::LoadedScene;
 use super::placement::Placement;
+use super::sources::{EnvironmentSource, TextureSource};
 use super::units::radians;
+use super::value::{ColorValue, ScalarValue};
 use super::view::View;
 use crate::render::{Display, Environment, ImageTexture, MapParams, RenderSettings, Texture, TexturePattern};
 use bevy_ecs::name::Name;
@@ -99,24 +101,24 @@ impl LoadedScene {
         let of_world = world.get_resource::<Rendering>().map_or(0, |rendering| rendering.0.seed);
         let seed = self.shot.as_ref().map_or(of_world, |shot| shot.seed);
         world.insert_resource(Rendering(RenderSettings {
-            integrator: file.integrator.into(),
+            integrator: file.integrator,
             max_depth: file.max_depth.unwrap_or(u32::MAX),
             seed,
-            filter: file.film.filter.into(),
+            filter: file.film.filter,
             ..RenderSettings::default()
         }));
-        let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve.into() };
+        let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve };
         world.insert_resource(DisplaySettings(display));
     }
 
     fn environment(&self) -> Environment {
         match &self.file.environment {
-            EnvironmentPart::Black => Environment::Black,
-            EnvironmentPart::Constant(radiance) => Environment::Constant(radiance.0),
-            EnvironmentPart::Gradient { zenith, horizon, ground } => {
+            EnvironmentSource::Black => Environment::Black,
+            EnvironmentSource::Constant(radiance) => Environment::Constant(radiance.0),
+            EnvironmentSource::Gradient { zenith, horizon, ground } => {
                 Environment::Gradient { zenith: zenith.0, horizon: horizon.0, ground: ground.0 }
             }
-            EnvironmentPart::Image { file, scale, rotate } => match self.pictures.get(file) {
+            EnvironmentSource::Image { file, scale, rotate } => match self.pictures.get(file) {
                 Some(image) => Environment::Image { image: image.clone(), scale: scale.0, rotation: radians(*rotate) },
                 None => Environment::Black,
             },
@@ -150,14 +152,14 @@ impl LoadedScene {
 }
 
 /// A texture as a scene file describes it; `None` where its `picture` cannot be had.
-pub fn texture_of(part: &TexturePart, picture: impl FnOnce(&str) -> Option<Arc<ImageTexture>>) -> Option<Texture> {
+pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc<ImageTexture>>) -> Option<Texture> {
     let (pattern, scale, offset, rotate) = match part {
-        TexturePart::Checker { a, b, squares, offset, rotate } => {
+        TextureSource::Checker { a, b, squares, offset, rotate } => {
             (TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
         }
-        TexturePart::Image { file, repeat, offset, rotate, wrap, smooth } => {
+        TextureSource::Image { file, repeat, offset, rotate, wrap, smooth } => {
             let image = picture(file)?;
-            (TexturePattern::Image { image, wrap: (*wrap).into(), smooth: *smooth }, *repeat, *offset, *rotate)
+            (TexturePattern::Image { image, wrap: *wrap, smooth: *smooth }, *repeat, *offset, *rotate)
         }
     };
     let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate));
@@ -189,21 +191,21 @@ struct FileToWorld<'a> {
 }
 
 impl MapParams<InFile, InWorld> for FileToWorld<'_> {
-    fn color(&mut self, color: &file::ColorParam) -> ColorParam {
+    fn color(&mut self, color: &ColorValue) -> ColorParam {
         match color {
-            file::ColorParam::Rgb(rgb) => ColorParam::Rgb(*rgb),
+            ColorValue::Rgb(rgb) => ColorParam::Rgb(*rgb),
             // Only a mesh's own picture can be missing, and that was said in a warning.
-            file::ColorParam::Texture(name) => self
+            ColorValue::Texture(name) => self
                 .textures
                 .get(name.as_str())
                 .map_or(ColorParam::Rgb(glam::Vec3::splat(0.5)), |texture| ColorParam::Texture(texture.clone())),
         }
     }
 
-    fn scalar(&mut self, scalar: &file::ScalarParam) -> ScalarParam {
+    fn scalar(&mut self, scalar: &ScalarValue) -> ScalarParam {
         match scalar {
-            file::ScalarParam::Number(value) => ScalarParam::Number(*value),
-            file::ScalarParam::Texture(name) => self
+            ScalarValue::Number(value) => ScalarParam::Number(*value),
+            ScalarValue::Texture(name) => self
                 .textures
                 .get(name.as_str())
                 .map_or(ScalarParam::Number(0.5), |texture| ScalarParam::Texture(texture.clone())),

@@ -94,8 +94,7 @@ fn difference(a: &Picture, b: &Picture) -> Option<Difference> {
 mod tests {
     use super::*;
     use crate::frame::{Command, Edit, MeshMeasure, Selection, SessionOptions, Target};
-    use crate::scene::SceneSource;
-    use crate::scene::file::MeshShadingPart;
+    use crate::scene::{MeshShading, SceneSource};
     use std::time::{Duration, Instant};
 
     #[test]
@@ -140,7 +139,7 @@ mod tests {
         let entity = serpent.expect("the gallery has a serpent").entity;
         let coarse = |session: &mut Session, change: &mut PictureChange, ratio, is_whole| {
             change.begin(entity, is_whole, session);
-            let edit = Edit::Remesh { id: entity.to_bits(), shading: MeshShadingPart::Auto, ratio };
+            let edit = Edit::Remesh { id: entity.to_bits(), shading: MeshShading::Auto, ratio };
             session.send(Command::Edit(edit));
             settle(session, change);
             assert!(session.world().get::<MeshMeasure>(entity).is_some());

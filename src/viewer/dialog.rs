@@ -5,7 +5,8 @@
 //! the picture goes on.
 
 use crate::frame::{Command, Edit, Id, NewThing, Waker};
-use crate::scene::file::{MeshSourcePart, TexturePart, WrapPart};
+use crate::render::Wrap;
+use crate::scene::{MeshSource, TextureSource};
 use glam::DVec2;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -49,15 +50,15 @@ impl DialogPurpose {
             Self::Open => Command::Open { path },
             Self::AddMesh => {
                 let path = crate::scene::path_to_text(&path);
-                Command::Edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path))))
+                Command::Edit(Edit::Add(NewThing::Mesh(MeshSource::Obj(path))))
             }
             Self::Texture { id } => {
-                let part = TexturePart::Image {
+                let part = TextureSource::Image {
                     file: crate::scene::path_to_text(&path),
                     repeat: DVec2::ONE,
                     offset: DVec2::ZERO,
                     rotate: 0.0,
-                    wrap: WrapPart::default(),
+                    wrap: Wrap::default(),
                     smooth: true,
                 };
                 Command::Edit(Edit::Paint { id, part })

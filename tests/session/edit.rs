@@ -6,10 +6,10 @@ use firstlight::frame::{
     Bookmarks, Command, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection, Session,
     SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::{Inspection, MaterialKind};
-use firstlight::scene::file::{MeshShadingPart, MeshSourcePart, Rgb, TexturePart, WrapPart};
+use firstlight::render::{Inspection, MaterialKind, Wrap};
 use firstlight::scene::{
-    ColorParam, Material, MaterialSlots, MeshOrigin, Placement, PointLight, SceneSource, Shape, SurfaceMaterial,
+    ColorParam, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight, Rgb, SceneSource,
+    Shape, SurfaceMaterial, TextureSource,
 };
 use glam::{DVec2, DVec3, Vec3};
 use std::time::{Duration, Instant};
@@ -247,7 +247,7 @@ fn a_mesh_is_simplified_beside_the_picture() {
     let id = driver.named("serpent").to_bits();
     let whole: Shape = driver.get("serpent");
     let restarts = driver.session.status().restarts;
-    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Auto, ratio: 0.05 }]);
+    driver.edit([Edit::Remesh { id, shading: MeshShading::Auto, ratio: 0.05 }]);
     assert!(!driver.session.is_idle() && driver.get::<Shape>("serpent") == whole, "the frame did not wait for it");
     driver.until(|session| session.status().restarts > restarts && session.is_idle());
     let (shape, measure): (Shape, MeshMeasure) = (driver.get("serpent"), driver.get("serpent"));
@@ -260,9 +260,9 @@ fn a_mesh_is_simplified_beside_the_picture() {
     driver.edit([Edit::Undo]);
     driver.until(Session::is_idle);
     assert_eq!(driver.get::<Shape>("serpent"), whole);
-    driver.edit([Edit::Add(NewThing::Mesh(MeshSourcePart::Builtin("torus".to_owned())))]);
+    driver.edit([Edit::Add(NewThing::Mesh(MeshSource::Builtin("torus".to_owned())))]);
     driver.until(|session| session.inputs().objects.iter().any(|object| object.name.as_deref() == Some("torus")));
-    driver.edit([Edit::Add(NewThing::Mesh(MeshSourcePart::Obj("/no/such.obj".to_owned())))]);
+    driver.edit([Edit::Add(NewThing::Mesh(MeshSource::Obj("/no/such.obj".to_owned())))]);
     driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("no such file")));
 }
 
@@ -278,24 +278,24 @@ fn what_is_asked_of_a_mesh_adds_up_and_is_taken_back_before_it_is_there() {
     let n_objects = count(&driver);
     // A slider that is dragged, and another control.
     for ratio in [0.9, 0.5, 0.2, 0.05] {
-        driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Auto, ratio }]);
-        assert_eq!(wanted(&driver), Some((MeshShadingPart::Auto, ratio)));
+        driver.edit([Edit::Remesh { id, shading: MeshShading::Auto, ratio }]);
+        assert_eq!(wanted(&driver), Some((MeshShading::Auto, ratio)));
     }
-    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Flat, ratio: 0.05 }]);
-    assert_eq!(wanted(&driver), Some((MeshShadingPart::Flat, 0.05)));
+    driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
+    assert_eq!(wanted(&driver), Some((MeshShading::Flat, 0.05)));
     driver.edit([Edit::Undo]);
     driver.until(Session::is_idle);
     assert_eq!((wanted(&driver), count(&driver)), (before, n_objects), "the mesh was what came last, not the sphere");
     assert_eq!(driver.get::<Shape>("serpent"), whole);
     // What was done after it was asked for goes first.
-    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Flat, ratio: 0.05 }]);
+    driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
     driver.edit([Edit::Add(NewThing::Sphere), Edit::Undo]);
     assert_eq!(count(&driver), n_objects);
     driver.until(Session::is_idle);
-    assert_eq!(wanted(&driver), Some((MeshShadingPart::Flat, 0.05)));
+    assert_eq!(wanted(&driver), Some((MeshShading::Flat, 0.05)));
     assert!(driver.get::<MeshMeasure>("serpent").faces <= driver.get::<MeshMeasure>("serpent").whole_faces / 20);
     // Nor does it begin again for what is so already.
-    driver.edit([Edit::Remesh { id, shading: MeshShadingPart::Flat, ratio: 0.05 }]);
+    driver.edit([Edit::Remesh { id, shading: MeshShading::Flat, ratio: 0.05 }]);
     assert!(driver.session.status().loading.is_none());
     driver.edit([Edit::Undo]);
     driver.until(Session::is_idle);
@@ -394,7 +394,7 @@ fn colours_become_textures_and_textures_change() {
     image::RgbImage::from_fn(4, 4, |x, _| image::Rgb([if x % 2 == 0 { 200 } else { 20 }; 3])).save(&file).unwrap();
     let mut driver = Driver::open("gallery");
     let id = driver.named("red").to_bits();
-    let checker = |squares: f64| TexturePart::Checker {
+    let checker = |squares: f64| TextureSource::Checker {
         a: Rgb(Vec3::splat(0.7)),
         b: Rgb(Vec3::splat(0.1)),
         squares: DVec2::splat(squares),
@@ -416,12 +416,12 @@ fn colours_become_textures_and_textures_change() {
     assert_eq!(texture(&driver), Some(("checker".to_owned(), checker(3.0))), "it keeps its name");
     assert_eq!(driver.session.status().restarts, restarts + 1, "and the picture shows it");
     // A picture is read beside.
-    let picture = TexturePart::Image {
+    let picture = TextureSource::Image {
         file: file.to_string_lossy().into_owned(),
         repeat: DVec2::ONE,
         offset: DVec2::ZERO,
         rotate: 0.0,
-        wrap: WrapPart::Repeat,
+        wrap: Wrap::Repeat,
         smooth: true,
     };
     driver.edit([Edit::Paint { id, part: picture.clone() }]);
@@ -435,12 +435,12 @@ fn colours_become_textures_and_textures_change() {
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
     // What cannot be read is told, and changes nothing.
-    let missing = TexturePart::Image {
+    let missing = TextureSource::Image {
         file: "nowhere.png".to_owned(),
         repeat: DVec2::ONE,
         offset: DVec2::ZERO,
         rotate: 0.0,
-        wrap: WrapPart::Repeat,
+        wrap: Wrap::Repeat,
         smooth: true,
     };
     driver.edit([Edit::Paint { id, part: missing }]);

@@ -20,8 +20,8 @@ pub use crate::core::counts::RayCounts;
 pub use crate::core::environment::Environment;
 pub use crate::core::filter::PixelFilter;
 pub use crate::core::material::{
-    ColorInput, Emission, Fresnel, InSnapshot, MapParams, Material, MaterialId, MaterialKind, Param, ParamMut,
-    ParamRef, Params, ScalarInput,
+    ColorInput, Emission, Fresnel, InSnapshot, MAX_LOBES, MapParams, Material, MaterialId, MaterialKind, Param,
+    ParamMut, ParamRef, Params, ScalarInput,
 };
 pub use crate::core::settings::{Integrator, RenderSettings, SettingsError};
 pub use crate::core::snapshot::{Geometry, Object, Shading, Snapshot};

@@ -6,9 +6,9 @@
 use super::spot::{self, Spot};
 use crate::frame::selection::Selection;
 use crate::mesh::procedural;
-use crate::scene::file::{MeshShadingPart, MeshSourcePart};
 use crate::scene::{
-    ColorParam, GREY, Material, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Shape, SurfaceMaterial,
+    ColorParam, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Ordinal, Placement, PointLight,
+    Shape, SurfaceMaterial,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
@@ -25,7 +25,7 @@ pub enum NewThing {
     PointLight,
     Cube,
     /// A built-in mesh or an OBJ file; read beside the picture.
-    Mesh(MeshSourcePart),
+    Mesh(MeshSource),
 }
 
 /// Whether the entity is an object or a light that stands in the scene.
@@ -78,8 +78,8 @@ pub fn add(world: &mut World, new: &NewThing) {
             let shape = Shape::Mesh(std::sync::Arc::new(mesh));
             let placement = sized(Placement::at(place + up), 2.0 * size);
             let origin = MeshOrigin {
-                source: MeshSourcePart::Builtin("cube".to_owned()),
-                shading: MeshShadingPart::Flat,
+                source: MeshSource::Builtin("cube".to_owned()),
+                shading: MeshShading::Flat,
                 simplify: None,
                 own_materials: false,
             };

@@ -33,8 +33,7 @@ use super::resources::{Clock, PictureSize, RenderState};
 use super::selection::{Selection, pick};
 use super::status::{MessageKind, Status};
 use crate::render::MaterialKind;
-use crate::scene::file::{MeshShadingPart, TexturePart};
-use crate::scene::{MaterialSlots, users_of};
+use crate::scene::{MaterialSlots, MeshShading, TextureSource, users_of};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
@@ -107,7 +106,7 @@ pub enum Edit {
     /// Puts a texture of this description in the place of a material's colour; a picture is read beside the picture.
     Paint {
         id: Id,
-        part: TexturePart,
+        part: TextureSource,
     },
     /// Gives an object a material that the scene has.
     Assign {
@@ -125,7 +124,7 @@ pub enum Edit {
     /// Makes an object's mesh anew from where it came from, beside the picture.
     Remesh {
         id: Id,
-        shading: MeshShadingPart,
+        shading: MeshShading,
         /// Share of the faces to keep, (0, 1].
         ratio: f64,
     },

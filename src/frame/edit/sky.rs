@@ -2,9 +2,8 @@
 
 use super::property::Property;
 use crate::render::Environment;
-use crate::scene::SceneEnvironment;
-use crate::scene::file::{EnvironmentPart, Rgb};
 use crate::scene::units::radians;
+use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
 
@@ -73,15 +72,15 @@ fn turned(sky: &Environment, angle: f32) -> Option<Environment> {
 }
 
 /// What a scene file says of it; a picture keeps its file, and its turn as it was written unless there is a new one.
-fn part_of(light: &Environment, old: &EnvironmentPart, angle_deg: Option<f64>) -> EnvironmentPart {
+fn part_of(light: &Environment, old: &EnvironmentSource, angle_deg: Option<f64>) -> EnvironmentSource {
     match (light, old) {
-        (Environment::Black, _) => EnvironmentPart::Black,
-        (Environment::Constant(radiance), _) => EnvironmentPart::Constant(Rgb(*radiance)),
+        (Environment::Black, _) => EnvironmentSource::Black,
+        (Environment::Constant(radiance), _) => EnvironmentSource::Constant(Rgb(*radiance)),
         (Environment::Gradient { zenith, horizon, ground }, _) => {
-            EnvironmentPart::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
+            EnvironmentSource::Gradient { zenith: Rgb(*zenith), horizon: Rgb(*horizon), ground: Rgb(*ground) }
         }
-        (Environment::Image { scale, .. }, EnvironmentPart::Image { file, rotate, .. }) => {
-            EnvironmentPart::Image { file: file.clone(), scale: Rgb(*scale), rotate: angle_deg.unwrap_or(*rotate) }
+        (Environment::Image { scale, .. }, EnvironmentSource::Image { file, rotate, .. }) => {
+            EnvironmentSource::Image { file: file.clone(), scale: Rgb(*scale), rotate: angle_deg.unwrap_or(*rotate) }
         }
         (Environment::Image { .. }, old) => old.clone(),
     }

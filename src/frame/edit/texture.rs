@@ -5,8 +5,7 @@ use crate::frame::background::BackgroundTasks;
 use crate::frame::resources::{Clock, CurrentScene};
 use crate::frame::status::{MessageKind, Status};
 use crate::render::{ImageTexture, TexturePattern};
-use crate::scene::file::TexturePart;
-use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, texture_of};
+use crate::scene::{ColorParam, Material, SurfaceMaterial, SurfaceTexture, TextureSource, texture_of};
 use bevy_ecs::prelude::{Entity, World};
 use std::path::Path;
 use std::sync::Arc;
@@ -33,20 +32,20 @@ pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), 
 }
 
 /// One of this description. A picture that the scene has is shared, another one is read beside the picture.
-pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(), String> {
+pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(), String> {
     let colored = SurfaceMaterial::of(world, entity).is_some_and(|material| material.color().is_some());
     if !colored {
         return Err("this has no colour".to_owned());
     }
     let known = match &part {
-        TexturePart::Image { file, .. } => textures(world).into_iter().find_map(|texture| {
+        TextureSource::Image { file, .. } => textures(world).into_iter().find_map(|texture| {
             let TexturePattern::Image { image, .. } = &texture.texture.pattern else { return None };
-            let same = matches!(&texture.part, TexturePart::Image { file: other, .. } if other == file);
+            let same = matches!(&texture.part, TextureSource::Image { file: other, .. } if other == file);
             same.then(|| image.clone())
         }),
-        TexturePart::Checker { .. } => None,
+        TextureSource::Checker { .. } => None,
     };
-    if let (TexturePart::Image { file, .. }, None) = (&part, &known) {
+    if let (TextureSource::Image { file, .. }, None) = (&part, &known) {
         let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
         let path = folder.join(crate::scene::text_to_path(file));
         world.resource::<BackgroundTasks>().read_picture(entity, part, path);
@@ -56,7 +55,7 @@ pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(),
 }
 
 /// A picture for this entity has been read.
-pub fn take(world: &mut World, entity: Entity, part: TexturePart, result: Result<ImageTexture, String>) {
+pub fn take(world: &mut World, entity: Entity, part: TextureSource, result: Result<ImageTexture, String>) {
     let put = result.and_then(|picture| make(world, entity, part, Some(Arc::new(picture))));
     if let Err(problem) = put {
         let now = world.resource::<Clock>().0;
@@ -67,7 +66,7 @@ pub fn take(world: &mut World, entity: Entity, part: TexturePart, result: Result
 fn make(
     world: &mut World,
     entity: Entity,
-    part: TexturePart,
+    part: TextureSource,
     picture: Option<Arc<ImageTexture>>,
 ) -> Result<(), String> {
     let texture = texture_of(&part, |_| picture).ok_or("the picture is not there")?;
@@ -75,8 +74,8 @@ fn make(
     let old = SurfaceMaterial::of(world, entity).and_then(Material::color);
     let name = match (old, &part) {
         (Some(ColorParam::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
-        (_, TexturePart::Checker { .. }) => free_name(world, "checker"),
-        (_, TexturePart::Image { file, .. }) => {
+        (_, TextureSource::Checker { .. }) => free_name(world, "checker"),
+        (_, TextureSource::Image { file, .. }) => {
             let stem = Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
             free_name(world, &stem.unwrap_or_else(|| "picture".to_owned()))
         }
@@ -84,10 +83,10 @@ fn make(
     put(world, entity, Arc::new(SurfaceTexture { name, part, texture }))
 }
 
-fn same_source(a: &TexturePart, b: &TexturePart) -> bool {
+fn same_source(a: &TextureSource, b: &TextureSource) -> bool {
     match (a, b) {
-        (TexturePart::Checker { .. }, TexturePart::Checker { .. }) => true,
-        (TexturePart::Image { file: a, .. }, TexturePart::Image { file: b, .. }) => a == b,
+        (TextureSource::Checker { .. }, TextureSource::Checker { .. }) => true,
+        (TextureSource::Image { file: a, .. }, TextureSource::Image { file: b, .. }) => a == b,
         _ => false,
     }
 }

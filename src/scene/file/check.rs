@@ -1,18 +1,15 @@
 //! What the values of a scene file must satisfy before anything is built from them.
 
-use super::parts::{
-    CameraPart, EnvironmentPart, LightPart, MaterialPart, MeshSourcePart, ObjectPart, RadiiPart, SceneFile,
-    TexturePart, TransformPart,
-};
-use super::value::{ColorParam, Rgb, ScalarParam};
-use crate::render::Param;
+use super::parts::{CameraPart, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
+use crate::render::{MAX_LOBES, Param};
 use crate::scene::bounds::{
     check_film_size, check_max_depth, coordinate_rule, is_coordinate, is_size, number, size_rule, triple,
 };
-use crate::scene::components::{MAX_LOBES, PHONG_LOBES};
 use crate::scene::error::suggestion;
 use crate::scene::meshes::BUILTIN_NAMES;
 use crate::scene::placement::Placement;
+use crate::scene::sources::{EnvironmentSource, MeshSource, TextureSource};
+use crate::scene::value::{ColorValue, Rgb, ScalarValue};
 use crate::scene::view::unit_direction;
 use glam::{DVec2, DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -96,28 +93,28 @@ impl Check<'_> {
     fn environment(&mut self) {
         self.light("air", self.file.air);
         match &self.file.environment {
-            EnvironmentPart::Black => {}
-            EnvironmentPart::Constant(radiance) => self.light("environment", *radiance),
-            EnvironmentPart::Gradient { zenith, horizon, ground } => {
+            EnvironmentSource::Black => {}
+            EnvironmentSource::Constant(radiance) => self.light("environment", *radiance),
+            EnvironmentSource::Gradient { zenith, horizon, ground } => {
                 self.light("environment/zenith", *zenith);
                 self.light("environment/horizon", *horizon);
                 self.light("environment/ground", *ground);
             }
-            EnvironmentPart::Image { scale, rotate, .. } => {
+            EnvironmentSource::Image { scale, rotate, .. } => {
                 self.light("environment/scale", *scale);
                 self.finite("environment/rotate", *rotate);
             }
         }
     }
 
-    fn texture(&mut self, path: &str, texture: &TexturePart) {
+    fn texture(&mut self, path: &str, texture: &TextureSource) {
         let (size, offset, rotate) = match texture {
-            TexturePart::Checker { a, b, squares, offset, rotate } => {
+            TextureSource::Checker { a, b, squares, offset, rotate } => {
                 self.light(&format!("{path}/a"), *a);
                 self.light(&format!("{path}/b"), *b);
                 (("squares", *squares), *offset, *rotate)
             }
-            TexturePart::Image { repeat, offset, rotate, .. } => (("repeat", *repeat), *offset, *rotate),
+            TextureSource::Image { repeat, offset, rotate, .. } => (("repeat", *repeat), *offset, *rotate),
         };
         let (field, DVec2 { x, y }) = size;
         // Beyond these, single precision has no such number.
@@ -141,8 +138,8 @@ impl Check<'_> {
             let path = format!("{path}/{field}");
             match param {
                 Param::Reflectance(color) => self.share(&path, field, color),
-                Param::Radiance(ColorParam::Rgb(rgb)) => self.light(&path, Rgb(*rgb)),
-                Param::Radiance(ColorParam::Texture(texture)) => self.texture_name(&path, texture),
+                Param::Radiance(ColorValue::Rgb(rgb)) => self.light(&path, Rgb(*rgb)),
+                Param::Radiance(ColorValue::Texture(texture)) => self.texture_name(&path, texture),
                 Param::Share(scalar) => self.scalar(&path, field, scalar),
                 Param::ConstantShare(value) if !(0.0..=1.0).contains(value) => {
                     self.wrong(&path, format!("`{field}` is {value}, but must lie in 0..1"));
@@ -172,7 +169,7 @@ impl Check<'_> {
                 self.wrong(&path, format!("the blend has more than {MAX_LOBES} plain materials: nest fewer"));
             } else if glowing > 1 {
                 self.wrong(&path, "the blend has more than one emissive part: keep one of them");
-            } else if glowing == 1 && matches!(weight, ScalarParam::Texture(_)) {
+            } else if glowing == 1 && matches!(weight, ScalarValue::Texture(_)) {
                 self.wrong(&format!("{path}/weight"), "with an emissive part, `weight` must be a number");
             }
         }
@@ -207,8 +204,7 @@ impl Check<'_> {
             match self.materials.get(name) {
                 Some(MaterialPart::Blend { a, b, .. }) => open.extend([a.as_str(), b.as_str()]),
                 Some(MaterialPart::Emissive { .. }) => (lobes, glowing) = (lobes + 1, glowing + 1),
-                Some(MaterialPart::Phong { .. }) => lobes += PHONG_LOBES,
-                _ => lobes += 1,
+                plain => lobes += plain.map_or(1, |material| material.n_lobes()),
             }
         }
         (lobes, glowing)
@@ -255,7 +251,7 @@ impl Check<'_> {
                 for (i, name) in materials.iter().flatten().enumerate() {
                     self.material_name(&format!("{path}/materials/{i}"), name);
                 }
-                if let MeshSourcePart::Builtin(name) = source
+                if let MeshSource::Builtin(name) = source
                     && !BUILTIN_NAMES.contains(&name.as_str())
                 {
                     let what = format!("there is no built-in mesh `{name}`");
@@ -348,24 +344,24 @@ impl Check<'_> {
     }
 
     /// A share of the light in each channel: 0..1.
-    fn share(&mut self, path: &str, field: &str, color: &ColorParam) {
+    fn share(&mut self, path: &str, field: &str, color: &ColorValue) {
         match color {
-            ColorParam::Texture(name) => self.texture_name(path, name),
-            ColorParam::Rgb(rgb) if !(rgb.cmpge(Vec3::ZERO).all() && rgb.cmple(Vec3::ONE).all()) => {
+            ColorValue::Texture(name) => self.texture_name(path, name),
+            ColorValue::Rgb(rgb) if !(rgb.cmpge(Vec3::ZERO).all() && rgb.cmple(Vec3::ONE).all()) => {
                 let Vec3 { x, y, z } = rgb;
                 self.wrong(path, format!("`{field}` is ({x}, {y}, {z}), but is a share of light: between 0 and 1"));
             }
-            ColorParam::Rgb(_) => {}
+            ColorValue::Rgb(_) => {}
         }
     }
 
-    fn scalar(&mut self, path: &str, field: &str, scalar: &ScalarParam) {
+    fn scalar(&mut self, path: &str, field: &str, scalar: &ScalarValue) {
         match scalar {
-            ScalarParam::Texture(name) => self.texture_name(path, name),
-            ScalarParam::Number(value) if !(0.0..=1.0).contains(value) => {
+            ScalarValue::Texture(name) => self.texture_name(path, name),
+            ScalarValue::Number(value) if !(0.0..=1.0).contains(value) => {
                 self.wrong(path, format!("`{field}` is {value}, but must lie between 0 and 1"));
             }
-            ScalarParam::Number(_) => {}
+            ScalarValue::Number(_) => {}
         }
     }
 

@@ -8,16 +8,14 @@ mod check;
 mod locate;
 mod parts;
 mod syntax;
-mod value;
 
 pub use super::bounds::check_film_size;
+pub use super::value::Named;
 pub use locate::locate;
 pub use parts::{
-    CameraPart, DisplayPart, EnvironmentPart, FilmPart, FilterPart, InFile, IntegratorPart, LightPart, MaterialPart,
-    MeshShadingPart, MeshSourcePart, ObjectPart, RadiiPart, ScalePart, SceneFile, TexturePart, ToneCurvePart,
-    TransformPart, WrapPart, ball_grid,
+    CameraPart, DisplayPart, FilmPart, InFile, LightPart, MaterialPart, ObjectPart, RadiiPart, ScalePart, SceneFile,
+    TransformPart, ball_grid,
 };
-pub use value::{ColorParam, Named, Rgb, ScalarParam};
 
 use super::error::{Problem, SceneError};
 use super::input_file::BYTE_ORDER_MARK;

@@ -1,8 +1,9 @@
 //! The parts of a scene file, as written. Meaning and limits are checked in `check`.
 
-use super::value::{ColorParam, Named, Rgb, ScalarParam};
-use crate::render::{Display, Integrator, Material, Params, PixelFilter, ToneCurve, Wrap};
-use glam::{DVec2, DVec3, Vec3};
+use crate::render::{Display, Integrator, Material, Params, PixelFilter, ToneCurve};
+use crate::scene::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+use crate::scene::value::{ColorValue, Named, Rgb, ScalarValue};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Everything that a scene file says. Only `camera` must be given.
@@ -13,19 +14,19 @@ pub struct SceneFile {
     #[serde(default)]
     pub film: FilmPart,
     #[serde(default)]
-    pub integrator: IntegratorPart,
+    pub integrator: Integrator,
     /// Longest path in segments; 1 shows emitters alone; unbounded when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
     #[serde(default)]
     pub display: DisplayPart,
     #[serde(default)]
-    pub environment: EnvironmentPart,
+    pub environment: EnvironmentSource,
     /// What the air absorbs, per metre. Light from the environment has passed it already.
     #[serde(default, skip_serializing_if = "is_default")]
     pub air: Rgb,
     #[serde(default, skip_serializing_if = "Named::is_empty")]
-    pub textures: Named<TexturePart>,
+    pub textures: Named<TextureSource>,
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub materials: Named<MaterialPart>,
     #[serde(default)]
@@ -98,74 +99,12 @@ pub struct FilmPart {
     pub width: u32,
     pub height: u32,
     #[serde(default, skip_serializing_if = "is_default")]
-    pub filter: FilterPart,
+    pub filter: PixelFilter,
 }
 
 impl Default for FilmPart {
     fn default() -> Self {
-        Self { width: 1280, height: 720, filter: FilterPart::default() }
-    }
-}
-
-/// How the light around a pixel is weighted; see [`PixelFilter`] for their widths.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FilterPart {
-    #[default]
-    Box,
-    Tent,
-    Gaussian,
-    BlackmanHarris,
-    Mitchell,
-}
-
-impl From<FilterPart> for PixelFilter {
-    fn from(part: FilterPart) -> Self {
-        match part {
-            FilterPart::Box => Self::Box,
-            FilterPart::Tent => Self::Tent,
-            FilterPart::Gaussian => Self::Gaussian,
-            FilterPart::BlackmanHarris => Self::BlackmanHarris,
-            FilterPart::Mitchell => Self::Mitchell,
-        }
-    }
-}
-
-impl From<PixelFilter> for FilterPart {
-    fn from(value: PixelFilter) -> Self {
-        match value {
-            PixelFilter::Box => Self::Box,
-            PixelFilter::Tent => Self::Tent,
-            PixelFilter::Gaussian => Self::Gaussian,
-            PixelFilter::BlackmanHarris => Self::BlackmanHarris,
-            PixelFilter::Mitchell => Self::Mitchell,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum IntegratorPart {
-    #[default]
-    Path,
-    Phong,
-}
-
-impl From<IntegratorPart> for Integrator {
-    fn from(part: IntegratorPart) -> Self {
-        match part {
-            IntegratorPart::Path => Self::Path,
-            IntegratorPart::Phong => Self::Phong,
-        }
-    }
-}
-
-impl From<Integrator> for IntegratorPart {
-    fn from(value: Integrator) -> Self {
-        match value {
-            Integrator::Path => Self::Path,
-            Integrator::Phong => Self::Phong,
-        }
+        Self { width: 1280, height: 720, filter: PixelFilter::default() }
     }
 }
 
@@ -175,122 +114,18 @@ impl From<Integrator> for IntegratorPart {
 pub struct DisplayPart {
     /// Factors of two.
     pub exposure: f32,
-    pub tone_curve: ToneCurvePart,
+    pub tone_curve: ToneCurve,
 }
 
 impl From<DisplayPart> for Display {
     fn from(part: DisplayPart) -> Self {
-        Self { exposure_stops: part.exposure, tone_curve: part.tone_curve.into() }
+        Self { exposure_stops: part.exposure, tone_curve: part.tone_curve }
     }
 }
 
 impl From<Display> for DisplayPart {
     fn from(display: Display) -> Self {
-        Self { exposure: display.exposure_stops, tone_curve: display.tone_curve.into() }
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ToneCurvePart {
-    Linear,
-    #[default]
-    Neutral,
-    Filmic,
-}
-
-impl From<ToneCurvePart> for ToneCurve {
-    fn from(part: ToneCurvePart) -> Self {
-        match part {
-            ToneCurvePart::Linear => Self::Linear,
-            ToneCurvePart::Neutral => Self::Neutral,
-            ToneCurvePart::Filmic => Self::Filmic,
-        }
-    }
-}
-
-impl From<ToneCurve> for ToneCurvePart {
-    fn from(value: ToneCurve) -> Self {
-        match value {
-            ToneCurve::Linear => Self::Linear,
-            ToneCurve::Neutral => Self::Neutral,
-            ToneCurve::Filmic => Self::Filmic,
-        }
-    }
-}
-
-/// Radiance from infinitely far away.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum EnvironmentPart {
-    #[default]
-    Black,
-    Constant(Rgb),
-    Gradient {
-        zenith: Rgb,
-        horizon: Rgb,
-        ground: Rgb,
-    },
-    /// Equirectangular, HDR, EXR, PNG or JPEG.
-    Image {
-        file: String,
-        #[serde(default = "white")]
-        scale: Rgb,
-        /// Degrees about +Y.
-        #[serde(default, skip_serializing_if = "is_default")]
-        rotate: f64,
-    },
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum TexturePart {
-    /// `squares` along u and v of the surface (0..1), or a metre on an infinite plane; (0, 0) lies in colour `a`.
-    Checker {
-        a: Rgb,
-        b: Rgb,
-        #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
-        squares: DVec2,
-        #[serde(default, skip_serializing_if = "is_default")]
-        offset: DVec2,
-        /// Degrees.
-        #[serde(default, skip_serializing_if = "is_default")]
-        rotate: f64,
-    },
-    Image {
-        file: String,
-        /// How often the picture fits along u and v.
-        #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
-        repeat: DVec2,
-        #[serde(default, skip_serializing_if = "is_default")]
-        offset: DVec2,
-        /// Degrees.
-        #[serde(default, skip_serializing_if = "is_default")]
-        rotate: f64,
-        #[serde(default, skip_serializing_if = "is_default")]
-        wrap: WrapPart,
-        /// Bilinear between texels, or the nearest texel.
-        #[serde(default = "yes")]
-        smooth: bool,
-    },
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum WrapPart {
-    #[default]
-    Repeat,
-    Mirror,
-    Clamp,
-}
-
-impl From<WrapPart> for Wrap {
-    fn from(part: WrapPart) -> Self {
-        match part {
-            WrapPart::Repeat => Self::Repeat,
-            WrapPart::Mirror => Self::Mirror,
-            WrapPart::Clamp => Self::Clamp,
-        }
+        Self { exposure: display.exposure_stops, tone_curve: display.tone_curve }
     }
 }
 
@@ -299,8 +134,8 @@ impl From<WrapPart> for Wrap {
 pub struct InFile;
 
 impl Params for InFile {
-    type Color = ColorParam;
-    type Scalar = ScalarParam;
+    type Color = ColorValue;
+    type Scalar = ScalarValue;
     type Rgb = Rgb;
     type Material = String;
 }
@@ -356,10 +191,10 @@ pub enum ObjectPart {
     Mesh {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
-        source: MeshSourcePart,
+        source: MeshSource,
         /// How normals between vertices are found.
         #[serde(default, skip_serializing_if = "is_default")]
-        shading: MeshShadingPart,
+        shading: MeshShading,
         /// Share of the faces to keep, 0..1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         simplify: Option<f64>,
@@ -449,27 +284,6 @@ pub fn ball_grid(first: DVec3, steps: &[(u32, DVec3)]) -> Vec<DVec3> {
         let row = |center: DVec3| (0..count).map(move |i| center + f64::from(i) * step);
         centers.into_iter().flat_map(row).collect()
     })
-}
-
-/// Where the triangles of a mesh come from.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MeshSourcePart {
-    /// Wavefront OBJ, relative to the scene file.
-    Obj(String),
-    /// A mesh that the program makes.
-    Builtin(String),
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MeshShadingPart {
-    /// Normals of the file where it has them, else smooth.
-    #[default]
-    Auto,
-    /// Area-weighted vertex normals, whatever the file says.
-    Smooth,
-    Flat,
 }
 
 /// One radius for all balls or one for each.
@@ -565,22 +379,6 @@ fn default_vfov() -> f64 {
 
 fn default_light_radius() -> f64 {
     0.01
-}
-
-fn white() -> Rgb {
-    Rgb(Vec3::ONE)
-}
-
-fn one_by_one() -> DVec2 {
-    DVec2::ONE
-}
-
-fn is_one_by_one(value: &DVec2) -> bool {
-    *value == DVec2::ONE
-}
-
-fn yes() -> bool {
-    true
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

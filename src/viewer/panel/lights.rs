@@ -5,8 +5,7 @@ use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_d
 use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::Environment;
-use crate::scene::file::EnvironmentPart;
-use crate::scene::{ColorParam, LightEntry, Material, PointLight, SurfaceMaterial};
+use crate::scene::{ColorParam, EnvironmentSource, LightEntry, Material, PointLight, SurfaceMaterial};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -121,7 +120,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
         }
         Environment::Image { scale, rotation, .. } => {
             let (file, angle_deg) = match &environment.part {
-                EnvironmentPart::Image { file, rotate, .. } => (file.as_str(), *rotate),
+                EnvironmentSource::Image { file, rotate, .. } => (file.as_str(), *rotate),
                 _ => ("?", f64::from(rotation.to_degrees())),
             };
             row(ui, "picture", |ui| ui.add(egui::Label::new(file).truncate()));

@@ -3,8 +3,7 @@
 use super::widgets::{row, rows};
 use super::{Asked, PanelState};
 use crate::frame::{Edit, MeshMeasure, Selection, Session, wanted_mesh};
-use crate::scene::file::MeshShadingPart;
-use crate::scene::{MeshOrigin, Shape};
+use crate::scene::{MeshOrigin, MeshShading, Shape};
 use crate::viewer::change::Difference;
 use crate::viewer::status::{metres, percent, thousands};
 use egui::Ui;
@@ -22,11 +21,7 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
         let Some((wanted, ratio)) = wanted_mesh(session.world(), entity) else { return };
         row(ui, "normals", |ui| {
             ui.horizontal(|ui| {
-                let kinds = [
-                    (MeshShadingPart::Auto, "auto"),
-                    (MeshShadingPart::Smooth, "smooth"),
-                    (MeshShadingPart::Flat, "flat"),
-                ];
+                let kinds = [(MeshShading::Auto, "auto"), (MeshShading::Smooth, "smooth"), (MeshShading::Flat, "flat")];
                 for (shading, label) in kinds {
                     if ui.selectable_label(wanted == shading, label).clicked() && wanted != shading {
                         asked.edit(Edit::Remesh { id, shading, ratio });

@@ -5,8 +5,7 @@ use super::widgets::choice;
 use super::{Asked, PanelState};
 use crate::frame::{Command, Edit, NewThing, Selection, Session};
 use crate::printable;
-use crate::scene::ObjectEntry;
-use crate::scene::file::MeshSourcePart;
+use crate::scene::{MeshSource, ObjectEntry};
 use crate::viewer::dialog::DialogPurpose;
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
@@ -77,7 +76,7 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
         egui::ComboBox::from_id_salt("builtin mesh").selected_text("Mesh").show_ui(ui, |ui| {
             for name in crate::scene::BUILTIN_MESHES {
                 if ui.selectable_label(false, *name).clicked() {
-                    asked.edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Builtin((*name).to_owned()))));
+                    asked.edit(Edit::Add(NewThing::Mesh(MeshSource::Builtin((*name).to_owned()))));
                 }
             }
         });
@@ -87,7 +86,7 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
             asked.dialog = Some(DialogPurpose::AddMesh);
         }
         if (ui.button("Add").clicked() || entered) && !path.trim().is_empty() {
-            asked.edit(Edit::Add(NewThing::Mesh(MeshSourcePart::Obj(path.trim().to_owned()))));
+            asked.edit(Edit::Add(NewThing::Mesh(MeshSource::Obj(path.trim().to_owned()))));
         }
     });
 }

@@ -1,7 +1,6 @@
 //! The colour that a material is known by, in a list.
 
-use crate::scene::file::TexturePart;
-use crate::scene::{ColorParam, Material, SurfaceMaterial};
+use crate::scene::{ColorParam, Material, SurfaceMaterial, TextureSource};
 use bevy_ecs::prelude::{Entity, World};
 use egui::{Color32, Sense, Stroke, Ui, vec2};
 use glam::Vec3;
@@ -36,8 +35,8 @@ fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
             // Of a light, the hue.
             Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
             Some(ColorParam::Texture(texture)) => match &texture.part {
-                TexturePart::Checker { a, b, .. } => [a.0, b.0],
-                TexturePart::Image { .. } => [Vec3::splat(0.75), Vec3::splat(0.1)],
+                TextureSource::Checker { a, b, .. } => [a.0, b.0],
+                TextureSource::Image { .. } => [Vec3::splat(0.75), Vec3::splat(0.1)],
             },
             None => [Vec3::splat(0.5); 2],
         },

@@ -3,8 +3,8 @@
 use super::Asked;
 use super::widgets::{color, number, row};
 use crate::frame::{Edit, Property, Session};
-use crate::scene::ColorParam;
-use crate::scene::file::{Rgb, TexturePart, WrapPart};
+use crate::render::Wrap;
+use crate::scene::{ColorParam, Rgb, TextureSource};
 use crate::viewer::dialog::DialogPurpose;
 use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
@@ -30,7 +30,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: 
         if ui.button("new checker").clicked() {
             let a = if let ColorParam::Rgb(rgb) = paint { rgb.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::splat(0.7) };
             let (squares, offset) = (DVec2::splat(8.0), DVec2::ZERO);
-            let part = TexturePart::Checker { a: Rgb(a), b: Rgb(0.2 * a), squares, offset, rotate: 0.0 };
+            let part = TextureSource::Checker { a: Rgb(a), b: Rgb(0.2 * a), squares, offset, rotate: 0.0 };
             asked.edit(Edit::Paint { id, part });
             ui.close();
         }
@@ -47,10 +47,10 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: 
 }
 
 /// How the texture lies on the surface, and its colours.
-pub fn numbers(ui: &mut Ui, id: u64, part: &TexturePart, asked: &mut Asked) {
+pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
     let mut new = part.clone();
     match &mut new {
-        TexturePart::Checker { a, b, squares, offset, rotate } => {
+        TextureSource::Checker { a, b, squares, offset, rotate } => {
             row(ui, "colours", |ui| {
                 ui.horizontal(|ui| {
                     for paint in [a, b] {
@@ -62,12 +62,11 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TexturePart, asked: &mut Asked) {
             });
             lie(ui, "squares", squares, offset, rotate);
         }
-        TexturePart::Image { repeat, offset, rotate, wrap, smooth, .. } => {
+        TextureSource::Image { repeat, offset, rotate, wrap, smooth, .. } => {
             lie(ui, "repeat", repeat, offset, rotate);
             row(ui, "wrap", |ui| {
                 ui.horizontal(|ui| {
-                    let kinds =
-                        [(WrapPart::Repeat, "repeat"), (WrapPart::Mirror, "mirror"), (WrapPart::Clamp, "clamp")];
+                    let kinds = [(Wrap::Repeat, "repeat"), (Wrap::Mirror, "mirror"), (Wrap::Clamp, "clamp")];
                     for (kind, label) in kinds {
                         if ui.selectable_label(*wrap == kind, label).clicked() {
                             *wrap = kind;

@@ -10,18 +10,24 @@ use serde::{Deserialize, Serialize};
 
 /// How the light around a pixel is weighted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PixelFilter {
     /// The pixel's own square, evenly.
     #[default]
+    #[serde(alias = "Box")]
     Box,
     /// Falls in a straight line to zero at 1.
+    #[serde(alias = "Tent")]
     Tent,
     /// A bell with a standard deviation of 1/2, lowered to reach zero at 1.5.
+    #[serde(alias = "Gaussian")]
     Gaussian,
     /// The window of Harris 1978 with four terms, zero from 1.65 on: hardly any ringing.
+    #[serde(alias = "BlackmanHarris")]
     BlackmanHarris,
     /// Mitchell and Netravali 1988, B = C = 1/3, zero from 2 on: sharpens. Its negative rim gives samples negative
     /// weight, so a few samples look peppered; the mean is right.
+    #[serde(alias = "Mitchell")]
     Mitchell,
 }
 

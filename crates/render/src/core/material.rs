@@ -13,6 +13,9 @@ use std::fmt::Debug;
 /// Below it a GGX surface is a mirror: its highlight is narrower than directions in `f32` can tell apart.
 pub(crate) const SMALLEST_ALPHA: f32 = 1e-4;
 
+/// Lobes that a blend may come to, however it is nested; see [`Material::n_lobes`].
+pub const MAX_LOBES: usize = 8;
+
 /// Index into the materials of a snapshot.
 pub type MaterialId = u32;
 
@@ -312,6 +315,14 @@ impl<P: Params> Material<P> {
             Self::Metal { .. } => MaterialKind::Metal,
             Self::Phong { .. } => MaterialKind::Phong,
             Self::Blend { .. } => MaterialKind::Blend,
+        }
+    }
+
+    /// For how many of [`MAX_LOBES`] a material counts in a blend; a blend itself counts by its parts.
+    pub fn n_lobes(&self) -> usize {
+        match self {
+            Self::Phong { .. } => 3,
+            _ => 1,
         }
     }
 

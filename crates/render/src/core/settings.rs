@@ -8,11 +8,14 @@ use thiserror::Error;
 
 /// The light model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Integrator {
     /// The truth: unbiased path tracing.
     #[default]
+    #[serde(alias = "Path")]
     Path,
     /// The classic local model with shadows and recursive mirrors and glass.
+    #[serde(alias = "Phong")]
     Phong,
 }
 

@@ -1,13 +1,15 @@
 //! Colours that vary over a surface.
 
 use glam::{Mat2, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Index into the textures of a snapshot.
 pub type TextureId = u32;
 
 /// What happens outside the unit square.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Wrap {
     #[default]
     Repeat,

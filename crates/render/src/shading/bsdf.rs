@@ -5,7 +5,7 @@
 //! sampling finds them.
 
 use crate::core::color::luminance;
-use crate::core::material::{Fresnel, SMALLEST_ALPHA};
+use crate::core::material::{Fresnel, MAX_LOBES, SMALLEST_ALPHA};
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, refract};
 use crate::shading::ggx;
@@ -27,9 +27,6 @@ impl Lobe {
     /// Something that light passes through, to be told apart from other lobes but not to be sampled.
     pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, squeeze: 1.0, beyond: MediumId::OUTSIDE });
 }
-
-/// How many lobes a blend of blends may come to.
-pub(crate) const MAX_LOBES: usize = 8;
 
 /// What the integrator asks of a surface, be it one lobe or a blend.
 pub(crate) trait Scatter {

@@ -1,10 +1,10 @@
 //! From a hit to everything that shading needs to know of the place.
 
-use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
+use crate::core::material::{ColorInput, MAX_LOBES, Material, MaterialId, ScalarInput};
 use crate::prepare::bodies::Boundary;
 use crate::prepare::light::shape::sphere_uv;
 use crate::prepare::prepared::Prepared;
-use crate::shading::bsdf::{Blend, Lobe, MAX_LOBES};
+use crate::shading::bsdf::{Blend, Lobe};
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
 use firstlight_kdtree::geometry::{Frame, Ray, robust};

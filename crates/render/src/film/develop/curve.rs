@@ -6,13 +6,17 @@ use serde::{Deserialize, Serialize};
 
 /// How bright light is squeezed into what a screen can show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ToneCurve {
     /// Clip at 1: what the numbers say.
+    #[serde(alias = "Linear")]
     Linear,
     /// Khronos PBR Neutral: keeps colours true, rolls off highlights.
     #[default]
+    #[serde(alias = "Neutral")]
     Neutral,
     /// A filmic curve: Hill's fit of the ACES reference transform.
+    #[serde(alias = "Filmic")]
     Filmic,
 }
 

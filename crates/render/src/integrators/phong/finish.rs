@@ -1,9 +1,8 @@
 //! What the classic model makes of a material: a matte part, highlights, mirrors and panes.
 
-use crate::core::material::{Material, MaterialId, SMALLEST_ALPHA};
+use crate::core::material::{MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA};
 use crate::integrators::phong::lobe::lobe_pdf;
 use crate::prepare::prepared::Prepared;
-use crate::shading::bsdf::MAX_LOBES;
 use crate::shading::dielectric::fresnel;
 use crate::shading::interface::Interface;
 use crate::shading::lights::power_heuristic;

@@ -21,7 +21,7 @@ pub(crate) fn least_weight(depth: u32) -> f32 {
 /// and three for each shiny part.
 pub(crate) const DIM_ENVIRONMENT: u32 = crate::prepare::light::EACH_DIMENSIONS;
 pub(crate) const DIM_SHINY: u32 = DIM_ENVIRONMENT + 1;
-const VERTEX_DIMENSIONS: u32 = DIM_SHINY + 3 * crate::shading::bsdf::MAX_LOBES as u32;
+const VERTEX_DIMENSIONS: u32 = DIM_SHINY + 3 * crate::core::material::MAX_LOBES as u32;
 
 /// What a ray may still bring of lights, which a highlight asks for by itself, as the density that it keeps: infinite for
 /// all of it, because nothing else has asked; this for nothing, because a highlight has stood in for them; else the ray lies

@@ -9,14 +9,14 @@ use std::marker::PhantomData;
 
 /// A colour, linear Rec. 709: `0.5` for a grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
 #[derive(Clone, Debug, PartialEq)]
-pub enum ColorParam {
+pub enum ColorValue {
     Rgb(Vec3),
     Texture(String),
 }
 
 /// A number, or the name of a texture whose red channel is taken.
 #[derive(Clone, Debug, PartialEq)]
-pub enum ScalarParam {
+pub enum ScalarValue {
     Number(f32),
     Texture(String),
 }
@@ -25,7 +25,7 @@ pub enum ScalarParam {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rgb(pub Vec3);
 
-impl ColorParam {
+impl ColorValue {
     pub const fn grey(value: f32) -> Self {
         Self::Rgb(Vec3::splat(value))
     }
@@ -35,13 +35,13 @@ impl ColorParam {
     }
 }
 
-impl From<Vec3> for ColorParam {
+impl From<Vec3> for ColorValue {
     fn from(rgb: Vec3) -> Self {
         Self::Rgb(rgb)
     }
 }
 
-impl From<f32> for ScalarParam {
+impl From<f32> for ScalarValue {
     fn from(number: f32) -> Self {
         Self::Number(number)
     }
@@ -126,7 +126,7 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 }
 
-impl<'de> Deserialize<'de> for ColorParam {
+impl<'de> Deserialize<'de> for ColorValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: true })? {
             Found::Number(value) => Self::grey(value),
@@ -136,7 +136,7 @@ impl<'de> Deserialize<'de> for ColorParam {
     }
 }
 
-impl<'de> Deserialize<'de> for ScalarParam {
+impl<'de> Deserialize<'de> for ScalarValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(match deserializer.deserialize_any(AnyValue { textures: true, colours: false })? {
             Found::Name(name) => Self::Texture(name),
@@ -171,7 +171,7 @@ impl Serialize for Rgb {
     }
 }
 
-impl Serialize for ColorParam {
+impl Serialize for ColorValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Rgb(rgb) => Rgb(*rgb).serialize(serializer),
@@ -180,7 +180,7 @@ impl Serialize for ColorParam {
     }
 }
 
-impl Serialize for ScalarParam {
+impl Serialize for ScalarValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Number(value) => serializer.serialize_f32(*value),
