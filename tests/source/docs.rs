@@ -584,8 +584,8 @@ fn whole_scene(text: &str) -> String {
     if !has("materials:") {
         scene.push_str("materials: { \"white\": diffuse(albedo: 0.7), \"light\": emissive(radiance: 10) },\n");
     }
-    if !has("objects:") {
-        scene.push_str("objects: [plane(material: \"white\")],\n");
+    if !has("environment:") {
+        scene.push_str("environment: constant(1),\n");
     }
     scene + ")\n"
 }
