@@ -1,4 +1,5 @@
-//! The source itself: who imports whom, and who may open a file.
+//! The source itself: who imports whom, who may open a file; and the documentation.
 
+mod docs;
 mod gates;
 mod layers;
