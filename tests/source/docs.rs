@@ -624,21 +624,42 @@ fn a_wrong_scene_would_be_found() {
     assert_eq!(found.len(), 1, "{found:?}");
 }
 
-/// Names that a scene file may have, from the types that it is read into.
+/// The types that a scene file is read into; of the files without a list, all.
+const GRAMMAR: [(&str, &[&str]); 7] = [
+    ("src/scene/file/parts.rs", &[]),
+    ("src/scene/sources.rs", &[]),
+    ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
+    ("crates/render/src/core/texture.rs", &["Wrap"]),
+    ("crates/render/src/core/filter.rs", &["PixelFilter"]),
+    ("crates/render/src/core/settings.rs", &["Integrator"]),
+    ("crates/render/src/film/develop/curve.rs", &["ToneCurve"]),
+];
+
+/// Names that a scene file may have.
 fn grammar_words() -> BTreeSet<String> {
-    let text = read("src/scene/file/parts.rs").text;
     let mut words = BTreeSet::new();
-    let mut is_type = false;
-    for line in text.lines() {
-        is_type = (is_type || line.starts_with("pub struct ") || line.starts_with("pub enum ")) && line != "}";
-        let line = line.trim().trim_start_matches("pub ");
-        let name: String = line.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-        let after = &line[name.len()..];
-        let is_field = after.starts_with(": ") && after.ends_with(',');
-        let is_variant =
-            name.starts_with(char::is_uppercase) && (after == "," || after == " {" || after.starts_with('('));
-        if is_type && !name.is_empty() && (is_field || is_variant) {
-            words.insert(snake_case(&name));
+    for (path, types) in GRAMMAR {
+        let mut is_type = false;
+        for line in read(path).text.lines() {
+            if let Some(name) = line.strip_prefix("pub struct ").or_else(|| line.strip_prefix("pub enum ")) {
+                let name: String = name.chars().take_while(|c| c.is_alphanumeric()).collect();
+                is_type = types.is_empty() || types.contains(&name.as_str());
+            }
+            is_type &= line != "}";
+            let line = line.trim().trim_start_matches("pub ");
+            let name: String = line.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            let after = &line[name.len()..];
+            let is_field = after.starts_with(": ") && after.ends_with(',');
+            let is_variant = name.starts_with(char::is_uppercase)
+                && (after == "," || after.starts_with(" {") || after.starts_with('('));
+            if is_type && !name.is_empty() && (is_field || is_variant) {
+                words.insert(snake_case(&name));
+            }
+            // A variant on one line has its fields in braces.
+            if let Some((_, fields)) = after.split_once("{ ").filter(|_| is_type && is_variant) {
+                let names = fields.split(", ").filter_map(|field| field.split_once(": ")).map(|(name, _)| name);
+                words.extend(names.map(str::to_owned));
+            }
         }
     }
     words
