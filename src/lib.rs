@@ -1,25 +1,46 @@
 //! firstlight: an interactive, progressive path tracer whose scene is a bevy_ecs world.
 //!
-//! From the ground up; imports point down (ARCHITECTURE.md has the whole picture):
+//! ```
+//! # fn main() -> Result<(), firstlight::Error> {
+//! # let out = std::env::temp_dir().join(format!("firstlight-lib-{}.png", std::process::id()));
+//! use firstlight::prelude::*;
+//! let scene = Scene::open("cornell")?; // or "model.obj", "scene.ron", "image.png"
+//! let image = scene.render(&RenderOptions::default().size(64, 48).spp(4))?;
+//! image.save(&out)?;
+//! # std::fs::remove_file(out).unwrap();
+//! # Ok(())
+//! # }
+//! ```
 //!
-//! | module | what lives there |
+//! [`Scene`], [`RenderOptions`] and [`Image`] cover what most programs need. An interactive program runs a
+//! [`Session`](frame::Session), which shows the image while it converges and obeys commands; its systems may change the
+//! world between two frames. `docs/library.md` is a guide to both.
+//!
+//! From the top down; imports point down:
+//!
+//! | module | contents |
 //! |---|---|
-//! | [`geometry`], [`kdtree`] | rays, boxes, robust arithmetic; which surface a ray meets first |
-//! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
-//! | [`sampling`], [`render`] | sequences, warps, distributions; snapshot, camera, film, integrators, lights, materials |
-//! | [`printable`], [`console`] | foreign text made fit to be printed; what is said on a terminal |
+//! | `viewer` (feature `viewer`) | the window: input, overlays, presenting |
+//! | [`embed`] | [`Scene`], [`RenderOptions`], [`Image`] |
+//! | [`report`], [`stability`] | error against time; hard cases, counted |
+//! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
-//! | [`frame`] | the ECS schedule in the order in which a frame runs |
-//! | [`report`] | speed against error: convergence curves, metrics, tables and plots |
-//! | [`stability`] | the hard cases, counted |
-//! | `viewer` (feature) | the window: input, overlays, presenting |
+//! | [`printable`], [`console`] | escaping of foreign text; output to a terminal |
+//! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
+//! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
+//! | [`kdtree`], [`geometry`] | which surface a ray meets first; rays, boxes, robust arithmetic |
 
+pub use bevy_ecs;
+pub use embed::{Error, Image, RenderOptions, Scene};
 pub use firstlight_kdtree::{self as kdtree, geometry};
 pub use firstlight_mesh as mesh;
 pub use firstlight_render::{self as render, sampling};
+pub use glam;
 
 pub mod console;
+pub mod embed;
 pub mod frame;
+pub mod prelude;
 pub mod printable;
 pub mod report;
 pub mod scene;

@@ -21,10 +21,11 @@ const PRINTABLE: &str = "src/printable";
 const CONSOLE: &str = "src/console";
 const SCENE: &str = "src/scene";
 const FRAME: &str = "src/frame";
+const EMBED: &str = "src/embed";
 
 /// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
 /// of its line; in `src` they may be imported everywhere.
-const LAYERS: [(&str, &[&str]); 21] = [
+const LAYERS: [(&str, &[&str]); 23] = [
     (SIMD, &[]),
     (GEOMETRY, &[]),
     (KDTREE, &[SIMD, GEOMETRY]),
@@ -44,10 +45,12 @@ const LAYERS: [(&str, &[&str]); 21] = [
     (FRAME, &[PRINTABLE, CONSOLE, SCENE]),
     ("src/report", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     ("src/stability", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
+    (EMBED, &[SCENE, FRAME]),
+    ("src/prelude", &[SCENE, FRAME, EMBED]),
     ("src/viewer", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     // A program of its own, that sees the rest as the library `firstlight`.
     ("src/cli", &[]),
-    ("src", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
+    ("src", &[PRINTABLE, CONSOLE, SCENE, FRAME, EMBED]),
 ];
 
 /// The folders in which no files may import each other in a circle.

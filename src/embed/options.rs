@@ -1,0 +1,164 @@
+//! How an image is rendered, and when it is good enough.
+
+use super::Error;
+use crate::frame::{Progress, Target};
+use crate::render::{Integrator, PixelFilter, RenderSettings};
+use crate::scene::{check_film_size, check_max_depth};
+use std::fmt;
+
+/// Whether to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    Continue,
+    /// End the rendering; the image has the samples so far.
+    Stop,
+}
+
+type OnProgress = Box<dyn Fn(&Progress) -> Flow + Send + Sync>;
+type Stop = Box<dyn Fn() -> bool + Send + Sync>;
+
+/// How an image is rendered. What is not set is as the scene has it.
+///
+/// ```
+/// # use firstlight::prelude::*;
+/// let options = RenderOptions::default().size(64, 48).spp(4);
+/// ```
+#[derive(Default)]
+pub struct RenderOptions {
+    pub(super) size: Option<(u32, u32)>,
+    target: Target,
+    integrator: Option<Integrator>,
+    max_depth: Option<u32>,
+    seed: Option<u32>,
+    filter: Option<PixelFilter>,
+    pub(super) exposure: f32,
+    pub(super) threads: Option<usize>,
+    on_progress: Option<OnProgress>,
+    stop: Option<Stop>,
+}
+
+impl RenderOptions {
+    /// Samples per pixel where no other target is set.
+    pub const DEFAULT_SPP: u32 = 256;
+
+    /// Pixels.
+    pub fn size(mut self, width: u32, height: u32) -> Self {
+        self.size = Some((width, height));
+        self
+    }
+
+    /// Ends at so many samples per pixel. The first target that is reached ends the rendering.
+    pub fn spp(mut self, spp: u32) -> Self {
+        self.target.spp = Some(spp);
+        self
+    }
+
+    /// Ends after so many seconds, but not before each pixel has a sample.
+    pub fn seconds(mut self, seconds: f64) -> Self {
+        self.target.seconds = Some(seconds);
+        self
+    }
+
+    /// Ends when the estimated relative error of the whole image is below this: 0.01 is 1 %.
+    pub fn error(mut self, relative: f64) -> Self {
+        self.target.error = Some(relative);
+        self
+    }
+
+    pub fn integrator(mut self, integrator: Integrator) -> Self {
+        self.integrator = Some(integrator);
+        self
+    }
+
+    /// Longest path in segments, at least 1; 1 shows emitters alone.
+    pub fn max_depth(mut self, segments: u32) -> Self {
+        self.max_depth = Some(segments);
+        self
+    }
+
+    /// Random seed: another one gives another noise of the same strength.
+    pub fn seed(mut self, seed: u32) -> Self {
+        self.seed = Some(seed);
+        self
+    }
+
+    /// Pixel reconstruction filter.
+    pub fn filter(mut self, filter: PixelFilter) -> Self {
+        self.filter = Some(filter);
+        self
+    }
+
+    /// Stops added to the exposure of the scene; concerns PNG files alone, never [`Image::pixels`](super::Image::pixels).
+    pub fn exposure(mut self, stops: f32) -> Self {
+        self.exposure = stops;
+        self
+    }
+
+    /// Threads; all processors when not set. The image is the same for any number.
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.threads = Some(threads);
+        self
+    }
+
+    /// Called a few times per second, on the thread that renders.
+    pub fn on_progress(mut self, on_progress: impl Fn(&Progress) -> Flow + Send + Sync + 'static) -> Self {
+        self.on_progress = Some(Box::new(on_progress));
+        self
+    }
+
+    /// Asked often and by all threads: `true` ends the rendering within milliseconds. Pixels may then have different
+    /// numbers of samples, or none.
+    pub fn stop_when(mut self, stop: impl Fn() -> bool + Send + Sync + 'static) -> Self {
+        self.stop = Some(Box::new(stop));
+        self
+    }
+
+    pub(super) fn check(&self) -> Result<(), Error> {
+        if let Some((width, height)) = self.size {
+            check_film_size(width, height)?;
+        }
+        check_max_depth(self.max_depth)?;
+        self.target.check()?;
+        Ok(())
+    }
+
+    pub(super) fn target(&self) -> Target {
+        let is_open = self.target == Target::default();
+        Target { spp: self.target.spp.or(is_open.then_some(Self::DEFAULT_SPP)), ..self.target }
+    }
+
+    /// - `of_scene`: for what is not set.
+    pub(super) fn settings(&self, of_scene: RenderSettings) -> RenderSettings {
+        RenderSettings {
+            integrator: self.integrator.unwrap_or(of_scene.integrator),
+            max_depth: self.max_depth.unwrap_or(of_scene.max_depth),
+            seed: self.seed.unwrap_or(of_scene.seed),
+            filter: self.filter.unwrap_or(of_scene.filter),
+            ..of_scene
+        }
+    }
+
+    pub(super) fn progress(&self, now: &Progress) -> bool {
+        self.on_progress.as_ref().is_none_or(|told| told(now) == Flow::Continue)
+    }
+
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(|stop| stop())
+    }
+}
+
+impl fmt::Debug for RenderOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { size, target, integrator, max_depth, seed, filter, exposure, threads, .. } = self;
+        f.debug_struct("RenderOptions")
+            .field("size", size)
+            .field("target", target)
+            .field("integrator", integrator)
+            .field("max_depth", max_depth)
+            .field("seed", seed)
+            .field("filter", filter)
+            .field("exposure", exposure)
+            .field("threads", threads)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,11 @@
+//! What most programs that render a scene use: `use firstlight::prelude::*`.
+
+pub use crate::embed::{Error, Flow, Image, RenderOptions, Scene};
+pub use crate::frame::{Command, Progress, Session, SessionOptions, Target};
+pub use crate::render::{Integrator, PixelFilter};
+pub use crate::scene::{
+    ColorParam, Lens, Material, MaterialSlots, Placement, PointLight, Projection, ScalarParam, SceneEnvironment, Shape,
+    SurfaceMaterial, View,
+};
+pub use bevy_ecs::prelude::{Entity, Name, World};
+pub use glam::{DVec3, Vec3};
