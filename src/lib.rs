@@ -47,3 +47,9 @@ pub mod scene;
 pub mod stability;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+
+/// The Rust code of the guide and the README is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+#[doc = include_str!("../README.md")]
+struct CodeOfTheDocs;
