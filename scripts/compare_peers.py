@@ -2,7 +2,7 @@
 """Seconds to equal error: firstlight against Mitsuba 3 and Cycles on the same scenes, machine, threads and run.
 
     pip install mitsuba numpy                 # Mitsuba's LLVM mode needs libLLVM: apt-get install libllvm19
-    cargo build --release --no-default-features --target-dir target/headless
+    cargo build --release --no-default-features --features cli --target-dir target/headless
     scripts/compare_peers.py --program target/headless/release/firstlight cornell.json veach_mis.json
 
 Scenes are in the neutral JSON form of scripts/neutral_to_scene.py; beside each lies a converged picture with the same

@@ -22,10 +22,10 @@
 //! |---|---|
 //! | `viewer` (feature `viewer`) | the window: input, overlays, presenting |
 //! | [`embed`] | [`Scene`], [`RenderOptions`], [`Image`] |
-//! | [`report`], [`stability`] | error against time; hard cases, counted |
+//! | `report`, `stability` (feature `cli`) | error against time; hard cases, counted |
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
-//! | [`printable`], [`console`] | escaping of foreign text; output to a terminal |
+//! | [`printable`], `console` (feature `cli`) | escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
 //! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
 //! | [`kdtree`], [`geometry`] | which surface a ray meets first; rays, boxes, robust arithmetic |
@@ -37,13 +37,16 @@ pub use firstlight_mesh as mesh;
 pub use firstlight_render::{self as render, sampling};
 pub use glam;
 
+#[cfg(feature = "cli")]
 pub mod console;
 pub mod embed;
 pub mod frame;
 pub mod prelude;
 pub mod printable;
+#[cfg(feature = "cli")]
 pub mod report;
 pub mod scene;
+#[cfg(feature = "cli")]
 pub mod stability;
 #[cfg(feature = "viewer")]
 pub mod viewer;

@@ -140,6 +140,7 @@ fn prints(c: char) -> bool {
 mod tests {
     use super::*;
 
+    #[cfg(feature = "cli")]
     #[test]
     fn json_means_the_same_with_escapes() {
         let odd = "a\u{9b}31m\u{202e}x\u{7f}\u{feff}\u{e0001}é\u{3000}\n";

@@ -73,6 +73,7 @@ pub struct SettingsStore {
 
 impl SettingsStore {
     /// In the platform's folder for settings; keeps nothing where there is none.
+    #[cfg(feature = "cli")]
     pub fn of_platform() -> Self {
         let folders = directories::ProjectDirs::from("", "", "firstlight");
         Self { folder: folders.map(|folders| folders.config_dir().to_path_buf()) }

@@ -65,6 +65,7 @@ pub use loaded::LoadedScene;
 pub use meshes::{BUILTIN_NAMES as BUILTIN_MESHES, MeshBase};
 pub use metadata_draft::MetadataDraft;
 pub use outputs::{Files, FilesError};
+#[cfg(feature = "cli")]
 pub(crate) use picture::{decode_picture, picture_reader};
 pub use picture::{read_picture, read_picture_within};
 pub use placement::{Linear, Placement};
