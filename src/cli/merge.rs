@@ -56,7 +56,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         if let Some(what) = shot.differs_from(&other.shot) {
             return Err(failed(format!("the second is a film of another {what}")));
         }
-        film.merge(&other.film).map_err(failed)?;
+        film.merge(&other.film).map_err(|error| failed(error.to_string()))?;
     }
     let note = |path: &Path| {
         let samples = (film.first_sample(), film.spp(), film.max_spp() > film.spp());

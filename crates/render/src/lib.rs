@@ -33,6 +33,7 @@ pub use driver::inspect::{
 };
 pub use driver::renderer::{BadSample, PassReport, advance, advance_region, replay_sample};
 pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
+pub use film::error::{MergeError, RecordError};
 pub use film::estimate::ErrorEstimate;
 pub use film::record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
 pub use film::region::Region;

@@ -1,6 +1,7 @@
 //! Where light is summed up, how far it is from the truth, and how it becomes a picture.
 
 pub(crate) mod develop;
+pub(crate) mod error;
 pub(crate) mod estimate;
 pub(crate) mod exact_sum;
 pub(crate) mod light_layer;

@@ -1,5 +1,6 @@
 //! A film as plain numbers, for keeping it on disk, and back.
 
+use crate::film::error::RecordError;
 use crate::film::estimate::TileConvergence;
 use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
@@ -117,24 +118,24 @@ impl Film {
 
     /// # Errors
     /// When the numbers contradict each other.
-    pub fn from_record(record: &FilmRecord) -> Result<Self, String> {
+    pub fn from_record(record: &FilmRecord) -> Result<Self, RecordError> {
         let FilmLayout { width, height, tile_size, tiles, lamps } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
         let n_pixels = u64::from(width) * u64::from(height);
         if n_pixels == 0 || tile_size == 0 {
-            return Err("it has no pixels".to_owned());
+            return Err(RecordError::NoPixels);
         }
         let n_tiles = u64::from(width.div_ceil(tile_size)) * u64::from(height.div_ceil(tile_size));
         let planes_fit = record.planes.iter().all(|plane| plane.len() as u64 == n_pixels);
         if tiles.len() as u64 != n_tiles || record.planes.len() != N_PLANES || !planes_fit {
-            return Err("its parts do not have the size that it names".to_owned());
+            return Err(RecordError::Size);
         }
         let mut film = Self::with_tile_size(width, height, tile_size);
         for (tile, record_of_tile) in film.tiles.iter_mut().zip(tiles) {
             let n_pixels = tile.n_pixels();
             check_ranges(&record_of_tile.samples, Self::MAX_SAMPLES)?;
             let spp: u64 = record_of_tile.samples.iter().map(|(start, end)| u64::from(end - start)).sum();
-            tile.spp = u32::try_from(spp).map_err(|_| "it has more samples than can be counted".to_owned())?;
+            tile.spp = u32::try_from(spp).map_err(|_| RecordError::TooManySamples)?;
             tile.ranges = record_of_tile.samples.iter().map(|&(start, end)| start..end).collect();
             tile.bad = record_of_tile.bad.clone();
             let n_bad_at_most = tile.spp as usize;
@@ -142,7 +143,7 @@ impl Film {
             for (pixel, _) in &tile.bad {
                 match n_bad.get_mut(*pixel as usize) {
                     Some(n) if *n < n_bad_at_most => *n += 1,
-                    _ => return Err("its list of samples that were left out is wrong".to_owned()),
+                    _ => return Err(RecordError::BadSamples),
                 }
             }
             let mut checkpoint = Vec::new();
@@ -156,7 +157,7 @@ impl Film {
             if record_of_tile.mean_of > 0 {
                 let n_doublings = record_of_tile.mean_of.ilog2() as usize;
                 if !record_of_tile.mean_of.is_power_of_two() || record_of_tile.steps.len() != n_doublings {
-                    return Err("what it knows of its error does not fit its samples".to_owned());
+                    return Err(RecordError::Convergence);
                 }
                 tile.convergence = TileConvergence {
                     n_values: 3.0 * checkpoint.len() as f64,
@@ -167,7 +168,7 @@ impl Film {
                     last: Vec::new(),
                 };
             } else if !record_of_tile.steps.is_empty() {
-                return Err("what it knows of its error does not fit its samples".to_owned());
+                return Err(RecordError::Convergence);
             }
         }
         if let Some(lamps) = lamps {
@@ -179,7 +180,7 @@ impl Film {
             }
             light.done = lamps.batches.iter().map(|&(start, end)| start..end).collect();
             if light.complete() != lamps.spp {
-                return Err("its light from the lamps has another number of samples".to_owned());
+                return Err(RecordError::LightPaths);
             }
             light.spp = lamps.spp;
             film.light = Some(light);
@@ -189,14 +190,14 @@ impl Film {
 }
 
 /// - `most`: that no range may go beyond.
-fn check_ranges<T: PartialOrd>(ranges: &[(T, T)], most: T) -> Result<(), String> {
+fn check_ranges<T: PartialOrd>(ranges: &[(T, T)], most: T) -> Result<(), RecordError> {
     let ascending = ranges.windows(2).all(|pair| pair[0].1 < pair[1].0);
     let whole = ranges.iter().all(|(start, end)| start <= end);
     if !ascending || !whole || ranges.is_empty() {
-        return Err("its ranges of samples overlap or run backwards".to_owned());
+        return Err(RecordError::Ranges);
     }
     if ranges.last().is_some_and(|(_, end)| *end > most) {
-        return Err("its samples have higher numbers than can be counted".to_owned());
+        return Err(RecordError::Numbers);
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
 //! ([`Film::merge`]) to the very film that has all of them.
 
+use crate::film::error::MergeError;
 use crate::film::estimate::{ErrorEstimate, TileConvergence};
 use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
@@ -212,22 +213,16 @@ impl Film {
     ///
     /// # Errors
     /// When the films differ in size, or have a sample in common. Then nothing has been added.
-    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+    pub fn merge(&mut self, other: &Self) -> Result<(), MergeError> {
         if (self.width, self.height) != (other.width, other.height) {
-            let size = |film: &Self| format!("{} x {}", film.width, film.height);
-            return Err(format!("one film has {} pixels, the other {}", size(self), size(other)));
+            return Err(MergeError::Sizes((self.width, self.height), (other.width, other.height)));
         }
         if self.tile_size != other.tile_size {
-            return Err(format!("one film has tiles of {}, the other of {}", self.tile_size, other.tile_size));
+            return Err(MergeError::TileSizes(self.tile_size, other.tile_size));
         }
         for (tile, other) in self.tiles.iter().zip(&other.tiles) {
             if let Some(shared) = tile.shares_with(other) {
-                return Err(format!(
-                    "both films have the samples {} to {}: render ranges that do not overlap, such as --samples 0..64 and \
-                     --samples 64..128",
-                    shared.start,
-                    shared.end - 1
-                ));
+                return Err(MergeError::SharedSamples { first: shared.start, last: shared.end - 1 });
             }
         }
         for (tile, other) in self.tiles.iter_mut().zip(&other.tiles) {
