@@ -3,3 +3,4 @@
 mod docs;
 mod gates;
 mod layers;
+mod words;

@@ -7,6 +7,6 @@
 mod commands;
 mod coverage;
 mod links;
-mod page;
+pub mod page;
 mod scenes;
 mod words;

@@ -1,0 +1,177 @@
+//! Words that have a better one, in whatever users read: texts of the program and of the documentation.
+
+use crate::docs::page::{expect_none, files, read, without_code};
+use std::collections::BTreeSet;
+
+/// Words that have a better one; see the right column.
+const RETIRED: [(&str, &str); 52] = [
+    ("lamp", "light"),
+    ("lamps", "lights"),
+    ("ball", "sphere"),
+    ("balls", "spheres"),
+    ("matte", "diffuse"),
+    ("eye", "camera"),
+    ("eyes", "cameras"),
+    ("surroundings", "environment"),
+    ("sky", "environment"),
+    ("skies", "environments"),
+    ("picture", "image"),
+    ("pictures", "images"),
+    ("density", "pdf"),
+    ("densities", "pdfs"),
+    ("chance", "probability, or at random"),
+    ("house", "architecture"),
+    ("judge", "reference intersector"),
+    ("verdict", "check result"),
+    ("ladder", "convergence curve"),
+    ("rung", "step"),
+    ("rungs", "steps"),
+    ("scouts", "pilot paths"),
+    ("arrivals", "lens connections"),
+    ("foretold", "predicted"),
+    ("hasty", "preview"),
+    ("sieve", "quad filter"),
+    ("crowd", "many instances"),
+    ("crowds", "many instances"),
+    ("slack", "error bound"),
+    ("wobble", "error bound"),
+    ("paint", "colour parameter"),
+    ("anew", "again"),
+    ("whoever", "any"),
+    ("lately", "recently"),
+    ("begin again", "restart"),
+    ("begins again", "restarts"),
+    ("go on with", "resume"),
+    ("goes on with", "resumes"),
+    ("going on with", "resuming"),
+    ("gone on with", "resumed"),
+    ("take back", "undo"),
+    ("taken back", "undone"),
+    ("in earnest", "exactly"),
+    ("samples a pixel", "samples per pixel"),
+    ("sample a pixel", "sample per pixel"),
+    ("bytes a pixel", "bytes per pixel"),
+    ("rays a pixel", "rays per pixel"),
+    ("rays a second", "rays per second"),
+    ("paths a second", "paths per second"),
+    ("frames a second", "frames per second"),
+    ("ns a ray", "ns per ray"),
+    ("visits a ray", "visits per ray"),
+];
+
+/// In the window an image may be a picture, and the environment a sky.
+const FINE_IN_THE_PROGRAM: [&str; 5] = ["picture", "pictures", "sky", "skies", "house"];
+
+/// Names of scenes, which may have words that are retired elsewhere.
+pub fn scene_names() -> BTreeSet<String> {
+    let name = |path: &String| path.trim_start_matches("assets/scenes/").trim_end_matches(".ron").to_owned();
+    files("assets/scenes", &[".ron"]).iter().map(name).filter(|name| name.contains('-')).collect()
+}
+
+/// Retired words of a line of prose, each with what to say instead.
+pub fn retired_words(line: &str, scenes: &BTreeSet<String>) -> Vec<(&'static str, &'static str)> {
+    let mut text = without_code(line).to_lowercase();
+    if text.starts_with("<!--") || (text.starts_with('[') && text.contains("]: ")) {
+        return Vec::new();
+    }
+    // Targets of links are names of files.
+    while let Some(at) = text.find("](") {
+        let end = text[at..].find(')').map_or(text.len(), |end| at + end + 1);
+        text.replace_range(at..end, " ");
+    }
+    for name in scenes {
+        text = text.replace(name, " ");
+    }
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: Vec<&str> = text.split(|c| !is_word(c)).filter(|word| !word.is_empty()).collect();
+    let is_there = |phrase: &str| {
+        let phrase: Vec<&str> = phrase.split(' ').collect();
+        words.windows(phrase.len()).any(|found| found == phrase)
+    };
+    RETIRED.into_iter().filter(|(word, _)| is_there(word)).collect()
+}
+
+/// The text literals of a source file before its tests, each with its line.
+fn literals(source: &str) -> Vec<(usize, String)> {
+    let source = source.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    let (mut found, mut line, mut rest) = (Vec::new(), 1, source);
+    while let Some(c) = rest.chars().next() {
+        let length = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if rest.starts_with("'\"'") || rest.starts_with("b'\"'") {
+            rest.find("\"'").map_or(1, |at| at + 2)
+        } else if rest.starts_with("r#\"") {
+            rest[3..].find("\"#").map_or(rest.len(), |at| {
+                found.push((line, rest[3..3 + at].to_owned()));
+                at + 5
+            })
+        } else if c == '"' {
+            let mut is_escaped = false;
+            let end = rest[1..].find(|c| {
+                let ends = c == '"' && !is_escaped;
+                is_escaped = c == '\\' && !is_escaped;
+                ends
+            });
+            let end = end.map_or(rest.len() - 1, |at| at + 1);
+            // A text goes on in the next line behind a backslash.
+            found.push((line, rest[1..end].split("\\\n").map(str::trim_start).collect::<Vec<_>>().join("")));
+            end + 1
+        } else {
+            c.len_utf8()
+        };
+        let (read, after) = rest.split_at(length.min(rest.len()));
+        line += read.matches('\n').count();
+        rest = after;
+    }
+    found
+}
+
+/// Docstrings that the command line shows as help.
+fn help(source: &str) -> Vec<(usize, String)> {
+    let lines = source.lines().zip(1..);
+    lines.filter_map(|(line, n)| Some((n, line.trim().strip_prefix("/// ")?.to_owned()))).collect()
+}
+
+/// A field or a scene by its name alone, or a whole scene.
+fn is_grammar(text: &str) -> bool {
+    ["eye", "ball", "balls"].contains(&text) || text.ends_with(".ron") || text.contains("camera: (")
+}
+
+/// `{lamp}` is a name in the source.
+fn without_placeholders(text: &str) -> String {
+    let parts = text.split('{').enumerate();
+    parts.map(|(i, part)| if i == 0 { part } else { part.split_once('}').map_or("", |(_, rest)| rest) }).collect()
+}
+
+#[test]
+fn texts_of_the_program_are_in_words_of_the_field() {
+    let scenes = scene_names();
+    let mut problems = Vec::new();
+    for path in files("src", &[".rs"]).into_iter().chain(files("crates", &[".rs"])) {
+        // The search for keys knows other words too.
+        if path == "src/viewer/keys/words.rs" {
+            continue;
+        }
+        let source = read(&path).text;
+        let mut texts = literals(&source);
+        if path.starts_with("src/cli/") {
+            texts.extend(help(&source));
+        }
+        for (line, text) in texts.into_iter().filter(|(_, text)| !is_grammar(text)) {
+            let text = without_placeholders(&text);
+            for (word, better) in retired_words(&text, &scenes) {
+                if !FINE_IN_THE_PROGRAM.contains(&word) {
+                    problems.push(format!("{path}:{line}: `{word}`: say {better}: {text}"));
+                }
+            }
+        }
+    }
+    expect_none(problems);
+}
+
+#[test]
+fn texts_are_found() {
+    let source = "let a = \"one \\\"two\\\" \\\n    three\"; // \"not\"\nlet c = '\"'; f(r#\"four\"#);\n\n#[cfg(test)]\nmod tests { \"x\" }";
+    let texts: Vec<(usize, String)> = literals(source);
+    assert_eq!(texts, [(1, "one \\\"two\\\" three".to_owned()), (3, "four".to_owned())]);
+}
