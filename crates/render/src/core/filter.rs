@@ -4,7 +4,7 @@
 //!
 //! All filters are products of one function of x and the same of y; widths are in pixels from the pixel's centre.
 
-use firstlight_simd::{Float, Simd, select};
+use firstlight_simd::{Float, Real, Simd, select};
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 

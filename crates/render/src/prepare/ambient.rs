@@ -5,7 +5,7 @@
 //! Representation for Irradiance Environment Maps".
 
 use crate::core::environment::Environment;
-use firstlight_simd::{Simd, Vector};
+use firstlight_simd::{Real, Simd, Vector};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 

@@ -9,7 +9,7 @@
 
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, warp_simd};
 use firstlight_kdtree::geometry::Frame;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, padded, select};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! [`firstlight_kdtree::geometry::robust::offset_ray_origin`] for sixteen points.
 
 use firstlight_kdtree::geometry::robust::UNIT_ROUNDOFF;
-use firstlight_simd::{Float, Simd, Vector, select};
+use firstlight_simd::{Float, Real, Simd, Vector, select};
 
 /// `distance` metres along `normal`.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! The maps of [`crate::sampling`], sixteen points at a time.
 
-use firstlight_simd::{Float, Simd, Vector, select, sin_cos_eighth};
+use firstlight_simd::{Float, Real, Simd, Vector, select, sin_cos_eighth};
 use std::f32::consts::{FRAC_PI_4, TAU};
 
 /// See [`crate::sampling::warp::uniform_disc`].

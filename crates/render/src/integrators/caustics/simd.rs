@@ -23,7 +23,7 @@ use crate::shading::simd::lights::power_weight;
 use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector};
 use glam::{Vec2, Vec3};
 
 /// Hits of one kind of material, and where their light and their paths go on.

@@ -5,7 +5,7 @@ use crate::core::filter::FilterSampler;
 use crate::sampling::SamplerLanes;
 use crate::sampling::warp_simd::uniform_disc;
 use crate::shading::paths::{PathBatch, PathLanes};
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch};
 use glam::{UVec2, Vec3};
 
 /// Pixels whose camera rays are wanted, in the order of the rays.

@@ -24,8 +24,8 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{
-    Bits, Float, InstructionSet, Kernel, LANES, Mask, Simd, Vector, dispatch, frame_around, power, select,
-    select_vector, sin_cos,
+    Bits, Elementary, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, frame_around, select,
+    select_vector,
 };
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -277,15 +277,15 @@ fn ask_environment<S: Simd>(
 /// See `phong/mod.rs`.
 #[inline(always)]
 fn lobe_pdf<S: Simd>(exponent: Float<S>, cos: Float<S>) -> Float<S> {
-    (exponent + 1.0) * (1.0 / TAU) * power(cos.at_least(0.0).at_most(1.0), exponent)
+    (exponent + 1.0) * (1.0 / TAU) * cos.at_least(0.0).at_most(1.0).power(exponent)
 }
 
 /// A unit direction a lane with density [`lobe_pdf`] about `axis`.
 #[inline(always)]
 fn within_lobe<S: Simd>(axis: Vector<S>, exponent: Float<S>, [u, v]: [Float<S>; 2]) -> Vector<S> {
     let one = u.all(1.0);
-    let cos = power(one - u, one / (exponent + 1.0));
+    let cos = (one - u).power(one / (exponent + 1.0));
     let sin = (one - cos * cos).at_least(0.0).sqrt();
-    let (sin_phi, cos_phi) = sin_cos(v * TAU);
+    let (sin_phi, cos_phi) = (v * TAU).sin_cos();
     Vector { x: sin * cos_phi, y: sin * sin_phi, z: cos }.to_world(&frame_around(axis)).normalize()
 }

@@ -6,7 +6,7 @@ use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{lanes_of, transmittance};
 use crate::shading::simd::lights::light_weight;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch, select};
 use glam::Vec3;
 
 /// Adds the light of hits on emitters, weighted against light sampling having found it.

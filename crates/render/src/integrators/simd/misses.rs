@@ -6,7 +6,7 @@ use crate::shading::medium::MediumSets;
 use crate::shading::paths::PathBatch;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::lanes_of;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select_vector};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select_vector};
 use glam::Vec3;
 
 /// Adds what the surroundings send along the rays of `order`; see [`Environment::radiance`].

@@ -17,7 +17,7 @@ use crate::shading::simd::lights::{LightPoints, light_weight};
 use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select, select_vector};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select, select_vector};
 use glam::Vec3;
 
 /// Hits of one kind of material, and where their light and their paths go on.

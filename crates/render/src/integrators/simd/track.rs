@@ -12,7 +12,7 @@ use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, MIRROR, lanes_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::{blend_at, lobe_at};
-use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
+use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 

@@ -10,7 +10,7 @@ use crate::sampling::offset_simd::offset_origin;
 use crate::sampling::warp_simd::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
 use firstlight_kdtree::geometry::robust::gamma;
 use firstlight_simd::{
-    Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
+    Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, frame_around, padded, select, select_vector,
 };
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -336,7 +336,7 @@ impl LightArrays {
             (local.to_world(&axes), one_minus_cos_max)
         } else {
             let z = one - u[0] * 2.0;
-            let (sin, cos) = sin_cos(u[1] * TAU);
+            let (sin, cos) = (u[1] * TAU).sin_cos();
             let r = (one - z * z).at_least(0.0).sqrt();
             (Vector { x: r * cos, y: r * sin, z }, zero)
         };
@@ -449,7 +449,7 @@ impl<S: Simd> QuadLanes<S> {
         let triple = area * unit * unit * -z;
         let first = half(&corner, &length, [0, 1, 2]);
         let second = half(&corner, &length, [0, 2, 3]);
-        let solid_angle = atan2(triple * (first + second), first * second - triple * triple) * 2.0;
+        let solid_angle = (triple * (first + second)).atan2(first * second - triple * triple) * 2.0;
         Self { x0, y0, z0, x1, y1, solid_angle }
     }
 
@@ -465,7 +465,7 @@ impl<S: Simd> QuadLanes<S> {
         let (cos_2, sin_2) = (-(b1 * n3), (r1 + b1 * b1 * r3).sqrt());
         let (cos_3, sin_3) = (-(n3 * b0), (r0 + b0 * b0 * r3).sqrt());
         let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
-        let (sin_part, cos_part) = sin_cos(u * solid_angle);
+        let (sin_part, cos_part) = (u * solid_angle).sin_cos();
         let cos_au = cos_part * cos_sum + sin_part * sin_sum;
         let sin_au = sin_part * cos_sum - cos_part * sin_sum;
         let product = cos_au * b0;

@@ -6,7 +6,7 @@ use crate::prepare::light::shape::LightShape;
 use crate::prepare::light::tree::LightTree;
 use crate::prepare::light::tree_simd::LightTreeArrays;
 use crate::sampling::AliasTable;
-use firstlight_simd::{Float, Simd, Vector, select};
+use firstlight_simd::{Float, Real, Simd, Vector, select};
 use glam::Vec3;
 
 /// Up to this many lights their contributions are estimated one by one; more would cost more than they save.

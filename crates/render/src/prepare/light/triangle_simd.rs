@@ -1,6 +1,6 @@
 //! Triangles as seen from sixteen points; see [`crate::sampling::SphericalTriangle`].
 
-use firstlight_simd::{Float, Mask, Simd, Vector, atan2, select, select_vector, sin_cos};
+use firstlight_simd::{Elementary, Float, Mask, Real, Simd, Vector, select, select_vector};
 
 pub(crate) struct TriangleLanes<S: Simd> {
     /// Unit directions to the corners.
@@ -18,7 +18,7 @@ impl<S: Simd> TriangleLanes<S> {
         let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
         let one = la.all(1.0);
         let corners = [a * (one / la), b * (one / lb), c * (one / lc)];
-        Self { corners, solid_angle: atan2(triple, denominator) * 2.0 }
+        Self { corners, solid_angle: triple.atan2(denominator) * 2.0 }
     }
 
     /// Unit directions uniform in the triangles, and the lanes whose triangle does not look like a line.
@@ -31,7 +31,7 @@ impl<S: Simd> TriangleLanes<S> {
         // The angle at `a`, between the two edges that meet there.
         let (n_ab, n_ca) = (n_ab * (one / l_ab), n_ca * (one / l_ca));
         let (cos_alpha, sin_alpha) = (n_ab.dot(n_ca), n_ab.cross(n_ca).length());
-        let (sin, cos) = sin_cos(u * self.solid_angle);
+        let (sin, cos) = (u * self.solid_angle).sin_cos();
         let (sin_phi, cos_phi) = (sin * cos_alpha - cos * sin_alpha, cos * cos_alpha + sin * sin_alpha);
         let k1 = cos_phi - cos_alpha;
         let k2 = sin_phi + sin_alpha * a.dot(b);

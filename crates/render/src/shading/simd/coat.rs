@@ -8,7 +8,7 @@ use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
 use crate::shading::simd::lanes::{DIFFUSE, METAL, MIRROR};
 use crate::shading::simd::metal::MetalLanes;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
-use firstlight_simd::{Bits, Float, Mask, Simd, Vector, frame_around, select, select_vector, two};
+use firstlight_simd::{Bits, Float, Mask, Real, Simd, Vector, frame_around, select, select_vector, two};
 use std::f32::consts::FRAC_1_PI;
 
 /// The parts of the surface of each lane, by what they do; of each kind there is one at most.

@@ -6,7 +6,7 @@ use crate::shading::dimensions::DIM_LOBE;
 use crate::shading::mis_state::MisState;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
-use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
+use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
 
 /// What each lane is told.

@@ -9,7 +9,7 @@ use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes, ball_points};
 use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, gamma};
 use firstlight_kdtree::{F64_ERROR, INSET, Shape};
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, select, select_vector, three, two};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
 use glam::Vec3;
 
 /// The product with a matrix a lane.

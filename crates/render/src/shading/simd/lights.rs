@@ -8,7 +8,7 @@ use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::lights::choose_light_point;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::SurfaceLanes;
-use firstlight_simd::{Float, Kernel, LANES, Mask, Simd, Vector};
+use firstlight_simd::{Float, Kernel, LANES, Mask, Real, Simd, Vector};
 use glam::Vec3;
 
 /// A point on a light for each lane.

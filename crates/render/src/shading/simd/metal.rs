@@ -3,7 +3,7 @@
 use crate::prepare::material_table::{COMPENSATE, SCHLICK};
 use crate::sampling::warp_simd::uniform_disc;
 use crate::shading::ggx;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around, select, select_vector};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
 use std::f32::consts::PI;
 
 /// Metal as seen along `wo`.

@@ -16,7 +16,7 @@ use crate::shading::simd::metal;
 use crate::shading::simd::metal::MetalLanes;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::scalar_at;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around, select, select_vector};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
 use glam::Vec2;
 use std::f32::consts::FRAC_1_PI;
 

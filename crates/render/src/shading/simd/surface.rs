@@ -8,7 +8,7 @@ use crate::shading::paths::PathBatch;
 use crate::shading::surface::Vertex;
 use firstlight_kdtree::geometry::robust::UNIT_ROUNDOFF;
 use firstlight_kdtree::{F64_ERROR, HitBatch};
-use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Simd, Vector, select, select_vector, three, two};
+use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
 use glam::{Vec2, Vec3};
 
 /// Points on surfaces, each seen along a ray.

@@ -5,7 +5,7 @@ use crate::core::texture::TexturePattern;
 use crate::prepare::prepared::Prepared;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::SurfaceLanes;
-use firstlight_simd::{Bits, Mask, Simd, Vector, floor, select_vector, truncated};
+use firstlight_simd::{Bits, Elementary, Mask, Real, Simd, Vector, select_vector};
 use glam::Vec2;
 
 /// `color`, but for the lanes of `textured`: there what `inputs` says of their rows.
@@ -33,8 +33,8 @@ pub(crate) fn looked_up<S: Simd>(
             let x = u * m.x_axis.x + v * m.y_axis.x + offset.x;
             let y = u * m.x_axis.y + v * m.y_axis.y + offset.y;
             // See [`crate::core::texture::Texture::eval`].
-            let half = (floor(x) + floor(y)) * 0.5;
-            let even = (half - truncated(half)).is_zero();
+            let half = (x.floor() + y.floor()) * 0.5;
+            let even = (half - half.truncated()).is_zero();
             let alike = textured & row.equals(first);
             let found = select_vector(even, Vector::splat(s, *a), Vector::splat(s, *b));
             color = select_vector(alike, found, color);
