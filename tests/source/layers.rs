@@ -26,7 +26,7 @@ const FRAME: &str = "src/frame";
 /// of its line; in `src` they may be imported everywhere.
 const LAYERS: [(&str, &[&str]); 21] = [
     (SIMD, &[]),
-    (GEOMETRY, &[]),
+    (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
     (MESH, &[GEOMETRY]),
     (SAMPLING, &[SIMD, GEOMETRY]),

@@ -12,7 +12,7 @@ use crate::prepare::casters::NO_CASTER;
 use crate::prepare::material_table::COATED;
 use crate::prepare::surface_table::SurfaceTable;
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_simd::uniform_disc;
+use crate::sampling::warp::uniform_disc;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};

@@ -3,7 +3,7 @@
 use crate::core::camera::Camera;
 use crate::core::filter::FilterSampler;
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_simd::uniform_disc;
+use crate::sampling::warp::uniform_disc;
 use crate::shading::paths::{PathBatch, PathLanes};
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch};
 use glam::{UVec2, Vec3};

@@ -7,7 +7,7 @@ use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
 use crate::prepare::light::triangle_simd::TriangleLanes;
 use crate::sampling::offset_simd::offset_origin;
-use crate::sampling::warp_simd::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
+use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc, uniform_triangle};
 use firstlight_kdtree::geometry::robust::gamma;
 use firstlight_simd::{
     Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, frame_around, padded, select, select_vector,
@@ -268,10 +268,7 @@ impl LightArrays {
         let relative = first - position;
         let (zero, one) = (area.all(0.0), area.all(1.0));
         let mut found = mask & relative.dot(normal).lt(zero);
-        // See `crate::sampling::uniform_triangle`.
-        let halves = [u[0] * 0.5, u[1] * 0.5];
-        let below = u[0].lt(u[1]);
-        let mut weights = [select(below, halves[0], u[0] - halves[1]), select(below, u[1] - halves[0], halves[1])];
+        let mut weights = uniform_triangle(u);
         let (mut angle, mut solid_angle) = (0, one);
         if by_angle {
             let triangle = TriangleLanes::new(relative, e1, e2);

@@ -113,7 +113,7 @@ impl LightShape {
                 uv: u,
             },
             Self::Triangle { vertices: [a, b, c], normal, .. } => {
-                let weights = uniform_triangle(u);
+                let weights = Vec2::from(uniform_triangle(u.to_array()));
                 SurfaceOfLight {
                     position: *a + weights.x * (*b - *a) + weights.y * (*c - *a),
                     error: robust::gamma(7) * (a.abs() + b.abs() + c.abs()),
@@ -185,7 +185,7 @@ impl LightShape {
                         let over = (b1 + b2).max(1.0);
                         Vec2::new(b1, b2) / over
                     }
-                    None => uniform_triangle(u),
+                    None => uniform_triangle(u.to_array()).into(),
                 };
                 let point = a + weights.x * (b - a) + weights.y * (c - a);
                 let (wi, distance) = direction(position, point)?;
@@ -246,7 +246,8 @@ pub(crate) fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) 
     }
     let sin2_max = r2 / distance2;
     let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
-    let (local, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
+    let (local, one_minus_cos) = uniform_cone(u.to_array(), one_minus_cos_max);
+    let local = Vec3::from(local);
     let frame = Frame::around(to_center / distance2.sqrt());
     if distance2 < CLOSE * r2 {
         return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));

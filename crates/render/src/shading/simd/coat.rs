@@ -3,7 +3,7 @@
 //! The formulas are those of [`crate::shading::bsdf::Blend`]: light sampling asks both parts, a bounce is chosen from one
 //! and weighted over both.
 
-use crate::sampling::warp_simd::cosine_hemisphere;
+use crate::sampling::warp::cosine_hemisphere;
 use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
 use crate::shading::simd::lanes::{DIFFUSE, METAL, MIRROR};
 use crate::shading::simd::metal::MetalLanes;

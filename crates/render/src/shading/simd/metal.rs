@@ -1,7 +1,7 @@
 //! Rough metal, sixteen points at a time: the formulas of [`crate::shading::ggx`] and of metal in `bsdf.rs`.
 
 use crate::prepare::material_table::{COMPENSATE, SCHLICK};
-use crate::sampling::warp_simd::uniform_disc;
+use crate::sampling::warp::uniform_disc;
 use crate::shading::ggx;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
 use std::f32::consts::PI;

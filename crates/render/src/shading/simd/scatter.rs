@@ -3,7 +3,7 @@
 use crate::core::material::SMALLEST_ALPHA;
 use crate::prepare::material_table::{COATED, TEXTURED};
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_simd::cosine_hemisphere;
+use crate::sampling::warp::cosine_hemisphere;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
