@@ -5,7 +5,6 @@
 mod alias;
 mod distribution;
 mod hash;
-pub(crate) mod offset_simd;
 mod sobol;
 mod sobol_simd;
 mod spherical_quad;

@@ -6,9 +6,8 @@ use crate::core::material::ColorInput;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
 use crate::prepare::light::triangle_simd::TriangleLanes;
-use crate::sampling::offset_simd::offset_origin;
 use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc, uniform_triangle};
-use firstlight_kdtree::geometry::robust::gamma;
+use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{
     Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, frame_around, padded, select, select_vector,
 };
@@ -128,7 +127,7 @@ impl LightArrays {
         let around = n.x + n.y + n.z;
         let lift = (n.dot(center.abs()) + around * radius) * gamma(6) + around * distance * gamma(16);
         let ratio = distance / radius;
-        let target = offset_origin(center - wi * radius, lift, -wi);
+        let target = offset_along(center - wi * radius, lift, -wi);
         LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi }
     }
 
@@ -250,7 +249,7 @@ impl LightArrays {
         // The rounding of the point, and what the kernel loses over the distance.
         let lift =
             Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
-        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+        LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi }
     }
 
     #[inline(always)]
@@ -296,7 +295,7 @@ impl LightArrays {
         let found = found & zero.lt(distance) & (angle | (zero.lt(cos) & zero.lt(area)));
         let lift =
             Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
-        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+        LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi }
     }
 
     #[inline(always)]
@@ -354,7 +353,7 @@ impl LightArrays {
         let n = normal.abs();
         let around = n.x + n.y + n.z;
         let lift = (n.dot(size) + around * radius) * gamma(6) + around * distance * gamma(16);
-        let lanes = LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi };
+        let lanes = LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi };
         let close = found & distance2.lt(r2 * CLOSE);
         if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
     }
