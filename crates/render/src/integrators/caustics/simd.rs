@@ -7,6 +7,7 @@ use crate::core::camera::Camera;
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
 use crate::integrators::caustics::lens_connections::LensConnections;
 use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::weight::etendue_gain;
 use crate::integrators::simd::shade::{knows, scatters};
 use crate::prepare::casters::NO_CASTER;
 use crate::prepare::material_table::COATED;
@@ -19,7 +20,6 @@ use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::lights::power_weight;
 use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
@@ -167,8 +167,8 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
         open &= surface.non_specular & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
         let importance = distance2 * (cos_lens * cos_lens * cos_lens);
-        let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
-        let weight = lamp_weight(pass, ratio);
+        let ratio = ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf);
+        let weight = pass.lamp_weight(ratio);
         let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
         open &= !light.is_zero();
         if open == 0 {
@@ -229,8 +229,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             }
         }
         let (cos_i, cos_o) = (place.wo.dot(normal), along.abs());
-        // What a specular surface does to the étendue; 1 where the true normal shades.
-        let gain = ((cos_i * place.normal.dot(wi)) / (along * place.normal.dot(place.wo))).abs();
+        let gain = etendue_gain(normal, place.normal, wi, place.wo);
         // Radiance is squeezed on its way into glass, flux is not.
         let white = Vector::splat(s, Vec3::ONE);
         let mut factor = if KIND == GLASS { white } else { bounce.weight } * gain;
@@ -277,14 +276,4 @@ impl<S: Simd> LightPathLanes<'_, S> {
             next_media.extend(lanes_of(go_on).map(|lane| media[lane]));
         }
     }
-}
-
-/// See [`CausticPass::lamp_weight`].
-#[inline(always)]
-fn lamp_weight<S: Simd>(pass: &CausticPass, ratio: Float<S>) -> Float<S> {
-    let one = ratio.all(1.0);
-    if pass.techniques.mis {
-        return one - power_weight(ratio);
-    }
-    select(ratio.is_positive(), one, ratio.all(0.0))
 }

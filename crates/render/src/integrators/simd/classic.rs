@@ -13,12 +13,12 @@ use crate::prepare::classic_table::{GLOSS, Inputs, MATTE, ROUGH};
 use crate::prepare::light::arrays::LightLanes;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{Sampler, SamplerLanes};
+use crate::shading::lights::power_heuristic;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::bounce::mirrored;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{lanes_of, transmittance};
-use crate::shading::simd::lights::power_weight;
 use crate::shading::simd::metal::fresnel;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
@@ -238,8 +238,7 @@ fn reflect<S: Simd>(
     if let Some(gloss) = &lit.gloss {
         let mut lobe = lobe_pdf(gloss.exponent, gloss.mirrored.dot(wi));
         if gloss.rough {
-            let one = pdf.all(1.0);
-            lobe = lobe * select(pdf.is_zero() | lobe.is_zero(), one, power_weight(lobe / pdf));
+            lobe = lobe * select(pdf.is_zero(), pdf.all(1.0), power_heuristic(pdf, lobe));
         }
         value = value + gloss.tint * lobe;
     }

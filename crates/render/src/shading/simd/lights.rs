@@ -8,7 +8,7 @@ use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::lights::choose_light_point;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::SurfaceLanes;
-use firstlight_simd::{Float, Kernel, LANES, Mask, Real, Simd, Vector};
+use firstlight_simd::{Float, Kernel, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
 /// A point on a light for each lane.
@@ -81,16 +81,4 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
         pdf: Float::load(s, &pdf),
         radiance: Vector::from_arrays(s, &[g, h, i]),
     }
-}
-
-/// Weight of light that light sampling found with density `own`, and a bounce would have found with `other`.
-#[inline(always)]
-pub(crate) fn light_weight<S: Simd>(techniques: &Techniques, own: Float<S>, other: Float<S>) -> Float<S> {
-    if techniques.mis { power_weight(other / own) } else { own.all(1.0) }
-}
-
-/// See [`crate::shading::lights::power_weight`].
-#[inline(always)]
-pub(crate) fn power_weight<S: Simd>(ratio: Float<S>) -> Float<S> {
-    ratio.all(1.0) / (ratio * ratio + 1.0)
 }
