@@ -5,6 +5,7 @@ use crate::prepare::bodies::Boundary;
 use crate::prepare::light::shape::sphere_uv;
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::{Blend, Lobe, MAX_LOBES};
+use crate::shading::dielectric::reflect;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
@@ -109,7 +110,7 @@ impl Vertex {
     /// `wo` mirrored by the shading normal, unit.
     #[inline]
     pub fn mirrored(&self) -> Vec3 {
-        (2.0 * self.normal.dot(self.wo) * self.normal - self.wo).normalize()
+        reflect(self.wo.into(), self.normal.into()).into()
     }
 
     /// Whether light from `wi` can meet the side that `wo` sees.

@@ -283,7 +283,7 @@ impl PhongWave {
                 let weight = path.throughput * share;
                 self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
                 if reflectance < 1.0 {
-                    let wi = refract(vertex.wo, vertex.normal, eta, cos_t);
+                    let wi = refract(vertex.wo.into(), vertex.normal.into(), eta, cos_t).into();
                     // Radiance is squeezed into a narrower cone where light is slower: the factor η².
                     let weight = weight * ((1.0 - reflectance) * squeeze * squeeze);
                     self.follow(step, weight, wi, Some(interface), f32::INFINITY, dimension + 2);

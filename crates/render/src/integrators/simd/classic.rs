@@ -11,15 +11,16 @@ use crate::integrators::phong::shadow::Shadows;
 use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
 use crate::prepare::classic_table::{GLOSS, Inputs, MATTE, ROUGH};
 use crate::prepare::light::arrays::LightLanes;
+use crate::prepare::material_table::SCHLICK;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{Sampler, SamplerLanes};
+use crate::shading::dielectric;
 use crate::shading::lights::power_heuristic;
 use crate::shading::medium::MediumSets;
+use crate::shading::metal;
 use crate::shading::paths::{PathBatch, PathLanes};
-use crate::shading::simd::bounce::mirrored;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{lanes_of, transmittance};
-use crate::shading::simd::metal::fresnel;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_kdtree::HitBatch;
@@ -124,10 +125,10 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         let (mut tint, mut exponent, mut wi) = (matte, zero, place.wo);
         if kind != MATTE {
             tint = color_of(s, &at, &table.shiny, row, &place);
-            let flags = Bits::gather(&table.flags, row);
-            tint = fresnel(flags, tint, place.normal.dot(place.wo)) * Float::gather(&table.shiny.weight, row);
+            let schlick = Bits::gather(&table.flags, row).has(SCHLICK);
+            tint = metal::tint(schlick, tint, place.normal.dot(place.wo)) * Float::gather(&table.shiny.weight, row);
             exponent = Float::gather(&table.exponent, row);
-            wi = mirrored(place.wo, place.normal);
+            wi = dielectric::reflect(place.wo, place.normal);
         }
         let gloss =
             (kind == GLOSS || kind == ROUGH).then_some(Gloss { tint, exponent, mirrored: wi, rough: kind == ROUGH });

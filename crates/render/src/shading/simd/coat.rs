@@ -4,9 +4,11 @@
 //! and weighted over both.
 
 use crate::sampling::warp::cosine_hemisphere;
-use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
+use crate::shading::dielectric::reflect;
+use crate::shading::metal::Metal;
+use crate::shading::simd::bounce::{Bounce, colors_of};
 use crate::shading::simd::lanes::{DIFFUSE, METAL, MIRROR};
-use crate::shading::simd::metal::MetalLanes;
+use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Bits, Float, Mask, Real, Simd, Vector, frame_around, select, select_vector, two};
 use std::f32::consts::FRAC_1_PI;
@@ -17,7 +19,7 @@ pub(crate) struct Coat<S: Simd> {
     rough: CoatPart<S>,
     mirror: CoatPart<S>,
     /// The rough parts; `None` where no lane has one.
-    metal: Option<MetalLanes<S>>,
+    metal: Option<Metal<Float<S>>>,
     /// In the order of choice.
     kinds: [Bits<S>; 2],
     pmfs: [Float<S>; 2],
@@ -55,7 +57,7 @@ impl<S: Simd> Coat<S> {
             let row = Bits { s, v: s.select_u(first, rows[0].v, rows[1].v) };
             let alpha = select(rough.here, Float::gather(&table.alpha, row), Float::splat(s, 1.0));
             let flags = Bits::gather(&table.flags, row);
-            metal = Some(MetalLanes::new(s, rough.here, place.normal, place.wo, alpha, rough.color, flags));
+            metal = Some(metals(s, rough.here, place.normal, place.wo, alpha, rough.color, flags));
         }
         Self { matte, rough, mirror, metal, kinds, pmfs }
     }
@@ -110,7 +112,7 @@ impl<S: Simd> Coat<S> {
         let mut weight = Vector { x: value.x / pdf, y: value.y / pdf, z: value.z / pdf };
         if mirror != 0 {
             go_on |= mirror;
-            wi = select_vector(mirror, mirrored(place.wo, place.normal), wi);
+            wi = select_vector(mirror, reflect(place.wo, place.normal), wi);
             weight = select_vector(mirror, self.mirror.color * (self.mirror.weight / self.mirror.pmf), weight);
             pdf = select(mirror, pdf.all(f32::INFINITY), pdf);
         }

@@ -4,16 +4,17 @@ use crate::core::material::SMALLEST_ALPHA;
 use crate::prepare::material_table::{COATED, TEXTURED};
 use crate::sampling::SamplerLanes;
 use crate::sampling::warp::cosine_hemisphere;
+use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
-use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
+use crate::shading::metal::{Metal, tint};
+use crate::shading::simd::bounce::{Bounce, colors_of};
 use crate::shading::simd::coat::Coat;
 use crate::shading::simd::glass::GlassLanes;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, lanes_of};
-use crate::shading::simd::metal;
-use crate::shading::simd::metal::MetalLanes;
+use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::scalar_at;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
@@ -24,7 +25,7 @@ use std::f32::consts::FRAC_1_PI;
 pub(crate) struct SurfaceScatter<S: Simd> {
     /// Albedo or reflectance.
     pub color: Vector<S>,
-    pub metal: Option<MetalLanes<S>>,
+    pub metal: Option<Metal<Float<S>>>,
     pub coat: Option<Coat<S>>,
     pub glass: Option<GlassLanes<S>>,
     /// Lanes that light sampling can do something for.
@@ -69,7 +70,7 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
             }
             alpha = Float::load(s, &alphas);
         }
-        let metal = MetalLanes::new(s, at.mask, place.normal, place.wo, alpha, color, flags);
+        let metal = metals(s, at.mask, place.normal, place.wo, alpha, color, flags);
         let non_specular = Float::splat(s, SMALLEST_ALPHA).le(alpha);
         return SurfaceScatter { color, metal: Some(metal), coat: None, glass: None, non_specular };
     }
@@ -137,10 +138,10 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let mut bounce = Bounce { go_on, wi, weight: found.tint * found.weight, pdf: found.pdf, transmitted: 0 };
             if !surface.non_specular & at.mask != 0 {
                 let non_specular = surface.non_specular;
-                let tint = metal::fresnel(metal.flags, metal.reflectance, cos_o);
+                let facing = tint(metal.schlick, metal.reflectance, cos_o);
                 bounce.go_on |= !non_specular;
-                bounce.wi = select_vector(non_specular, bounce.wi, mirrored(place.wo, normal));
-                bounce.weight = select_vector(non_specular, bounce.weight, tint);
+                bounce.wi = select_vector(non_specular, bounce.wi, reflect(place.wo, normal));
+                bounce.weight = select_vector(non_specular, bounce.weight, facing);
                 bounce.pdf = select(non_specular, bounce.pdf, infinite);
             }
             bounce
@@ -149,25 +150,16 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let glass = surface.glass.as_ref().expect("glass has its two sides");
             let eta = glass.eta;
             let one = eta.all(1.0);
-            let cos_i = cos_o.at_least(0.0).at_most(1.0);
-            let cos2_t = (one - eta) * (eta + 1.0) + (eta * cos_i) * (eta * cos_i);
-            let total = cos2_t.le(eta.all(0.0));
-            let cos_t = cos2_t.at_least(0.0).sqrt();
-            let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-            let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-            let reflectance = (perpendicular * perpendicular + parallel * parallel) * 0.5;
-            let alike = s.eq(eta.v, one.v) & !total;
-            let reflectance = select(total, one, select(alike, eta.all(0.0), reflectance));
-            let cos_t = select(alike, cos_i, cos_t);
+            let (reflectance, cos_t) = fresnel(cos_o.at_least(0.0).at_most(1.0), eta);
             let reflected = sampler.single(dimension + DIM_LOBE).lt(reflectance);
-            let refracted = place.wo * -eta + normal * (eta * cos_o - cos_t);
-            let wi = select_vector(reflected, mirrored(place.wo, normal), refracted.normalize());
+            let refracted = refract(place.wo, normal, eta, cos_t);
+            let wi = select_vector(reflected, reflect(place.wo, normal), refracted);
             let squeeze = select(reflected, one, glass.squeeze * glass.squeeze);
             let weight = Vector { x: squeeze, y: squeeze, z: squeeze };
             Bounce { go_on: Mask::MAX, wi, weight, pdf: infinite, transmitted: !reflected }
         }
         _ => {
-            let wi = mirrored(place.wo, normal);
+            let wi = reflect(place.wo, normal);
             Bounce { go_on: Mask::MAX, wi, weight: surface.color, pdf: infinite, transmitted: 0 }
         }
     }
