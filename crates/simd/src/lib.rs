@@ -4,7 +4,7 @@
 //! `S: Simd`, `#[inline(always)]` all the way down, and compiled once a set by [`dispatch`]. Nothing is contracted or
 //! approximated differently from one set to the next: all give the same bits.
 //!
-//! A formula is written once, generic over [`Real`] and [`Vector3`]: with `f32` it is the code for one point, with
+//! A formula is written once, generic over [`Real`], [`Word`] and [`Vector3`]: with `f32` it is the code for one point, with
 //! [`Float`] that for sixteen.
 
 mod math;
@@ -12,6 +12,7 @@ mod number;
 mod real;
 mod simd;
 mod vector;
+mod word;
 
 pub use math::{Elementary, sin_cos_eighth};
 pub use number::{Bits, Float, padded};
@@ -21,6 +22,7 @@ pub use simd::InstructionSet;
 pub use simd::{Avx2, Avx512};
 pub use simd::{Kernel, LANES, Mask, Portable, Simd};
 pub use vector::{Vector, Vector3, frame_around, select_vector};
+pub use word::Word;
 
 /// The array of an expression for 0, 1 and 2.
 ///

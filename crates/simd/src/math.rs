@@ -3,6 +3,7 @@
 use super::number::Float;
 use super::real::{Real, select};
 use super::simd::Simd;
+use super::word::Word;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
 
 /// Functions that one number and sixteen of them do not have to the same bit: formulas that use them agree but for rounding.

@@ -154,21 +154,6 @@ impl<S: Simd> Bits<S> {
     }
 
     #[inline(always)]
-    pub fn all(self, x: u32) -> Self {
-        Self::splat(self.s, x)
-    }
-
-    #[inline(always)]
-    pub fn shift_left(self, bits: u32) -> Self {
-        Self { s: self.s, v: self.s.shl_u(self.v, bits) }
-    }
-
-    #[inline(always)]
-    pub fn shift_right(self, bits: u32) -> Self {
-        Self { s: self.s, v: self.s.shr_u(self.v, bits) }
-    }
-
-    #[inline(always)]
     pub fn equals(self, x: u32) -> Mask {
         self.s.eq_u(self.v, self.s.splat_u(x))
     }
@@ -176,7 +161,7 @@ impl<S: Simd> Bits<S> {
     /// Lanes with any of these bits.
     #[inline(always)]
     pub fn has(self, bits: u32) -> Mask {
-        !(self & self.all(bits)).equals(0)
+        !(self & Self::splat(self.s, bits)).equals(0)
     }
 
     /// The number that these are the bits of.

@@ -9,7 +9,7 @@
 
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::Frame;
-use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Truth, Vector, Vector3, padded, select};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Truth, Vector, Vector3, Word, padded, select};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 

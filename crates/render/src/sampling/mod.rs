@@ -6,7 +6,6 @@ mod alias;
 mod distribution;
 mod hash;
 mod sobol;
-mod sobol_simd;
 mod spherical_quad;
 mod spherical_triangle;
 pub(crate) mod warp;
@@ -14,8 +13,8 @@ pub(crate) mod warp;
 pub use alias::AliasTable;
 pub use distribution::PictureDistribution;
 pub use hash::{hash_combine, hash_u32};
-pub use sobol::Sampler;
-pub(crate) use sobol_simd::SamplerLanes;
+pub(crate) use sobol::SamplerLanes;
+pub use sobol::{Sampler, SamplerOf};
 pub use spherical_quad::SphericalQuad;
 pub use spherical_triangle::SphericalTriangle;
 pub use warp::{

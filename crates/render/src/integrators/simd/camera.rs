@@ -53,9 +53,9 @@ fn start<S: Simd>(s: S, lens: CameraRays, pixels: &Pixels, sample: u32, slot: u3
         let mask = if count == LANES { Mask::MAX } else { (1 << count) - 1 };
         let (x, y) = (load_some(s, &pixels.x[first..]), load_some(s, &pixels.y[first..]));
         let sampler = if lens.even_samples {
-            SamplerLanes::of_pixels(s, lens.seed, [x, y], sample)
+            SamplerLanes::of_pixels(lens.seed, [x, y], sample)
         } else {
-            SamplerLanes::independent(s, lens.seed, [x, y], sample)
+            SamplerLanes::all_independent(lens.seed, [x, y], sample)
         };
         let [dx, dy] = lens.filter.sample_lanes(sampler.pair(0));
         let (x, y) = (x.to_float() + dx, y.to_float() + dy);

@@ -4,7 +4,7 @@
 //! lanes pass, fit into registers.
 
 use crate::prepare::light::tree::{LEAF, LightTree};
-use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, padded, select};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, Word, padded, select};
 
 #[derive(Debug, Default)]
 pub(crate) struct LightTreeArrays {
