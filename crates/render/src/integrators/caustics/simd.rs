@@ -167,7 +167,8 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
         open &= surface.non_specular & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
         let importance = distance2 * (cos_lens * cos_lens * cos_lens);
-        let ratio = ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf);
+        // `CausticPass::join_ratio`, rounded in an order of its own.
+        let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
         let weight = pass.lamp_weight(ratio);
         let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
         open &= !light.is_zero();

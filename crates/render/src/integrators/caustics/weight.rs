@@ -77,9 +77,13 @@ impl CausticPass<'_> {
     /// The factor of the vertex that is joined to the lens, and of the number of paths.
     #[inline(always)]
     pub fn join_ratio<R: Real>(&self, distance2: R, cos_lens: R, cos_o: R, cos_i: R, pdf: R) -> R {
-        // Of paths from the lamps that are joined to a pixel.
-        let density_scale = self.paths_per_sample as f32 * self.pixel_area;
-        distance2 * density_scale * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * pdf)
+        distance2 * self.density_scale() * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * pdf)
+    }
+
+    /// Of paths from the lamps that are joined to a pixel.
+    #[inline]
+    pub fn density_scale(&self) -> f32 {
+        self.paths_per_sample as f32 * self.pixel_area
     }
 
     /// Weight of light that a path from the eye finds on a lamp; `None` if paths from lamps do not matter here.
