@@ -5,7 +5,7 @@
 //! depend on which hits share a register.
 
 use crate::integrators::phong::lobe::{
-    AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, DIRECT_ALREADY_SAMPLED, least_weight,
+    AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, DIRECT_ALREADY_SAMPLED, least_weight, lobe_pdf, within_lobe,
 };
 use crate::integrators::phong::shadow::Shadows;
 use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
@@ -25,11 +25,10 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{
-    Bits, Elementary, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, frame_around, select,
-    select_vector,
+    Bits, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector,
 };
 use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 
 /// Hits on materials of one kind of a [`crate::prepare::classic_table::ClassicTable`], and where their light and their rays go on.
 pub(crate) struct ClassicGroup<'a> {
@@ -272,20 +271,4 @@ fn ask_environment<S: Simd>(
         }
     }
     (found, Vector::from_arrays(s, &dir), Float::load(s, &pdf), Vector::from_arrays(s, &radiance))
-}
-
-/// See `phong/mod.rs`.
-#[inline(always)]
-fn lobe_pdf<S: Simd>(exponent: Float<S>, cos: Float<S>) -> Float<S> {
-    (exponent + 1.0) * (1.0 / TAU) * cos.at_least(0.0).at_most(1.0).power(exponent)
-}
-
-/// A unit direction a lane with density [`lobe_pdf`] about `axis`.
-#[inline(always)]
-fn within_lobe<S: Simd>(axis: Vector<S>, exponent: Float<S>, [u, v]: [Float<S>; 2]) -> Vector<S> {
-    let one = u.all(1.0);
-    let cos = (one - u).power(one / (exponent + 1.0));
-    let sin = (one - cos * cos).at_least(0.0).sqrt();
-    let (sin_phi, cos_phi) = (v * TAU).sin_cos();
-    Vector { x: sin * cos_phi, y: sin * sin_phi, z: cos }.to_world(&frame_around(axis)).normalize()
 }
