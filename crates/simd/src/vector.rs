@@ -54,6 +54,12 @@ pub fn frame_around<R: Real>(normal: Vector3<R>) -> [Vector3<R>; 3] {
 }
 
 impl<R: Real> Vector3<R> {
+    /// The same vector in all lanes, of which `like` has as many.
+    #[inline(always)]
+    pub fn in_all(like: R, v: Vec3) -> Self {
+        Self { x: like.all(v.x), y: like.all(v.y), z: like.all(v.z) }
+    }
+
     /// The same number in all three.
     #[inline(always)]
     pub fn all(x: R) -> Self {
