@@ -5,8 +5,8 @@
 use crate::core::material::ColorInput;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
-use crate::prepare::light::triangle_simd::TriangleLanes;
 use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc, uniform_triangle};
+use crate::sampling::{SphericalQuad, SphericalTriangle};
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{
     Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, frame_around, padded, select, select_vector,
@@ -184,14 +184,14 @@ impl LightArrays {
             pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
             if by_angle && self.has_triangles {
                 let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
-                let angle = TriangleLanes::new(relative, e1, e2).solid_angle;
+                let angle = SphericalTriangle::new(relative, e1, e2).solid_angle();
                 pdf = select(flags.has(TRIANGLE) & large_enough(angle), one / angle, pdf);
             }
             if by_angle && self.has_quads {
                 let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
                 let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
-                let (x, y, height) = (relative.dot(unit_u), relative.dot(unit_v), relative.dot(normal));
-                let angle = QuadLanes::new(x, y, height, length_u, length_v, area).solid_angle;
+                let corner = Vector { x: relative.dot(unit_u), y: relative.dot(unit_v), z: relative.dot(normal) };
+                let angle = SphericalQuad::new(corner, [length_u, length_v], area).solid_angle();
                 pdf = select(flags.has(RECTANGLE) & one.all(SMALL_SOLID_ANGLE).le(angle), one / angle, pdf);
             }
         }
@@ -229,9 +229,10 @@ impl LightArrays {
         let mut uv = u;
         let (mut angle, mut solid_angle) = (0, area);
         if by_angle {
-            let quad = QuadLanes::new(relative.dot(unit_u), relative.dot(unit_v), height, length_u, length_v, area);
+            let corner = Vector { x: relative.dot(unit_u), y: relative.dot(unit_v), z: height };
+            let quad = SphericalQuad::new(corner, [length_u, length_v], area);
             let rectangle = Bits::gather(&self.flags, id).has(RECTANGLE);
-            solid_angle = quad.solid_angle;
+            solid_angle = quad.solid_angle();
             angle = rectangle & zero.all(SMALL_SOLID_ANGLE).le(solid_angle);
             if angle & seen != 0 {
                 let [x, y] = quad.sample(u);
@@ -270,8 +271,8 @@ impl LightArrays {
         let mut weights = uniform_triangle(u);
         let (mut angle, mut solid_angle) = (0, one);
         if by_angle {
-            let triangle = TriangleLanes::new(relative, e1, e2);
-            solid_angle = triangle.solid_angle;
+            let triangle = SphericalTriangle::new(relative, e1, e2);
+            solid_angle = triangle.solid_angle();
             angle = large_enough(solid_angle);
             if angle & found != 0 {
                 let (dir, seen) = triangle.sample(u);
@@ -409,92 +410,4 @@ fn spheres_close_by<S: Simd>(
     lanes.wi = Vector::from_arrays(s, &wi);
     lanes.pdf = Float::load(s, &pdf);
     lanes
-}
-
-/// See [`crate::sampling::SphericalQuad`].
-struct QuadLanes<S: Simd> {
-    x0: Float<S>,
-    y0: Float<S>,
-    z0: Float<S>,
-    x1: Float<S>,
-    y1: Float<S>,
-    solid_angle: Float<S>,
-}
-
-impl<S: Simd> QuadLanes<S> {
-    #[inline(always)]
-    pub fn new(
-        x0: Float<S>,
-        y0: Float<S>,
-        height: Float<S>,
-        length_u: Float<S>,
-        length_v: Float<S>,
-        area: Float<S>,
-    ) -> Self {
-        let z0 = -height.abs();
-        let (x1, y1) = (x0 + length_u, y0 + length_v);
-        let unit = x0.all(1.0) / (x0 * x0 + y0 * y0 + z0 * z0).sqrt().at_least(f32::MIN_POSITIVE);
-        let (ax, ay, bx, by, z) = (x0 * unit, y0 * unit, x1 * unit, y1 * unit, z0 * unit);
-        let corner = [
-            Vector { x: ax, y: ay, z },
-            Vector { x: bx, y: ay, z },
-            Vector { x: bx, y: by, z },
-            Vector { x: ax, y: by, z },
-        ];
-        let length = [corner[0].length(), corner[1].length(), corner[2].length(), corner[3].length()];
-        let triple = area * unit * unit * -z;
-        let first = half(&corner, &length, [0, 1, 2]);
-        let second = half(&corner, &length, [0, 2, 3]);
-        let solid_angle = (triple * (first + second)).atan2(first * second - triple * triple) * 2.0;
-        Self { x0, y0, z0, x1, y1, solid_angle }
-    }
-
-    #[inline(always)]
-    pub fn sample(&self, [u, v]: [Float<S>; 2]) -> [Float<S>; 2] {
-        let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
-        let one = x0.all(1.0);
-        let z2 = z0 * z0;
-        let (h0, r0) = height(z2, y0);
-        let (b1, r1) = height(z2, y1);
-        let (h3, r3) = height(z2, x0);
-        let (b0, n3) = (-h0, -h3);
-        let (cos_2, sin_2) = (-(b1 * n3), (r1 + b1 * b1 * r3).sqrt());
-        let (cos_3, sin_3) = (-(n3 * b0), (r0 + b0 * b0 * r3).sqrt());
-        let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
-        let (sin_part, cos_part) = (u * solid_angle).sin_cos();
-        let cos_au = cos_part * cos_sum + sin_part * sin_sum;
-        let sin_au = sin_part * cos_sum - cos_part * sin_sum;
-        let product = cos_au * b0;
-        let (lack_0, lack_1) = (r0 / (b0.abs() + 1.0), r1 / (b1.abs() + 1.0));
-        let lack_au = sin_au * sin_au / (cos_au.abs() + 1.0);
-        let lacking = (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * one.copysign(b1);
-        let difference = select((product * b1).is_positive(), lacking, product - b1);
-        let fu = difference / sin_au;
-        let xu = (-z0).copysign(fu) / (fu * fu - r0).at_least(f32::MIN_POSITIVE).sqrt();
-        // NaN becomes the lower end.
-        let xu = xu.max(x0).min(x1);
-        let d2 = xu * xu + z2;
-        let h0 = y0 / (d2 + y0 * y0).sqrt();
-        let h1 = y1 / (d2 + y1 * y1).sqrt();
-        let hv = h0 + v * (h1 - h0);
-        let hv2 = hv * hv;
-        let yv = hv * d2.sqrt() / (one - hv2).sqrt();
-        let yv = select(hv2.lt(one.all(1.0 - 1e-6)), yv, y1);
-        [(xu - x0) / (x1 - x0), (yv.max(y0).min(y1) - y0) / (y1 - y0)]
-    }
-}
-
-/// Denominator of the solid angle of half the rectangle.
-#[inline(always)]
-fn half<S: Simd>(corner: &[Vector<S>; 4], length: &[Float<S>; 4], [p, q, r]: [usize; 3]) -> Float<S> {
-    let (a, b, c) = (corner[p], corner[q], corner[r]);
-    let (la, lb, lc) = (length[p], length[q], length[r]);
-    la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
-}
-
-/// Height of an edge plane's normal, and the square of what it lacks to 1.
-#[inline(always)]
-fn height<S: Simd>(z2: Float<S>, y: Float<S>) -> (Float<S>, Float<S>) {
-    let h2 = z2 + y * y;
-    (y / h2.sqrt(), z2 / h2)
 }

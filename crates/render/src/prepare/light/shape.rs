@@ -67,6 +67,16 @@ pub(crate) const SMALL_SOLID_ANGLE: f32 = 1e-3;
 /// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
 pub(crate) const LARGE_SOLID_ANGLE: f32 = 6.0;
 
+impl Rectangle {
+    /// - `corner`: relative to the point that it is seen from.
+    #[inline]
+    fn seen(self, corner: Vec3) -> SphericalQuad<f32> {
+        let Self { unit_u, unit_v, length_u, length_v } = self;
+        let corner = Vec3::new(corner.dot(unit_u), corner.dot(unit_v), corner.dot(unit_u.cross(unit_v)));
+        SphericalQuad::new(corner.into(), [length_u, length_v], length_u * length_v)
+    }
+}
+
 impl LightShape {
     pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Self {
         let cross = edge_u.cross(edge_v);
@@ -153,9 +163,9 @@ impl LightShape {
                 }
                 let by_angle = rectangle
                     .filter(|_| by_angle)
-                    .map(|r| SphericalQuad::new(relative, r.unit_u, r.length_u, r.unit_v, r.length_v))
+                    .map(|r| r.seen(relative))
                     .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
-                let uv = by_angle.map_or(u, |quad| quad.sample(u));
+                let uv = by_angle.map_or(u, |quad| quad.sample(u.to_array()).into());
                 let point = corner + uv.x * edge_u + uv.y * edge_v;
                 let (wi, distance) = direction(position, point)?;
                 let pdf = match by_angle {
@@ -175,7 +185,11 @@ impl LightShape {
                 let weights = match by_angle {
                     Some(triangle) => {
                         let (e1, e2) = (b - a, c - a);
-                        let d = triangle.sample(u)?;
+                        let (d, seen) = triangle.sample(u.to_array());
+                        if !seen {
+                            return None;
+                        }
+                        let d = Vec3::from(d);
                         // Where the direction meets the plane (Möller and Trumbore 1997).
                         let p = d.cross(e2);
                         let determinant = p.dot(e1);
@@ -218,7 +232,7 @@ impl LightShape {
             Self::Quad { corner, normal, area, rectangle, .. } => {
                 let by_angle = rectangle
                     .filter(|_| by_angle)
-                    .map(|r| SphericalQuad::new(corner - position, r.unit_u, r.length_u, r.unit_v, r.length_v))
+                    .map(|r| r.seen(corner - position))
                     .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
                 match by_angle {
                     Some(quad) => 1.0 / quad.solid_angle(),
@@ -366,8 +380,8 @@ fn area_pdf(distance: f32, wi: Vec3, normal: Vec3, area: f32) -> Option<f32> {
 }
 
 #[inline]
-fn spherical_triangle(relative: [Vec3; 3]) -> Option<SphericalTriangle> {
-    let triangle = SphericalTriangle::new(relative);
+fn spherical_triangle([a, b, c]: [Vec3; 3]) -> Option<SphericalTriangle<f32>> {
+    let triangle = SphericalTriangle::new(a.into(), (b - a).into(), (c - a).into());
     (SMALL_SOLID_ANGLE..=LARGE_SOLID_ANGLE).contains(&triangle.solid_angle()).then_some(triangle)
 }
 
