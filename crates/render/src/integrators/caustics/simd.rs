@@ -134,23 +134,15 @@ impl<S: Simd> LightPathLanes<'_, S> {
     fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut LensConnections) {
         let &Self { pass, at, place, media, throughput, ratio, .. } = self;
         let scene = pass.scene;
-        let Camera { eye, right, up, forward, tan_half_vfov, focus_distance, .. } = scene.camera;
         let mut open = at.mask;
         if scene.tables.features.glass {
             lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane] != camera) << lane));
         }
-        let [x, y] = self.lens_offsets(s, &scene.camera);
-        let (right, up) = (Vector::splat(s, right), Vector::splat(s, up));
-        let lens = Vector::splat(s, eye) + (right * x + up * y);
-        // The film point as `Camera::film_point` finds it.
+        let offsets = self.lens_offsets(s, &scene.camera);
+        let lens = scene.camera.lens_points(offsets);
         let way = place.position - lens;
-        let depth = way.dot(Vector::splat(s, forward));
+        let ([film_x, film_y], depth) = scene.camera.film_points(offsets, way, pass.size);
         open &= depth.is_positive();
-        let scale = pass.size.y / tan_half_vfov;
-        let across = way.dot(right) / depth + x / x.all(focus_distance);
-        let above = way.dot(up) / depth + y / y.all(focus_distance);
-        let film_x = (across * scale + pass.size.x) * 0.5;
-        let film_y = (above * -scale + pass.size.y) * 0.5;
         let least = depth.all(0.5 - pass.filter.radius());
         let rim = pass.filter.radius() - 0.5;
         open &= least.le(film_x) & film_x.lt(depth.all(pass.size.x + rim));
