@@ -6,7 +6,7 @@ use crate::prepare::light::shape::LightShape;
 use crate::prepare::light::tree::LightTree;
 use crate::prepare::light::tree_simd::LightTreeArrays;
 use crate::sampling::AliasTable;
-use firstlight_simd::{Real, Vector3, select};
+use firstlight_simd::{Float, Real, Simd, Vector, Vector3, select};
 use glam::Vec3;
 
 /// Up to this many lights their contributions are estimated one by one; more would cost more than they save.
@@ -131,7 +131,7 @@ impl LightSelection {
         let mut estimates = [0.0; MAX_ESTIMATED];
         let mut sum = 0.0;
         for (estimate, bounds) in estimates.iter_mut().zip(&self.bounds) {
-            *estimate = bounds.estimate(position.into(), normal.into());
+            *estimate = bounds.estimate_one(position, normal);
             sum += *estimate;
         }
         (estimates, sum)
@@ -155,14 +155,26 @@ impl LightBounds {
         Self { center, radius, normal, intensity: light.mean_radiance * projected }
     }
 
-    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
+    #[inline]
+    fn estimate_one(&self, position: Vec3, normal: Vec3) -> f32 {
+        let offset = Vector3::from(self.center - position);
+        self.estimate(offset.length_squared(), offset / offset.length(), normal.into())
+    }
+
+    /// The same from sixteen points.
     #[inline(always)]
-    pub fn estimate<R: Real>(&self, position: Vector3<R>, normal: Vector3<R>) -> R {
-        let (r2, one) = (self.radius * self.radius, position.x.all(1.0));
-        let offset = Vector3::in_all(one, self.center) - position;
+    pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+        let offset = Vector::in_all(position.x, self.center) - position;
         let distance2 = offset.length_squared();
-        let distance = distance2.sqrt();
-        let wi = offset * (one / distance);
+        self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), normal)
+    }
+
+    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
+    ///
+    /// - `distance2`: to the centre, squared; `wi`: unit, to the centre; `normal`: unit, of the surface.
+    #[inline(always)]
+    fn estimate<R: Real>(&self, distance2: R, wi: Vector3<R>, normal: Vector3<R>) -> R {
+        let (r2, one, distance) = (self.radius * self.radius, distance2.all(1.0), distance2.sqrt());
         let sin_u = one.all(self.radius) / distance;
         let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
         let mut estimate = largest_cosine(wi.dot(normal), cos_u, sin_u) * self.intensity;
