@@ -14,7 +14,6 @@ use crate::shading::metal::{Metal, schlick};
 use firstlight_kdtree::geometry::Frame;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
-use std::f32::consts::FRAC_1_PI;
 
 /// One way of scattering, all inputs looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,7 +165,10 @@ impl Scatter for Lobe {
             return (Vec3::ZERO, 0.0);
         }
         match *self {
-            Self::Diffuse { albedo } => (albedo * (FRAC_1_PI * cos), cosine_hemisphere_pdf(cos)),
+            Self::Diffuse { albedo } => {
+                let pdf = cosine_hemisphere_pdf(cos);
+                (albedo * pdf, pdf)
+            }
             Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
                 let metal = metal_at(normal, wo, alpha, reflectance, fresnel, compensate);
                 if !metal.facing() {

@@ -251,7 +251,7 @@ impl PhongWave {
             }
         } else if tables.features.environment {
             let scale = sets.environment_scale(path.media);
-            ambient += finish.ambient * tables.ambient.radiance(vertex.normal) * scale;
+            ambient += finish.ambient * Vec3::from(tables.ambient.radiance(vertex.normal.into())) * scale;
         }
         ambient
     }

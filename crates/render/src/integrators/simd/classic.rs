@@ -161,7 +161,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
                     shadows.append(n_lights, found, [leaving, wi], zero.all(f32::INFINITY), slot, seen, wi, &media);
                 }
             } else if features.environment {
-                let mut around = tables.ambient.radiance_lanes(place.normal);
+                let mut around = tables.ambient.radiance(place.normal);
                 if features.glass {
                     let ior = iors(s, scene, sets, lit.mask, &media);
                     around = around * (ior * ior);

@@ -5,6 +5,7 @@ use crate::core::material::Material;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::weight::etendue_gain;
 use crate::prepare::casters::NO_CASTER;
+use crate::sampling::cosine_hemisphere_pdf;
 use crate::shading::bsdf::Scatter;
 use crate::shading::interface::MediumId;
 use crate::shading::mis_state::MisState;
@@ -15,7 +16,6 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::{blend_at, lobe_at};
 use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
-use std::f32::consts::FRAC_1_PI;
 
 /// How the paths go on.
 pub(crate) struct BounceMisStates<'a, S: Simd> {
@@ -89,8 +89,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
     fn reverse_pdf<const KIND: usize>(&self, s: S, mask: Mask) -> Float<S> {
         let Self { at, place, bounce, .. } = *self;
         if KIND == DIFFUSE {
-            let cos = place.normal.dot(place.wo);
-            return select(cos.is_positive(), cos * FRAC_1_PI, cos.all(0.0));
+            return cosine_hemisphere_pdf(place.normal.dot(place.wo));
         }
         let mut pdfs = [0.0; LANES];
         if mask != 0 {

@@ -4,7 +4,9 @@
 
 use crate::core::material::ColorInput;
 use crate::prepare::light::emitter::Light;
-use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
+use crate::prepare::light::shape::{
+    CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, cos_at_center, pdf_by_area, sample_sphere,
+};
 use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc, uniform_triangle};
 use crate::sampling::{SphericalQuad, SphericalTriangle};
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
@@ -180,7 +182,7 @@ impl LightArrays {
         if self.has_quads || self.has_triangles {
             let normal = Vector::gather(&self.normal, id);
             let cos = -wi.dot(normal);
-            let by_area = distance * distance / (cos * area);
+            let by_area = pdf_by_area(distance, cos, area);
             pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
             if by_angle && self.has_triangles {
                 let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
@@ -202,7 +204,7 @@ impl LightArrays {
                 cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
             } else {
                 let cos = wi.dot(relative - wi * distance) / radius;
-                select(cos.is_positive(), distance * distance / (cos * area), zero)
+                select(cos.is_positive(), pdf_by_area(distance, cos, area), zero)
             };
             pdf = select(flags.has(SPHERE), select(r2.lt(distance2), of_sphere, zero), pdf);
         }
@@ -244,7 +246,7 @@ impl LightArrays {
         let distance = offset.length();
         let wi = offset * (distance.all(1.0) / distance);
         let cos = -wi.dot(normal);
-        let by_area = distance * distance / (cos * area);
+        let by_area = pdf_by_area(distance, cos, area);
         let pdf = select(angle, zero.all(1.0) / solid_angle, by_area);
         let found = seen & zero.lt(distance) & (angle | zero.lt(cos));
         // The rounding of the point, and what the kernel loses over the distance.
@@ -292,7 +294,7 @@ impl LightArrays {
         let distance = offset.length();
         let wi = offset * (one / distance);
         let cos = -wi.dot(normal);
-        let pdf = select(angle, one / solid_angle, distance * distance / (cos * area));
+        let pdf = select(angle, one / solid_angle, pdf_by_area(distance, cos, area));
         let found = found & zero.lt(distance) & (angle | (zero.lt(cos) & zero.lt(area)));
         let lift =
             Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
@@ -322,8 +324,7 @@ impl LightArrays {
             let one_minus_cos = disc2.at_most(1.0) * one_minus_cos_max;
             let sin2 = (one_minus_cos * (-one_minus_cos + 2.0)).at_least(0.0);
             let cos = one - one_minus_cos;
-            let along = sin2 / sin2_max;
-            let cos_alpha = (sin2 / sin2_max.sqrt() + cos * (one - along).at_least(0.0).sqrt()).at_most(1.0);
+            let cos_alpha = cos_at_center(sin2, cos, sin2_max);
             let sin_alpha = (one - cos_alpha * cos_alpha).at_least(0.0).sqrt();
             // The direction on the disc, unit; any in the middle.
             let middle = disc2.is_zero();

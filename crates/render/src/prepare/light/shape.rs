@@ -4,6 +4,7 @@ use crate::sampling::{
     SphericalQuad, SphericalTriangle, cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle,
 };
 use firstlight_kdtree::geometry::{Frame, robust};
+use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
 /// The surface of a light; all emit on their front alone.
@@ -266,11 +267,9 @@ pub(crate) fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) 
     if distance2 < CLOSE * r2 {
         return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));
     }
-    // The angle at the centre that belongs to the angle at the shading point (Pharr et al., section 6.2.4), written
-    // so that nothing cancels for a sphere of few pixels.
     let sin2 = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0);
     let cos = 1.0 - one_minus_cos;
-    let cos_alpha = (sin2 / sin2_max.sqrt() + cos * (1.0 - sin2 / sin2_max).max(0.0).sqrt()).min(1.0);
+    let cos_alpha = cos_at_center(sin2, cos, sin2_max);
     let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
     let around = local.truncate().normalize_or(Vec2::X);
     let normal = frame.to_world((around * sin_alpha).extend(-cos_alpha));
@@ -376,7 +375,25 @@ fn direction(from: Vec3, to: Vec3) -> Option<(Vec3, f32)> {
 #[inline]
 fn area_pdf(distance: f32, wi: Vec3, normal: Vec3, area: f32) -> Option<f32> {
     let cos = -wi.dot(normal);
-    (cos > 0.0 && area > 0.0).then(|| distance * distance / (cos * area))
+    (cos > 0.0 && area > 0.0).then(|| pdf_by_area(distance, cos, area))
+}
+
+/// Per steradian, of points that are even over an area.
+///
+/// - `distance`: metres; `cos`: at the light; `area`: square metres.
+#[inline(always)]
+pub(crate) fn pdf_by_area<R: Real>(distance: R, cos: R, area: R) -> R {
+    distance * distance / (cos * area)
+}
+
+/// Cosine of the angle at the centre of a sphere between the point that is seen and the one that looks (Pharr et al., section
+/// 6.2.4), written so that nothing cancels for a sphere of few pixels.
+///
+/// - `sin2`, `cos`: of the angle at the one that looks; `sin2_max`: of that of the rim.
+#[inline(always)]
+pub(crate) fn cos_at_center<R: Real>(sin2: R, cos: R, sin2_max: R) -> R {
+    let rest = (cos.all(1.0) - sin2 / sin2_max).at_least(0.0);
+    (sin2 / sin2_max.sqrt() + cos * rest.sqrt()).at_most(1.0)
 }
 
 #[inline]

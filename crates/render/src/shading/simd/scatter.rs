@@ -2,8 +2,8 @@
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::prepare::material_table::{COATED, TEXTURED};
-use crate::sampling::SamplerLanes;
 use crate::sampling::warp::cosine_hemisphere;
+use crate::sampling::{SamplerLanes, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::MediumId;
@@ -19,7 +19,6 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::scalar_at;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
 use glam::Vec2;
-use std::f32::consts::FRAC_1_PI;
 
 /// How the surface of each lane scatters.
 pub(crate) struct SurfaceScatter<S: Simd> {
@@ -91,18 +90,16 @@ pub(crate) fn eval<S: Simd, const KIND: usize>(
         return coat.eval(place.normal, wi);
     }
     let cos = place.normal.dot(wi);
-    let above = cos.is_positive();
-    let zero = cos.all(0.0);
     if let Some(metal) = &surface.metal
         && KIND == METAL
     {
         let found = metal.eval(metal.local(wi));
-        let valid = above & metal.facing();
+        let valid = cos.is_positive() & metal.facing();
         let value = found.tint * found.value;
-        let pdf = select(valid, found.pdf, zero);
+        let pdf = select(valid, found.pdf, cos.all(0.0));
         return (value, pdf);
     }
-    let pdf = select(above, cos * FRAC_1_PI, zero);
+    let pdf = cosine_hemisphere_pdf(cos);
     (surface.color * pdf, pdf)
 }
 
@@ -128,7 +125,7 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let local = cosine_hemisphere(sampler.pair(dimension + DIM_DIRECTION));
             let wi = local.to_world(&frame_around(normal));
             let go_on = local.z.is_positive();
-            Bounce { go_on, wi, weight: surface.color, pdf: local.z * FRAC_1_PI, transmitted: 0 }
+            Bounce { go_on, wi, weight: surface.color, pdf: cosine_hemisphere_pdf(local.z), transmitted: 0 }
         }
         METAL => {
             let metal = surface.metal.as_ref().expect("metal has metal parameters");
