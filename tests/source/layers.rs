@@ -27,7 +27,7 @@ const EMBED: &str = "src/embed";
 /// of its line; in `src` they may be imported everywhere.
 const LAYERS: [(&str, &[&str]); 23] = [
     (SIMD, &[]),
-    (GEOMETRY, &[]),
+    (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
     (MESH, &[GEOMETRY]),
     (SAMPLING, &[SIMD, GEOMETRY]),

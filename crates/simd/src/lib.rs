@@ -3,19 +3,26 @@
 //! [`Simd`] is what a processor can do; [`Float`], [`Bits`] and [`Vector`] give it operators. Code is generic over
 //! `S: Simd`, `#[inline(always)]` all the way down, and compiled once a set by [`dispatch`]. Nothing is contracted or
 //! approximated differently from one set to the next: all give the same bits.
+//!
+//! A formula is written once, generic over [`Real`], [`Word`] and [`Vector3`]: with `f32` it is the code for one point, with
+//! [`Float`] that for sixteen.
 
 mod math;
 mod number;
+mod real;
 mod simd;
 mod vector;
+mod word;
 
-pub use math::{atan2, floor, power, sin_cos, sin_cos_eighth, truncated};
-pub use number::{Bits, Float, padded, select};
+pub use math::{Elementary, sin_cos_eighth};
+pub use number::{Bits, Float, padded};
+pub use real::{Real, Truth, select};
 pub use simd::InstructionSet;
 #[cfg(target_arch = "x86_64")]
 pub use simd::{Avx2, Avx512};
 pub use simd::{Kernel, LANES, Mask, Portable, Simd};
-pub use vector::{Vector, frame_around, select_vector};
+pub use vector::{Vector, Vector3, frame_around, select_vector};
+pub use word::Word;
 
 /// The array of an expression for 0, 1 and 2.
 ///

@@ -1,15 +1,89 @@
-//! Angles, sixteen at a time.
+//! Functions that are no single operation: of the standard library for one number, series for sixteen.
 
-use super::number::{Float, select};
+use super::number::Float;
+use super::real::{Real, select};
 use super::simd::Simd;
+use super::word::Word;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
+
+/// Functions that one number and sixteen of them do not have to the same bit: formulas that use them agree but for rounding.
+pub trait Elementary: Real {
+    /// Sine and cosine of an angle within ±100, to 2e-7.
+    fn sin_cos(self) -> (Self, Self);
+
+    /// The angle of (`x`, `self`), in −π..π; relative error below 4e-7. At the origin sixteen are NaN.
+    fn atan2(self, x: Self) -> Self;
+
+    /// `self` to the power of `y`, for `self` in 0..=1 and `y` from 0 on; see [`power`] for the error.
+    fn power(self, y: Self) -> Self;
+
+    /// The largest whole number that is not above it, for finite ones; the sign of zero may differ.
+    fn floor(self) -> Self;
+
+    /// The next whole number towards zero, for finite ones; the sign of zero may differ.
+    fn truncated(self) -> Self;
+}
+
+impl Elementary for f32 {
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        f32::sin_cos(self)
+    }
+
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        f32::atan2(self, x)
+    }
+
+    #[inline(always)]
+    fn power(self, y: Self) -> Self {
+        f32::powf(self, y)
+    }
+
+    #[inline(always)]
+    fn floor(self) -> Self {
+        f32::floor(self)
+    }
+
+    #[inline(always)]
+    fn truncated(self) -> Self {
+        f32::trunc(self)
+    }
+}
+
+impl<S: Simd> Elementary for Float<S> {
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        sin_cos(self)
+    }
+
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        atan2(self, x)
+    }
+
+    #[inline(always)]
+    fn power(self, y: Self) -> Self {
+        power(self, y)
+    }
+
+    #[inline(always)]
+    fn floor(self) -> Self {
+        floor(self)
+    }
+
+    #[inline(always)]
+    fn truncated(self) -> Self {
+        truncated(self)
+    }
+}
 
 /// Sine and cosine of angles within ±100, to 2e-7.
 ///
 /// The angle is brought to an eighth of a turn by whole quarters; there Taylor's series are cut where the rest falls
 /// below rounding.
 #[inline(always)]
-pub fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
+fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
     // To the nearest quarter, by truncation after a half away from zero.
     let quarters = (x * (1.0 / FRAC_PI_2) + x.all(0.5).copysign(x)).truncate();
     let count = quarters.to_float();
@@ -27,9 +101,9 @@ pub fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
 const QUARTER_HIGH: f32 = 1.570_312_5;
 const QUARTER_LOW: f32 = 4.838_268e-4;
 
-/// As `sampling::warp::sin_cos_eighth`, rounding for rounding.
+/// Sine and cosine of an angle in −π/4..π/4, to 1e-7: Taylor's series, cut where the rest falls below rounding.
 #[inline(always)]
-pub fn sin_cos_eighth<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
+pub fn sin_cos_eighth<R: Real>(x: R) -> (R, R) {
     let (x2, one) = (x * x, x.all(1.0));
     let s = x.all(1.0 / 5040.0) - x2 * (1.0 / 362_880.0);
     let s = x.all(1.0 / 6.0) - x2 * (x.all(1.0 / 120.0) - x2 * s);
@@ -43,7 +117,7 @@ pub fn sin_cos_eighth<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
 ///
 /// The quotient is brought below tan(π/8), where a short polynomial does (Moshier's Cephes library, `atanf`).
 #[inline(always)]
-pub fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
+fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
     const TAN_PI_8: f32 = 0.414_213_57;
     let (ax, ay) = (x.abs(), y.abs());
     let (short, long) = (ax.min(ay), ax.max(ay));
@@ -63,7 +137,7 @@ pub fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
 ///
 /// The mantissa is brought to within a factor √2 of 1, where the series of the area tangent is short.
 #[inline(always)]
-pub fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
+fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
     const ONE: u32 = 0x3f80_0000;
     const SQRT_HALF: u32 = 0x3f35_04f3;
     let shifted = x.to_bits() + (ONE - SQRT_HALF);
@@ -87,14 +161,14 @@ pub fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
 
 /// The largest whole number that is not above `x`, as `f32::floor` for all finite numbers.
 #[inline(always)]
-pub fn floor<S: Simd>(x: Float<S>) -> Float<S> {
+fn floor<S: Simd>(x: Float<S>) -> Float<S> {
     let whole = truncated(x);
     select(x.lt(whole), whole - 1.0, whole)
 }
 
 /// As `f32::trunc` for all finite numbers but for the sign of zero.
 #[inline(always)]
-pub fn truncated<S: Simd>(x: Float<S>) -> Float<S> {
+fn truncated<S: Simd>(x: Float<S>) -> Float<S> {
     // Larger ones have no digits behind the point.
     let small = x.abs().lt(x.all(8_388_608.0));
     select(small, select(small, x, x.all(0.0)).truncate().to_float(), x)

@@ -1,5 +1,6 @@
 //! Sixteen `f32` or `u32` with operators.
 
+use super::real::Real;
 use super::simd::{LANES, Mask, Simd};
 use std::ops::{Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, Neg, Sub};
 
@@ -15,12 +16,6 @@ pub struct Float<S: Simd> {
 pub struct Bits<S: Simd> {
     pub s: S,
     pub v: S::U,
-}
-
-/// `a` where the bit is set, else `b`.
-#[inline(always)]
-pub fn select<S: Simd>(mask: Mask, a: Float<S>, b: Float<S>) -> Float<S> {
-    Float { s: a.s, v: a.s.select(mask, a.v, b.v) }
 }
 
 /// A table as [`Float::gather`] reads it fastest: filled up to a multiple of sixteen.
@@ -58,75 +53,6 @@ impl<S: Simd> Float<S> {
         Self { s: indices.s, v: indices.s.gather(from, indices.v) }
     }
 
-    /// The same number in all lanes.
-    #[inline(always)]
-    pub fn all(self, x: f32) -> Self {
-        Self::splat(self.s, x)
-    }
-
-    #[inline(always)]
-    pub fn sqrt(self) -> Self {
-        Self { s: self.s, v: self.s.sqrt(self.v) }
-    }
-
-    #[inline(always)]
-    pub fn abs(self) -> Self {
-        Self { s: self.s, v: self.s.abs(self.v) }
-    }
-
-    /// The second where either is NaN.
-    #[inline(always)]
-    pub fn min(self, other: Self) -> Self {
-        Self { s: self.s, v: self.s.min(self.v, other.v) }
-    }
-
-    /// The second where either is NaN.
-    #[inline(always)]
-    pub fn max(self, other: Self) -> Self {
-        Self { s: self.s, v: self.s.max(self.v, other.v) }
-    }
-
-    /// At least `least`, also where it is NaN.
-    #[inline(always)]
-    pub fn at_least(self, least: f32) -> Self {
-        self.max(self.all(least))
-    }
-
-    #[inline(always)]
-    pub fn at_most(self, most: f32) -> Self {
-        self.min(self.all(most))
-    }
-
-    #[inline(always)]
-    pub fn lt(self, other: Self) -> Mask {
-        self.s.lt(self.v, other.v)
-    }
-
-    #[inline(always)]
-    pub fn le(self, other: Self) -> Mask {
-        self.s.le(self.v, other.v)
-    }
-
-    #[inline(always)]
-    pub fn is_positive(self) -> Mask {
-        self.all(0.0).lt(self)
-    }
-
-    #[inline(always)]
-    pub fn is_negative(self) -> Mask {
-        self.lt(self.all(0.0))
-    }
-
-    #[inline(always)]
-    pub fn is_zero(self) -> Mask {
-        self.s.eq(self.v, self.s.splat(0.0))
-    }
-
-    #[inline(always)]
-    pub fn is_nan(self) -> Mask {
-        !self.s.eq(self.v, self.v)
-    }
-
     #[inline(always)]
     pub fn to_bits(self) -> Bits<S> {
         Bits { s: self.s, v: self.s.to_bits(self.v) }
@@ -139,14 +65,62 @@ impl<S: Simd> Float<S> {
     }
 
     #[inline(always)]
-    pub fn copysign(self, sign: Self) -> Self {
-        let top = Bits::splat(self.s, 1 << 31);
-        (self.abs().to_bits() | (sign.to_bits() & top)).as_float()
+    pub fn compress(self, mask: Mask) -> Self {
+        Self { s: self.s, v: self.s.compress(mask, self.v) }
+    }
+}
+
+impl<S: Simd> Real for Float<S> {
+    type Mask = Mask;
+
+    #[inline(always)]
+    fn all(self, x: f32) -> Self {
+        Self::splat(self.s, x)
     }
 
     #[inline(always)]
-    pub fn compress(self, mask: Mask) -> Self {
-        Self { s: self.s, v: self.s.compress(mask, self.v) }
+    fn choose(mask: Mask, a: Self, b: Self) -> Self {
+        Self { s: a.s, v: a.s.select(mask, a.v, b.v) }
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self { s: self.s, v: self.s.sqrt(self.v) }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self { s: self.s, v: self.s.abs(self.v) }
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self { s: self.s, v: self.s.min(self.v, other.v) }
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self { s: self.s, v: self.s.max(self.v, other.v) }
+    }
+
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        (self.abs().to_bits() | (sign.to_bits() & (1 << 31))).as_float()
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> Mask {
+        self.s.lt(self.v, other.v)
+    }
+
+    #[inline(always)]
+    fn le(self, other: Self) -> Mask {
+        self.s.le(self.v, other.v)
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> Mask {
+        self.s.eq(self.v, other.v)
     }
 }
 
@@ -180,21 +154,6 @@ impl<S: Simd> Bits<S> {
     }
 
     #[inline(always)]
-    pub fn all(self, x: u32) -> Self {
-        Self::splat(self.s, x)
-    }
-
-    #[inline(always)]
-    pub fn shift_left(self, bits: u32) -> Self {
-        Self { s: self.s, v: self.s.shl_u(self.v, bits) }
-    }
-
-    #[inline(always)]
-    pub fn shift_right(self, bits: u32) -> Self {
-        Self { s: self.s, v: self.s.shr_u(self.v, bits) }
-    }
-
-    #[inline(always)]
     pub fn equals(self, x: u32) -> Mask {
         self.s.eq_u(self.v, self.s.splat_u(x))
     }
@@ -202,7 +161,7 @@ impl<S: Simd> Bits<S> {
     /// Lanes with any of these bits.
     #[inline(always)]
     pub fn has(self, bits: u32) -> Mask {
-        !(self & self.all(bits)).equals(0)
+        !(self & Self::splat(self.s, bits)).equals(0)
     }
 
     /// The number that these are the bits of.

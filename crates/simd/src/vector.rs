@@ -1,55 +1,73 @@
-//! Sixteen vectors of three.
+//! Vectors of three, one or sixteen of them.
 
-use super::number::{Bits, Float, select};
-use super::simd::{Mask, Simd};
+use super::number::{Bits, Float};
+use super::real::{Real, select};
+use super::simd::Simd;
 use glam::Vec3;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Sixteen [`Vec3`], one register a coordinate; every operation rounds as glam's does.
-#[derive(Clone, Copy)]
-pub struct Vector<S: Simd> {
-    pub x: Float<S>,
-    pub y: Float<S>,
-    pub z: Float<S>,
+/// A [`Vec3`], or sixteen, one register a coordinate; every operation rounds as glam's does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vector3<R> {
+    pub x: R,
+    pub y: R,
+    pub z: R,
 }
 
-/// `a` where the bit is set, else `b`.
-#[inline(always)]
-pub fn select_vector<S: Simd>(mask: Mask, a: Vector<S>, b: Vector<S>) -> Vector<S> {
-    Vector { x: select(mask, a.x, b.x), y: select(mask, a.y, b.y), z: select(mask, a.z, b.z) }
+/// Sixteen [`Vec3`].
+pub type Vector<S> = Vector3<Float<S>>;
+
+impl From<Vec3> for Vector3<f32> {
+    #[inline(always)]
+    fn from(Vec3 { x, y, z }: Vec3) -> Self {
+        Self { x, y, z }
+    }
 }
 
-/// The axes across a unit normal; see `Frame::around` of `firstlight_kdtree::geometry`.
+impl From<Vector3<f32>> for Vec3 {
+    #[inline(always)]
+    fn from(Vector3 { x, y, z }: Vector3<f32>) -> Self {
+        Self { x, y, z }
+    }
+}
+
+/// `a` where the mask is true, else `b`.
 #[inline(always)]
-pub fn frame_around<S: Simd>(normal: Vector<S>) -> [Vector<S>; 3] {
-    let Vector { x, y, z } = normal;
+pub fn select_vector<R: Real>(mask: R::Mask, a: Vector3<R>, b: Vector3<R>) -> Vector3<R> {
+    Vector3 { x: select(mask, a.x, b.x), y: select(mask, a.y, b.y), z: select(mask, a.z, b.z) }
+}
+
+/// Right-handed axes at right angles, all unit, of which the last is the given unit normal.
+///
+/// Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+#[inline(always)]
+pub fn frame_around<R: Real>(normal: Vector3<R>) -> [Vector3<R>; 3] {
+    let Vector3 { x, y, z } = normal;
     let sign = z.all(1.0).copysign(z);
     let a = z.all(-1.0) / (sign + z);
     let b = x * y * a;
     [
-        Vector { x: sign * x * x * a + 1.0, y: sign * b, z: -sign * x },
-        Vector { x: b, y: sign + y * y * a, z: -y },
+        Vector3 { x: sign * x * x * a + 1.0, y: sign * b, z: -sign * x },
+        Vector3 { x: b, y: sign + y * y * a, z: -y },
         normal,
     ]
 }
 
-impl<S: Simd> Vector<S> {
+impl<R: Real> Vector3<R> {
+    /// The same vector in all lanes, of which `like` has as many.
     #[inline(always)]
-    pub fn splat(s: S, v: Vec3) -> Self {
-        Self { x: Float::splat(s, v.x), y: Float::splat(s, v.y), z: Float::splat(s, v.z) }
+    pub fn in_all(like: R, v: Vec3) -> Self {
+        Self { x: like.all(v.x), y: like.all(v.y), z: like.all(v.z) }
+    }
+
+    /// The same number in all three.
+    #[inline(always)]
+    pub fn all(x: R) -> Self {
+        Self { x, y: x, z: x }
     }
 
     #[inline(always)]
-    pub fn gather(from: &[Vec<f32>; 3], indices: Bits<S>) -> Self {
-        Self {
-            x: Float::gather(&from[0], indices),
-            y: Float::gather(&from[1], indices),
-            z: Float::gather(&from[2], indices),
-        }
-    }
-
-    #[inline(always)]
-    pub fn dot(self, other: Self) -> Float<S> {
+    pub fn dot(self, other: Self) -> R {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
@@ -63,12 +81,12 @@ impl<S: Simd> Vector<S> {
     }
 
     #[inline(always)]
-    pub fn length_squared(self) -> Float<S> {
+    pub fn length_squared(self) -> R {
         self.dot(self)
     }
 
     #[inline(always)]
-    pub fn length(self) -> Float<S> {
+    pub fn length(self) -> R {
         self.dot(self).sqrt()
     }
 
@@ -95,13 +113,13 @@ impl<S: Simd> Vector<S> {
     }
 
     #[inline(always)]
-    pub fn max_element(self) -> Float<S> {
+    pub fn max_element(self) -> R {
         self.x.max(self.y).max(self.z)
     }
 
-    /// Lanes that are zero in all coordinates.
+    /// Whether all coordinates are zero.
     #[inline(always)]
-    pub fn is_zero(self) -> Mask {
+    pub fn is_zero(self) -> R::Mask {
         self.x.is_zero() & self.y.is_zero() & self.z.is_zero()
     }
 
@@ -111,6 +129,7 @@ impl<S: Simd> Vector<S> {
         axes[0] * self.x + axes[1] * self.y + axes[2] * self.z
     }
 
+    /// To coordinates along these axes.
     #[inline(always)]
     pub fn to_local(self, axes: &[Self; 3]) -> Self {
         Self { x: axes[0].dot(self), y: axes[1].dot(self), z: axes[2].dot(self) }
@@ -119,6 +138,22 @@ impl<S: Simd> Vector<S> {
     #[inline(always)]
     pub fn mul_all(self, x: f32) -> Self {
         Self { x: self.x * x, y: self.y * x, z: self.z * x }
+    }
+}
+
+impl<S: Simd> Vector<S> {
+    #[inline(always)]
+    pub fn splat(s: S, v: Vec3) -> Self {
+        Self { x: Float::splat(s, v.x), y: Float::splat(s, v.y), z: Float::splat(s, v.z) }
+    }
+
+    #[inline(always)]
+    pub fn gather(from: &[Vec<f32>; 3], indices: Bits<S>) -> Self {
+        Self {
+            x: Float::gather(&from[0], indices),
+            y: Float::gather(&from[1], indices),
+            z: Float::gather(&from[2], indices),
+        }
     }
 
     /// The vector of one lane of stored coordinates.
@@ -133,7 +168,7 @@ impl<S: Simd> Vector<S> {
     }
 }
 
-impl<S: Simd> Add for Vector<S> {
+impl<R: Real> Add for Vector3<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -141,7 +176,7 @@ impl<S: Simd> Add for Vector<S> {
     }
 }
 
-impl<S: Simd> Sub for Vector<S> {
+impl<R: Real> Sub for Vector3<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -149,15 +184,23 @@ impl<S: Simd> Sub for Vector<S> {
     }
 }
 
-impl<S: Simd> Mul<Float<S>> for Vector<S> {
+impl<R: Real> Mul<R> for Vector3<R> {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, x: Float<S>) -> Self {
+    fn mul(self, x: R) -> Self {
         Self { x: self.x * x, y: self.y * x, z: self.z * x }
     }
 }
 
-impl<S: Simd> Neg for Vector<S> {
+impl<R: Real> Div<R> for Vector3<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, x: R) -> Self {
+        Self { x: self.x / x, y: self.y / x, z: self.z / x }
+    }
+}
+
+impl<R: Real> Neg for Vector3<R> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {

@@ -1,3 +1,4 @@
+use firstlight_simd::frame_around;
 use glam::Vec3;
 
 /// A right-handed orthonormal frame around a unit normal, which is its z axis.
@@ -9,17 +10,11 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+    /// See [`frame_around`].
     #[inline]
     pub fn around(normal: Vec3) -> Self {
-        let sign = 1.0_f32.copysign(normal.z);
-        let a = -1.0 / (sign + normal.z);
-        let b = normal.x * normal.y * a;
-        Self {
-            x: Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x),
-            y: Vec3::new(b, sign + normal.y * normal.y * a, -normal.y),
-            z: normal,
-        }
+        let [x, y, z] = frame_around(normal.into()).map(Vec3::from);
+        Self { x, y, z }
     }
 
     #[inline]

@@ -4,6 +4,7 @@
 //! leaves the hit starts beyond that bound along the geometric normal (Pharr, Jakob and Humphreys,
 //! "Physically Based Rendering", 4th edition, section 6.8).
 
+use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 
 /// Unit roundoff of `f32`: half the distance from 1 to the next number.
@@ -36,11 +37,26 @@ pub fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
 #[inline]
 pub fn offset_ray_origin(point: Vec3, error: Vec3, geometric_normal: Vec3, dir: Vec3) -> Vec3 {
     let distance = geometric_normal.abs().dot(error);
-    let offset = distance * if dir.dot(geometric_normal) < 0.0 { -geometric_normal } else { geometric_normal };
+    let outwards = if dir.dot(geometric_normal) < 0.0 { -geometric_normal } else { geometric_normal };
+    offset_along(point.into(), distance, outwards.into()).into()
+}
+
+/// Moves `point` off its surface to the side of `normal`, farther than it is known to be from the surface.
+///
+/// - `distance`: bound on the error of `point` along `normal`, metres.
+/// - `normal`: unit, the geometric normal or its opposite.
+#[inline(always)]
+pub fn offset_along<R: Real>(point: Vector3<R>, distance: R, normal: Vector3<R>) -> Vector3<R> {
+    let offset = normal * distance;
     let sum = point + offset;
-    // The addition rounds by half a unit in the last place at most: a whole one, away from the surface, makes up for it.
-    let away = sum + (2.0 * UNIT_ROUNDOFF * sum.abs()).copysign(offset);
-    Vec3::select(offset.cmpeq(Vec3::ZERO), sum, away)
+    Vector3 { x: rounded_away(sum.x, offset.x), y: rounded_away(sum.y, offset.y), z: rounded_away(sum.z, offset.z) }
+}
+
+/// The addition rounds by half a unit in the last place at most: a whole one, away from the surface, makes up for it.
+#[inline(always)]
+fn rounded_away<R: Real>(sum: R, offset: R) -> R {
+    let away = sum + (sum.abs() * (2.0 * UNIT_ROUNDOFF)).copysign(offset);
+    select(offset.is_zero(), sum, away)
 }
 
 /// Property tests that draw the same cases on every run.

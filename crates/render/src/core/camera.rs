@@ -2,6 +2,7 @@
 
 use crate::sampling::{polygon_disc, uniform_disc};
 use firstlight_kdtree::geometry::Ray;
+use firstlight_simd::{Real, Vector3};
 use glam::{Vec2, Vec3};
 use thiserror::Error;
 
@@ -76,13 +77,26 @@ impl Camera {
         if self.lens_radius == 0.0 {
             return Ray::new(self.eye, direction.normalize());
         }
-        let offset = self.lens_offset(lens);
-        let offset = offset.x * self.right + offset.y * self.up;
-        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye. Or
-        // the other way round, for a plane so near that the quotient would leave the range of f32.
-        let focus = self.focus_distance;
-        let towards = if focus >= 1.0 { direction - offset / focus } else { direction * focus - offset };
-        Ray::new(self.eye + offset, (towards / towards.abs().max_element()).normalize())
+        let (origin, dir) = self.through_lens(direction.into(), self.aperture_point(lens).to_array());
+        Ray::new(origin.into(), dir.into())
+    }
+
+    /// Origin and unit direction of the ray through a point of the lens.
+    ///
+    /// - `direction`: see [`Self::film_directions`]; `aperture`: the point over the radius of the lens, along `right` and `up`.
+    #[inline(always)]
+    pub(crate) fn through_lens<R: Real>(&self, direction: Vector3<R>, [x, y]: [R; 2]) -> (Vector3<R>, Vector3<R>) {
+        let (focus, one) = (self.focus_distance, x.all(1.0));
+        let offset =
+            (Vector3::in_all(one, self.right) * x + Vector3::in_all(one, self.up) * y).mul_all(self.lens_radius);
+        let origin = Vector3::in_all(one, self.eye) + offset;
+        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye.
+        if focus >= 1.0 {
+            return (origin, (direction - offset * (one / one.all(focus))).normalize());
+        }
+        // Or the other way round, for a plane so near that the quotient would leave the range of f32.
+        let towards = direction.mul_all(focus) - offset;
+        (origin, (towards * (one / towards.abs().max_element())).normalize())
     }
 
     /// Nearest and farthest depth, metres along `forward`, at which the circle of confusion is at most one pixel of a
@@ -104,13 +118,25 @@ impl Camera {
     /// - `u`: two numbers in `[0, 1)`.
     #[inline]
     pub fn lens_offset(&self, u: Vec2) -> Vec2 {
-        let point = if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) };
-        self.lens_radius * point
+        self.lens_radius * self.aperture_point(u)
+    }
+
+    /// The same over the radius of the lens.
+    #[inline]
+    fn aperture_point(&self, u: Vec2) -> Vec2 {
+        if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
     }
 
     #[inline]
     pub fn lens_point(&self, offset: Vec2) -> Vec3 {
-        self.eye + (offset.x * self.right + offset.y * self.up)
+        self.lens_points(offset.to_array()).into()
+    }
+
+    /// See [`Self::lens_point`].
+    #[inline(always)]
+    pub(crate) fn lens_points<R: Real>(&self, [x, y]: [R; 2]) -> Vector3<R> {
+        let across = Vector3::in_all(x, self.right) * x + Vector3::in_all(x, self.up) * y;
+        Vector3::in_all(x, self.eye) + across
     }
 
     /// Where in the film light ends that comes to a point of the lens, and the cosine of its way with `forward`: the
@@ -119,21 +145,32 @@ impl Camera {
     /// - `offset`: the point of the lens; `way`: from there to where the light comes from, any length.
     #[inline]
     pub fn film_point(&self, offset: Vec2, way: Vec3, size: Vec2) -> Option<(Vec2, f32)> {
-        let depth = way.dot(self.forward);
-        if depth <= 0.0 {
-            return None;
-        }
-        let ahead = Vec2::new(way.dot(self.right), way.dot(self.up)) / depth + offset / self.focus_distance;
-        let pixels = ahead / self.tan_half_vfov * size.y;
-        Some((0.5 * Vec2::new(size.x + pixels.x, size.y - pixels.y), depth / way.length()))
+        let (film, depth) = self.film_points(offset.to_array(), way.into(), size);
+        (depth > 0.0).then(|| (film.into(), depth / way.length()))
+    }
+
+    /// See [`Self::film_point`]; also how far ahead along `forward` the light comes from, metres.
+    #[inline(always)]
+    pub(crate) fn film_points<R: Real>(&self, [x, y]: [R; 2], way: Vector3<R>, size: Vec2) -> ([R; 2], R) {
+        let depth = way.dot(Vector3::in_all(x, self.forward));
+        let across = way.dot(Vector3::in_all(x, self.right)) / depth + x / self.focus_distance;
+        let above = way.dot(Vector3::in_all(x, self.up)) / depth + y / self.focus_distance;
+        let scale = size.y / self.tan_half_vfov;
+        ([(across * scale + size.x) * 0.5, (above * -scale + size.y) * 0.5], depth)
     }
 
     /// From the eye through a point of the film to the plane one metre ahead; not unit.
     #[inline]
     pub fn film_direction(&self, film: Vec2, size: Vec2) -> Vec3 {
-        let x = (2.0 * film.x - size.x) / size.y * self.tan_half_vfov;
-        let y = (size.y - 2.0 * film.y) / size.y * self.tan_half_vfov;
-        self.forward + x * self.right + y * self.up
+        self.film_directions(film.to_array(), size).into()
+    }
+
+    /// See [`Self::film_direction`].
+    #[inline(always)]
+    pub(crate) fn film_directions<R: Real>(&self, [x, y]: [R; 2], size: Vec2) -> Vector3<R> {
+        let across = (x * 2.0 - size.x) / size.y * self.tan_half_vfov;
+        let above = (x.all(size.y) - y * 2.0) / size.y * self.tan_half_vfov;
+        Vector3::in_all(x, self.forward) + Vector3::in_all(x, self.right) * across + Vector3::in_all(x, self.up) * above
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::core::color::luminance;
 use crate::core::texture::ImageTexture;
 use crate::sampling::PictureDistribution;
+use firstlight_simd::{Real, Vector3, select_vector};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
@@ -36,12 +37,7 @@ impl Environment {
             Self::Black => Vec3::ZERO,
             Self::Constant(radiance) => *radiance,
             Self::Gradient { zenith, horizon, ground } => {
-                if dir.y < 0.0 {
-                    *ground
-                } else {
-                    // The air is thickest along the horizon: most of the change lies in its lowest quarter.
-                    horizon.lerp(*zenith, 1.0 - (1.0 - dir.y).powi(3))
-                }
+                sky_gradient([*zenith, *horizon, *ground].map(Vector3::from), dir.y).into()
             }
             Self::Image { image, scale, rotation } => {
                 let uv = direction_to_uv(dir, *rotation);
@@ -51,6 +47,16 @@ impl Environment {
             }
         }
     }
+}
+
+/// A smooth sky of these radiances (zenith, horizon, ground) along a direction that rises by `y` a metre.
+#[inline(always)]
+pub(crate) fn sky_gradient<R: Real>([zenith, horizon, ground]: [Vector3<R>; 3], y: R) -> Vector3<R> {
+    // The air is thickest along the horizon: most of the change lies in its lowest quarter.
+    let rest = -y + 1.0;
+    let share = -(rest * rest * rest) + 1.0;
+    let above = horizon * (-share + 1.0) + zenith * share;
+    select_vector(y.is_negative(), ground, above)
 }
 
 /// Directions by the brightness of an environment picture.

@@ -4,7 +4,7 @@
 //!
 //! All filters are products of one function of x and the same of y; widths are in pixels from the pixel's centre.
 
-use firstlight_simd::{Float, Simd, select};
+use firstlight_simd::{Float, Real, Simd, select};
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
@@ -154,7 +154,7 @@ impl FilterSampler {
     #[inline(always)]
     pub fn sample_lanes<S: Simd>(&self, [x, y]: [Float<S>; 2]) -> [Float<S>; 2] {
         match self.filter {
-            PixelFilter::Tent => [tent_lanes(x) + 0.5, tent_lanes(y) + 0.5],
+            PixelFilter::Tent => [tent(x) + 0.5, tent(y) + 0.5],
             _ => [x, y],
         }
     }
@@ -169,13 +169,8 @@ impl FilterSampler {
 }
 
 /// Uniform to triangular on −1..1.
-#[inline]
-fn tent(u: f32) -> f32 {
-    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
-}
-
 #[inline(always)]
-fn tent_lanes<S: Simd>(u: Float<S>) -> Float<S> {
+fn tent<R: Real>(u: R) -> R {
     let one = u.all(1.0);
     let (rising, falling) = ((u * 2.0).sqrt() - one, one - (u.all(2.0) - u * 2.0).at_least(0.0).sqrt());
     select(u.lt(u.all(0.5)), rising, falling)

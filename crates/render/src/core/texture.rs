@@ -1,5 +1,6 @@
 //! Colours that vary over a surface.
 
+use firstlight_simd::{Elementary, Real};
 use glam::{Mat2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -55,17 +56,25 @@ impl Texture {
     /// The colour at a surface coordinate.
     #[inline]
     pub fn eval(&self, uv: Vec2) -> Vec3 {
-        let p = self.uv_matrix * uv + self.uv_offset;
+        let p = Vec2::from(self.pattern_coordinates(uv.to_array()));
         match &self.pattern {
             TexturePattern::Checker { a, b } => {
-                // Parity of the sum without integers, which far planes would overflow.
-                let square = p.floor();
-                let odd = (0.5 * (square.x + square.y)).fract() != 0.0;
-                if odd { *b } else { *a }
+                if is_even_square(p.to_array()) {
+                    *a
+                } else {
+                    *b
+                }
             }
             TexturePattern::Image { image, wrap, smooth: false } => image.nearest(p, *wrap),
             TexturePattern::Image { image, wrap, smooth: true } => image.bilinear(p, *wrap),
         }
+    }
+
+    /// Surface coordinates as the pattern counts them.
+    #[inline(always)]
+    pub(crate) fn pattern_coordinates<R: Real>(&self, [u, v]: [R; 2]) -> [R; 2] {
+        let (m, offset) = (self.uv_matrix, self.uv_offset);
+        [u * m.x_axis.x + v * m.y_axis.x + offset.x, u * m.x_axis.y + v * m.y_axis.y + offset.y]
     }
 
     /// The mean colour over the pattern, for the power of lights.
@@ -78,6 +87,14 @@ impl Texture {
             }
         }
     }
+}
+
+/// Whether a point lies in a square of the first colour of a checker.
+#[inline(always)]
+pub(crate) fn is_even_square<R: Elementary>([x, y]: [R; 2]) -> R::Mask {
+    // Parity of the sum without integers, which far planes would overflow.
+    let half = (x.floor() + y.floor()) * 0.5;
+    (half - half.truncated()).is_zero()
 }
 
 impl ImageTexture {

@@ -137,7 +137,7 @@ impl CasterTable {
         let distance2 = to_center.length_squared();
         let dir = if distance2 > radius * radius {
             let one_minus_cos_max = one_minus_cos_from_sin2(radius * radius / distance2);
-            Frame::around(to_center / distance2.sqrt()).to_world(uniform_cone(u, one_minus_cos_max).0)
+            Frame::around(to_center / distance2.sqrt()).to_world(uniform_cone(u.to_array(), one_minus_cos_max).0.into())
         } else {
             Frame::around(point.normal).to_world(cosine_hemisphere(u))
         }

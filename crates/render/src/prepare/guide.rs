@@ -7,9 +7,9 @@
 //! points reached gives each place a small list of such exits; part of the directions there are chosen towards them,
 //! the density of the mixture being known exactly, so the mean stays as it is whatever the list holds.
 
-use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, warp_simd};
+use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::Frame;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Truth, Vector, Vector3, Word, padded, select};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
@@ -225,11 +225,11 @@ impl Hints<'_> {
         let way = exit.center - self.position;
         let distance2 = way.length_squared();
         if distance2 <= exit.radius2 {
-            let (local, _) = uniform_cone(u, 2.0);
-            return local.normalize();
+            let (local, _) = uniform_cone(u.to_array(), 2.0);
+            return local.normalize().into();
         }
         let cone = one_minus_cos_from_sin2(exit.radius2 / distance2);
-        Frame::around(way / distance2.sqrt()).to_world(uniform_cone(u, cone).0).normalize()
+        Frame::around(way / distance2.sqrt()).to_world(uniform_cone(u.to_array(), cone).0.into()).normalize()
     }
 
     /// Per steradian.
@@ -237,14 +237,7 @@ impl Hints<'_> {
         let sum: f32 = (0..self.n_exits as usize)
             .map(|i| {
                 let exit = self.blocks[i / LANES].exit(i % LANES);
-                let way = exit.center - self.position;
-                let (distance2, along) = (way.length_squared(), way.dot(wi));
-                if distance2 <= exit.radius2 {
-                    return cone_pdf(2.0);
-                }
-                // The line passes the centre within the radius: measured across it, where nothing cancels.
-                let hit = along > 0.0 && way.cross(wi).length_squared() <= exit.radius2;
-                if hit { cone_pdf(one_minus_cos_from_sin2(exit.radius2 / distance2)) } else { 0.0 }
+                exit_pdf((exit.center - self.position).into(), exit.radius2, wi.into())
             })
             .sum();
         sum / self.n_exits as f32
@@ -254,20 +247,30 @@ impl Hints<'_> {
     #[inline(always)]
     pub fn pdf_lanes<S: Simd>(&self, s: S, wi: Vec3) -> f32 {
         let (position, wi) = (Vector::splat(s, self.position), Vector::splat(s, wi));
-        let zero = Float::splat(s, 0.0);
-        let mut sum = zero;
+        let mut sum = Float::splat(s, 0.0);
         for block in self.blocks {
             let (way, radius2) = (Vector::from_arrays(s, &block.center) - position, Float::load(s, &block.radius2));
-            let distance2 = way.length_squared();
-            let inside = distance2.le(radius2);
-            let hit = way.dot(wi).is_positive() & way.cross(wi).length_squared().le(radius2);
-            if inside | hit != 0 {
-                let found = warp_simd::cone_pdf(warp_simd::one_minus_cos_from_sin2(radius2 / distance2));
-                sum += select(inside, zero.all(cone_pdf(2.0)), select(hit, found, zero));
-            }
+            sum += exit_pdf(way, radius2, wi);
         }
         sum.to_array().iter().sum::<f32>() / self.n_exits as f32
     }
+}
+
+/// Per steradian, with which `wi` is found that is sampled evenly over the directions to a sphere; over all directions from within it.
+///
+/// - `way`: to the centre; `radius2`: square of the radius; `wi`: unit.
+#[inline(always)]
+fn exit_pdf<R: Real>(way: Vector3<R>, radius2: R, wi: Vector3<R>) -> R {
+    let distance2 = way.length_squared();
+    let inside = distance2.le(radius2);
+    // The line passes the centre within the radius: measured across it, where nothing cancels.
+    let hit = way.dot(wi).is_positive() & way.cross(wi).length_squared().le(radius2);
+    let zero = distance2.all(0.0);
+    if !(inside | hit).any() {
+        return zero;
+    }
+    let found = cone_pdf(one_minus_cos_from_sin2(radius2 / distance2));
+    select(inside, cone_pdf(zero.all(2.0)), select(hit, found, zero))
 }
 
 #[cfg(test)]

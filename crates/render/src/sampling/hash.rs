@@ -1,17 +1,30 @@
-//! Integer hashes: the only source of randomness.
+//! Integer hashes: the only source of randomness; of one number or of sixteen.
+
+use firstlight_simd::Word;
 
 /// A bijection of 32-bit numbers without visible structure ("lowbias32", Wellons 2018, exact bias 0.174).
-#[inline]
-pub const fn hash_u32(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
+#[inline(always)]
+pub fn hash_u32<W: Word>(x: W) -> W {
+    let x = (x ^ x.shift_right(16)).times_all(0x7feb_352d);
+    let x = (x ^ x.shift_right(15)).times_all(0x846c_a68b);
+    x ^ x.shift_right(16)
 }
 
 /// Mixes `value` into `seed`; the order of the two matters.
-#[inline]
-pub const fn hash_combine(seed: u32, value: u32) -> u32 {
-    hash_u32(seed.wrapping_mul(0x9e37_79b1).wrapping_add(hash_u32(value ^ 0x5bd1_e995)))
+#[inline(always)]
+pub fn hash_combine<W: Word>(seed: W, value: W) -> W {
+    mix(seed, hash_u32(value ^ FLIP))
+}
+
+/// The same of one `value` for all.
+#[inline(always)]
+pub(super) fn hash_combine_all<W: Word>(seed: W, value: u32) -> W {
+    mix(seed, seed.all(hash_u32(value ^ FLIP)))
+}
+
+const FLIP: u32 = 0x5bd1_e995;
+
+#[inline(always)]
+fn mix<W: Word>(seed: W, hashed: W) -> W {
+    hash_u32(seed.times_all(0x9e37_79b1).plus(hashed))
 }

@@ -5,22 +5,32 @@
 mod alias;
 mod distribution;
 mod hash;
-pub(crate) mod offset_simd;
 mod sobol;
-mod sobol_simd;
 mod spherical_quad;
 mod spherical_triangle;
-mod warp;
-pub(crate) mod warp_simd;
+pub(crate) mod warp;
 
 pub use alias::AliasTable;
 pub use distribution::PictureDistribution;
 pub use hash::{hash_combine, hash_u32};
-pub use sobol::Sampler;
-pub(crate) use sobol_simd::SamplerLanes;
+pub(crate) use sobol::SamplerLanes;
+pub use sobol::{Sampler, SamplerOf};
 pub use spherical_quad::SphericalQuad;
 pub use spherical_triangle::SphericalTriangle;
 pub use warp::{
-    cone_pdf, cosine_hemisphere, cosine_hemisphere_pdf, one_minus_cos_from_sin2, polygon_disc, uniform_cone,
-    uniform_disc, uniform_triangle,
+    cone_pdf, cosine_hemisphere_pdf, one_minus_cos_from_sin2, polygon_disc, uniform_cone, uniform_triangle,
 };
+
+use glam::{Vec2, Vec3};
+
+/// Uniform on the unit disc; keeps neighbours together (Shirley and Chiu 1997).
+#[inline]
+pub fn uniform_disc(u: Vec2) -> Vec2 {
+    warp::uniform_disc(u.to_array()).into()
+}
+
+/// Cosine-weighted on the hemisphere around +z; density [`cosine_hemisphere_pdf`].
+#[inline]
+pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    warp::cosine_hemisphere(u.to_array()).into()
+}

@@ -12,20 +12,27 @@
 //! left of noise is fine-grained (the idea is that of Ahmed and Wonka 2020, "Screen-Space Blue-Noise Diffusion", made
 //! progressive: the number of samples need not be known).
 
-use super::hash::{hash_combine, hash_u32};
+use super::hash::{hash_combine, hash_combine_all, hash_u32};
+use firstlight_simd::{Bits, Float, Simd, Truth, Word};
 use glam::Vec2;
 use std::sync::LazyLock;
 
-/// The random numbers of one sample of one pixel.
+/// The random numbers of one sample of one pixel, or of sixteen, bit for bit the same; see [`Sampler`].
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sampler {
+pub struct SamplerOf<W> {
     /// Hash of seed and pixel.
-    stream: u32,
+    pub(crate) stream: W,
     /// Bits of the sample number, lowest first.
-    reversed_index: u32,
-    /// See [`screen_place`]; 0 for what is not a pixel.
-    screen: u32,
+    pub(crate) reversed_index: W,
+    /// See [`screen_place`]; 0 for what is not a pixel. Either all lanes are pixels or none is.
+    pub(crate) screen: W,
 }
+
+/// The random numbers of one sample of one pixel.
+pub type Sampler = SamplerOf<u32>;
+
+/// The random numbers of sixteen samples.
+pub(crate) type SamplerLanes<S> = SamplerOf<Bits<S>>;
 
 /// How many dimensions of a pixel's samples are spread over the screen: the camera's and those of the first vertex of a
 /// path, whose noise is what the eye sees first.
@@ -35,20 +42,18 @@ impl Sampler {
     /// Of one of a family of sequences that know nothing of each other.
     #[inline]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
-        let stream = hash_combine(hash_combine(hash_u32(seed), x), y);
-        Self { stream, reversed_index: sample.reverse_bits(), screen: 0 }
+        Self::of_family(seed, [x, y], sample)
     }
 
     /// Of a pixel: its samples are spread evenly together with those of the pixels around.
     #[inline]
     pub fn of_pixel(seed: u32, x: u32, y: u32, sample: u32) -> Self {
-        Self { screen: screen_place(seed, x, y), ..Self::new(seed, x, y, sample) }
+        Self::of_pixels(seed, [x, y], sample)
     }
 
     /// Numbers that owe nothing to the other samples of the pixel: plain random sampling, to compare with.
     pub fn independent(seed: u32, x: u32, y: u32, sample: u32) -> Self {
-        let Self { stream, .. } = Self::new(seed, x, y, 0);
-        Self { stream: hash_combine(stream, sample), reversed_index: 0, screen: 0 }
+        Self::all_independent(seed, [x, y], sample)
     }
 
     /// What it consists of, see [`Self::from_parts`].
@@ -66,119 +71,160 @@ impl Sampler {
     /// Two numbers in `[0, 1)`, well spread together over the samples of a pixel.
     #[inline]
     pub fn pair(&self, dimension: u32) -> Vec2 {
-        let [x, y] = match self.screen_seed(dimension) {
-            None => sobol_pair(self.reversed_index, hash_combine(self.stream, dimension)),
-            Some(seed) => {
-                let shared = sobol_pair(self.reversed_index, seed);
-                let at = self.shift_at(dimension);
-                [shared[0] ^ SHIFTS[0][at], shared[1] ^ SHIFTS[1][at]]
-            }
+        self.two(dimension).into()
+    }
+}
+
+impl<S: Simd> SamplerLanes<S> {
+    /// See [`Sampler::pair`].
+    #[inline(always)]
+    pub fn pair(&self, dimension: u32) -> [Float<S>; 2] {
+        self.two(dimension)
+    }
+}
+
+impl<W: Word> SamplerOf<W> {
+    /// See [`Sampler::new`].
+    #[inline(always)]
+    fn of_family(seed: u32, [x, y]: [W; 2], sample: u32) -> Self {
+        let stream = hash_combine(hash_combine(x.all(hash_u32(seed)), x), y);
+        Self { stream, reversed_index: x.all(sample.reverse_bits()), screen: x.all(0) }
+    }
+
+    /// See [`Sampler::of_pixel`].
+    #[inline(always)]
+    pub(crate) fn of_pixels(seed: u32, pixel: [W; 2], sample: u32) -> Self {
+        Self { screen: screen_place(seed, pixel), ..Self::of_family(seed, pixel, sample) }
+    }
+
+    /// See [`Sampler::independent`].
+    #[inline(always)]
+    pub(crate) fn all_independent(seed: u32, [x, y]: [W; 2], sample: u32) -> Self {
+        let Self { stream, .. } = Self::of_family(seed, [x, y], 0);
+        Self { stream: hash_combine_all(stream, sample), reversed_index: x.all(0), screen: x.all(0) }
+    }
+
+    #[inline(always)]
+    fn two(&self, dimension: u32) -> [W::Real; 2] {
+        let [x, y] = if self.is_on_screen(dimension) {
+            let shared = sobol_pair(self.reversed_index, self.screen_seed(dimension));
+            let (shifts, at) = (&*SHIFTS, self.shift_at(dimension));
+            [shared[0] ^ W::gather(&shifts[0], at), shared[1] ^ W::gather(&shifts[1], at)]
+        } else {
+            sobol_pair(self.reversed_index, hash_combine_all(self.stream, dimension))
         };
-        Vec2::new(to_unit(x.reverse_bits()), to_unit(y.reverse_bits()))
+        [to_unit(x.reversed()), to_unit(y.reversed())]
     }
 
     /// One number in `[0, 1)`, well spread over the samples of a pixel.
-    #[inline]
-    pub fn single(&self, dimension: u32) -> f32 {
-        let x = match self.screen_seed(dimension) {
-            None => van_der_corput(self.reversed_index, hash_combine(self.stream, dimension)),
-            Some(seed) => van_der_corput(self.reversed_index, seed) ^ SHIFTS[0][self.shift_at(dimension)],
+    #[inline(always)]
+    pub fn single(&self, dimension: u32) -> W::Real {
+        let x = if self.is_on_screen(dimension) {
+            let shared = van_der_corput(self.reversed_index, self.screen_seed(dimension));
+            shared ^ W::gather(&SHIFTS[0], self.shift_at(dimension))
+        } else {
+            van_der_corput(self.reversed_index, hash_combine_all(self.stream, dimension))
         };
-        to_unit(x.reverse_bits())
+        to_unit(x.reversed())
+    }
+
+    #[inline(always)]
+    fn is_on_screen(&self, dimension: u32) -> bool {
+        dimension < SCREEN_DIMENSIONS && (!self.screen.equals(0)).any()
     }
 
     /// What the pixels of a block share, in the dimensions where they share something.
-    #[inline]
-    fn screen_seed(&self, dimension: u32) -> Option<u32> {
-        (self.screen != 0 && dimension < SCREEN_DIMENSIONS)
-            .then(|| hash_combine(self.screen >> (2 * LOG_BLOCK), dimension))
+    #[inline(always)]
+    fn screen_seed(&self, dimension: u32) -> W {
+        hash_combine_all(self.screen.shift_right(2 * LOG_BLOCK), dimension)
     }
 
     /// Index into both of [`SHIFTS`].
-    #[inline]
-    fn shift_at(&self, dimension: u32) -> usize {
-        (self.screen & (BLOCK_PIXELS - 1) | dimension << (2 * LOG_BLOCK)) as usize
+    #[inline(always)]
+    fn shift_at(&self, dimension: u32) -> W {
+        self.screen & (BLOCK_PIXELS - 1) | (dimension << (2 * LOG_BLOCK))
     }
 }
 
 /// Place of a pixel along a Z-order curve through its block in the lowest bits, above them a hash of seed and block that is
 /// not 0.
-#[inline]
-fn screen_place(seed: u32, x: u32, y: u32) -> u32 {
-    let block = hash_combine(hash_combine(hash_u32(seed), x >> LOG_BLOCK), y >> LOG_BLOCK) | BLOCK_PIXELS;
-    block & !(BLOCK_PIXELS - 1) | spread_bits(x & LOW) | spread_bits(y & LOW) << 1
+#[inline(always)]
+fn screen_place<W: Word>(seed: u32, [x, y]: [W; 2]) -> W {
+    let first = x.all(hash_u32(seed));
+    let block = hash_combine(hash_combine(first, x.shift_right(LOG_BLOCK)), y.shift_right(LOG_BLOCK));
+    let z = spread_bits(x & LOW) | spread_bits(y & LOW).shift_left(1);
+    (block | BLOCK_PIXELS) & !(BLOCK_PIXELS - 1) | z
 }
 
 /// Pixels in a row of a block, as a power of two: small enough for [`SHIFTS`] to stay in a cache.
-pub(super) const LOG_BLOCK: u32 = 6;
-pub(super) const BLOCK_PIXELS: u32 = 1 << (2 * LOG_BLOCK);
+const LOG_BLOCK: u32 = 6;
+const BLOCK_PIXELS: u32 = 1 << (2 * LOG_BLOCK);
 /// What of a coordinate tells where in its block a pixel is.
-pub(super) const LOW: u32 = (1 << LOG_BLOCK) - 1;
+const LOW: u32 = (1 << LOG_BLOCK) - 1;
 
 /// The first and second coordinates of the shifts of all pixels of a block, dimension by dimension, along the curve; their
 /// bits are in reverse.
-pub(super) static SHIFTS: LazyLock<[Vec<u32>; 2]> = LazyLock::new(|| {
+static SHIFTS: LazyLock<[Vec<u32>; 2]> = LazyLock::new(|| {
     let places = (0..SCREEN_DIMENSIONS).flat_map(|dimension| (0..BLOCK_PIXELS).map(move |z| (dimension, z)));
     let (x, y) = places.map(|(dimension, z)| sobol_pair(z.reverse_bits(), hash_u32(dimension)).into()).unzip();
     [x, y]
 });
 
 /// The lower eight bits, a zero above each.
-#[inline]
-fn spread_bits(x: u32) -> u32 {
-    let x = (x | x << 4) & 0x0f0f;
-    let x = (x | x << 2) & 0x3333;
-    (x | x << 1) & 0x5555
+#[inline(always)]
+fn spread_bits<W: Word>(x: W) -> W {
+    let x = (x | x.shift_left(4)) & 0x0f0f;
+    let x = (x | x.shift_left(2)) & 0x3333;
+    (x | x.shift_left(1)) & 0x5555
 }
 
 /// A point of the scrambled sequence, the bits of its coordinates lowest first.
-#[inline]
-fn sobol_pair(reversed_index: u32, seed: u32) -> [u32; 2] {
-    let index = scramble(reversed_index, seed).reverse_bits();
+#[inline(always)]
+fn sobol_pair<W: Word>(reversed_index: W, seed: W) -> [W; 2] {
+    let index = scramble(reversed_index, seed).reversed();
     let x = scramble(index, hash_u32(seed ^ 0x68bc_21eb));
     [x, scramble(sobol_second_reversed(index), hash_u32(seed ^ 0x02e5_be93))]
 }
 
 /// The same for one dimension. Shuffling the order of a scrambled van der Corput sequence is what keeps it independent
 /// of other dimensions.
-#[inline]
-fn van_der_corput(reversed_index: u32, seed: u32) -> u32 {
-    let index = scramble(reversed_index, seed).reverse_bits();
+#[inline(always)]
+fn van_der_corput<W: Word>(reversed_index: W, seed: W) -> W {
+    let index = scramble(reversed_index, seed).reversed();
     scramble(index, hash_u32(seed ^ 0x68bc_21eb))
 }
 
 /// The second Sobol' coordinate of point `index`, lowest bit first: bit i is the xor of the bits j of the index with
 /// i ⊆ j, because the generator matrix is Pascal's triangle modulo 2.
-#[inline]
-fn sobol_second_reversed(index: u32) -> u32 {
-    let mut v = index;
-    v ^= v >> 16;
-    v ^= (v & 0xff00_ff00) >> 8;
-    v ^= (v & 0xf0f0_f0f0) >> 4;
-    v ^= (v & 0xcccc_cccc) >> 2;
-    v ^ ((v & 0xaaaa_aaaa) >> 1)
+#[inline(always)]
+fn sobol_second_reversed<W: Word>(index: W) -> W {
+    let v = index ^ index.shift_right(16);
+    let v = v ^ (v & 0xff00_ff00).shift_right(8);
+    let v = v ^ (v & 0xf0f0_f0f0).shift_right(4);
+    let v = v ^ (v & 0xcccc_cccc).shift_right(2);
+    v ^ (v & 0xaaaa_aaaa).shift_right(1)
 }
 
 /// Owen scrambling of a number whose bits come lowest first: each bit is flipped by a hash of the bits below it.
-#[inline]
-fn scramble(mut reversed: u32, seed: u32) -> u32 {
-    reversed ^= reversed.wrapping_mul(0x3d20_adea);
-    reversed = reversed.wrapping_add(seed);
-    reversed = reversed.wrapping_mul((seed >> 16) | 1);
-    reversed ^= reversed.wrapping_mul(0x0552_6c56);
-    reversed ^ reversed.wrapping_mul(0x53a2_2864)
+#[inline(always)]
+fn scramble<W: Word>(reversed: W, seed: W) -> W {
+    let x = (reversed ^ reversed.times_all(0x3d20_adea)).plus(seed);
+    let x = x.times(seed.shift_right(16) | 1);
+    let x = x ^ x.times_all(0x0552_6c56);
+    x ^ x.times_all(0x53a2_2864)
 }
 
 /// The upper 24 bits as a number in `[0, 1)`, exactly.
-#[inline]
-fn to_unit(bits: u32) -> f32 {
-    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+#[inline(always)]
+fn to_unit<W: Word>(bits: W) -> W::Real {
+    bits.shift_right(8).to_real() * (1.0 / 16_777_216.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::test_statistics::ChiSquared;
+    use firstlight_simd::{InstructionSet, LANES, dispatch};
 
     /// The definition by direction numbers (primitive polynomial x + 1), which the bit trick must reproduce.
     fn sobol_second_by_directions(index: u32) -> u32 {
@@ -318,6 +364,64 @@ mod tests {
             for b in 0..a {
                 let correlation = rows.iter().map(|r| 12.0 * f64::from(r[a] * r[b])).sum::<f64>() / f64::from(n);
                 assert!(correlation.abs() < 4.5 / f64::from(n).sqrt(), "dimensions {a} and {b}: {correlation}");
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn draw<S: Simd>(s: S, samplers: &[Sampler; LANES], dimension: u32, out: &mut [[f32; LANES]; 3]) {
+        let part = |k: usize| Bits::load(s, &samplers.map(|sampler| sampler.parts()[k]));
+        let lanes = SamplerLanes { stream: part(0), reversed_index: part(1), screen: part(2) };
+        let [x, y] = lanes.pair(dimension);
+        x.store(&mut out[0]);
+        y.store(&mut out[1]);
+        lanes.single(dimension).store(&mut out[2]);
+    }
+
+    #[test]
+    fn lanes_draw_the_same_bits() {
+        for i in 0..1000 {
+            let make = if i % 2 == 0 { Sampler::new } else { Sampler::of_pixel };
+            let samplers: [Sampler; LANES] = std::array::from_fn(|k| make(5, i, k as u32, hash_u32(i) >> (k % 32)));
+            for set in InstructionSet::available() {
+                let dimension = i / 2 % 16;
+                let mut out = [[0.0; LANES]; 3];
+                let (samplers, to) = (&samplers, &mut out);
+                dispatch!(set, draw(samplers: &[Sampler; LANES], dimension: u32, to: &mut [[f32; LANES]; 3]));
+                for (k, sampler) in samplers.iter().enumerate() {
+                    let pair = sampler.pair(dimension);
+                    assert_eq!([pair.x, pair.y, sampler.single(dimension)], out.map(|numbers| numbers[k]), "{set:?}");
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn start<S: Simd>(s: S, first: [u32; 2], sample: u32, out: &mut [[u32; LANES]; 6]) {
+        let x = Bits::load(s, &std::array::from_fn(|k| first[0] + 37 * k as u32));
+        let y = Bits::load(s, &std::array::from_fn(|k| first[1] + 11 * k as u32));
+        let (even, other) =
+            (SamplerLanes::of_pixels(6, [x, y], sample), SamplerLanes::all_independent(6, [x, y], sample));
+        for (k, sampler) in [even, other].into_iter().enumerate() {
+            sampler.stream.store(&mut out[3 * k]);
+            sampler.reversed_index.store(&mut out[3 * k + 1]);
+            sampler.screen.store(&mut out[3 * k + 2]);
+        }
+    }
+
+    #[test]
+    fn lanes_begin_with_the_same_bits() {
+        for (first, sample) in [([0, 0], 0), ([250, 1000], 7), ([70_000, 3], 64)] {
+            for set in InstructionSet::available() {
+                let mut out = [[0; LANES]; 6];
+                let to = &mut out;
+                dispatch!(set, start(first: [u32; 2], sample: u32, to: &mut [[u32; LANES]; 6]));
+                for k in 0..LANES {
+                    let (x, y) = (first[0] + 37 * k as u32, first[1] + 11 * k as u32);
+                    let even = Sampler::of_pixel(6, x, y, sample).parts();
+                    let other = Sampler::independent(6, x, y, sample).parts();
+                    assert_eq!([even, other].concat(), out.map(|numbers| numbers[k]), "{set:?}");
+                }
             }
         }
     }

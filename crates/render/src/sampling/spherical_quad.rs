@@ -1,104 +1,119 @@
-//! A rectangle as seen from a point: its solid angle, and directions uniform in it.
+//! Rectangles as seen from a point: their solid angle, and directions uniform in it; for one point or sixteen.
 
-use glam::{Vec2, Vec3};
+use firstlight_simd::{Elementary, Real, Vector3, select};
 
 /// A rectangle seen from a reference point, ready to be sampled by solid angle.
 ///
 /// Source: Ureña, Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical Rectangles". The solid
 /// angle comes from van Oosterom and Strackee 1983 instead: a sum of four angles less 2π cancels when it is small.
 #[derive(Clone, Copy, Debug)]
-pub struct SphericalQuad {
+pub struct SphericalQuad<R> {
     /// Nearest and farthest corner in the frame of the rectangle, about the reference point; `z` is not positive.
-    x0: f32,
-    y0: f32,
-    z0: f32,
-    x1: f32,
-    y1: f32,
-    solid_angle: f32,
+    x0: R,
+    y0: R,
+    z0: R,
+    x1: R,
+    y1: R,
+    solid_angle: R,
 }
 
-impl SphericalQuad {
-    /// - `corner`: relative to the reference point;
-    /// - `unit_u`, `unit_v`: unit, at right angles; `length_u`, `length_v`: sides in metres.
-    #[inline]
-    pub fn new(corner: Vec3, unit_u: Vec3, length_u: f32, unit_v: Vec3, length_v: f32) -> Self {
-        let (x0, y0) = (corner.dot(unit_u), corner.dot(unit_v));
-        let z0 = -corner.dot(unit_u.cross(unit_v)).abs();
+impl<R: Elementary> SphericalQuad<R> {
+    /// - `corner`: the first one along the sides and the normal, about the reference point; on either side of the plane;
+    /// - `lengths`: of the sides, metres; `area`: their product.
+    #[inline(always)]
+    pub fn new(corner: Vector3<R>, [length_u, length_v]: [R; 2], area: R) -> Self {
+        let (x0, y0, z0) = (corner.x, corner.y, -corner.z.abs());
         let (x1, y1) = (x0 + length_u, y0 + length_v);
-        let mut quad = Self { x0, y0, z0, x1, y1, solid_angle: 0.0 };
-        quad.solid_angle = quad.compute_solid_angle(length_u * length_v);
-        quad
+        // In units of the distance to the first corner, so that products of six lengths stay in range.
+        let unit = x0.all(1.0) / (x0 * x0 + y0 * y0 + z0 * z0).sqrt().at_least(f32::MIN_POSITIVE);
+        let (ax, ay, bx, by, z) = (x0 * unit, y0 * unit, x1 * unit, y1 * unit, z0 * unit);
+        let corner = [
+            Vector3 { x: ax, y: ay, z },
+            Vector3 { x: bx, y: ay, z },
+            Vector3 { x: bx, y: by, z },
+            Vector3 { x: ax, y: by, z },
+        ];
+        let length = [corner[0].length(), corner[1].length(), corner[2].length(), corner[3].length()];
+        // The triple product of both halves: exact up to rounding, however small the rectangle looks.
+        let triple = area * unit * unit * -z;
+        let first = half(&corner, &length, [0, 1, 2]);
+        let second = half(&corner, &length, [0, 2, 3]);
+        // Each half is twice the angle of (denominator, triple); the product of the two as complex numbers adds them.
+        let solid_angle = (triple * (first + second)).atan2(first * second - triple * triple) * 2.0;
+        Self { x0, y0, z0, x1, y1, solid_angle }
     }
 
     /// Steradians.
-    #[inline]
-    pub fn solid_angle(&self) -> f32 {
+    #[inline(always)]
+    pub fn solid_angle(&self) -> R {
         self.solid_angle
     }
 
-    fn compute_solid_angle(&self, area: f32) -> f32 {
-        // In units of the distance to the first corner, so that products of six lengths stay in range.
-        let unit = Vec3::new(self.x0, self.y0, self.z0).length().max(f32::MIN_POSITIVE).recip();
-        let corner = |x, y| Vec3::new(x, y, self.z0) * unit;
-        let [a, b, c, d] =
-            [corner(self.x0, self.y0), corner(self.x1, self.y0), corner(self.x1, self.y1), corner(self.x0, self.y1)];
-        let [la, lb, lc, ld] = [a, b, c, d].map(Vec3::length);
-        // The triple product of both halves: exact up to rounding, however small the rectangle looks.
-        let triple = area * unit * unit * (-self.z0 * unit);
-        let half = |p: Vec3, lp: f32, q: Vec3, lq: f32, r: Vec3, lr: f32| {
-            lp * lq * lr + p.dot(q) * lr + q.dot(r) * lp + r.dot(p) * lq
-        };
-        let (first, second) = (half(a, la, b, lb, c, lc), half(a, la, c, lc, d, ld));
-        // Each half is twice the angle of (denominator, triple); the product of the two as complex numbers adds them.
-        2.0 * (triple * (first + second)).atan2(first * second - triple * triple)
-    }
-
     /// Where on the rectangle, `[0, 1]²` along its sides, a direction uniform in solid angle meets it.
-    #[inline]
-    pub fn sample(&self, u: Vec2) -> Vec2 {
+    #[inline(always)]
+    pub fn sample(&self, [u, v]: [R; 2]) -> [R; 2] {
         let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
+        let one = x0.all(1.0);
         // Heights of the four edge planes' normals; the angles between them are those of the spherical rectangle. Of
         // each, the square of what it lacks to 1 is known without cancellation.
         let z2 = z0 * z0;
-        let height = |y: f32| {
-            let h2 = z2 + y * y;
-            (y / h2.sqrt(), z2 / h2)
-        };
-        let ((h0, r0), (b1, r1), (h3, r3)) = (height(y0), height(y1), height(x0));
+        let ((h0, r0), (b1, r1), (h3, r3)) = (height(z2, y0), height(z2, y1), height(z2, x0));
         let (b0, n3) = (-h0, -h3);
         // Cosine and sine of the two angles at the far side of x0, and of their sum.
-        let (cos_2, sin_2) = (-b1 * n3, (r1 + b1 * b1 * r3).sqrt());
-        let (cos_3, sin_3) = (-n3 * b0, (r0 + b0 * b0 * r3).sqrt());
+        let (cos_2, sin_2) = (-(b1 * n3), (r1 + b1 * b1 * r3).sqrt());
+        let (cos_3, sin_3) = (-(n3 * b0), (r0 + b0 * b0 * r3).sqrt());
         let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
         // The slice of the wanted area ends at the plane with angle u · area − sum (mod 2π).
-        let (sin_part, cos_part) = (u.x * solid_angle).sin_cos();
+        let (sin_part, cos_part) = (u * solid_angle).sin_cos();
         let cos_au = cos_part * cos_sum + sin_part * sin_sum;
         let sin_au = sin_part * cos_sum - cos_part * sin_sum;
         // cos · b0 − b1: all three may be near 1, and then only what each lacks to 1 tells them apart.
-        let (product, lack_0, lack_1) = (cos_au * b0, r0 / (1.0 + b0.abs()), r1 / (1.0 + b1.abs()));
-        let lack_au = sin_au * sin_au / (1.0 + cos_au.abs());
-        let difference = if product * b1 > 0.0 {
-            (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * b1.signum()
-        } else {
-            product - b1
-        };
+        let product = cos_au * b0;
+        let (lack_0, lack_1) = (r0 / (b0.abs() + 1.0), r1 / (b1.abs() + 1.0));
+        let lack_au = sin_au * sin_au / (cos_au.abs() + 1.0);
+        let lacking = (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * one.copysign(b1);
+        let difference = select((product * b1).is_positive(), lacking, product - b1);
         let fu = difference / sin_au;
-        // Where that plane meets the rectangle: cu = ±1 / √(fu² + b0²), written so that 1 − cu² does not cancel.
-        let xu = (-z0).copysign(fu) / (fu * fu - r0).max(f32::MIN_POSITIVE).sqrt();
-        let xu = if xu.is_nan() { x0 } else { xu.clamp(x0, x1) };
-        let d2 = xu * xu + z0 * z0;
+        // Where that plane meets the rectangle: cu = ±1 / √(fu² + b0²), written so that 1 − cu² does not cancel. NaN becomes
+        // the lower end.
+        let xu = (-z0).copysign(fu) / (fu * fu - r0).at_least(f32::MIN_POSITIVE).sqrt();
+        let xu = xu.max(x0).min(x1);
+        let d2 = xu * xu + z2;
         let h0 = y0 / (d2 + y0 * y0).sqrt();
         let h1 = y1 / (d2 + y1 * y1).sqrt();
-        let hv = h0 + u.y * (h1 - h0);
+        let hv = h0 + v * (h1 - h0);
         let hv2 = hv * hv;
-        let yv = if hv2 < 1.0 - 1e-6 { (hv * d2.sqrt()) / (1.0 - hv2).sqrt() } else { y1 };
-        Vec2::new((xu - x0) / (x1 - x0), (yv.clamp(y0, y1) - y0) / (y1 - y0))
+        let yv = hv * d2.sqrt() / (one - hv2).sqrt();
+        let yv = select(hv2.lt(one.all(1.0 - 1e-6)), yv, y1);
+        [(xu - x0) / (x1 - x0), (yv.max(y0).min(y1) - y0) / (y1 - y0)]
     }
+}
+
+/// Denominator of the solid angle of half the rectangle.
+#[inline(always)]
+fn half<R: Real>(corner: &[Vector3<R>; 4], length: &[R; 4], [p, q, r]: [usize; 3]) -> R {
+    let (a, b, c) = (corner[p], corner[q], corner[r]);
+    let (la, lb, lc) = (length[p], length[q], length[r]);
+    la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
+}
+
+/// Height of an edge plane's normal, and the square of what it lacks to 1.
+#[inline(always)]
+fn height<R: Real>(z2: R, y: R) -> (R, R) {
+    let h2 = z2 + y * y;
+    (y / h2.sqrt(), z2 / h2)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::{Vec2, Vec3};
+
+    fn quad(corner: Vec3, u: Vec3, v: Vec3) -> SphericalQuad<f32> {
+        let (unit_u, unit_v) = (u.normalize(), v.normalize());
+        let corner = Vec3::new(corner.dot(unit_u), corner.dot(unit_v), corner.dot(unit_u.cross(unit_v)));
+        SphericalQuad::new(corner.into(), [u.length(), v.length()], u.length() * v.length())
+    }
 
     /// Solid angle in f64 by adding up small pieces.
     fn solid_angle_by_parts(corner: Vec3, u: Vec3, v: Vec3) -> f64 {
@@ -125,7 +140,7 @@ mod tests {
     #[test]
     fn solid_angle_matches_the_sum_of_small_pieces() {
         for (corner, u, v) in CASES {
-            let quad = SphericalQuad::new(corner, u.normalize(), u.length(), v.normalize(), v.length());
+            let quad = quad(corner, u, v);
             let expected = solid_angle_by_parts(corner, u, v);
             let relative = (f64::from(quad.solid_angle()) - expected) / expected;
             assert!(relative.abs() < 2e-4, "{corner}: {} for {expected}", quad.solid_angle());
@@ -135,12 +150,12 @@ mod tests {
     #[test]
     fn points_follow_the_solid_angle() {
         for (corner, u, v) in &CASES[..4] {
-            let quad = SphericalQuad::new(*corner, u.normalize(), u.length(), v.normalize(), v.length());
+            let quad = quad(*corner, *u, *v);
             // Stratified samples; their share in each cell against the cell's solid angle.
             let (n, cells) = (512, 4);
             let mut counts = [0.0f64; 16];
             for i in 0..n * n {
-                let p = quad.sample(Vec2::new(((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32));
+                let p = Vec2::from(quad.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32]));
                 let cell = (p * cells as f32).as_uvec2().min(glam::UVec2::splat(cells - 1));
                 counts[(cell.y * cells + cell.x) as usize] += 1.0 / f64::from(n * n);
             }
@@ -175,14 +190,15 @@ mod tests {
         for z in [1.0_f32, 0.1, 0.01, 1e-3, 1e-4, 1e-5] {
             // In front of it, beside it, beyond its corner.
             for corner in [Vec3::new(-0.7, -1.2, -z), Vec3::new(0.2, -0.4, -z), Vec3::new(z, 0.1, -z)] {
-                let quad = SphericalQuad::new(corner, Vec3::X, 2.0, Vec3::Y, 2.0);
+                let quad = quad(corner, Vec3::X * 2.0, Vec3::Y * 2.0);
                 if quad.solid_angle() < 1e-3 {
                     continue;
                 }
                 let n = 512;
                 let mut sum = glam::DVec3::ZERO;
                 for i in 0..n * n {
-                    let p = quad.sample(Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32);
+                    let u = Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32;
+                    let p = Vec2::from(quad.sample(u.to_array()));
                     sum += (corner + 2.0 * p.extend(0.0)).as_dvec3().normalize() / f64::from(n * n);
                 }
                 let expected = mean_direction(corner, Vec3::X * 2.0, Vec3::Y * 2.0, f64::from(quad.solid_angle()));

@@ -1,26 +1,20 @@
-//! Maps from the unit square to discs, hemispheres, cones and triangles, with their densities.
+//! Maps from the unit square to discs, hemispheres, cones and triangles, with their densities; for one point or sixteen.
 
-use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_PI_4, PI, TAU};
+use firstlight_simd::{Real, Vector3, select, sin_cos_eighth};
+use glam::Vec2;
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 /// Uniform on the unit disc; keeps neighbours together (Shirley and Chiu 1997).
-#[inline]
-pub fn uniform_disc(u: Vec2) -> Vec2 {
-    let offset = 2.0 * u - Vec2::ONE;
+#[inline(always)]
+pub(crate) fn uniform_disc<R: Real>([u, v]: [R; 2]) -> [R; 2] {
+    let (x, y) = (u * 2.0 - 1.0, v * 2.0 - 1.0);
     // The longer coordinate is the radius, the quotient of the two an eighth of a turn at most to either side.
-    let across = offset.x.abs() > offset.y.abs();
-    let (r, short) = if across { (offset.x, offset.y) } else { (offset.y, offset.x) };
-    let (sin, cos) = sin_cos_eighth(FRAC_PI_4 * (short / if r == 0.0 { 1.0 } else { r }));
-    if across { Vec2::new(r * cos, r * sin) } else { Vec2::new(r * sin, r * cos) }
-}
-
-/// Sine and cosine of an angle in `[−π/4, π/4]`, to 1e-7: Taylor's series, cut where the rest falls below rounding.
-#[inline]
-fn sin_cos_eighth(x: f32) -> (f32, f32) {
-    let x2 = x * x;
-    let sin = x * (1.0 - x2 * (1.0 / 6.0 - x2 * (1.0 / 120.0 - x2 * (1.0 / 5040.0 - x2 * (1.0 / 362_880.0)))));
-    let cos = 1.0 - x2 * (0.5 - x2 * (1.0 / 24.0 - x2 * (1.0 / 720.0 - x2 * (1.0 / 40_320.0))));
-    (sin, cos)
+    let across = y.abs().lt(x.abs());
+    let (r, short) = (select(across, x, y), select(across, y, x));
+    let divisor = select(r.is_zero(), r.all(1.0), r);
+    let (sin, cos) = sin_cos_eighth(short / divisor * FRAC_PI_4);
+    let (long, short) = (r * cos, r * sin);
+    [select(across, long, short), select(across, short, long)]
 }
 
 /// Uniform on the regular polygon with `blades` corners on the unit circle, the first at angle `rotation`.
@@ -30,66 +24,64 @@ pub fn polygon_disc(u: Vec2, blades: u32, rotation: f32) -> Vec2 {
     let scaled = u.x * blades as f32;
     let blade = scaled.floor().min(blades as f32 - 1.0);
     let corner = |k: f32| Vec2::from_angle(rotation + k * TAU / blades as f32);
-    let weights = uniform_triangle(Vec2::new(scaled - blade, u.y));
-    weights.x * corner(blade) + weights.y * corner(blade + 1.0)
+    let [a, b] = uniform_triangle([scaled - blade, u.y]);
+    a * corner(blade) + b * corner(blade + 1.0)
 }
 
 /// Cosine-weighted on the hemisphere around +z; density [`cosine_hemisphere_pdf`].
-#[inline]
-pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
-    let p = uniform_disc(u);
+#[inline(always)]
+pub(crate) fn cosine_hemisphere<R: Real>(u: [R; 2]) -> Vector3<R> {
+    let [x, y] = uniform_disc(u);
     // Rounding may put the point just outside the circle.
-    p.extend((1.0 - p.length_squared()).max(0.0).sqrt())
+    let z = (x.all(1.0) - (x * x + y * y)).at_least(0.0).sqrt();
+    Vector3 { x, y, z }
 }
 
-/// Per steradian.
-#[inline]
-pub fn cosine_hemisphere_pdf(cos_theta: f32) -> f32 {
-    cos_theta.max(0.0) * (1.0 / PI)
+/// Per steradian; 0 below the horizon.
+#[inline(always)]
+pub fn cosine_hemisphere_pdf<R: Real>(cos_theta: R) -> R {
+    cos_theta.at_least(0.0) * FRAC_1_PI
 }
 
 /// 1 − cos θ for θ in `[0, π/2]` from sin²θ, exact for small cones where 1 − √(1 − sin²θ) would cancel.
-#[inline]
-pub fn one_minus_cos_from_sin2(sin2: f32) -> f32 {
-    sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())
+#[inline(always)]
+pub fn one_minus_cos_from_sin2<R: Real>(sin2: R) -> R {
+    sin2 / ((sin2.all(1.0) - sin2).at_least(0.0).sqrt() + 1.0)
 }
 
 /// Uniform in the cone around +z with half angle θ, given as 1 − cos θ; density [`cone_pdf`].
 ///
 /// Returns the direction and 1 − cos of its own angle, which the caller may need without cancellation.
-#[inline]
-pub fn uniform_cone(u: Vec2, one_minus_cos_max: f32) -> (Vec3, f32) {
-    let disc = uniform_disc(u);
+#[inline(always)]
+pub fn uniform_cone<R: Real>(u: [R; 2], one_minus_cos_max: R) -> (Vector3<R>, R) {
+    let [x, y] = uniform_disc(u);
     // The radius on the disc squared is uniform, and so is 1 − cos on the cap.
-    let r2 = disc.length_squared().min(1.0);
-    let one_minus_cos = r2 * one_minus_cos_max;
-    let sin_over_r = (one_minus_cos_max * (2.0 - one_minus_cos)).max(0.0).sqrt();
-    ((disc * sin_over_r).extend(1.0 - one_minus_cos), one_minus_cos)
+    let one_minus_cos = (x * x + y * y).at_most(1.0) * one_minus_cos_max;
+    let sin_over_r = (one_minus_cos_max * (-one_minus_cos + 2.0)).at_least(0.0).sqrt();
+    (Vector3 { x: x * sin_over_r, y: y * sin_over_r, z: -one_minus_cos + 1.0 }, one_minus_cos)
 }
 
 /// Per steradian.
-#[inline]
-pub fn cone_pdf(one_minus_cos_max: f32) -> f32 {
-    1.0 / (TAU * one_minus_cos_max)
+#[inline(always)]
+pub fn cone_pdf<R: Real>(one_minus_cos_max: R) -> R {
+    one_minus_cos_max.all(1.0) / (one_minus_cos_max * TAU)
 }
 
 /// Barycentric weights of the first two corners of a uniform point in a triangle (Heitz 2019, low distortion).
-#[inline]
-pub fn uniform_triangle(u: Vec2) -> Vec2 {
-    if u.x < u.y {
-        let b0 = 0.5 * u.x;
-        Vec2::new(b0, u.y - b0)
-    } else {
-        let b1 = 0.5 * u.y;
-        Vec2::new(u.x - b1, b1)
-    }
+#[inline(always)]
+pub fn uniform_triangle<R: Real>([u, v]: [R; 2]) -> [R; 2] {
+    let halves = [u * 0.5, v * 0.5];
+    let below = u.lt(v);
+    [select(below, halves[0], u - halves[1]), select(below, v - halves[0], halves[1])]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::Sampler;
+    use crate::sampling::{Sampler, cosine_hemisphere, uniform_disc};
     use crate::test_statistics::ChiSquared;
+    use glam::Vec3;
+    use std::f32::consts::PI;
 
     fn points(n: u32) -> impl Iterator<Item = Vec2> {
         // Hashed points, not Sobol': χ² needs independent draws.
@@ -167,7 +159,8 @@ mod tests {
         for one_minus_cos_max in [1e-12_f32, 1e-6, 0.01, 1.0] {
             let mut counts = vec![0; 8 * 16];
             for u in points(64 * 1024) {
-                let (d, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
+                let (d, one_minus_cos) = uniform_cone(u.into(), one_minus_cos_max);
+                let d = Vec3::from(d);
                 assert!((d.length() - 1.0).abs() < 1e-6);
                 let ring = (one_minus_cos / one_minus_cos_max * 8.0).min(7.0) as usize;
                 let sector = ((d.truncate().to_angle() + PI) / TAU * 16.0).min(15.0) as usize;
@@ -185,7 +178,7 @@ mod tests {
     fn triangle_is_even() {
         let mut counts = vec![0; 16];
         for u in points(64 * 1024) {
-            let b = uniform_triangle(u);
+            let b = Vec2::from(uniform_triangle(u.into()));
             assert!(b.min_element() >= 0.0 && b.x + b.y <= 1.0 + 1e-6);
             // Sixteen equal triangles: four rows of 7, 5, 3, 1.
             let (i, j) = ((b.x * 4.0).min(3.0), (b.y * 4.0).min(3.0));

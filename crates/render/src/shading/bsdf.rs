@@ -7,12 +7,13 @@
 use crate::core::color::luminance;
 use crate::core::material::{Fresnel, MAX_LOBES, SMALLEST_ALPHA};
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
-use crate::shading::dielectric::{fresnel, refract};
+use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
+use crate::shading::metal::{Metal, schlick};
 use firstlight_kdtree::geometry::Frame;
+use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
-use std::f32::consts::FRAC_1_PI;
 
 /// One way of scattering, all inputs looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,15 +162,17 @@ impl Scatter for Lobe {
             return (Vec3::ZERO, 0.0);
         }
         match *self {
-            Self::Diffuse { albedo } => (albedo * (FRAC_1_PI * cos), cosine_hemisphere_pdf(cos)),
+            Self::Diffuse { albedo } => {
+                let pdf = cosine_hemisphere_pdf(cos);
+                (albedo * pdf, pdf)
+            }
             Self::Metal { alpha, reflectance, fresnel, compensate } if alpha >= SMALLEST_ALPHA => {
-                let frame = Frame::around(normal);
-                let (o, i) = (frame.to_local(wo), frame.to_local(wi));
-                if o.z <= 0.0 {
+                let metal = metal_at(normal, wo, alpha, reflectance, fresnel, compensate);
+                if !metal.facing() {
                     return (Vec3::ZERO, 0.0);
                 }
-                let tint = metal_tint(o, i, alpha, reflectance, fresnel, compensate);
-                (tint * (ggx::reflection(o, i, alpha) * i.z), ggx::reflection_pdf(o, i, alpha))
+                let found = metal.eval_one(metal.local(wi.into()));
+                (Vec3::from(found.tint) * found.value, found.pdf)
             }
             _ => (Vec3::ZERO, 0.0),
         }
@@ -189,40 +192,35 @@ impl Scatter for Lobe {
                     through: None,
                 })
             }
-            Self::Mirror { reflectance } => Some(specular(reflect(wo, normal), reflectance, None)),
+            Self::Mirror { reflectance } => Some(specular(mirrored(wo, normal), reflectance, None)),
             Self::Metal { alpha, reflectance, fresnel, .. } if alpha < SMALLEST_ALPHA => {
                 let tint = fresnel.reflectance(reflectance, normal.dot(wo));
-                Some(specular(reflect(wo, normal), tint, None))
+                Some(specular(mirrored(wo, normal), tint, None))
             }
             Self::Metal { alpha, reflectance, fresnel, compensate } => {
-                let frame = Frame::around(normal);
-                let o = frame.to_local(wo);
-                if o.z <= 0.0 {
+                let metal = metal_at(normal, wo, alpha, reflectance, fresnel, compensate);
+                if !metal.facing() {
                     return None;
                 }
-                let h = ggx::sample_visible_normal(o, alpha, u);
-                let i = reflect(o, h);
+                let [wi, local] = metal.sample(u.to_array());
                 // Below the surface: the light that a second bounce would have returned.
-                if i.z <= 0.0 {
+                if local.z <= 0.0 {
                     return None;
                 }
-                let tint = metal_tint(o, i, alpha, reflectance, fresnel, compensate);
-                Some(BsdfSample {
-                    wi: frame.to_world(i).normalize(),
-                    weight: tint * ggx::reflection_weight(o, i, alpha),
-                    pdf: ggx::reflection_pdf(o, i, alpha),
-                    through: None,
-                })
+                let found = metal.eval_one(local);
+                let weight = Vec3::from(found.tint) * found.weight;
+                Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, through: None })
             }
             Self::Glass(interface) => {
                 let Interface { eta, squeeze, .. } = interface;
                 let (reflectance, cos_t) = fresnel(normal.dot(wo).clamp(0.0, 1.0), eta);
                 if u_choice() < reflectance {
                     // Weight f·cos/pdf is reflectance over the probability of reflecting: one.
-                    Some(specular(reflect(wo, normal), Vec3::ONE, None))
+                    Some(specular(mirrored(wo, normal), Vec3::ONE, None))
                 } else {
                     // Radiance is squeezed into a narrower cone where light is slower: the factor η².
-                    Some(specular(refract(wo, normal, eta, cos_t), Vec3::splat(squeeze * squeeze), Some(interface)))
+                    let wi = refract(wo.into(), normal.into(), eta, cos_t).into();
+                    Some(specular(wi, Vec3::splat(squeeze * squeeze), Some(interface)))
                 }
             }
         }
@@ -234,26 +232,22 @@ impl Fresnel {
     pub(crate) fn reflectance(self, facing: Vec3, cos: f32) -> Vec3 {
         match self {
             Self::Constant => facing,
-            Self::Schlick => facing + (Vec3::ONE - facing) * (1.0 - cos).clamp(0.0, 1.0).powi(5),
+            Self::Schlick => schlick(facing.into(), cos).into(),
         }
     }
 }
 
-/// Fresnel term, and the energy of further bounces given back (Turquin 2019, equation 16).
 #[inline]
-fn metal_tint(o: Vec3, i: Vec3, alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool) -> Vec3 {
-    let h = (o + i).normalize();
-    let tint = fresnel.reflectance(reflectance, o.dot(h));
-    if !compensate {
-        return tint;
-    }
-    let albedo = ggx::single_scattering_albedo(o.z, alpha);
-    tint * (Vec3::ONE + reflectance * ((1.0 - albedo) / albedo))
+fn metal_at(normal: Vec3, wo: Vec3, alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool) -> Metal<f32> {
+    let axes = frame_around(normal.into());
+    let wo = Vector3::from(wo).to_local(&axes);
+    let lost = if compensate { ggx::lost_over_returned(wo.z, alpha) } else { 0.0 };
+    Metal::new(axes, wo, alpha, reflectance.into(), fresnel == Fresnel::Schlick, lost)
 }
 
 #[inline]
-fn reflect(wo: Vec3, normal: Vec3) -> Vec3 {
-    (2.0 * normal.dot(wo) * normal - wo).normalize()
+fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
+    reflect(wo.into(), normal.into()).into()
 }
 
 #[cfg(test)]

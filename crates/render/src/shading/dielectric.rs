@@ -1,39 +1,46 @@
-//! Smooth interfaces between transparent media.
+//! Smooth interfaces between transparent media, and mirrors; for one point or sixteen.
 
-use glam::Vec3;
+use firstlight_simd::{Real, Vector3, select};
 
 /// Fresnel reflectance of unpolarised light at a smooth dielectric, and the cosine of the refracted ray.
 ///
 /// - `cos_i`: in `[0, 1]`, on the side of incidence; `eta`: index of that side over the index of the far side.
 ///
 /// Returns (1, 0) beyond the critical angle. Exact for `eta` = 1, where nothing is reflected.
-#[inline]
-pub fn fresnel(cos_i: f32, eta: f32) -> (f32, f32) {
+#[inline(always)]
+pub fn fresnel<R: Real>(cos_i: R, eta: R) -> (R, R) {
+    let (one, zero) = (eta.all(1.0), eta.all(0.0));
     // 1 − η²(1 − cos²) rearranged: with η near 1 the two terms of the plain form cancel.
-    let cos2_t = (1.0 - eta) * (1.0 + eta) + (eta * cos_i) * (eta * cos_i);
-    if cos2_t <= 0.0 {
-        return (1.0, 0.0);
-    }
-    let cos_t = cos2_t.sqrt();
-    if eta == 1.0 {
-        return (0.0, cos_i);
-    }
+    let cos2_t = (one - eta) * (eta + 1.0) + (eta * cos_i) * (eta * cos_i);
+    let total = cos2_t.le(zero);
+    let cos_t = cos2_t.at_least(0.0).sqrt();
     let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    (0.5 * (perpendicular * perpendicular + parallel * parallel), cos_t)
+    let reflectance = (perpendicular * perpendicular + parallel * parallel) * 0.5;
+    let alike = eta.equals(one) & !total;
+    (select(total, one, select(alike, zero, reflectance)), select(alike, cos_i, cos_t))
 }
 
 /// The refracted direction, unit.
 ///
 /// - `wo`: unit, on the side of `normal`; `eta` as in [`fresnel`], which also gives `cos_t`.
-#[inline]
-pub fn refract(wo: Vec3, normal: Vec3, eta: f32, cos_t: f32) -> Vec3 {
-    (-eta * wo + (eta * wo.dot(normal) - cos_t) * normal).normalize()
+#[inline(always)]
+pub fn refract<R: Real>(wo: Vector3<R>, normal: Vector3<R>, eta: R, cos_t: R) -> Vector3<R> {
+    (wo * -eta + normal * (eta * normal.dot(wo) - cos_t)).normalize()
+}
+
+/// The mirrored direction, unit.
+///
+/// - `wo`, `normal`: unit.
+#[inline(always)]
+pub fn reflect<R: Real>(wo: Vector3<R>, normal: Vector3<R>) -> Vector3<R> {
+    (normal * (normal.dot(wo) * 2.0) - wo).normalize()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     #[test]
     fn known_values_of_glass() {
@@ -81,7 +88,7 @@ mod tests {
             let theta = i as f32 * 0.03;
             let wo = Vec3::new(theta.sin(), 0.0, theta.cos());
             let (_, cos_t) = fresnel(wo.z, 1.0 / 1.5);
-            let wt = refract(wo, normal, 1.0 / 1.5, cos_t);
+            let wt = Vec3::from(refract(wo.into(), normal.into(), 1.0 / 1.5, cos_t));
             assert!((wt.x * 1.5 + wo.x).abs() < 1e-5 && wt.z < 0.0, "{wt}");
         }
     }

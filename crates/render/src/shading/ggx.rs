@@ -2,72 +2,80 @@
 //!
 //! All vectors are unit and in the shading frame, the normal being +z.
 
-use crate::sampling::uniform_disc;
-use glam::{Vec2, Vec3};
+use crate::sampling::warp::uniform_disc;
+use firstlight_simd::{Real, Vector3, select, select_vector};
+use glam::Vec3;
 use std::f32::consts::PI;
 use std::sync::OnceLock;
 
 /// Distribution of normals D, per steradian (Walter et al. 2007, equation 33).
-#[inline]
-pub fn distribution(h: Vec3, alpha: f32) -> f32 {
+#[inline(always)]
+pub fn distribution<R: Real>(h: Vector3<R>, alpha: R) -> R {
     // cos²(α² − 1) + 1 written as α²cos² + sin²: near the peak of a smooth surface the first form cancels.
-    let sin2 = h.x * h.x + h.y * h.y;
     let a2 = alpha * alpha;
-    let d = a2 * h.z * h.z + sin2;
-    a2 / (PI * d * d)
+    let d = a2 * h.z * h.z + (h.x * h.x + h.y * h.y);
+    a2 / (d * d * PI)
 }
 
 /// Smith's Λ.
-#[inline]
-fn lambda(w: Vec3, alpha: f32) -> f32 {
+#[inline(always)]
+pub fn lambda<R: Real>(w: Vector3<R>, alpha: R) -> R {
     let tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
     // (√(1 + a²tan²) − 1) / 2 without its cancellation for small slopes.
     let x = alpha * alpha * tan2;
-    0.5 * x / (1.0 + (1.0 + x).sqrt())
+    x * 0.5 / ((x + 1.0).sqrt() + 1.0)
 }
 
-/// f · reflectance⁻¹ of single scattering, sr⁻¹; height-correlated masking and shadowing (Heitz 2014, equation 99).
-#[inline]
-pub fn reflection(wo: Vec3, wi: Vec3, alpha: f32) -> f32 {
-    let h = (wo + wi).normalize();
-    let g2 = 1.0 / (1.0 + lambda(wo, alpha) + lambda(wi, alpha));
-    distribution(h, alpha) * g2 / (4.0 * wo.z * wi.z)
+/// Reflection of `wo` to `wi` at visible normals.
+pub struct Reflection<R> {
+    /// Unit, between the two.
+    pub half: Vector3<R>,
+    /// f · cos of single scattering over the reflectance; height-correlated masking and shadowing (Heitz 2014, equation 99).
+    pub value: R,
+    /// Per steradian, of reflecting `wo` at a visible normal.
+    pub pdf: R,
+    /// f · cos / pdf over the reflectance: G2 / G1.
+    pub weight: R,
 }
 
-/// Density per steradian of reflecting `wo` at a visible normal.
-#[inline]
-pub fn reflection_pdf(wo: Vec3, wi: Vec3, alpha: f32) -> f32 {
-    let h = (wo + wi).normalize();
-    distribution(h, alpha) / ((1.0 + lambda(wo, alpha)) * 4.0 * wo.z)
-}
-
-/// f · cos / pdf of a sampled reflection, divided by the reflectance: G2 / G1.
-#[inline]
-pub fn reflection_weight(wo: Vec3, wi: Vec3, alpha: f32) -> f32 {
-    let lambda_o = lambda(wo, alpha);
-    (1.0 + lambda_o) / (1.0 + lambda_o + lambda(wi, alpha))
+/// - `wo`, `wi`: unit, above the surface; `lambda_o`: [`lambda`] of `wo`.
+#[inline(always)]
+pub fn reflection<R: Real>(wo: Vector3<R>, lambda_o: R, wi: Vector3<R>, alpha: R) -> Reflection<R> {
+    let half = (wo + wi).normalize();
+    let masking = lambda_o + 1.0;
+    let both = masking + lambda(wi, alpha);
+    let per_area = distribution(half, alpha) / (wo.z * 4.0);
+    Reflection { half, value: per_area / both, pdf: per_area / masking, weight: masking / both }
 }
 
 /// A microfacet normal among those that `wo` can see.
 ///
 /// Density `D(h) · G1(wo) · max(0, wo·h) / wo.z` per steradian; `wo.z > 0`, `u` in `[0, 1)²`.
 /// Source: Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
-#[inline]
-pub fn sample_visible_normal(wo: Vec3, alpha: f32, u: Vec2) -> Vec3 {
-    let stretch = Vec3::new(alpha, alpha, 1.0);
-    let wo_std = (wo * stretch).normalize();
-    // The place on the cap by a disc, which keeps neighbours together: the square of its radius is uniform, and so is
-    // the height on the cap.
-    let disc = uniform_disc(u);
-    let r2 = disc.length_squared().min(1.0);
-    let z = (1.0 - r2) * (1.0 + wo_std.z) - wo_std.z;
+#[inline(always)]
+pub fn sample_visible_normal<R: Real>(wo: Vector3<R>, alpha: R, u: [R; 2]) -> Vector3<R> {
+    let wo_std = stretched(wo, alpha).normalize();
+    // The place on the cap by a disc, which keeps neighbours together and takes no sine: the square of its radius is uniform,
+    // and so is the height on the cap.
+    let [x, y] = uniform_disc(u);
+    let one = x.all(1.0);
+    let r2 = (x * x + y * y).at_most(1.0);
+    let z = (one - r2) * (wo_std.z + 1.0) - wo_std.z;
     // Rounding can push z² past 1, and the root of a negative number would be NaN.
-    let sin_theta = (1.0 - z * z).max(0.0).sqrt();
-    let across = if r2 > 0.0 { disc * (sin_theta / r2.sqrt()) } else { Vec2::new(sin_theta, 0.0) };
-    let wi_std = across.extend(z);
-    let h = (wo_std + wi_std) * stretch;
+    let sin_theta = (one - z * z).at_least(0.0).sqrt();
+    let middle = r2.is_zero();
+    let scale = sin_theta / select(middle, one, r2.sqrt());
+    let wi_std = Vector3 { x: select(middle, sin_theta, x * scale), y: y * scale, z };
+    let h = stretched(wo_std + wi_std, alpha);
+    let length = h.length();
     // Opposite vectors: the visible hemisphere's rim, where any normal will do.
-    h.try_normalize().unwrap_or(Vec3::Z)
+    let up = Vector3 { x: x.all(0.0), y: x.all(0.0), z: one };
+    select_vector(length.is_positive(), h * (one / length), up)
+}
+
+#[inline(always)]
+fn stretched<R: Real>(v: Vector3<R>, alpha: R) -> Vector3<R> {
+    Vector3 { x: v.x * alpha, y: v.y * alpha, z: v.z }
 }
 
 /// The share of light that one bounce returns from a surface with reflectance 1, seen under `cos_theta`.
@@ -88,6 +96,13 @@ pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
     let at = |dx, dy| table[(iy + dy) * N + ix + dx];
     let row = |dy| at(0, dy) + fx * (at(1, dy) - at(0, dy));
     row(0) + fy * (row(1) - row(0))
+}
+
+/// What one bounce loses over what it returns, for [`crate::shading::metal::Metal`]; arguments as of [`single_scattering_albedo`].
+#[inline]
+pub fn lost_over_returned(cos_theta: f32, alpha: f32) -> f32 {
+    let albedo = single_scattering_albedo(cos_theta, alpha);
+    (1.0 - albedo) / albedo
 }
 
 /// Entries along each side of the albedo table.
@@ -113,6 +128,7 @@ fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> 
     let wo = Vec3::new((1.0 - cos_theta * cos_theta).max(0.0).sqrt(), 0.0, cos_theta);
     let stretch = Vec3::new(alpha, alpha, 1.0);
     let wo_std = (wo * stretch).normalize();
+    let lambda_o = lambda(wo.into(), alpha);
     let mut sum = 0.0;
     for i in 0..n_radii {
         // 1 − r², by its cube root.
@@ -129,7 +145,9 @@ fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> 
                 (Vec3::new(sin_theta * cos_phi + wo_std.x, sin_theta * sin_phi, up) * stretch).normalize_or(Vec3::Z);
             let wi = 2.0 * wo.dot(h) * h - wo;
             if wi.z > 0.0 {
-                sum += f64::from(weight * reflection_weight(wo, wi, alpha));
+                // G2 / G1, see [`Reflection`].
+                let masking = lambda_o + 1.0;
+                sum += f64::from(weight * (masking / (masking + lambda(wi.into(), alpha))));
             }
         }
     }
@@ -141,7 +159,16 @@ mod tests {
     use super::*;
     use crate::sampling::Sampler;
     use crate::test_statistics::ChiSquared;
+    use glam::Vec2;
     use std::f32::consts::TAU;
+
+    fn reflected(wo: Vec3, wi: Vec3, alpha: f32) -> Reflection<f32> {
+        reflection(wo.into(), lambda(wo.into(), alpha), wi.into(), alpha)
+    }
+
+    fn normal(wo: Vec3, alpha: f32, u: Vec2) -> Vec3 {
+        sample_visible_normal(wo.into(), alpha, u.to_array()).into()
+    }
 
     #[test]
     fn projected_normals_cover_the_surface_once() {
@@ -155,7 +182,7 @@ mod tests {
                 let theta = (f64::from(alpha) * phi.tan()).atan();
                 let d_theta = f64::from(alpha) / (phi.cos().powi(2) * (1.0 + (f64::from(alpha) * phi.tan()).powi(2)));
                 let h = Vec3::new(theta.sin() as f32, 0.0, theta.cos() as f32);
-                sum += f64::from(distribution(h, alpha)) * theta.cos() * theta.sin() * d_theta;
+                sum += f64::from(distribution(h.into(), alpha)) * theta.cos() * theta.sin() * d_theta;
             }
             let integral = sum * std::f64::consts::TAU * std::f64::consts::FRAC_PI_2 / f64::from(n);
             assert!((integral - 1.0).abs() < 2e-3, "α {alpha}: {integral}");
@@ -172,7 +199,7 @@ mod tests {
             let (nz, nphi, n) = (16usize, 32usize, 200_000u32);
             let mut counts = vec![0.0f64; nz * nphi + 1];
             for i in 0..n {
-                let h = sample_visible_normal(wo, alpha, Sampler::new(i, case as u32, 0, 0).pair(3));
+                let h = normal(wo, alpha, Sampler::new(i, case as u32, 0, 0).pair(3));
                 let wi = 2.0 * wo.dot(h) * h - wo;
                 let bin = if wi.z <= 0.0 {
                     nz * nphi
@@ -190,7 +217,7 @@ mod tests {
                     let phi = ((bin % nphi) as f32 + ((s / fine) as f32 + 0.5) / fine as f32) / nphi as f32 * TAU - PI;
                     let r = (1.0 - z * z).sqrt();
                     let wi = Vec3::new(r * phi.cos(), r * phi.sin(), z);
-                    *slot += f64::from(reflection_pdf(wo, wi, alpha));
+                    *slot += f64::from(reflected(wo, wi, alpha).pdf);
                 }
                 *slot *= f64::from(n) * std::f64::consts::TAU / (nz * nphi * fine * fine) as f64;
             }
@@ -206,11 +233,11 @@ mod tests {
             let (a, b) = (sampler.pair(0), sampler.pair(1));
             let wo = crate::sampling::cosine_hemisphere(a).max(Vec3::new(-1.0, -1.0, 1e-3)).normalize();
             let alpha = 0.02 + b.x * 0.9;
-            let h = sample_visible_normal(wo, alpha, b);
+            let h = normal(wo, alpha, b);
             let wi = 2.0 * wo.dot(h) * h - wo;
             if wi.z > 1e-3 {
-                let expected = reflection(wo, wi, alpha) * wi.z / reflection_pdf(wo, wi, alpha);
-                let weight = reflection_weight(wo, wi, alpha);
+                let Reflection { value, pdf, weight, .. } = reflected(wo, wi, alpha);
+                let expected = value / pdf;
                 assert!((weight - expected).abs() < 1e-3 * expected, "{weight} for {expected}");
             }
         }

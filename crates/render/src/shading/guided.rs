@@ -2,12 +2,27 @@
 
 use crate::prepare::guide::{Hints, SHARE};
 use crate::shading::bsdf::{BsdfSample, Scatter};
+use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
 /// A surface together with the hints: what the integrator asks in place of the surface.
 pub(crate) struct Guided<'a, S> {
     pub surface: &'a S,
     pub hints: Hints<'a>,
+}
+
+/// Density of directions that come from hints with probability [`SHARE`], else from the surface.
+///
+/// - `surface`, `hints`: densities of the two, per steradian.
+#[inline(always)]
+pub(crate) fn mixed_pdf<R: Real>(surface: R, hints: R) -> R {
+    surface + (hints - surface) * SHARE
+}
+
+/// What is left of the number of a choice that fell on the surface, uniform in `[0, 1)` again.
+#[inline(always)]
+pub(crate) fn rest_of_choice<R: Real>(choice: R) -> R {
+    ((choice - SHARE) / (1.0 - SHARE)).at_least(0.0).at_most(1.0f32.next_down())
 }
 
 impl<S: Scatter> Scatter for Guided<'_, S> {
@@ -17,7 +32,7 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
 
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let (value, pdf) = self.surface.eval(wo, wi, normal);
-        (value, pdf + SHARE * (self.hints.pdf(wi) - pdf))
+        (value, mixed_pdf(pdf, self.hints.pdf(wi)))
     }
 
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
@@ -25,7 +40,7 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
         let wi = if choice < SHARE {
             self.hints.sample(choice / SHARE, u)
         } else {
-            let rest = ((choice - SHARE) / (1.0 - SHARE)).clamp(0.0, 1.0f32.next_down());
+            let rest = rest_of_choice(choice);
             let sample = self.surface.sample(wo, normal, || rest, u)?;
             if sample.pdf.is_infinite() {
                 return Some(BsdfSample { weight: sample.weight / (1.0 - SHARE), ..sample });

@@ -7,6 +7,7 @@ use crate::sampling::Sampler;
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::paths::Path;
 use firstlight_kdtree::Hit;
+use firstlight_simd::{Real, select};
 use glam::Vec3;
 
 /// A point on a light, or a direction to the surroundings: then there is no target. Takes two pairs of dimensions.
@@ -78,29 +79,29 @@ pub(crate) fn emitter_weight(scene: &Prepared, techniques: &Techniques, path: &P
 }
 
 /// Weight of light that light sampling found with density `own`, and a bounce would have found with `other`.
-#[inline]
-pub(crate) fn light_weight(techniques: &Techniques, own: f32, other: f32) -> f32 {
-    if techniques.mis { power_heuristic(own, other) } else { 1.0 }
+#[inline(always)]
+pub(crate) fn light_weight<R: Real>(techniques: &Techniques, own: R, other: R) -> R {
+    if techniques.mis { power_heuristic(own, other) } else { own.all(1.0) }
 }
 
 /// Weight of light that a bounce found with density `own`, and light sampling would have found with `other`.
-#[inline]
-pub(crate) fn bounce_weight(techniques: &Techniques, own: f32, other: f32) -> f32 {
-    match (techniques.mis, other > 0.0) {
-        (true, _) => power_heuristic(own, other),
-        (false, can_be_sampled) => f32::from(!can_be_sampled),
+#[inline(always)]
+pub(crate) fn bounce_weight<R: Real>(techniques: &Techniques, own: R, other: R) -> R {
+    if techniques.mis {
+        return power_heuristic(own, other);
     }
+    select(other.is_positive(), own.all(0.0), own.all(1.0))
 }
 
 /// Weight of a sample found with density `own` that another method finds with density `other` (Veach 1997, β = 2).
-#[inline]
-pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
+#[inline(always)]
+pub(crate) fn power_heuristic<R: Real>(own: R, other: R) -> R {
     // By the ratio: squares of densities overflow for lights of a few pixels.
-    if other == 0.0 { 1.0 } else { power_weight(other / own) }
+    select(other.is_zero(), own.all(1.0), power_weight(other / own))
 }
 
 /// The same by the ratio of the other density to its own.
-#[inline]
-pub(crate) fn power_weight(ratio: f32) -> f32 {
-    1.0 / (1.0 + ratio * ratio)
+#[inline(always)]
+pub(crate) fn power_weight<R: Real>(ratio: R) -> R {
+    ratio.all(1.0) / (ratio * ratio + 1.0)
 }

@@ -8,6 +8,7 @@ pub(crate) mod guided;
 pub(crate) mod interface;
 pub(crate) mod lights;
 pub(crate) mod medium;
+pub(crate) mod metal;
 pub(crate) mod mis_state;
 pub(crate) mod paths;
 pub(crate) mod simd;

@@ -5,7 +5,7 @@ use crate::shading::interface::MediumId;
 use crate::shading::mis_state::MisState;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{RayBatch, append, append_bits};
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector};
 use glam::Vec3;
 
 /// The state of one path between two bounces.

@@ -5,10 +5,12 @@ use crate::prepare::bodies::Boundary;
 use crate::prepare::light::shape::sphere_uv;
 use crate::prepare::prepared::Prepared;
 use crate::shading::bsdf::{Blend, Lobe};
+use crate::shading::dielectric::reflect;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
 use firstlight_kdtree::{Hit, Shape};
+use firstlight_simd::{Real, Vector3, three};
 use glam::{Vec2, Vec3};
 
 /// A point on a surface, seen along a ray.
@@ -64,8 +66,9 @@ impl Vertex {
                     // A normal that the viewer sees from behind would reflect light into the surface.
                     let turn = if smooth.dot(geometric_normal) < 0.0 { -1.0 } else { 1.0 };
                     smooth_normal = turn * smooth;
-                    let corners = [a, b, c].map(|i| (mesh.positions[i], turn * mesh.normals[i]));
-                    lift = world_from_object.transform_vector3(lift_of(&corners, weights));
+                    let corners = [a, b, c].map(|i| mesh.positions[i].into());
+                    let normals = [a, b, c].map(|i| (turn * mesh.normals[i]).into());
+                    lift = world_from_object.transform_vector3(lift_of(&corners, &normals, &weights.to_array()).into());
                 }
                 if !mesh.uvs.is_empty() {
                     uv = weights.x * mesh.uvs[a] + weights.y * mesh.uvs[b] + weights.z * mesh.uvs[c];
@@ -109,7 +112,7 @@ impl Vertex {
     /// `wo` mirrored by the shading normal, unit.
     #[inline]
     pub fn mirrored(&self) -> Vec3 {
-        (2.0 * self.normal.dot(self.wo) * self.normal - self.wo).normalize()
+        reflect(self.wo.into(), self.normal.into()).into()
     }
 
     /// Whether light from `wi` can meet the side that `wo` sees.
@@ -141,17 +144,18 @@ impl Vertex {
 
 /// From a point of a triangle to the smooth surface above it, in the triangle's space.
 ///
-/// - `corners`: positions and unit normals, on the side from which the point is seen; `weights`: barycentric.
+/// - `corners`: positions; `normals`: unit, on the side from which the point is seen; `weights`: barycentric.
 ///
 /// The point is projected onto the tangent plane of each corner that it lies below, and the results are weighted
 /// (Hanika 2021, "Hacking the Shadow Terminator"). Zero where it lies below none: where the surface is flat or bends
 /// the other way.
-#[inline]
-fn lift_of(corners: &[(Vec3, Vec3); 3], weights: Vec3) -> Vec3 {
-    let [(a, _), (b, _), (c, _)] = *corners;
-    let point = weights.x * a + weights.y * b + weights.z * c;
+#[inline(always)]
+pub(crate) fn lift_of<R: Real>(corners: &[Vector3<R>; 3], normals: &[Vector3<R>; 3], weights: &[R; 3]) -> Vector3<R> {
+    let [a, b, c] = *corners;
+    let point = a * weights[0] + b * weights[1] + c * weights[2];
     // The weighted corners give the point itself: what is left are the projections.
-    corners.iter().zip(weights.to_array()).map(|((p, normal), w)| -w * (point - p).dot(*normal).min(0.0) * normal).sum()
+    let lifts = three!(|k| normals[k] * (-weights[k] * (point - corners[k]).dot(normals[k]).at_most(0.0)));
+    lifts[0] + lifts[1] + lifts[2]
 }
 
 /// The material of a hit.

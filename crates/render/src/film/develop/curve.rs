@@ -1,6 +1,6 @@
 //! How bright light is squeezed into what a screen can show, a colour or sixteen at a time with the same bits.
 
-use firstlight_simd::{Float, Simd, Vector, select, select_vector};
+use firstlight_simd::{Float, Real, Simd, Vector, select, select_vector};
 use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 

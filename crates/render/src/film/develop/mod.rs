@@ -8,7 +8,7 @@ mod scale;
 mod srgb;
 
 use crate::film::tiles::Film;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, Word, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! A picture at another size, bilinearly: what is shown while things move.
 
 use crate::film::develop::write_pixels;
-use firstlight_simd::{Bits, InstructionSet, LANES, Simd, dispatch, padded};
+use firstlight_simd::{Bits, InstructionSet, LANES, Simd, Word, dispatch, padded};
 use rayon::prelude::*;
 
 /// From one size to the other, pixels wide and high; both sides are in bytes, four a pixel.

@@ -1,6 +1,6 @@
 //! The sRGB transfer function (IEC 61966-2-1).
 
-use firstlight_simd::{Bits, Float, Simd};
+use firstlight_simd::{Bits, Float, Real, Simd, Word};
 use std::sync::OnceLock;
 
 /// Light below this is 0: the first border between two bytes lies above.

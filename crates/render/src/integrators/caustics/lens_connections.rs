@@ -3,7 +3,7 @@
 use crate::shading::paths::{append_vector, get, set};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{RayBatch, append};
-use firstlight_simd::{Float, LANES, Mask, Simd, Vector};
+use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector};
 use glam::{Vec2, Vec3};
 
 /// Light that arrives in one pixel.

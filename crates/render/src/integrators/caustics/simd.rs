@@ -7,23 +7,23 @@ use crate::core::camera::Camera;
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
 use crate::integrators::caustics::lens_connections::LensConnections;
 use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::weight::etendue_gain;
 use crate::integrators::simd::shade::{knows, scatters};
 use crate::prepare::casters::NO_CASTER;
 use crate::prepare::material_table::COATED;
 use crate::prepare::surface_table::SurfaceTable;
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_simd::uniform_disc;
+use crate::sampling::warp::uniform_disc;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::lights::power_weight;
 use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet};
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, dispatch, select, select_vector};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector};
 use glam::{Vec2, Vec3};
 
 /// Hits of one kind of material, and where their light and their paths go on.
@@ -134,23 +134,15 @@ impl<S: Simd> LightPathLanes<'_, S> {
     fn join<const KIND: usize>(&self, s: S, sets: &mut MediumSets, camera: MediumId, arrivals: &mut LensConnections) {
         let &Self { pass, at, place, media, throughput, ratio, .. } = self;
         let scene = pass.scene;
-        let Camera { eye, right, up, forward, tan_half_vfov, focus_distance, .. } = scene.camera;
         let mut open = at.mask;
         if scene.tables.features.glass {
             lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane] != camera) << lane));
         }
-        let [x, y] = self.lens_offsets(s, &scene.camera);
-        let (right, up) = (Vector::splat(s, right), Vector::splat(s, up));
-        let lens = Vector::splat(s, eye) + (right * x + up * y);
-        // The film point as `Camera::film_point` finds it.
+        let offsets = self.lens_offsets(s, &scene.camera);
+        let lens = scene.camera.lens_points(offsets);
         let way = place.position - lens;
-        let depth = way.dot(Vector::splat(s, forward));
+        let ([film_x, film_y], depth) = scene.camera.film_points(offsets, way, pass.size);
         open &= depth.is_positive();
-        let scale = pass.size.y / tan_half_vfov;
-        let across = way.dot(right) / depth + x / x.all(focus_distance);
-        let above = way.dot(up) / depth + y / y.all(focus_distance);
-        let film_x = (across * scale + pass.size.x) * 0.5;
-        let film_y = (above * -scale + pass.size.y) * 0.5;
         let least = depth.all(0.5 - pass.filter.radius());
         let rim = pass.filter.radius() - 0.5;
         open &= least.le(film_x) & film_x.lt(depth.all(pass.size.x + rim));
@@ -167,8 +159,9 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
         open &= surface.non_specular & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
         let importance = distance2 * (cos_lens * cos_lens * cos_lens);
+        // `CausticPass::join_ratio`, rounded in an order of its own.
         let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
-        let weight = lamp_weight(pass, ratio);
+        let weight = pass.lamp_weight(ratio);
         let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
         open &= !light.is_zero();
         if open == 0 {
@@ -229,8 +222,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             }
         }
         let (cos_i, cos_o) = (place.wo.dot(normal), along.abs());
-        // What a specular surface does to the étendue; 1 where the true normal shades.
-        let gain = ((cos_i * place.normal.dot(wi)) / (along * place.normal.dot(place.wo))).abs();
+        let gain = etendue_gain(normal, place.normal, wi, place.wo);
         // Radiance is squeezed on its way into glass, flux is not.
         let white = Vector::splat(s, Vec3::ONE);
         let mut factor = if KIND == GLASS { white } else { bounce.weight } * gain;
@@ -277,14 +269,4 @@ impl<S: Simd> LightPathLanes<'_, S> {
             next_media.extend(lanes_of(go_on).map(|lane| media[lane]));
         }
     }
-}
-
-/// See [`CausticPass::lamp_weight`].
-#[inline(always)]
-fn lamp_weight<S: Simd>(pass: &CausticPass, ratio: Float<S>) -> Float<S> {
-    let one = ratio.all(1.0);
-    if pass.techniques.mis {
-        return one - power_weight(ratio);
-    }
-    select(ratio.is_positive(), one, ratio.all(0.0))
 }

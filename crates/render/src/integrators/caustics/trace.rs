@@ -13,7 +13,7 @@ use crate::integrators::caustics::lens_connections::{LensConnections, Splat};
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::simd;
 use crate::integrators::caustics::simd::LightHits;
-use crate::integrators::caustics::weight::{MisBounce, etendue_gain, is_reversible};
+use crate::integrators::caustics::weight::{MisBounce, etendue_gain_at, is_reversible};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
@@ -392,7 +392,7 @@ impl LightPathStep<'_> {
             return None;
         }
         let factor = if is_specular {
-            let gain = etendue_gain(vertex, vertex.wo, sample.wi);
+            let gain = etendue_gain_at(vertex, vertex.wo, sample.wi);
             path.ratio /= gain;
             // Radiance is squeezed on its way into glass, flux is not.
             let squeeze = sample.through.map_or(1.0, |Interface { squeeze, .. }| squeeze);

@@ -21,6 +21,7 @@ use crate::shading::lights::power_weight;
 use crate::shading::mis_state::MisState;
 use crate::shading::surface::Vertex;
 use firstlight_kdtree::Hit;
+use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 
 /// How a path from the eye goes on at a vertex.
@@ -61,7 +62,7 @@ impl CausticPass<'_> {
                 MisState { ratio, caster: NO_CASTER, ..track }
             }
             (None, true) => {
-                let ratio = track.ratio / etendue_gain(vertex, wi, vertex.wo);
+                let ratio = track.ratio / etendue_gain_at(vertex, wi, vertex.wo);
                 MisState { ratio, caster: self.casters.of_hit(bounce.hit), ..track }
             }
         }
@@ -74,9 +75,9 @@ impl CausticPass<'_> {
     }
 
     /// The factor of the vertex that is joined to the lens, and of the number of paths.
-    #[inline]
-    pub(crate) fn join_ratio(&self, distance2: f32, cos_lens: f32, cos_o: f32, cos_i: f32, pdf: f32) -> f32 {
-        self.density_scale() * distance2 * cos_lens.powi(3) * cos_i / (cos_o * pdf)
+    #[inline(always)]
+    pub fn join_ratio<R: Real>(&self, distance2: R, cos_lens: R, cos_o: R, cos_i: R, pdf: R) -> R {
+        distance2 * self.density_scale() * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * pdf)
     }
 
     /// Of paths from the lamps that are joined to a pixel.
@@ -98,15 +99,18 @@ impl CausticPass<'_> {
     }
 
     /// Of the way whose competitor has `ratio` times its density.
-    #[inline]
-    fn weight_against(&self, ratio: f32) -> f32 {
-        if self.techniques.mis { power_weight(ratio) } else { f32::from(!(ratio > 0.0)) }
+    #[inline(always)]
+    fn weight_against<R: Real>(&self, ratio: R) -> R {
+        if self.techniques.mis {
+            return power_weight(ratio);
+        }
+        select(ratio.is_positive(), ratio.all(0.0), ratio.all(1.0))
     }
 
     /// Weight of a path from the lamp that has `ratio` times the density of the one from the eye.
-    #[inline]
-    pub(crate) fn lamp_weight(&self, ratio: f32) -> f32 {
-        1.0 - self.weight_against(ratio)
+    #[inline(always)]
+    pub fn lamp_weight<R: Real>(&self, ratio: R) -> R {
+        ratio.all(1.0) - self.weight_against(ratio)
     }
 }
 
@@ -123,12 +127,16 @@ pub(crate) fn is_reversible(bounce: &MisBounce) -> bool {
     }
 }
 
-/// What a specular vertex does to the étendue of light that comes from `wi` and goes to `wo`.
-#[inline]
-pub(crate) fn etendue_gain(vertex: &Vertex, wi: Vec3, wo: Vec3) -> f32 {
-    if vertex.normal == vertex.geometric_normal {
-        return 1.0;
-    }
-    let (shading, geometric) = (vertex.normal, vertex.geometric_normal);
+/// What a specular vertex does to the étendue of light that comes from `wi` and goes to `wo`: 1 where the true normal shades.
+///
+/// - `geometric`, `shading`: the two normals, unit.
+#[inline(always)]
+pub(crate) fn etendue_gain<R: Real>(geometric: Vector3<R>, shading: Vector3<R>, wi: Vector3<R>, wo: Vector3<R>) -> R {
     ((geometric.dot(wo) * shading.dot(wi)) / (geometric.dot(wi) * shading.dot(wo))).abs()
+}
+
+/// The same of the two normals of a vertex.
+#[inline]
+pub(crate) fn etendue_gain_at(vertex: &Vertex, wi: Vec3, wo: Vec3) -> f32 {
+    etendue_gain(vertex.geometric_normal.into(), vertex.normal.into(), wi.into(), wo.into())
 }

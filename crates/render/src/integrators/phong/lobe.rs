@@ -1,8 +1,7 @@
 //! What the classic model is made of: weights, sample dimensions and the lobe of a highlight.
 
 use crate::shading::dimensions::CAMERA_DIMENSIONS;
-use firstlight_kdtree::geometry::Frame;
-use glam::{Vec2, Vec3};
+use firstlight_simd::{Elementary, Vector3, frame_around};
 use std::f32::consts::TAU;
 
 /// Share of a light's fluence at a point that reaches surfaces there from all around, whatever is in its way: about
@@ -33,16 +32,17 @@ pub(crate) fn first_dimension(depth: u32) -> u32 {
 }
 
 /// (n + 1) / 2π · cosⁿ about an axis, per steradian; `cos` may be negative.
-#[inline]
-pub(crate) fn lobe_pdf(exponent: f32, cos: f32) -> f32 {
-    (exponent + 1.0) / TAU * cos.max(0.0).powf(exponent)
+#[inline(always)]
+pub(crate) fn lobe_pdf<R: Elementary>(exponent: R, cos: R) -> R {
+    (exponent + 1.0) * (1.0 / TAU) * cos.at_least(0.0).at_most(1.0).power(exponent)
 }
 
 /// A unit direction with density [`lobe_pdf`] about `axis`.
-#[inline]
-pub(crate) fn within_lobe(axis: Vec3, exponent: f32, u: Vec2) -> Vec3 {
-    let cos = (1.0 - u.x).powf(1.0 / (exponent + 1.0));
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
-    Frame::around(axis).to_world(Vec3::new(sin * cos_phi, sin * sin_phi, cos)).normalize()
+#[inline(always)]
+pub(crate) fn within_lobe<R: Elementary>(axis: Vector3<R>, exponent: R, [u, v]: [R; 2]) -> Vector3<R> {
+    let one = u.all(1.0);
+    let cos = (one - u).power(one / (exponent + 1.0));
+    let sin = (one - cos * cos).at_least(0.0).sqrt();
+    let (sin_phi, cos_phi) = (v * TAU).sin_cos();
+    Vector3 { x: sin * cos_phi, y: sin * sin_phi, z: cos }.to_world(&frame_around(axis)).normalize()
 }

@@ -251,7 +251,7 @@ impl PhongWave {
             }
         } else if tables.features.environment {
             let scale = sets.environment_scale(path.media);
-            ambient += finish.ambient * tables.ambient.radiance(vertex.normal) * scale;
+            ambient += finish.ambient * Vec3::from(tables.ambient.radiance(vertex.normal.into())) * scale;
         }
         ambient
     }
@@ -267,7 +267,8 @@ impl PhongWave {
                 let mirrored = vertex.mirrored();
                 let weight = path.throughput * tint;
                 if rough {
-                    let wi = within_lobe(mirrored, exponent, path.sampler.pair(dimension + 1));
+                    let u = path.sampler.pair(dimension + 1).to_array();
+                    let wi = Vec3::from(within_lobe(mirrored.into(), exponent, u));
                     if vertex.is_reached_from(wi) && wi.dot(vertex.normal) > 0.0 {
                         let pdf = lobe_pdf(exponent, mirrored.dot(wi));
                         self.follow(step, weight, wi, None, pdf, dimension);
@@ -283,7 +284,7 @@ impl PhongWave {
                 let weight = path.throughput * share;
                 self.follow(step, weight * reflectance, vertex.mirrored(), None, f32::INFINITY, dimension);
                 if reflectance < 1.0 {
-                    let wi = refract(vertex.wo, vertex.normal, eta, cos_t);
+                    let wi = refract(vertex.wo.into(), vertex.normal.into(), eta, cos_t).into();
                     // Radiance is squeezed into a narrower cone where light is slower: the factor η².
                     let weight = weight * ((1.0 - reflectance) * squeeze * squeeze);
                     self.follow(step, weight, wi, Some(interface), f32::INFINITY, dimension + 2);
@@ -353,7 +354,8 @@ mod tests {
         let axis = Vec3::new(0.48, -0.6, 0.64);
         for exponent in [0.0, 5.0, 80.0, 1e5] {
             let n = 4096;
-            let cosines = (0..n).map(|i| axis.dot(within_lobe(axis, exponent, Sampler::new(1, 0, 0, i).pair(0))));
+            let pair = |i| Sampler::new(1, 0, 0, i).pair(0).to_array();
+            let cosines = (0..n).map(|i| axis.dot(within_lobe(axis.into(), exponent, pair(i)).into()));
             // ∫ cos · (n + 1) / 2π · cosⁿ dω = (n + 1) / (n + 2).
             let mean = cosines.sum::<f32>() / n as f32;
             let expected = (exponent + 1.0) / (exponent + 2.0);

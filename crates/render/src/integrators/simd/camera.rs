@@ -3,9 +3,9 @@
 use crate::core::camera::Camera;
 use crate::core::filter::FilterSampler;
 use crate::sampling::SamplerLanes;
-use crate::sampling::warp_simd::uniform_disc;
+use crate::sampling::warp::uniform_disc;
 use crate::shading::paths::{PathBatch, PathLanes};
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch};
 use glam::{UVec2, Vec3};
 
 /// Pixels whose camera rays are wanted, in the order of the rays.
@@ -43,33 +43,24 @@ impl CameraRays<'_> {
 
 #[inline(always)]
 fn start<S: Simd>(s: S, lens: CameraRays, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
-    let Camera { eye, right, up, forward, tan_half_vfov, lens_radius, focus_distance, .. } = *lens.camera;
-    let size = lens.size.as_vec2();
+    let (camera, size) = (lens.camera, lens.size.as_vec2());
     let one = Float::splat(s, 1.0);
-    let (right, up) = (Vector::splat(s, right), Vector::splat(s, up));
-    let (eye, forward) = (Vector::splat(s, eye), Vector::splat(s, forward));
     for first in (0..pixels.local.len()).step_by(LANES) {
         let count = (pixels.local.len() - first).min(LANES);
         let mask = if count == LANES { Mask::MAX } else { (1 << count) - 1 };
         let (x, y) = (load_some(s, &pixels.x[first..]), load_some(s, &pixels.y[first..]));
         let sampler = if lens.even_samples {
-            SamplerLanes::of_pixels(s, lens.seed, [x, y], sample)
+            SamplerLanes::of_pixels(lens.seed, [x, y], sample)
         } else {
-            SamplerLanes::independent(s, lens.seed, [x, y], sample)
+            SamplerLanes::all_independent(lens.seed, [x, y], sample)
         };
         let [dx, dy] = lens.filter.sample_lanes(sampler.pair(0));
-        let (x, y) = (x.to_float() + dx, y.to_float() + dy);
-        let x = (x * 2.0 - size.x) / one.all(size.y) * tan_half_vfov;
-        let y = (one.all(size.y) - y * 2.0) / one.all(size.y) * tan_half_vfov;
-        let mut dir = forward + right * x + up * y;
-        let mut origin = eye;
-        if lens_radius > 0.0 {
-            let [px, py] = uniform_disc(sampler.pair(1));
-            let offset = (right * px + up * py).mul_all(lens_radius);
-            dir = dir - offset * (one / one.all(focus_distance));
-            origin = eye + offset;
-        }
-        let dir = dir.normalize();
+        let direction = camera.film_directions([x.to_float() + dx, y.to_float() + dy], size);
+        let (origin, dir) = if camera.lens_radius > 0.0 {
+            camera.through_lens(direction, uniform_disc(sampler.pair(1)))
+        } else {
+            (Vector::splat(s, camera.eye), direction.normalize())
+        };
         let path = PathLanes {
             throughput: Vector::splat(s, Vec3::ONE),
             pdf: one.all(f32::INFINITY),

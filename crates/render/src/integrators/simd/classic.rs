@@ -5,30 +5,30 @@
 //! depend on which hits share a register.
 
 use crate::integrators::phong::lobe::{
-    AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, DIRECT_ALREADY_SAMPLED, least_weight,
+    AMBIENT_SHARE, DIM_ENVIRONMENT, DIM_SHINY, DIRECT_ALREADY_SAMPLED, least_weight, lobe_pdf, within_lobe,
 };
 use crate::integrators::phong::shadow::Shadows;
 use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
 use crate::prepare::classic_table::{GLOSS, Inputs, MATTE, ROUGH};
 use crate::prepare::light::arrays::LightLanes;
+use crate::prepare::material_table::SCHLICK;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::{Sampler, SamplerLanes};
+use crate::shading::dielectric;
+use crate::shading::lights::power_heuristic;
 use crate::shading::medium::MediumSets;
+use crate::shading::metal;
 use crate::shading::paths::{PathBatch, PathLanes};
-use crate::shading::simd::bounce::mirrored;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{lanes_of, transmittance};
-use crate::shading::simd::lights::power_weight;
-use crate::shading::simd::metal::fresnel;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{
-    Bits, Float, InstructionSet, Kernel, LANES, Mask, Simd, Vector, dispatch, frame_around, power, select,
-    select_vector, sin_cos,
+    Bits, Float, InstructionSet, Kernel, LANES, Mask, Real, Simd, Vector, dispatch, select, select_vector,
 };
 use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 
 /// Hits on materials of one kind of a [`crate::prepare::classic_table::ClassicTable`], and where their light and their rays go on.
 pub(crate) struct ClassicGroup<'a> {
@@ -124,10 +124,10 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
         let (mut tint, mut exponent, mut wi) = (matte, zero, place.wo);
         if kind != MATTE {
             tint = color_of(s, &at, &table.shiny, row, &place);
-            let flags = Bits::gather(&table.flags, row);
-            tint = fresnel(flags, tint, place.normal.dot(place.wo)) * Float::gather(&table.shiny.weight, row);
+            let schlick = Bits::gather(&table.flags, row).has(SCHLICK);
+            tint = metal::tint(schlick, tint, place.normal.dot(place.wo)) * Float::gather(&table.shiny.weight, row);
             exponent = Float::gather(&table.exponent, row);
-            wi = mirrored(place.wo, place.normal);
+            wi = dielectric::reflect(place.wo, place.normal);
         }
         let gloss =
             (kind == GLOSS || kind == ROUGH).then_some(Gloss { tint, exponent, mirrored: wi, rough: kind == ROUGH });
@@ -161,7 +161,7 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
                     shadows.append(n_lights, found, [leaving, wi], zero.all(f32::INFINITY), slot, seen, wi, &media);
                 }
             } else if features.environment {
-                let mut around = tables.ambient.radiance_lanes(place.normal);
+                let mut around = tables.ambient.radiance(place.normal);
                 if features.glass {
                     let ior = iors(s, scene, sets, lit.mask, &media);
                     around = around * (ior * ior);
@@ -238,8 +238,7 @@ fn reflect<S: Simd>(
     if let Some(gloss) = &lit.gloss {
         let mut lobe = lobe_pdf(gloss.exponent, gloss.mirrored.dot(wi));
         if gloss.rough {
-            let one = pdf.all(1.0);
-            lobe = lobe * select(pdf.is_zero() | lobe.is_zero(), one, power_weight(lobe / pdf));
+            lobe = lobe * select(pdf.is_zero(), pdf.all(1.0), power_heuristic(pdf, lobe));
         }
         value = value + gloss.tint * lobe;
     }
@@ -272,20 +271,4 @@ fn ask_environment<S: Simd>(
         }
     }
     (found, Vector::from_arrays(s, &dir), Float::load(s, &pdf), Vector::from_arrays(s, &radiance))
-}
-
-/// See `phong/mod.rs`.
-#[inline(always)]
-fn lobe_pdf<S: Simd>(exponent: Float<S>, cos: Float<S>) -> Float<S> {
-    (exponent + 1.0) * (1.0 / TAU) * power(cos.at_least(0.0).at_most(1.0), exponent)
-}
-
-/// A unit direction a lane with density [`lobe_pdf`] about `axis`.
-#[inline(always)]
-fn within_lobe<S: Simd>(axis: Vector<S>, exponent: Float<S>, [u, v]: [Float<S>; 2]) -> Vector<S> {
-    let one = u.all(1.0);
-    let cos = power(one - u, one / (exponent + 1.0));
-    let sin = (one - cos * cos).at_least(0.0).sqrt();
-    let (sin_phi, cos_phi) = sin_cos(v * TAU);
-    Vector { x: sin * cos_phi, y: sin * sin_phi, z: cos }.to_world(&frame_around(axis)).normalize()
 }

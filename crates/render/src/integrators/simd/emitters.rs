@@ -2,11 +2,11 @@
 
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::simd::shade::KindHits;
+use crate::shading::lights::bounce_weight;
 use crate::shading::simd::lane_group::LaneGroup;
 use crate::shading::simd::lanes::{lanes_of, transmittance};
-use crate::shading::simd::lights::light_weight;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Simd, Vector, dispatch, select};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch, select};
 use glam::Vec3;
 
 /// Adds the light of hits on emitters, weighted against light sampling having found it.
@@ -45,12 +45,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
             let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
             let id = Bits::load(s, &id);
             let other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
-            let by_bounce = if techniques.mis {
-                light_weight(techniques, pdf, other)
-            } else {
-                select(other.is_positive(), pdf.all(0.0), pdf.all(1.0))
-            };
-            weight = select(known, by_bounce, weight);
+            weight = select(known, bounce_weight(techniques, pdf, other), weight);
         }
         if let Some(pass) = caustics {
             weight = lamp_weights(s, pass, &at, &place, weight);

@@ -1,12 +1,12 @@
 //! Rays that leave the scene, sixteen at a time, under skies that are no pictures.
 
-use crate::core::environment::Environment;
+use crate::core::environment::{Environment, sky_gradient};
 use crate::prepare::prepared::Prepared;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::PathBatch;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::lanes_of;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select_vector};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch};
 use glam::Vec3;
 
 /// Adds what the surroundings send along the rays of `order`; see [`Environment::radiance`].
@@ -34,12 +34,8 @@ fn misses<S: Simd>(s: S, scene: &Prepared, paths: &PathBatch, sets: &MediumSets,
             Environment::Black => return,
             Environment::Constant(light) => Vector::splat(s, *light),
             Environment::Gradient { zenith, horizon, ground } => {
-                let y = Float::gather(&paths.rays.dir_y, index);
-                let rest = -y + 1.0;
-                let share = -(rest * rest * rest) + 1.0;
-                let (low, high) = (Vector::splat(s, *horizon), Vector::splat(s, *zenith));
-                let above = low * (-share + 1.0) + high * share;
-                select_vector(y.is_negative(), Vector::splat(s, *ground), above)
+                let colors = [Vector::splat(s, *zenith), Vector::splat(s, *horizon), Vector::splat(s, *ground)];
+                sky_gradient(colors, Float::gather(&paths.rays.dir_y, index))
             }
             Environment::Image { .. } => {
                 let mut found = [[0.0; LANES]; 3];

@@ -7,16 +7,17 @@ use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::material_table::COATED;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dimensions::DIM_ROULETTE;
+use crate::shading::lights::light_weight;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{PathBatch, PathLanes, ShadowBatch};
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lane_group::{LaneGroup, iors};
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, MIRROR, lanes_of, transmittance};
-use crate::shading::simd::lights::{LightPoints, light_weight};
+use crate::shading::simd::lights::LightPoints;
 use crate::shading::simd::scatter::{eval, sample, surface_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_kdtree::HitBatch;
-use firstlight_simd::{Bits, Float, InstructionSet, LANES, Simd, Vector, dispatch, select, select_vector};
+use firstlight_simd::{Bits, Float, InstructionSet, LANES, Real, Simd, Vector, dispatch, select, select_vector};
 
 /// Hits of one kind of material, and where their light and their paths go on.
 pub(crate) struct KindHits<'a> {

@@ -3,7 +3,9 @@
 use crate::core::camera::Camera;
 use crate::core::material::Material;
 use crate::integrators::caustics::pass::CausticPass;
+use crate::integrators::caustics::weight::etendue_gain;
 use crate::prepare::casters::NO_CASTER;
+use crate::sampling::cosine_hemisphere_pdf;
 use crate::shading::bsdf::Scatter;
 use crate::shading::interface::MediumId;
 use crate::shading::mis_state::MisState;
@@ -12,9 +14,8 @@ use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, MIRROR, lanes_of};
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::{blend_at, lobe_at};
-use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
+use firstlight_simd::{Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
-use std::f32::consts::FRAC_1_PI;
 
 /// How the paths go on.
 pub(crate) struct BounceMisStates<'a, S: Simd> {
@@ -59,7 +60,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
                 let known = !ratio.is_nan() & go_on & reversible & !specular;
                 ratio * self.reverse_pdf::<KIND>(s, known) * along.abs() / (cos_o * bounce.pdf)
             };
-            select(specular, ratio / self.etendue_gain(cos_o, along), scattered)
+            select(specular, ratio / etendue_gain(normal, place.normal, wo, wi), scattered)
         };
         let ratio = select(reversible, ratio, lost);
         let ratios = ratio.to_array();
@@ -80,8 +81,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
         let Camera { forward, .. } = self.at.scene.camera;
         let cos_lens = -self.place.wo.dot(Vector::splat(s, forward));
         let distance2 = (self.place.position - self.at.ray_origin()).length_squared();
-        let scale = distance2 * self.pass.density_scale();
-        scale * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * self.bounce.pdf)
+        self.pass.join_ratio(distance2, cos_lens, cos_o, cos_i, self.bounce.pdf)
     }
 
     /// See [`crate::integrators::caustics`]: with which the surface would scatter the other way.
@@ -89,8 +89,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
     fn reverse_pdf<const KIND: usize>(&self, s: S, mask: Mask) -> Float<S> {
         let Self { at, place, bounce, .. } = *self;
         if KIND == DIFFUSE {
-            let cos = place.normal.dot(place.wo);
-            return select(cos.is_positive(), cos * FRAC_1_PI, cos.all(0.0));
+            return cosine_hemisphere_pdf(place.normal.dot(place.wo));
         }
         let mut pdfs = [0.0; LANES];
         if mask != 0 {
@@ -108,13 +107,5 @@ impl<S: Simd> BounceMisStates<'_, S> {
             }
         }
         Float::load(s, &pdfs)
-    }
-
-    /// What a specular surface does to the étendue; 1 where the true normal shades.
-    #[inline(always)]
-    fn etendue_gain(&self, cos_o: Float<S>, cos_i: Float<S>) -> Float<S> {
-        let Self { place, bounce, .. } = *self;
-        let (wo, wi) = (place.normal.dot(place.wo), place.normal.dot(bounce.wi));
-        ((cos_i * wo) / (cos_o * wi)).abs()
     }
 }

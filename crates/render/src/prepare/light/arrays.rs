@@ -4,13 +4,14 @@
 
 use crate::core::material::ColorInput;
 use crate::prepare::light::emitter::Light;
-use crate::prepare::light::shape::{CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, sample_sphere};
-use crate::prepare::light::triangle_simd::TriangleLanes;
-use crate::sampling::offset_simd::offset_origin;
-use crate::sampling::warp_simd::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
-use firstlight_kdtree::geometry::robust::gamma;
+use crate::prepare::light::shape::{
+    CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, cos_at_center, pdf_by_area, sample_sphere,
+};
+use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc, uniform_triangle};
+use crate::sampling::{SphericalQuad, SphericalTriangle};
+use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{
-    Bits, Float, LANES, Mask, Simd, Vector, atan2, frame_around, padded, select, select_vector, sin_cos,
+    Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, frame_around, padded, select, select_vector,
 };
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -128,7 +129,7 @@ impl LightArrays {
         let around = n.x + n.y + n.z;
         let lift = (n.dot(center.abs()) + around * radius) * gamma(6) + around * distance * gamma(16);
         let ratio = distance / radius;
-        let target = offset_origin(center - wi * radius, lift, -wi);
+        let target = offset_along(center - wi * radius, lift, -wi);
         LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi }
     }
 
@@ -181,18 +182,18 @@ impl LightArrays {
         if self.has_quads || self.has_triangles {
             let normal = Vector::gather(&self.normal, id);
             let cos = -wi.dot(normal);
-            let by_area = distance * distance / (cos * area);
+            let by_area = pdf_by_area(distance, cos, area);
             pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
             if by_angle && self.has_triangles {
                 let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
-                let angle = TriangleLanes::new(relative, e1, e2).solid_angle;
+                let angle = SphericalTriangle::new(relative, e1, e2).solid_angle();
                 pdf = select(flags.has(TRIANGLE) & large_enough(angle), one / angle, pdf);
             }
             if by_angle && self.has_quads {
                 let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
                 let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
-                let (x, y, height) = (relative.dot(unit_u), relative.dot(unit_v), relative.dot(normal));
-                let angle = QuadLanes::new(x, y, height, length_u, length_v, area).solid_angle;
+                let corner = Vector { x: relative.dot(unit_u), y: relative.dot(unit_v), z: relative.dot(normal) };
+                let angle = SphericalQuad::new(corner, [length_u, length_v], area).solid_angle();
                 pdf = select(flags.has(RECTANGLE) & one.all(SMALL_SOLID_ANGLE).le(angle), one / angle, pdf);
             }
         }
@@ -203,7 +204,7 @@ impl LightArrays {
                 cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
             } else {
                 let cos = wi.dot(relative - wi * distance) / radius;
-                select(cos.is_positive(), distance * distance / (cos * area), zero)
+                select(cos.is_positive(), pdf_by_area(distance, cos, area), zero)
             };
             pdf = select(flags.has(SPHERE), select(r2.lt(distance2), of_sphere, zero), pdf);
         }
@@ -230,9 +231,10 @@ impl LightArrays {
         let mut uv = u;
         let (mut angle, mut solid_angle) = (0, area);
         if by_angle {
-            let quad = QuadLanes::new(relative.dot(unit_u), relative.dot(unit_v), height, length_u, length_v, area);
+            let corner = Vector { x: relative.dot(unit_u), y: relative.dot(unit_v), z: height };
+            let quad = SphericalQuad::new(corner, [length_u, length_v], area);
             let rectangle = Bits::gather(&self.flags, id).has(RECTANGLE);
-            solid_angle = quad.solid_angle;
+            solid_angle = quad.solid_angle();
             angle = rectangle & zero.all(SMALL_SOLID_ANGLE).le(solid_angle);
             if angle & seen != 0 {
                 let [x, y] = quad.sample(u);
@@ -244,13 +246,13 @@ impl LightArrays {
         let distance = offset.length();
         let wi = offset * (distance.all(1.0) / distance);
         let cos = -wi.dot(normal);
-        let by_area = distance * distance / (cos * area);
+        let by_area = pdf_by_area(distance, cos, area);
         let pdf = select(angle, zero.all(1.0) / solid_angle, by_area);
         let found = seen & zero.lt(distance) & (angle | zero.lt(cos));
         // The rounding of the point, and what the kernel loses over the distance.
         let lift =
             Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
-        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+        LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi }
     }
 
     #[inline(always)]
@@ -268,14 +270,11 @@ impl LightArrays {
         let relative = first - position;
         let (zero, one) = (area.all(0.0), area.all(1.0));
         let mut found = mask & relative.dot(normal).lt(zero);
-        // See `crate::sampling::uniform_triangle`.
-        let halves = [u[0] * 0.5, u[1] * 0.5];
-        let below = u[0].lt(u[1]);
-        let mut weights = [select(below, halves[0], u[0] - halves[1]), select(below, u[1] - halves[0], halves[1])];
+        let mut weights = uniform_triangle(u);
         let (mut angle, mut solid_angle) = (0, one);
         if by_angle {
-            let triangle = TriangleLanes::new(relative, e1, e2);
-            solid_angle = triangle.solid_angle;
+            let triangle = SphericalTriangle::new(relative, e1, e2);
+            solid_angle = triangle.solid_angle();
             angle = large_enough(solid_angle);
             if angle & found != 0 {
                 let (dir, seen) = triangle.sample(u);
@@ -295,11 +294,11 @@ impl LightArrays {
         let distance = offset.length();
         let wi = offset * (one / distance);
         let cos = -wi.dot(normal);
-        let pdf = select(angle, one / solid_angle, distance * distance / (cos * area));
+        let pdf = select(angle, one / solid_angle, pdf_by_area(distance, cos, area));
         let found = found & zero.lt(distance) & (angle | (zero.lt(cos) & zero.lt(area)));
         let lift =
             Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
-        LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi }
+        LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi }
     }
 
     #[inline(always)]
@@ -325,8 +324,7 @@ impl LightArrays {
             let one_minus_cos = disc2.at_most(1.0) * one_minus_cos_max;
             let sin2 = (one_minus_cos * (-one_minus_cos + 2.0)).at_least(0.0);
             let cos = one - one_minus_cos;
-            let along = sin2 / sin2_max;
-            let cos_alpha = (sin2 / sin2_max.sqrt() + cos * (one - along).at_least(0.0).sqrt()).at_most(1.0);
+            let cos_alpha = cos_at_center(sin2, cos, sin2_max);
             let sin_alpha = (one - cos_alpha * cos_alpha).at_least(0.0).sqrt();
             // The direction on the disc, unit; any in the middle.
             let middle = disc2.is_zero();
@@ -336,7 +334,7 @@ impl LightArrays {
             (local.to_world(&axes), one_minus_cos_max)
         } else {
             let z = one - u[0] * 2.0;
-            let (sin, cos) = sin_cos(u[1] * TAU);
+            let (sin, cos) = (u[1] * TAU).sin_cos();
             let r = (one - z * z).at_least(0.0).sqrt();
             (Vector { x: r * cos, y: r * sin, z }, zero)
         };
@@ -357,7 +355,7 @@ impl LightArrays {
         let n = normal.abs();
         let around = n.x + n.y + n.z;
         let lift = (n.dot(size) + around * radius) * gamma(6) + around * distance * gamma(16);
-        let lanes = LightLanes { found, target: offset_origin(point, lift, normal), wi, pdf, radiance: wi };
+        let lanes = LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi };
         let close = found & distance2.lt(r2 * CLOSE);
         if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
     }
@@ -413,92 +411,4 @@ fn spheres_close_by<S: Simd>(
     lanes.wi = Vector::from_arrays(s, &wi);
     lanes.pdf = Float::load(s, &pdf);
     lanes
-}
-
-/// See [`crate::sampling::SphericalQuad`].
-struct QuadLanes<S: Simd> {
-    x0: Float<S>,
-    y0: Float<S>,
-    z0: Float<S>,
-    x1: Float<S>,
-    y1: Float<S>,
-    solid_angle: Float<S>,
-}
-
-impl<S: Simd> QuadLanes<S> {
-    #[inline(always)]
-    pub fn new(
-        x0: Float<S>,
-        y0: Float<S>,
-        height: Float<S>,
-        length_u: Float<S>,
-        length_v: Float<S>,
-        area: Float<S>,
-    ) -> Self {
-        let z0 = -height.abs();
-        let (x1, y1) = (x0 + length_u, y0 + length_v);
-        let unit = x0.all(1.0) / (x0 * x0 + y0 * y0 + z0 * z0).sqrt().at_least(f32::MIN_POSITIVE);
-        let (ax, ay, bx, by, z) = (x0 * unit, y0 * unit, x1 * unit, y1 * unit, z0 * unit);
-        let corner = [
-            Vector { x: ax, y: ay, z },
-            Vector { x: bx, y: ay, z },
-            Vector { x: bx, y: by, z },
-            Vector { x: ax, y: by, z },
-        ];
-        let length = [corner[0].length(), corner[1].length(), corner[2].length(), corner[3].length()];
-        let triple = area * unit * unit * -z;
-        let first = half(&corner, &length, [0, 1, 2]);
-        let second = half(&corner, &length, [0, 2, 3]);
-        let solid_angle = atan2(triple * (first + second), first * second - triple * triple) * 2.0;
-        Self { x0, y0, z0, x1, y1, solid_angle }
-    }
-
-    #[inline(always)]
-    pub fn sample(&self, [u, v]: [Float<S>; 2]) -> [Float<S>; 2] {
-        let Self { x0, y0, z0, x1, y1, solid_angle } = *self;
-        let one = x0.all(1.0);
-        let z2 = z0 * z0;
-        let (h0, r0) = height(z2, y0);
-        let (b1, r1) = height(z2, y1);
-        let (h3, r3) = height(z2, x0);
-        let (b0, n3) = (-h0, -h3);
-        let (cos_2, sin_2) = (-(b1 * n3), (r1 + b1 * b1 * r3).sqrt());
-        let (cos_3, sin_3) = (-(n3 * b0), (r0 + b0 * b0 * r3).sqrt());
-        let (cos_sum, sin_sum) = (cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3);
-        let (sin_part, cos_part) = sin_cos(u * solid_angle);
-        let cos_au = cos_part * cos_sum + sin_part * sin_sum;
-        let sin_au = sin_part * cos_sum - cos_part * sin_sum;
-        let product = cos_au * b0;
-        let (lack_0, lack_1) = (r0 / (b0.abs() + 1.0), r1 / (b1.abs() + 1.0));
-        let lack_au = sin_au * sin_au / (cos_au.abs() + 1.0);
-        let lacking = (lack_1 - lack_0 - lack_au + lack_0 * lack_au) * one.copysign(b1);
-        let difference = select((product * b1).is_positive(), lacking, product - b1);
-        let fu = difference / sin_au;
-        let xu = (-z0).copysign(fu) / (fu * fu - r0).at_least(f32::MIN_POSITIVE).sqrt();
-        // NaN becomes the lower end.
-        let xu = xu.max(x0).min(x1);
-        let d2 = xu * xu + z2;
-        let h0 = y0 / (d2 + y0 * y0).sqrt();
-        let h1 = y1 / (d2 + y1 * y1).sqrt();
-        let hv = h0 + v * (h1 - h0);
-        let hv2 = hv * hv;
-        let yv = hv * d2.sqrt() / (one - hv2).sqrt();
-        let yv = select(hv2.lt(one.all(1.0 - 1e-6)), yv, y1);
-        [(xu - x0) / (x1 - x0), (yv.max(y0).min(y1) - y0) / (y1 - y0)]
-    }
-}
-
-/// Denominator of the solid angle of half the rectangle.
-#[inline(always)]
-fn half<S: Simd>(corner: &[Vector<S>; 4], length: &[Float<S>; 4], [p, q, r]: [usize; 3]) -> Float<S> {
-    let (a, b, c) = (corner[p], corner[q], corner[r]);
-    let (la, lb, lc) = (length[p], length[q], length[r]);
-    la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
-}
-
-/// Height of an edge plane's normal, and the square of what it lacks to 1.
-#[inline(always)]
-fn height<S: Simd>(z2: Float<S>, y: Float<S>) -> (Float<S>, Float<S>) {
-    let h2 = z2 + y * y;
-    (y / h2.sqrt(), z2 / h2)
 }

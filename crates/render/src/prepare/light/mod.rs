@@ -10,7 +10,6 @@ mod selection;
 pub(crate) mod shape;
 mod tree;
 mod tree_simd;
-mod triangle_simd;
 
 use crate::core::color::luminance;
 use crate::core::material::{ColorInput, Emission};

@@ -5,7 +5,7 @@ use crate::prepare::light::LightTable;
 use crate::prepare::light::arrays::{LightArrays, LightLanes, POINT};
 use crate::prepare::light::selection::MAX_ESTIMATED;
 use crate::sampling::SamplerLanes;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, select};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select};
 use glam::Vec3;
 
 impl LightTable {

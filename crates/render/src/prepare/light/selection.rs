@@ -6,7 +6,7 @@ use crate::prepare::light::shape::LightShape;
 use crate::prepare::light::tree::LightTree;
 use crate::prepare::light::tree_simd::LightTreeArrays;
 use crate::sampling::AliasTable;
-use firstlight_simd::{Float, Simd, Vector, select};
+use firstlight_simd::{Float, Real, Simd, Vector, Vector3, select};
 use glam::Vec3;
 
 /// Up to this many lights their contributions are estimated one by one; more would cost more than they save.
@@ -131,7 +131,7 @@ impl LightSelection {
         let mut estimates = [0.0; MAX_ESTIMATED];
         let mut sum = 0.0;
         for (estimate, bounds) in estimates.iter_mut().zip(&self.bounds) {
-            *estimate = bounds.estimate(position, normal);
+            *estimate = bounds.estimate_one(position, normal);
             sum += *estimate;
         }
         (estimates, sum)
@@ -155,49 +155,33 @@ impl LightBounds {
         Self { center, radius, normal, intensity: light.mean_radiance * projected }
     }
 
-    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
     #[inline]
-    fn estimate(&self, position: Vec3, normal: Vec3) -> f32 {
-        let offset = self.center - position;
-        let distance2 = offset.length_squared();
-        let r2 = self.radius * self.radius;
-        if distance2 <= r2 {
-            // Within the bounds of the light anything can happen.
-            return self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE);
-        }
-        let distance = distance2.sqrt();
-        let wi = offset / distance;
-        let sin_u = self.radius / distance;
-        let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
-        // The largest cosine of any direction to the bounding sphere, a little more so that rounding hides none.
-        let bound = |cos: f32| {
-            if cos >= cos_u {
-                1.0
-            } else {
-                let sin = (1.0 - cos * cos).max(0.0).sqrt();
-                (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).clamp(0.0, 1.0)
-            }
-        };
-        let receiver = bound(wi.dot(normal));
-        let emitter = if self.normal == Vec3::ZERO { 1.0 } else { bound(-wi.dot(self.normal)) };
-        self.intensity * receiver * emitter / distance2
+    fn estimate_one(&self, position: Vec3, normal: Vec3) -> f32 {
+        let offset = Vector3::from(self.center - position);
+        self.estimate(offset.length_squared(), offset / offset.length(), normal.into())
     }
 
-    /// The same for sixteen points.
+    /// The same from sixteen points.
     #[inline(always)]
     pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
-        let s = position.x.s;
-        let (r2, one) = (self.radius * self.radius, Float::splat(s, 1.0));
-        let offset = Vector::splat(s, self.center) - position;
+        let offset = Vector::in_all(position.x, self.center) - position;
         let distance2 = offset.length_squared();
-        let distance = distance2.sqrt();
-        let wi = offset * (one / distance);
+        self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), normal)
+    }
+
+    /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
+    ///
+    /// - `distance2`: to the centre, squared; `wi`: unit, to the centre; `normal`: unit, of the surface.
+    #[inline(always)]
+    fn estimate<R: Real>(&self, distance2: R, wi: Vector3<R>, normal: Vector3<R>) -> R {
+        let (r2, one, distance) = (self.radius * self.radius, distance2.all(1.0), distance2.sqrt());
         let sin_u = one.all(self.radius) / distance;
         let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
         let mut estimate = largest_cosine(wi.dot(normal), cos_u, sin_u) * self.intensity;
         if self.normal != Vec3::ZERO {
-            estimate = estimate * largest_cosine(-wi.dot(Vector::splat(s, self.normal)), cos_u, sin_u);
+            estimate = estimate * largest_cosine(-wi.dot(Vector3::in_all(one, self.normal)), cos_u, sin_u);
         }
+        // Within the bounds of the light anything can happen.
         let within = one.all(self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE));
         select(distance2.le(one.all(r2)), within, estimate / distance2)
     }
@@ -205,7 +189,7 @@ impl LightBounds {
 
 /// The largest cosine to any direction within the cone, a little more so that rounding hides none.
 #[inline(always)]
-fn largest_cosine<S: Simd>(cos: Float<S>, cos_u: Float<S>, sin_u: Float<S>) -> Float<S> {
+fn largest_cosine<R: Real>(cos: R, cos_u: R, sin_u: R) -> R {
     let one = cos.all(1.0);
     let sin = (one - cos * cos).at_least(0.0).sqrt();
     let bound = (cos * cos_u + sin * sin_u + 4.0 * f32::EPSILON).at_least(0.0).at_most(1.0);

@@ -4,6 +4,7 @@ use crate::sampling::{
     SphericalQuad, SphericalTriangle, cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle,
 };
 use firstlight_kdtree::geometry::{Frame, robust};
+use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
 /// The surface of a light; all emit on their front alone.
@@ -67,6 +68,16 @@ pub(crate) const SMALL_SOLID_ANGLE: f32 = 1e-3;
 /// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
 pub(crate) const LARGE_SOLID_ANGLE: f32 = 6.0;
 
+impl Rectangle {
+    /// - `corner`: relative to the point that it is seen from.
+    #[inline]
+    fn seen(self, corner: Vec3) -> SphericalQuad<f32> {
+        let Self { unit_u, unit_v, length_u, length_v } = self;
+        let corner = Vec3::new(corner.dot(unit_u), corner.dot(unit_v), corner.dot(unit_u.cross(unit_v)));
+        SphericalQuad::new(corner.into(), [length_u, length_v], length_u * length_v)
+    }
+}
+
 impl LightShape {
     pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Self {
         let cross = edge_u.cross(edge_v);
@@ -113,7 +124,7 @@ impl LightShape {
                 uv: u,
             },
             Self::Triangle { vertices: [a, b, c], normal, .. } => {
-                let weights = uniform_triangle(u);
+                let weights = Vec2::from(uniform_triangle(u.to_array()));
                 SurfaceOfLight {
                     position: *a + weights.x * (*b - *a) + weights.y * (*c - *a),
                     error: robust::gamma(7) * (a.abs() + b.abs() + c.abs()),
@@ -153,9 +164,9 @@ impl LightShape {
                 }
                 let by_angle = rectangle
                     .filter(|_| by_angle)
-                    .map(|r| SphericalQuad::new(relative, r.unit_u, r.length_u, r.unit_v, r.length_v))
+                    .map(|r| r.seen(relative))
                     .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
-                let uv = by_angle.map_or(u, |quad| quad.sample(u));
+                let uv = by_angle.map_or(u, |quad| quad.sample(u.to_array()).into());
                 let point = corner + uv.x * edge_u + uv.y * edge_v;
                 let (wi, distance) = direction(position, point)?;
                 let pdf = match by_angle {
@@ -175,7 +186,11 @@ impl LightShape {
                 let weights = match by_angle {
                     Some(triangle) => {
                         let (e1, e2) = (b - a, c - a);
-                        let d = triangle.sample(u)?;
+                        let (d, seen) = triangle.sample(u.to_array());
+                        if !seen {
+                            return None;
+                        }
+                        let d = Vec3::from(d);
                         // Where the direction meets the plane (Möller and Trumbore 1997).
                         let p = d.cross(e2);
                         let determinant = p.dot(e1);
@@ -185,7 +200,7 @@ impl LightShape {
                         let over = (b1 + b2).max(1.0);
                         Vec2::new(b1, b2) / over
                     }
-                    None => uniform_triangle(u),
+                    None => uniform_triangle(u.to_array()).into(),
                 };
                 let point = a + weights.x * (b - a) + weights.y * (c - a);
                 let (wi, distance) = direction(position, point)?;
@@ -218,7 +233,7 @@ impl LightShape {
             Self::Quad { corner, normal, area, rectangle, .. } => {
                 let by_angle = rectangle
                     .filter(|_| by_angle)
-                    .map(|r| SphericalQuad::new(corner - position, r.unit_u, r.length_u, r.unit_v, r.length_v))
+                    .map(|r| r.seen(corner - position))
                     .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
                 match by_angle {
                     Some(quad) => 1.0 / quad.solid_angle(),
@@ -246,16 +261,15 @@ pub(crate) fn sample_sphere(center: Vec3, radius: f32, position: Vec3, u: Vec2) 
     }
     let sin2_max = r2 / distance2;
     let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
-    let (local, one_minus_cos) = uniform_cone(u, one_minus_cos_max);
+    let (local, one_minus_cos) = uniform_cone(u.to_array(), one_minus_cos_max);
+    let local = Vec3::from(local);
     let frame = Frame::around(to_center / distance2.sqrt());
     if distance2 < CLOSE * r2 {
         return Some(sphere_from_close_by(center, radius, position, frame.to_world(local), one_minus_cos_max));
     }
-    // The angle at the centre that belongs to the angle at the shading point (Pharr et al., section 6.2.4), written
-    // so that nothing cancels for a sphere of few pixels.
     let sin2 = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0);
     let cos = 1.0 - one_minus_cos;
-    let cos_alpha = (sin2 / sin2_max.sqrt() + cos * (1.0 - sin2 / sin2_max).max(0.0).sqrt()).min(1.0);
+    let cos_alpha = cos_at_center(sin2, cos, sin2_max);
     let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
     let around = local.truncate().normalize_or(Vec2::X);
     let normal = frame.to_world((around * sin_alpha).extend(-cos_alpha));
@@ -361,12 +375,30 @@ fn direction(from: Vec3, to: Vec3) -> Option<(Vec3, f32)> {
 #[inline]
 fn area_pdf(distance: f32, wi: Vec3, normal: Vec3, area: f32) -> Option<f32> {
     let cos = -wi.dot(normal);
-    (cos > 0.0 && area > 0.0).then(|| distance * distance / (cos * area))
+    (cos > 0.0 && area > 0.0).then(|| pdf_by_area(distance, cos, area))
+}
+
+/// Per steradian, of points that are even over an area.
+///
+/// - `distance`: metres; `cos`: at the light; `area`: square metres.
+#[inline(always)]
+pub(crate) fn pdf_by_area<R: Real>(distance: R, cos: R, area: R) -> R {
+    distance * distance / (cos * area)
+}
+
+/// Cosine of the angle at the centre of a sphere between the point that is seen and the one that looks (Pharr et al., section
+/// 6.2.4), written so that nothing cancels for a sphere of few pixels.
+///
+/// - `sin2`, `cos`: of the angle at the one that looks; `sin2_max`: of that of the rim.
+#[inline(always)]
+pub(crate) fn cos_at_center<R: Real>(sin2: R, cos: R, sin2_max: R) -> R {
+    let rest = (cos.all(1.0) - sin2 / sin2_max).at_least(0.0);
+    (sin2 / sin2_max.sqrt() + cos * rest.sqrt()).at_most(1.0)
 }
 
 #[inline]
-fn spherical_triangle(relative: [Vec3; 3]) -> Option<SphericalTriangle> {
-    let triangle = SphericalTriangle::new(relative);
+fn spherical_triangle([a, b, c]: [Vec3; 3]) -> Option<SphericalTriangle<f32>> {
+    let triangle = SphericalTriangle::new(a.into(), (b - a).into(), (c - a).into());
     (SMALL_SOLID_ANGLE..=LARGE_SOLID_ANGLE).contains(&triangle.solid_angle()).then_some(triangle)
 }
 

@@ -9,6 +9,7 @@
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
 use firstlight_kdtree::geometry::Aabb;
+use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -148,24 +149,44 @@ impl LightNode {
         }
     }
 
+    /// See [`NodeBound::irradiance`].
+    #[inline]
+    fn bound(&self, position: Vec3, normal: Vec3) -> f32 {
+        let Self { center, radius, axis, widening, power, .. } = *self;
+        let bound = NodeBound { offset: (center - position).into(), radius, axis: axis.into(), widening, power };
+        bound.irradiance(normal.into())
+    }
+}
+
+/// A node, or sixteen, as seen from a point.
+pub(crate) struct NodeBound<R> {
+    /// From the point to the centre.
+    pub offset: Vector3<R>,
+    pub radius: R,
+    pub axis: Vector3<R>,
+    pub widening: R,
+    pub power: R,
+}
+
+impl<R: Real> NodeBound<R> {
     /// About the largest irradiance that the lights can cause, never zero where they can cause any.
     ///
     /// It is asked for twice a level, so it is made of one root and no other angle: the cosine of the largest lean of a
     /// ball is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
-    #[inline]
-    fn bound(&self, position: Vec3, normal: Vec3) -> f32 {
-        let offset = self.center - position;
-        let (distance2, r2) = (offset.length_squared(), self.radius * self.radius);
-        if distance2 <= r2 {
-            // Within the ball anything can happen; on average the lights are about a radius away.
-            return self.power / r2.max(f32::MIN_POSITIVE);
-        }
-        let inv_distance = 1.0 / distance2.sqrt();
+    #[inline(always)]
+    pub fn irradiance(self, normal: Vector3<R>) -> R {
+        let Self { offset, radius, axis, widening, power } = self;
+        let (distance2, r2) = (offset.length_squared(), radius * radius);
+        let inv_distance = radius.all(1.0) / distance2.sqrt();
         // A little more, so that rounding hides nothing.
         let slack = 16.0 * f32::EPSILON;
-        let receiver = (offset.dot(normal) + self.radius) * inv_distance + slack;
-        let emitter = (self.radius - offset.dot(self.axis)) * inv_distance + self.widening + slack;
-        self.power * receiver.clamp(0.0, 1.0) * emitter.clamp(0.0, 1.0) * (inv_distance * inv_distance)
+        let receiver = (offset.dot(normal) + radius) * inv_distance + slack;
+        let emitter = (radius - offset.dot(axis)) * inv_distance + widening + slack;
+        let receiver = receiver.at_least(0.0).at_most(1.0);
+        let emitter = emitter.at_least(0.0).at_most(1.0);
+        let outside = power * receiver * emitter * (inv_distance * inv_distance);
+        // Within the ball anything can happen; on average the lights are about a radius away.
+        select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
     }
 }
 

@@ -3,8 +3,8 @@
 //! The numbers are those of the scalar walk, bit for bit. Nodes are numbered by level here: the first levels, which all
 //! lanes pass, fit into registers.
 
-use crate::prepare::light::tree::{LEAF, LightTree};
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, padded, select};
+use crate::prepare::light::tree::{LEAF, LightTree, NodeBound};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, Word, padded, select};
 
 #[derive(Debug, Default)]
 pub(crate) struct LightTreeArrays {
@@ -145,21 +145,17 @@ impl Rows {
         }
     }
 
-    /// See `LightNode::bound` of the tree.
+    /// See [`NodeBound::irradiance`].
     #[inline(always)]
     fn bounds<S: Simd>(&self, node: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
-        let offset = Vector::gather(&self.center, node) - position;
-        let (radius, power) = (Float::gather(&self.radius, node), Float::gather(&self.power, node));
-        let (distance2, r2) = (offset.length_squared(), radius * radius);
-        let inv_distance = radius.all(1.0) / distance2.sqrt();
-        let slack = 16.0 * f32::EPSILON;
-        let receiver = (offset.dot(normal) + radius) * inv_distance + slack;
-        let facing = offset.dot(Vector::gather(&self.axis, node));
-        let emitter = (radius - facing) * inv_distance + Float::gather(&self.widening, node) + slack;
-        let receiver = receiver.at_least(0.0).at_most(1.0);
-        let emitter = emitter.at_least(0.0).at_most(1.0);
-        let outside = power * receiver * emitter * (inv_distance * inv_distance);
-        select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
+        let bound = NodeBound {
+            offset: Vector::gather(&self.center, node) - position,
+            radius: Float::gather(&self.radius, node),
+            axis: Vector::gather(&self.axis, node),
+            widening: Float::gather(&self.widening, node),
+            power: Float::gather(&self.power, node),
+        };
+        bound.irradiance(normal)
     }
 
     /// Where open lanes go on.

@@ -25,8 +25,3 @@ pub(crate) fn colors_of<S: Simd>(s: S, at: &HitGroup<S>, place: &SurfaceLanes<S>
     let textured = at.mask & Bits::gather(&table.flags, row).has(TEXTURED);
     looked_up(s, at.scene, &table.inputs, row, textured, place, color)
 }
-
-#[inline(always)]
-pub(crate) fn mirrored<S: Simd>(wo: Vector<S>, normal: Vector<S>) -> Vector<S> {
-    (normal * (normal.dot(wo) * 2.0) - wo).normalize()
-}

@@ -3,13 +3,16 @@
 //! The formulas are those of [`crate::shading::bsdf::Blend`]: light sampling asks both parts, a bounce is chosen from one
 //! and weighted over both.
 
-use crate::sampling::warp_simd::cosine_hemisphere;
-use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
+use crate::core::color::luminance_of;
+use crate::sampling::cosine_hemisphere_pdf;
+use crate::sampling::warp::cosine_hemisphere;
+use crate::shading::dielectric::reflect;
+use crate::shading::metal::Metal;
+use crate::shading::simd::bounce::{Bounce, colors_of};
 use crate::shading::simd::lanes::{DIFFUSE, METAL, MIRROR};
-use crate::shading::simd::metal::MetalLanes;
+use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
-use firstlight_simd::{Bits, Float, Mask, Simd, Vector, frame_around, select, select_vector, two};
-use std::f32::consts::FRAC_1_PI;
+use firstlight_simd::{Bits, Float, Mask, Real, Simd, Vector, frame_around, select, select_vector, two};
 
 /// The parts of the surface of each lane, by what they do; of each kind there is one at most.
 pub(crate) struct Coat<S: Simd> {
@@ -17,7 +20,7 @@ pub(crate) struct Coat<S: Simd> {
     rough: CoatPart<S>,
     mirror: CoatPart<S>,
     /// The rough parts; `None` where no lane has one.
-    metal: Option<MetalLanes<S>>,
+    metal: Option<Metal<Float<S>>>,
     /// In the order of choice.
     kinds: [Bits<S>; 2],
     pmfs: [Float<S>; 2],
@@ -43,7 +46,7 @@ impl<S: Simd> Coat<S> {
         let kinds = two!(|k| Bits::gather(&table.kinds.of_material, rows[k]));
         let colors = two!(|k| colors_of(s, at, place, rows[k]));
         // Chosen by what they reflect.
-        let strengths = two!(|k| luminance(colors[k]) * weights[k]);
+        let strengths = two!(|k| luminance_of(colors[k]) * weights[k]);
         let sum = strengths[0] + strengths[1];
         let pmfs = two!(|k| select(sum.is_positive(), strengths[k] / sum, sum.all(0.5)));
         let all = CoatParts { kinds, colors, weights, pmfs };
@@ -55,7 +58,7 @@ impl<S: Simd> Coat<S> {
             let row = Bits { s, v: s.select_u(first, rows[0].v, rows[1].v) };
             let alpha = select(rough.here, Float::gather(&table.alpha, row), Float::splat(s, 1.0));
             let flags = Bits::gather(&table.flags, row);
-            metal = Some(MetalLanes::new(s, rough.here, place.normal, place.wo, alpha, rough.color, flags));
+            metal = Some(metals(s, rough.here, place.normal, place.wo, alpha, rough.color, flags));
         }
         Self { matte, rough, mirror, metal, kinds, pmfs }
     }
@@ -70,8 +73,8 @@ impl<S: Simd> Coat<S> {
     #[inline(always)]
     pub fn eval(&self, normal: Vector<S>, wi: Vector<S>) -> (Vector<S>, Float<S>) {
         let cos = normal.dot(wi);
-        let (above, zero) = (cos.is_positive(), cos.all(0.0));
-        let of_matte = select(above & self.matte.here, cos * FRAC_1_PI, zero);
+        let above = cos.is_positive();
+        let of_matte = select(self.matte.here, cosine_hemisphere_pdf(cos), cos.all(0.0));
         let mut value = self.matte.color * of_matte * self.matte.weight;
         let mut pdf = of_matte * self.matte.pmf;
         if let Some(metal) = &self.metal {
@@ -110,7 +113,7 @@ impl<S: Simd> Coat<S> {
         let mut weight = Vector { x: value.x / pdf, y: value.y / pdf, z: value.z / pdf };
         if mirror != 0 {
             go_on |= mirror;
-            wi = select_vector(mirror, mirrored(place.wo, place.normal), wi);
+            wi = select_vector(mirror, reflect(place.wo, place.normal), wi);
             weight = select_vector(mirror, self.mirror.color * (self.mirror.weight / self.mirror.pmf), weight);
             pdf = select(mirror, pdf.all(f32::INFINITY), pdf);
         }
@@ -137,10 +140,4 @@ impl<S: Simd> CoatParts<S> {
             pmf: select(first, self.pmfs[0], self.pmfs[1]),
         }
     }
-}
-
-/// See [`crate::core::color::luminance`].
-#[inline(always)]
-fn luminance<S: Simd>(color: Vector<S>) -> Float<S> {
-    color.x * 0.2126 + color.y * 0.7152 + color.z * 0.0722
 }

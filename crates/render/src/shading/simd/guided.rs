@@ -8,7 +8,7 @@ use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::scatter::{SurfaceScatter, eval};
 use crate::shading::simd::surface::SurfaceLanes;
-use firstlight_simd::{Simd, Vector, select, select_vector};
+use firstlight_simd::{Real, Simd, Vector, select, select_vector};
 use glam::Vec2;
 
 impl HintLanes<'_> {

@@ -1,8 +1,9 @@
 //! Hints of where gathered light comes from, for sixteen surfaces; see [`crate::shading::guided::Guided`] for one.
 
-use crate::prepare::guide::{Guide, Hints, SHARE as GUIDED_SHARE};
+use crate::prepare::guide::{Guide, Hints};
 use crate::sampling::SamplerLanes;
 use crate::shading::dimensions::DIM_LOBE;
+use crate::shading::guided::{mixed_pdf, rest_of_choice};
 use crate::shading::mis_state::MisState;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
@@ -60,15 +61,14 @@ impl<'a> HintLanes<'a> {
                 hinted[lane] = hints.pdf_lanes(s, vec3_of(&directions, lane));
             }
         }
-        select(self.told, pdf + (Float::load(s, &hinted) - pdf) * GUIDED_SHARE, pdf)
+        select(self.told, mixed_pdf(pdf, Float::load(s, &hinted)), pdf)
     }
 
     /// The number that chooses a part of a surface: what is left of it where the choice was not to follow a hint.
     #[inline(always)]
     pub fn u_lobe<S: Simd>(&self, sampler: &SamplerLanes<S>, dimension: u32) -> Float<S> {
         let u = sampler.single(dimension + DIM_LOBE);
-        let rest = ((u - GUIDED_SHARE) / u.all(1.0 - GUIDED_SHARE)).at_least(0.0).at_most(1.0f32.next_down());
-        if self.told == 0 { u } else { select(self.told, rest, u) }
+        if self.told == 0 { u } else { select(self.told, rest_of_choice(u), u) }
     }
 
     /// Of a lane whose throughput is multiplied by `weight`.

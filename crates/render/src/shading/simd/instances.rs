@@ -7,9 +7,10 @@
 use crate::prepare::instance_table::{Columns, InstanceTable};
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes, ball_points};
+use crate::shading::surface::lift_of;
 use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, gamma};
 use firstlight_kdtree::{F64_ERROR, INSET, Shape};
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, select, select_vector, three, two};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
 use glam::Vec3;
 
 /// The product with a matrix a lane.
@@ -130,13 +131,8 @@ impl<S: Simd> SurfaceLanes<S> {
         let facing = select_vector(turned, -smooth, smooth);
         let seen = facing.dot(self.wo).is_positive();
         let normal = select_vector(seen, facing, self.geometric_normal);
-        let [a, b, c] = corners.positions;
-        let point = a * weights[0] + b * weights[1] + c * weights[2];
-        let lifts = three!(|k| {
-            let normal = select_vector(turned, -normals[k], normals[k]);
-            normal * (-weights[k] * (point - corners.positions[k]).dot(normal).at_most(0.0))
-        });
-        let lift = times(&table.world_from_object, row, lifts[0] + lifts[1] + lifts[2]);
+        let towards = three!(|k| select_vector(turned, -normals[k], normals[k]));
+        let lift = times(&table.world_from_object, row, lift_of(&corners.positions, &towards, &weights));
         let lifted = corners.smooth & !lift.is_zero();
         self.normal = select_vector(corners.smooth, normal, self.normal);
         self.reach_normal = select_vector(lifted, normal, self.reach_normal);

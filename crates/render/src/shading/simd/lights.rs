@@ -82,15 +82,3 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
         radiance: Vector::from_arrays(s, &[g, h, i]),
     }
 }
-
-/// Weight of light that light sampling found with density `own`, and a bounce would have found with `other`.
-#[inline(always)]
-pub(crate) fn light_weight<S: Simd>(techniques: &Techniques, own: Float<S>, other: Float<S>) -> Float<S> {
-    if techniques.mis { power_weight(other / own) } else { own.all(1.0) }
-}
-
-/// See [`crate::shading::lights::power_weight`].
-#[inline(always)]
-pub(crate) fn power_weight<S: Simd>(ratio: Float<S>) -> Float<S> {
-    ratio.all(1.0) / (ratio * ratio + 1.0)
-}

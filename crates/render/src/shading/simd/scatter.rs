@@ -2,29 +2,29 @@
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::prepare::material_table::{COATED, TEXTURED};
-use crate::sampling::SamplerLanes;
-use crate::sampling::warp_simd::cosine_hemisphere;
+use crate::sampling::warp::cosine_hemisphere;
+use crate::sampling::{SamplerLanes, cosine_hemisphere_pdf};
+use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
-use crate::shading::simd::bounce::{Bounce, colors_of, mirrored};
+use crate::shading::metal::{Metal, tint};
+use crate::shading::simd::bounce::{Bounce, colors_of};
 use crate::shading::simd::coat::Coat;
 use crate::shading::simd::glass::GlassLanes;
 use crate::shading::simd::hints::HintLanes;
 use crate::shading::simd::lanes::{DIFFUSE, GLASS, METAL, lanes_of};
-use crate::shading::simd::metal;
-use crate::shading::simd::metal::MetalLanes;
+use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::surface::scalar_at;
-use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around, select, select_vector};
+use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
 use glam::Vec2;
-use std::f32::consts::FRAC_1_PI;
 
 /// How the surface of each lane scatters.
 pub(crate) struct SurfaceScatter<S: Simd> {
     /// Albedo or reflectance.
     pub color: Vector<S>,
-    pub metal: Option<MetalLanes<S>>,
+    pub metal: Option<Metal<Float<S>>>,
     pub coat: Option<Coat<S>>,
     pub glass: Option<GlassLanes<S>>,
     /// Lanes that light sampling can do something for.
@@ -69,7 +69,7 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
             }
             alpha = Float::load(s, &alphas);
         }
-        let metal = MetalLanes::new(s, at.mask, place.normal, place.wo, alpha, color, flags);
+        let metal = metals(s, at.mask, place.normal, place.wo, alpha, color, flags);
         let non_specular = Float::splat(s, SMALLEST_ALPHA).le(alpha);
         return SurfaceScatter { color, metal: Some(metal), coat: None, glass: None, non_specular };
     }
@@ -90,18 +90,16 @@ pub(crate) fn eval<S: Simd, const KIND: usize>(
         return coat.eval(place.normal, wi);
     }
     let cos = place.normal.dot(wi);
-    let above = cos.is_positive();
-    let zero = cos.all(0.0);
     if let Some(metal) = &surface.metal
         && KIND == METAL
     {
         let found = metal.eval(metal.local(wi));
-        let valid = above & metal.facing();
+        let valid = cos.is_positive() & metal.facing();
         let value = found.tint * found.value;
-        let pdf = select(valid, found.pdf, zero);
+        let pdf = select(valid, found.pdf, cos.all(0.0));
         return (value, pdf);
     }
-    let pdf = select(above, cos * FRAC_1_PI, zero);
+    let pdf = cosine_hemisphere_pdf(cos);
     (surface.color * pdf, pdf)
 }
 
@@ -127,7 +125,7 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let local = cosine_hemisphere(sampler.pair(dimension + DIM_DIRECTION));
             let wi = local.to_world(&frame_around(normal));
             let go_on = local.z.is_positive();
-            Bounce { go_on, wi, weight: surface.color, pdf: local.z * FRAC_1_PI, transmitted: 0 }
+            Bounce { go_on, wi, weight: surface.color, pdf: cosine_hemisphere_pdf(local.z), transmitted: 0 }
         }
         METAL => {
             let metal = surface.metal.as_ref().expect("metal has metal parameters");
@@ -137,10 +135,10 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let mut bounce = Bounce { go_on, wi, weight: found.tint * found.weight, pdf: found.pdf, transmitted: 0 };
             if !surface.non_specular & at.mask != 0 {
                 let non_specular = surface.non_specular;
-                let tint = metal::fresnel(metal.flags, metal.reflectance, cos_o);
+                let facing = tint(metal.schlick, metal.reflectance, cos_o);
                 bounce.go_on |= !non_specular;
-                bounce.wi = select_vector(non_specular, bounce.wi, mirrored(place.wo, normal));
-                bounce.weight = select_vector(non_specular, bounce.weight, tint);
+                bounce.wi = select_vector(non_specular, bounce.wi, reflect(place.wo, normal));
+                bounce.weight = select_vector(non_specular, bounce.weight, facing);
                 bounce.pdf = select(non_specular, bounce.pdf, infinite);
             }
             bounce
@@ -149,25 +147,16 @@ pub(crate) fn sample<S: Simd, const KIND: usize>(
             let glass = surface.glass.as_ref().expect("glass has its two sides");
             let eta = glass.eta;
             let one = eta.all(1.0);
-            let cos_i = cos_o.at_least(0.0).at_most(1.0);
-            let cos2_t = (one - eta) * (eta + 1.0) + (eta * cos_i) * (eta * cos_i);
-            let total = cos2_t.le(eta.all(0.0));
-            let cos_t = cos2_t.at_least(0.0).sqrt();
-            let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-            let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-            let reflectance = (perpendicular * perpendicular + parallel * parallel) * 0.5;
-            let alike = s.eq(eta.v, one.v) & !total;
-            let reflectance = select(total, one, select(alike, eta.all(0.0), reflectance));
-            let cos_t = select(alike, cos_i, cos_t);
+            let (reflectance, cos_t) = fresnel(cos_o.at_least(0.0).at_most(1.0), eta);
             let reflected = sampler.single(dimension + DIM_LOBE).lt(reflectance);
-            let refracted = place.wo * -eta + normal * (eta * cos_o - cos_t);
-            let wi = select_vector(reflected, mirrored(place.wo, normal), refracted.normalize());
+            let refracted = refract(place.wo, normal, eta, cos_t);
+            let wi = select_vector(reflected, reflect(place.wo, normal), refracted);
             let squeeze = select(reflected, one, glass.squeeze * glass.squeeze);
             let weight = Vector { x: squeeze, y: squeeze, z: squeeze };
             Bounce { go_on: Mask::MAX, wi, weight, pdf: infinite, transmitted: !reflected }
         }
         _ => {
-            let wi = mirrored(place.wo, normal);
+            let wi = reflect(place.wo, normal);
             Bounce { go_on: Mask::MAX, wi, weight: surface.color, pdf: infinite, transmitted: 0 }
         }
     }

@@ -3,12 +3,11 @@
 use crate::prepare::material_table::TEXTURED;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
-use crate::sampling::offset_simd::offset_origin;
 use crate::shading::paths::PathBatch;
 use crate::shading::surface::Vertex;
-use firstlight_kdtree::geometry::robust::UNIT_ROUNDOFF;
+use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, offset_along};
 use firstlight_kdtree::{F64_ERROR, HitBatch};
-use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Simd, Vector, select, select_vector, three, two};
+use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
 use glam::{Vec2, Vec3};
 
 /// Points on surfaces, each seen along a ray.
@@ -252,13 +251,13 @@ impl<S: Simd> SurfaceLanes<S> {
     /// Where a ray starts that stays on the side of `wo`.
     #[inline(always)]
     pub fn leaving(&self) -> Vector<S> {
-        offset_origin(self.lifted, self.offset, self.geometric_normal)
+        offset_along(self.lifted, self.offset, self.geometric_normal)
     }
 
     /// Where a ray starts that goes to the far side.
     #[inline(always)]
     pub fn passing(&self) -> Vector<S> {
-        offset_origin(self.position, self.offset, -self.geometric_normal)
+        offset_along(self.position, self.offset, -self.geometric_normal)
     }
 }
 

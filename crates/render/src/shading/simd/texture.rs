@@ -1,11 +1,11 @@
 //! Colours that vary over surfaces: checkers for all lanes at once, pictures one lane at a time.
 
 use crate::core::material::ColorInput;
-use crate::core::texture::TexturePattern;
+use crate::core::texture::{TexturePattern, is_even_square};
 use crate::prepare::prepared::Prepared;
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::SurfaceLanes;
-use firstlight_simd::{Bits, Mask, Simd, Vector, floor, select_vector, truncated};
+use firstlight_simd::{Bits, Mask, Simd, Vector, select_vector};
 use glam::Vec2;
 
 /// `color`, but for the lanes of `textured`: there what `inputs` says of their rows.
@@ -28,13 +28,7 @@ pub(crate) fn looked_up<S: Simd>(
     if let ColorInput::Texture(id) = inputs[first as usize] {
         let texture = &scene.shading.textures[id as usize];
         if let TexturePattern::Checker { a, b } = &texture.pattern {
-            let [u, v] = place.uv;
-            let (m, offset) = (texture.uv_matrix, texture.uv_offset);
-            let x = u * m.x_axis.x + v * m.y_axis.x + offset.x;
-            let y = u * m.x_axis.y + v * m.y_axis.y + offset.y;
-            // See [`crate::core::texture::Texture::eval`].
-            let half = (floor(x) + floor(y)) * 0.5;
-            let even = (half - truncated(half)).is_zero();
+            let even = is_even_square(texture.pattern_coordinates(place.uv));
             let alike = textured & row.equals(first);
             let found = select_vector(even, Vector::splat(s, *a), Vector::splat(s, *b));
             color = select_vector(alike, found, color);

@@ -1,0 +1,164 @@
+//! One `f32`, or sixteen: what a formula needs to be written once for both.
+//!
+//! Code that is generic over [`Real`] is `#[inline(always)]` all the way down, as everything for sixteen lanes is. With `f32` it
+//! is the scalar code, and what tests hold the lanes against.
+
+use super::simd::Mask;
+use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
+
+/// Answers to a question: a `bool`, or one bit a lane.
+pub trait Truth:
+    Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> + BitAndAssign + BitOrAssign
+{
+    /// Whether it is true of any lane.
+    fn any(self) -> bool;
+}
+
+/// One number or sixteen of them. All operations round as IEEE 754 says, so one lane of sixteen agrees with the one to the last
+/// bit; functions that do not are in [`crate::Elementary`].
+pub trait Real:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + Add<f32, Output = Self>
+    + Sub<f32, Output = Self>
+    + Mul<f32, Output = Self>
+    + Div<f32, Output = Self>
+{
+    type Mask: Truth;
+
+    /// The same number in all lanes.
+    fn all(self, x: f32) -> Self;
+
+    /// `a` where the mask is true, else `b`; see [`select`].
+    fn choose(mask: Self::Mask, a: Self, b: Self) -> Self;
+
+    fn sqrt(self) -> Self;
+
+    fn abs(self) -> Self;
+
+    /// The second where either is NaN.
+    fn min(self, other: Self) -> Self;
+
+    /// The second where either is NaN.
+    fn max(self, other: Self) -> Self;
+
+    fn copysign(self, sign: Self) -> Self;
+
+    /// False where either is NaN, as all comparisons are.
+    fn lt(self, other: Self) -> Self::Mask;
+
+    fn le(self, other: Self) -> Self::Mask;
+
+    fn equals(self, other: Self) -> Self::Mask;
+
+    /// At least `least`, also where it is NaN.
+    #[inline(always)]
+    fn at_least(self, least: f32) -> Self {
+        self.max(self.all(least))
+    }
+
+    /// At most `most`, also where it is NaN.
+    #[inline(always)]
+    fn at_most(self, most: f32) -> Self {
+        self.min(self.all(most))
+    }
+
+    #[inline(always)]
+    fn is_positive(self) -> Self::Mask {
+        self.all(0.0).lt(self)
+    }
+
+    #[inline(always)]
+    fn is_negative(self) -> Self::Mask {
+        self.lt(self.all(0.0))
+    }
+
+    #[inline(always)]
+    fn is_zero(self) -> Self::Mask {
+        self.equals(self.all(0.0))
+    }
+
+    #[inline(always)]
+    fn is_nan(self) -> Self::Mask {
+        !self.equals(self)
+    }
+}
+
+/// `a` where the mask is true, else `b`.
+#[inline(always)]
+pub fn select<R: Real>(mask: R::Mask, a: R, b: R) -> R {
+    R::choose(mask, a, b)
+}
+
+impl Truth for bool {
+    #[inline(always)]
+    fn any(self) -> bool {
+        self
+    }
+}
+
+impl Truth for Mask {
+    #[inline(always)]
+    fn any(self) -> bool {
+        self != 0
+    }
+}
+
+impl Real for f32 {
+    type Mask = bool;
+
+    #[inline(always)]
+    fn all(self, x: f32) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn choose(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        f32::copysign(self, sign)
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self < other
+    }
+
+    #[inline(always)]
+    fn le(self, other: Self) -> bool {
+        self <= other
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> bool {
+        self == other
+    }
+}
