@@ -72,7 +72,7 @@ impl Remake {
         let (MeshSourcePart::Obj(name) | MeshSourcePart::Builtin(name)) = &self.source;
         match self.for_whom {
             ForWhom::Object(_) => format!("simplifying {name}"),
-            ForWhom::NewObject { .. } => format!("reading {name}"),
+            ForWhom::NewObject { .. } => format!("loading {name}"),
         }
     }
 }

@@ -28,7 +28,7 @@ pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
 /// One that the scene has, by name.
 pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), String> {
     let texture = textures(world).into_iter().find(|texture| texture.name == name);
-    let texture = texture.ok_or_else(|| format!("no material uses a texture `{name}`"))?;
+    let texture = texture.ok_or_else(|| format!("there is no texture `{name}`"))?;
     put(world, entity, texture)
 }
 
@@ -36,7 +36,7 @@ pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), 
 pub fn paint(world: &mut World, entity: Entity, part: TexturePart) -> Result<(), String> {
     let colored = world.get::<Material>(entity).is_some_and(|material| paint_of(material).is_some());
     if !colored {
-        return Err("this has no colour".to_owned());
+        return Err("this material has no colour".to_owned());
     }
     let known = match &part {
         TexturePart::Image { file, .. } => textures(world).into_iter().find_map(|texture| {
@@ -70,7 +70,7 @@ fn make(
     part: TexturePart,
     picture: Option<Arc<ImageTexture>>,
 ) -> Result<(), String> {
-    let texture = texture_of(&part, |_| picture).ok_or("the picture is not there")?;
+    let texture = texture_of(&part, |_| picture).ok_or("the image has not been loaded")?;
     // A texture that is only changed keeps its name.
     let old = world.get::<Material>(entity).and_then(paint_of);
     let name = match (old, &part) {
@@ -93,7 +93,7 @@ fn same_source(a: &TexturePart, b: &TexturePart) -> bool {
 }
 
 fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
-    let mut material = world.get::<Material>(entity).cloned().ok_or("this is not a material")?;
+    let mut material = world.get::<Material>(entity).cloned().ok_or("not a material")?;
     *paint_mut(&mut material).ok_or("this material has no colour")? = ColorParam::Texture(texture);
     set_if_different(world, entity, material);
     Ok(())
