@@ -10,6 +10,15 @@ use std::backtrace::{Backtrace, BacktraceStatus};
 use std::fmt;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::panic::PanicHookInfo;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether only warnings and errors are printed beside results.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From now on, [`inform`] prints nothing and no [`Bar`] is shown.
+pub fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
+}
 
 /// Something that can be said.
 pub trait Message {
@@ -71,7 +80,31 @@ pub fn print(message: impl Message) -> io::Result<()> {
     }
 }
 
-/// Prints something beside the result.
+/// Writes a result that is no text to standard output: as it is, with nothing around it.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_bytes(bytes: &[u8]) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Whether standard output is a terminal, which bytes of a picture would upset.
+pub fn prints_to_terminal() -> bool {
+    io::stdout().is_terminal()
+}
+
+/// Prints something beside the result that is good to know, unless the program is to [`be_quiet`].
+pub fn inform(message: impl Message) {
+    if !QUIET.load(Ordering::Relaxed) {
+        remark(message);
+    }
+}
+
+/// Prints a warning or an error beside the result.
 pub fn remark(message: impl Message) {
     // Nobody listens, and there is nobody left to tell.
     let _ = writeln!(io::stderr().lock(), "{}", message.text());
@@ -129,7 +162,7 @@ pub struct Bar(ProgressBar);
 impl Bar {
     /// Whether there is somebody who could look at one.
     pub fn is_watched() -> bool {
-        io::stderr().is_terminal()
+        !QUIET.load(Ordering::Relaxed) && io::stderr().is_terminal()
     }
 
     pub fn new(length: u64) -> Self {

@@ -1,6 +1,6 @@
 //! `firstlight render --turntable N` and `--bookmarks 1,2,3 --frames N`: numbered pictures of a camera that moves.
 
-use super::console::remark;
+use super::console::{inform, remark};
 use super::failure::Failure;
 use super::job::RenderJob;
 use super::progress::Progress;
@@ -24,19 +24,20 @@ pub(super) fn animate(
     let digits = digits(rigs.len());
     let replace = args.overwrite.replace();
     for (i, rig) in rigs.iter().enumerate() {
-        progress.at(i as f64 / rigs.len() as f64, format!("picture {} of {}", i + 1, rigs.len()));
+        progress.at(i as f64 / rigs.len() as f64, format!("frame {} of {}", i + 1, rigs.len()));
         job.set_rig(rig);
         let film = job.picture(args, target)?;
-        job.write(&film, &numbered(&args.output, i + 1, digits), replace)?;
-        stop.has_saved(format!("{} of {} pictures are saved", i + 1, rigs.len()));
+        job.write(args, &film, &numbered(&args.output, i + 1, digits), replace)?;
+        stop.has_saved(format!("{} of {} frames are saved", i + 1, rigs.len()));
     }
     progress.finish();
     let (first, last) = (numbered(&args.output, 1, digits), numbered(&args.output, rigs.len(), digits));
     let replaced = match n_replaced {
         0 => String::new(),
-        n => format!(", {n} of them in place of files that were there"),
+        1 => ", replacing 1 existing file".to_owned(),
+        n => format!(", replacing {n} existing files"),
     };
-    remark(format_args!("{} to {}: {} pictures{replaced}", first.display(), last.display(), rigs.len()));
+    inform(format_args!("{} to {}: {} frames{replaced}", first.display(), last.display(), rigs.len()));
     Ok(())
 }
 
@@ -66,7 +67,7 @@ fn way(args: &RenderArgs, job: &mut RenderJob) -> Result<Vec<Rig>, Failure> {
         bookmarks.views.get(number).copied().ok_or_else(|| {
             let known: Vec<String> = bookmarks.views.keys().map(u8::to_string).collect();
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-            Failure::Failed(format!("{} has no view under {number} (there are: {known})", source.title()))
+            Failure::Failed(format!("{} has no bookmark {number} (it has {known})", source.title()))
         })
     };
     let stops: Vec<Rig> = numbers.iter().map(stop).collect::<Result<_, _>>()?;

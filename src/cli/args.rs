@@ -8,17 +8,43 @@ use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{Files, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What to open, and how.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// A built-in scene, a scene file (.ron), a model (.obj), or a picture (.png, .exr) that this program made.
+    /// Built-in scene, scene file (.ron), model (.obj), or picture rendered by firstlight (.png, .exr).
     #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     pub scene: OsString,
-    /// Which axis of a model points up; guessed from how it would stand when not given.
+    #[command(flatten)]
+    pub how: OpenArgs,
+}
+
+/// Several things to open, in the same way.
+#[derive(Args, Clone, Debug)]
+pub struct ScenesArgs {
+    /// Built-in scenes, scene files (.ron), models (.obj), or pictures rendered by firstlight (.png, .exr).
+    #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
+    pub scenes: Vec<OsString>,
+    #[command(flatten)]
+    pub how: OpenArgs,
+}
+
+impl ScenesArgs {
+    pub fn each(&self) -> impl Iterator<Item = SceneArgs> {
+        self.scenes.iter().map(|scene| SceneArgs { scene: scene.clone(), how: self.how.clone() })
+    }
+}
+
+/// How to open a scene.
+#[derive(Args, Clone, Debug, Default)]
+pub struct OpenArgs {
+    /// Up axis of a model [default: detected from its shape].
     #[arg(long, value_enum)]
     pub up: Option<UpArg>,
+    /// Environment image (.hdr, .exr, .png, .jpg) that lights the scene instead of its own environment.
+    #[arg(long, value_name = "FILE", visible_alias = "environment")]
+    pub env: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -31,7 +57,7 @@ pub enum UpArg {
 pub enum IntegratorArg {
     /// Unbiased path tracing.
     Path,
-    /// The classic local model with shadows, mirrors and glass.
+    /// Phong shading with shadows, mirrors and glass.
     Phong,
 }
 
@@ -67,7 +93,7 @@ impl From<FilterArg> for PixelFilter {
 
 impl SceneArgs {
     pub fn up(&self) -> Option<UpAxis> {
-        self.up.map(|up| match up {
+        self.how.up.map(|up| match up {
             UpArg::Y => UpAxis::Y,
             UpArg::Z => UpAxis::Z,
         })
@@ -86,7 +112,9 @@ impl SceneArgs {
             files.read(path)?;
             check_film_source(&source).map_err(Failure::Failed)?;
         }
-        let options = LoadOptions { up: self.up(), aspect, progress: Some(progress), ..LoadOptions::default() };
+        let environment = self.how.env.as_deref();
+        let options =
+            LoadOptions { up: self.up(), aspect, environment, progress: Some(progress), ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;
         files.read_all(scene.files())?;
         for warning in &scene.warnings {
@@ -108,7 +136,7 @@ impl SceneArgs {
 /// What outputs may take the place of.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct OverwriteArgs {
-    /// Let an output take the place of a film, whose samples are lost then.
+    /// Allow an output to replace an existing film, whose samples are lost.
     #[arg(long)]
     pub overwrite: bool,
 }
@@ -121,5 +149,17 @@ impl OverwriteArgs {
     /// The files of a command that writes.
     pub fn files(self) -> Files {
         Files::new(self.replace())
+    }
+}
+
+/// Names the files that were replaced, for the end of a message.
+pub fn replaced(paths: &[PathBuf], output: &Path) -> String {
+    match paths {
+        [] => String::new(),
+        [path] if path == output => ", replaced the existing file".to_owned(),
+        paths => {
+            let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+            format!(", replaced {}", names.join(", "))
+        }
     }
 }

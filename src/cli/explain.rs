@@ -15,19 +15,19 @@ use glam::{DVec3, UVec2};
 pub struct ExplainArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// The pixel, from the upper left corner.
+    /// Pixel coordinates; 0,0 is the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
     pixel: UVec2,
-    /// Width and height of the picture that it is a pixel of; the scene's own when not given.
+    /// Width and height of the picture in pixels [default: from the scene].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
-    /// How many of its samples are told, from the first.
+    /// Number of samples to trace.
     #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: u32,
-    /// Another number, other samples; the scene's own when not given.
+    /// Random seed [default: from the scene].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u32>,
-    /// Print one JSON object, with every vertex of every path.
+    /// Print all paths with their vertices as one line of JSON.
     #[arg(long)]
     json: bool,
 }
@@ -65,7 +65,7 @@ fn check_pixel(UVec2 { x, y }: UVec2, size: UVec2) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage(format!(
-        "--pixel: there is no pixel {x},{y} in a picture of {} x {}: the last one is {},{}",
+        "--pixel: {x},{y} is outside of the picture of {} x {} pixels: the last pixel is {},{}",
         size.x,
         size.y,
         size.x - 1,
@@ -81,7 +81,7 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     let last = story.samples.end - 1;
     line(format!("{title}: pixel {x},{y} of {} x {}, samples {} to {last}", size.x, size.y, story.samples.start));
     if story.n_bad > 0 {
-        line(format!("{} of them are not finite and are left out", story.n_bad));
+        line(format!("{} of them are not finite and were discarded", story.n_bad));
     }
     let from_lamps = story.from_lamps.unwrap_or_default();
     let all = brightness(story.total());
@@ -99,7 +99,7 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
         let [a, b, c, d] = figures;
         columns(name, [a, b, c, d, share(total)])
     };
-    line(columns("light", ["seen", "direct", "indirect", "together", "share"].map(str::to_owned)));
+    line(columns("light", ["visible", "direct", "indirect", "total", "share"].map(str::to_owned)));
     for light in &story.lights {
         line(row(&printable::name(&light.name), light.parts()));
     }
@@ -107,7 +107,7 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
         let total = brightness(from_lamps);
         let empty = String::new;
         let cells = [empty(), empty(), empty(), format!("{total:.5}"), share(total)];
-        line(columns("by paths from the lamps", cells));
+        line(columns("by light tracing", cells));
     }
     let [seen, direct, indirect] = story.parts().map(brightness);
     let cells = [seen, direct, indirect, all].map(|figure| format!("{figure:.5}"));
@@ -118,9 +118,9 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
         .collect();
     line(format!("  by bounces   {}", bounces.join("   ")));
     let (itself, asked) = (share(brightness(story.by_itself)), share(brightness(story.by_asking)));
-    line(format!("  found by     running into it: {itself}   asking for it: {asked}"));
+    line(format!("  sampled by   BSDF: {itself}   light: {asked}"));
     let DVec3 { x: r, y: g, z: b } = story.total();
-    line(format!("  radiance     {r:.5} {g:.5} {b:.5}, ± {:.5} in brightness", brightness(story.deviation)));
+    line(format!("  radiance     {r:.5} {g:.5} {b:.5}, ± {:.5} in luminance", brightness(story.deviation)));
     out
 }
 
@@ -177,7 +177,7 @@ fn json(title: &str, story: &PixelStory) -> serde_json::Value {
 
 /// `640,360` as a pixel.
 fn parse_pixel(text: &str) -> Result<UVec2, String> {
-    let wrong = || format!("`{text}` is not a pixel: write it as X,Y, such as 640,360");
+    let wrong = || format!("`{text}` is not a pixel: expected X,Y, such as 640,360");
     let (x, y) = text.split_once(',').ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
     Ok(UVec2::new(number(x)?, number(y)?))

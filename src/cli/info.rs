@@ -1,9 +1,11 @@
 //! `firstlight info SCENE`: what is in it, what it uses, what is not modelled, memory.
 
-use super::args::SceneArgs;
+use super::args::{SceneArgs, ScenesArgs};
 use super::console::{print, remark};
 use super::failure::Failure;
+use super::number::two_digits;
 use clap::Args;
+use firstlight::frame::{f_number, f_stop};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::render::{Environment, Film};
@@ -16,17 +18,21 @@ use std::sync::Arc;
 #[derive(Args, Clone, Debug)]
 pub struct InfoArgs {
     #[command(flatten)]
-    scene: SceneArgs,
-    /// Build many trees over each mesh instead, and tell what they and their rays cost.
+    scenes: ScenesArgs,
+    /// Compare kd-trees over each mesh: build time, size, and cost per ray.
     #[arg(long)]
     tree: bool,
-    /// Print one JSON object.
+    /// Print the result as one line of JSON.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
-    let scene = args.scene.load(None, &mut firstlight::scene::Files::default(), &|_| ())?;
+    args.scenes.each().try_for_each(|scene| tell(args, &scene))
+}
+
+fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
+    let scene = scene.load(None, &mut firstlight::scene::Files::default(), &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let inputs = SceneInputs::of(&mut world);
@@ -59,7 +65,7 @@ struct Told<'a> {
 }
 
 const NOT_MODELLED: [&str; 6] =
-    ["spectra", "polarisation", "motion blur", "media that scatter", "rough glass", "light behind a lens"];
+    ["spectra", "polarisation", "motion blur", "participating media", "rough glass", "lens aberrations"];
 
 impl Told<'_> {
     /// For people.
@@ -80,7 +86,7 @@ impl Told<'_> {
                     row("", format!("{name}: {triangles}, {}", counted(mesh.positions.len(), "vertex", "vertices")));
                     self.faults[&Arc::as_ptr(mesh)].sentences().for_each(|fault| row("", format!("{name}: {fault}")));
                 }
-                Shape::Spheres(balls) => row("", format!("{name}: {} balls", balls.centers.len())),
+                Shape::Spheres(balls) => row("", format!("{name}: {} spheres", balls.centers.len())),
                 _ => {}
             }
         }
@@ -91,12 +97,12 @@ impl Told<'_> {
         row("lights", format!("{emitters}, {}", counted(inputs.lights.len(), "point light", "point lights")));
         row("environment", environment(&shading.environment));
         let lens = self.lens();
-        row("camera", if lens.enabled { format!("lens of radius {} m", lens.radius) } else { "pinhole".to_owned() });
+        row("camera", if lens.enabled { self.aperture() } else { "pinhole".to_owned() });
         row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
         let mib = |bytes: usize| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
         let [meshes, trees, film] = self.bytes().map(mib);
-        row("memory", format!("meshes {meshes}, trees {trees}, film {film}"));
-        row("time", format!("{:.3} s to read, {:.3} s to build trees", scene.load_seconds, scene.build_seconds));
+        row("memory", format!("meshes {meshes}, kd-trees {trees}, film {film}"));
+        row("time", format!("{:.3} s to load, {:.3} s to build kd-trees", scene.load_seconds, scene.build_seconds));
         row("uses", list(&self.features(true)));
         row("not used", list(&self.features(false)));
         row("not modelled", NOT_MODELLED.join(", "));
@@ -166,6 +172,12 @@ impl Told<'_> {
         self.inputs.camera.map_or_else(Lens::default, |camera| camera.lens)
     }
 
+    /// As photographers write it.
+    fn aperture(&self) -> String {
+        let stop = self.inputs.camera.map_or(0.0, |camera| f_stop(camera.lens.radius, &camera.projection));
+        format!("{}, lens radius {} m", f_number(stop), two_digits(self.lens().radius))
+    }
+
     fn filter(&self) -> String {
         // As the scene file spells it.
         let words = format!("{:?}", self.scene.file.film.filter);
@@ -205,7 +217,7 @@ fn kind_of_shape(shape: &Shape) -> &'static str {
         Shape::Quad { .. } => "quad",
         Shape::Triangle { .. } => "triangle",
         Shape::Mesh(_) => "mesh",
-        Shape::Spheres(_) => "cloud of balls",
+        Shape::Spheres(_) => "sphere cloud",
     }
 }
 
@@ -214,7 +226,7 @@ fn environment(environment: &Environment) -> String {
         Environment::Black => "black".to_owned(),
         Environment::Constant(radiance) => format!("constant {radiance}"),
         Environment::Gradient { .. } => "gradient sky".to_owned(),
-        Environment::Image { image, .. } => format!("picture, {} x {}", image.width, image.height),
+        Environment::Image { image, .. } => format!("image, {} x {}", image.width, image.height),
     }
 }
 

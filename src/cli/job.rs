@@ -1,12 +1,13 @@
 //! A scene that is rendered without a window, and the pictures of it.
 
-use super::console::remark;
+use super::console::{inform, print_bytes, remark};
 use super::failure::Failure;
 use super::progress::Progress;
 use super::render_args::{DEFAULT_SPP, RenderArgs};
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{FilmFile, PictureFormat, Print, Target, render_offline_until};
+use firstlight::kdtree::InstructionSet;
 use firstlight::render::{Display, Film, NoRoom, Purpose, RenderSettings, Room};
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
@@ -38,7 +39,7 @@ impl RenderJob {
         let aspect = args.size.map(|(width, height)| f64::from(width) / f64::from(height));
         let scene = args.scene.load(aspect, files, &|text| progress.stage(text.to_owned()))?;
         if let Some(announcement) = &args.announcement {
-            progress.suspend(|| remark(announcement));
+            progress.suspend(|| inform(announcement));
         }
         progress.stage("preparing the scene".to_owned());
         let mut world = bevy_ecs::world::World::new();
@@ -46,6 +47,13 @@ impl RenderJob {
         let start = Instant::now();
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &scene.trees);
         let build_seconds = scene.build_seconds + start.elapsed().as_secs_f64();
+        tracing::info!(
+            "{}: loaded in {:.3} s, kd-trees built in {build_seconds:.3} s; {} threads, {:?}",
+            scene.source.title(),
+            scene.load_seconds,
+            rayon::current_num_threads(),
+            InstructionSet::detect()
+        );
         for problem in &extraction.problems {
             remark(format_args!("warning: {problem}"));
         }
@@ -108,11 +116,14 @@ impl RenderJob {
         Ok(film)
     }
 
-    /// Writes a picture with its note.
-    pub fn write(&self, film: &Film, path: &Path, replace: Replace) -> Result<(), Failure> {
+    /// Writes a picture with its metadata to a file, or to standard output.
+    pub fn write(&self, args: &RenderArgs, film: &Film, path: &Path, replace: Replace) -> Result<(), Failure> {
         let note = self.note(film, path);
         let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
-        picture.write(path, replace).map_err(Failure::Failed)
+        if !args.to_stdout() {
+            return picture.write(path, replace).map_err(Failure::Failed);
+        }
+        print_bytes(&picture.bytes(args.picture_format()?).map_err(Failure::Failed)?)
     }
 
     /// The note of a picture of this film at `path`.
@@ -132,7 +143,7 @@ impl RenderJob {
         match ours.differs_from(&shot) {
             None => Ok(film),
             Some(what) => Err(Failure::Failed(format!(
-                "{}: is a film of another {what}: go on with it as it was begun, or keep a new film",
+                "{}: the film was rendered with a different {what}; resume it with the original {what}, or choose a new --film",
                 path.display()
             ))),
         }
@@ -151,7 +162,7 @@ impl RenderJob {
 /// What is written at the end.
 pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
     let film = args.film.is_some() || args.resume;
-    let picture = match PictureFormat::of(&args.output) {
+    let picture = match args.picture_format() {
         Ok(PictureFormat::Exr) => Purpose::Exr,
         _ => Purpose::Png,
     };

@@ -1,8 +1,9 @@
 //! `firstlight merge A.exr B.exr -o C.exr`: films of the same picture with different samples, added up.
 
-use super::args::OverwriteArgs;
-use super::console::{print, remark};
+use super::args::{OverwriteArgs, replaced};
+use super::console::{inform, print, remark};
 use super::failure::Failure;
+use super::number::percent;
 use clap::Args;
 use firstlight::frame::{FilmFile, PictureFormat, Print, check_replaced_film, read_film_file, write_film_into};
 use firstlight::scene::ImageMetadata;
@@ -11,25 +12,25 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// Films of one picture, each with samples of its own (render --film FILE --samples A..B).
+    /// Films of one picture with disjoint samples (`render --film FILE --samples A..B`).
     #[arg(value_name = "FILM.exr", required = true, num_args = 2..)]
     films: Vec<PathBuf>,
-    /// The film that has all samples; go on with it by render --resume.
+    /// Merged film; `render --resume` continues it.
     #[arg(short, long, value_name = "FILM.exr")]
     output: PathBuf,
-    /// Also a picture of it: .png is developed, .exr is linear light.
+    /// Also save the picture: .png is tone-mapped, .exr holds linear light (HDR).
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     #[command(flatten)]
     overwrite: OverwriteArgs,
-    /// Print one JSON object.
+    /// Print the result as one line of JSON.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     if !matches!(PictureFormat::of(&args.output), Ok(PictureFormat::Exr)) {
-        let message = "films are OpenEXR pictures: end the name in .exr (--picture writes a .png of it)";
+        let message = "the name of a film must end in .exr (use --picture for a .png)";
         return Err(Failure::Usage(format!("{}: {message}", args.output.display())));
     }
     let mut files = args.overwrite.files();
@@ -51,10 +52,10 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         let mut other = read_film_file(path).map_err(Failure::Failed)?;
         warn(other.warning.take());
         let failed = |reason: String| {
-            Failure::Failed(format!("{} and {} cannot be added up: {reason}", first.display(), path.display()))
+            Failure::Failed(format!("{} and {} cannot be merged: {reason}", first.display(), path.display()))
         };
         if let Some(what) = shot.differs_from(&other.shot) {
-            return Err(failed(format!("the second is a film of another {what}")));
+            return Err(failed(format!("they have a different {what}")));
         }
         film.merge(&other.film).map_err(|error| failed(error.to_string()))?;
     }
@@ -87,7 +88,8 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
             "estimated_error": error,
         }));
     }
-    let error = error.map_or_else(String::new, |error| format!(", {:.2} % error", 100.0 * error));
-    remark(format_args!("{}: {} samples per pixel{error}", args.output.display(), film.spp()));
+    let error = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
+    let replaced = replaced(files.replaced(), &args.output);
+    inform(format_args!("{}: {} samples per pixel{error}{replaced}", args.output.display(), film.spp()));
     Ok(())
 }

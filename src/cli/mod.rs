@@ -5,11 +5,13 @@
 
 mod animate;
 mod args;
+mod completions;
 mod console;
 mod explain;
 mod failure;
 mod info;
 mod job;
+mod man;
 mod merge;
 mod number;
 mod progress;
@@ -23,6 +25,7 @@ mod stability;
 mod stop;
 mod trees;
 mod waiting;
+mod words;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use console::{lines, remark};
@@ -31,11 +34,11 @@ use firstlight::console::LogWriter;
 use firstlight::kdtree::InstructionSet;
 use firstlight::printable;
 use firstlight::scene::{BUILTIN_SCENES, Limits};
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::process::ExitCode;
 use stop::Stop;
 
-/// An interactive, progressive path tracer: open a model, fly through it, watch it converge.
+/// Interactive, progressive path tracer: open a model, fly through it, watch it converge.
 #[derive(Parser)]
 #[command(name = "firstlight", bin_name = "firstlight", version, args_conflicts_with_subcommands = true, after_help = builtin_help())]
 struct CommandLine {
@@ -43,9 +46,15 @@ struct CommandLine {
     command: Option<CliCommand>,
     #[command(flatten)]
     show: show::ShowArgs,
-    /// Instruction set of the renderer; the pictures are the same. Without it: the widest of the processor.
+    /// Instruction set of the renderer [default: the widest available]; the pictures are identical.
     #[arg(long, value_name = "SET", value_enum, global = true)]
     simd: Option<SimdArg>,
+    /// Print only results, warnings and errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Log details to standard error; RUST_LOG selects them exactly.
+    #[arg(short, long, global = true)]
+    verbose: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -63,29 +72,33 @@ impl SimdArg {
             Self::Avx2 => InstructionSet::Avx2,
             Self::Portable => InstructionSet::Portable,
         };
-        let missing = || Failure::Failed(format!("this processor does not have {set:?}: leave out --simd"));
+        let missing = || Failure::Failed(format!("this processor does not support {set:?}: omit --simd"));
         set.set_default().then_some(()).ok_or_else(missing)
     }
 }
 
 #[derive(Subcommand)]
 enum CliCommand {
-    /// Render a scene to a picture, without a window.
-    Render(render_args::RenderArgs),
-    /// Measure speed against error: how fast scenes get right, and what each technique is worth.
+    /// Render a scene to a picture file, without a window.
+    Render(Box<render_args::RenderCommand>),
+    /// Measure error against time, and the benefit of each sampling technique.
     Report(report::ReportArgs),
-    /// Add up films of one picture that have different samples.
+    /// Merge films that hold different samples of the same picture.
     Merge(merge::MergeArgs),
-    /// Write a scene file of a model, a built-in scene, or of what a picture shows.
+    /// Save a model, a built-in scene or the scene of a picture as a scene file.
     Save(save::SaveArgs),
-    /// Count failures on hard cases: leaks, self-hits, missed hits, wrong depths, bad samples, lost light.
+    /// Stress-test the renderer: count leaks, self-intersections, missed hits, wrong depths, non-finite samples and lost energy.
     Stability(stability::StabilityArgs),
-    /// Tell what is in a scene, what it uses and what is not modelled.
+    /// Show what a scene contains, which features it uses and what is not modelled.
     Info(info::InfoArgs),
-    /// Tell why a pixel looks as it does: which lights reach it, after how many bounces, and along which paths.
+    /// Explain a pixel: which lights contribute to it, after how many bounces, along which paths.
     Explain(explain::ExplainArgs),
-    /// Write a model with fewer triangles, and measure how far it is from the original.
+    /// Reduce the number of triangles of a model and measure the deviation from the original.
     Simplify(simplify::SimplifyArgs),
+    /// Print a completion script for a shell.
+    Completions(completions::CompletionsArgs),
+    /// Print the manual page, or write the pages of all commands to a folder.
+    Man(man::ManArgs),
 }
 
 impl CliCommand {
@@ -99,6 +112,8 @@ impl CliCommand {
             Self::Info(args) => info::run(args),
             Self::Explain(args) => explain::run(args),
             Self::Simplify(args) => simplify::run(args, stop),
+            Self::Completions(args) => completions::run(args),
+            Self::Man(args) => man::run(args),
         }
     }
 }
@@ -106,17 +121,23 @@ impl CliCommand {
 /// Runs what the command line asks for.
 pub fn main() -> ExitCode {
     firstlight::console::tell_panics();
-    start_log();
     if let Some(warning) = Limits::misunderstood() {
         remark(format_args!("warning: {warning}"));
     }
-    let line = match CommandLine::try_parse() {
+    let line = match CommandLine::try_parse_from(words::typed()) {
         Ok(line) => line,
         Err(error) => return not_understood(error),
     };
+    start_log(line.verbose);
+    if line.quiet {
+        firstlight::console::be_quiet();
+    }
     let result = line.simd.map_or(Ok(()), SimdArg::choose).and_then(|()| match line.command {
         Some(command) => Stop::obeyed_by(move |stop| command.run(stop)),
-        None => show::run(&line.show),
+        None => match words::mistyped_command() {
+            Some(message) => Err(Failure::Usage(message)),
+            None => show::run(&line.show),
+        },
     });
     let (messages, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,
@@ -139,17 +160,21 @@ pub fn main() -> ExitCode {
 fn not_understood(error: clap::Error) -> ExitCode {
     if !error.use_stderr() {
         // The program's own words. Whoever closed the pipe has read enough; a full disk has not.
-        return match error.print().and_then(|()| std::io::stdout().flush()) {
+        return match error.print().and_then(|()| firstlight::console::print_bytes(&[])) {
             Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-                remark(format_args!("error: the help cannot be written: {error}"));
+                remark(format_args!("error: cannot write the help text: {error}"));
                 ExitCode::FAILURE
             }
             _ => ExitCode::SUCCESS,
         };
     }
+    if let Some(message) = words::mistyped_command() {
+        remark(format_args!("error: {message}"));
+        return ExitCode::from(2);
+    }
     // It quotes what was typed, and a line end in that would begin a line of its own: asked again with words that are fit
     // to be printed, it says the same of those.
-    let words: Vec<_> = std::env::args_os().collect();
+    let words = words::typed();
     let shown: Vec<String> = words.iter().map(|word| printable::name(&word.to_string_lossy()).into_owned()).collect();
     let error = match words.iter().zip(&shown).all(|(word, shown)| word == shown.as_str()) {
         true => error,
@@ -159,11 +184,13 @@ fn not_understood(error: clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Warnings go to the terminal, those of the window libraries only when something fails; `RUST_LOG` asks for more.
-fn start_log() {
+/// Warnings go to the terminal, those of the window libraries only when something fails; `--verbose` and `RUST_LOG` ask
+/// for more.
+fn start_log(verbose: bool) {
     use tracing_subscriber::EnvFilter;
+    let own = if verbose { "warn,firstlight=debug" } else { "warn" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
-        EnvFilter::new("warn,winit=error,egui_wgpu=error,wgpu_core=error,wgpu_hal=error,naga=error")
+        EnvFilter::new(format!("{own},winit=error,egui_wgpu=error,wgpu_core=error,wgpu_hal=error,naga=error"))
     });
     // Only a second logger can fail, and then the first one does the work.
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(|| LogWriter);
@@ -173,5 +200,10 @@ fn start_log() {
 fn builtin_help() -> String {
     let width = BUILTIN_SCENES.iter().map(|(name, _, _)| name.len()).max().unwrap_or(0);
     let rows: String = BUILTIN_SCENES.iter().map(|(name, about, _)| format!("\n  {name:width$}  {about}")).collect();
-    format!("Built-in scenes:{rows}")
+    format!(
+        "Built-in scenes:{rows}\n\nEnvironment variables:\n  \
+         NO_COLOR           Print help and errors without colours\n  \
+         RUST_LOG           Log filter, such as info or firstlight=debug\n  \
+         FIRSTLIGHT_LIMITS  Factor for the limits on input size, such as 2"
+    )
 }

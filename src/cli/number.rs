@@ -5,7 +5,7 @@ use firstlight::scene::check_stops;
 
 /// `640x480` as a width and a height.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let (width, height) = text.split_once(['x', 'X', '×']).ok_or("write it as WIDTHxHEIGHT, such as 1280x720")?;
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a number of pixels"));
     let (width, height) = (number(width)?, number(height)?);
     firstlight::scene::file::check_film_size(width, height)?;
@@ -20,20 +20,28 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A relative error to stop at: `0.05`, or the same as `5%`. Above 1 only with the sign: who writes 5 means per cent.
+/// A relative error to stop at: `0.05`, or the same as `5%`. Above 1 only with the sign: who writes 5 means percent.
 pub fn parse_share(text: &str) -> Result<f64, String> {
-    let (number, unit) = match text.trim_end().strip_suffix('%') {
-        Some(number) => (number.trim_end(), 0.01),
-        None => (text.trim_end(), 1.0),
-    };
+    let (number, unit) = number_and_unit(text);
     match number.parse::<f64>().map(|value| value * unit) {
         Ok(share) if unit == 1.0 && share > 1.0 && share.is_finite() => {
             let per_cent = 100.0 * share;
-            Err(format!("{number} means {per_cent} %: write {number}% for {number} per cent"))
+            Err(format!("{number} means {per_cent} %: write {number}% for {number} percent"))
         }
         Ok(share) if share > 0.0 && share.is_finite() => Ok(share),
-        _ => Err("must be a positive number: five per cent is 0.05 or 5%".to_owned()),
+        _ => Err("must be a positive number: five percent is 0.05 or 5%".to_owned()),
     }
+}
+
+/// A share as a percentage with two significant digits: estimates are no more precise than that.
+pub fn percent(share: f64) -> String {
+    format!("{} %", two_digits(100.0 * share))
+}
+
+/// A number with two significant digits, or all before the point.
+pub fn two_digits(value: f64) -> String {
+    let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize } else { 0 };
+    format!("{value:.digits$}")
 }
 
 /// Stops of exposure: any number that is one.
@@ -44,9 +52,10 @@ pub fn parse_stops(text: &str) -> Result<f32, String> {
     }
 }
 
-/// The share of triangles to keep.
+/// The share of triangles to keep: `0.1` or `10%`.
 pub fn parse_ratio(text: &str) -> Result<f64, String> {
-    let ratio = text.parse().map_err(|_| "must be a number above 0 and at most 1")?;
+    let (number, unit) = number_and_unit(text);
+    let ratio = number.parse::<f64>().map_err(|_| "must be a number above 0 and at most 1, or a percentage")? * unit;
     check_target(Target::Ratio(ratio)).map_err(|error| error.to_string())?;
     Ok(ratio)
 }
@@ -59,10 +68,38 @@ pub fn parse_faces(text: &str) -> Result<usize, String> {
 }
 
 /// The largest distance between two surfaces.
-pub fn parse_error(text: &str) -> Result<f64, String> {
-    let error = text.parse().map_err(|_| "must be a length above 0")?;
-    check_target(Target::Error(error)).map_err(|error| error.to_string())?;
-    Ok(error)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Deviation {
+    /// In the units of the file.
+    Length(f64),
+    /// Of the diagonal of the model's bounding box.
+    Share(f64),
+}
+
+impl Deviation {
+    /// In the units of a model with this diagonal.
+    pub fn length(self, diagonal: f64) -> f64 {
+        match self {
+            Self::Length(length) => length,
+            Self::Share(share) => share * diagonal,
+        }
+    }
+}
+
+/// `0.01` as a length, `0.5%` as a share of the diagonal.
+pub fn parse_error(text: &str) -> Result<Deviation, String> {
+    let (number, unit) = number_and_unit(text);
+    let number: f64 = number.parse().map_err(|_| "must be a length above 0, or a percentage of the diagonal")?;
+    check_target(Target::Error(number)).map_err(|error| error.to_string())?;
+    Ok(if unit == 1.0 { Deviation::Length(number) } else { Deviation::Share(unit * number) })
+}
+
+/// A number and what it counts: `%` is a hundredth.
+fn number_and_unit(text: &str) -> (&str, f64) {
+    match text.trim_end().strip_suffix('%') {
+        Some(number) => (number.trim_end(), 0.01),
+        None => (text.trim_end(), 1.0),
+    }
 }
 
 #[cfg(test)]
@@ -70,7 +107,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_are_numbers_or_per_cent() {
+    fn percentages_have_two_digits_that_mean_something() {
+        for (share, text) in [
+            (1.0549, "105 %"),
+            (0.0819, "8.2 %"),
+            (0.12, "12 %"),
+            (0.00416, "0.42 %"),
+            (1e-6, "0.00010 %"),
+            (0.0, "0 %"),
+        ] {
+            assert_eq!(percent(share), text);
+        }
+    }
+
+    #[test]
+    fn deviations_are_lengths_or_percentages_of_the_diagonal() {
+        assert_eq!(parse_error("0.25"), Ok(Deviation::Length(0.25)));
+        assert_eq!(parse_error("0.5%").unwrap().length(200.0), 1.0);
+        assert_eq!(parse_error("2 %").unwrap().length(50.0), 1.0);
+        for text in ["", "%", "0%", "-1%", "nan", "0", "half"] {
+            assert!(parse_error(text).is_err(), "{text}");
+        }
+        assert_eq!((parse_ratio("0.25"), parse_ratio("25%")), (Ok(0.25), Ok(0.25)));
+        assert!(parse_ratio("150%").is_err() && parse_ratio("0 %").is_err());
+    }
+
+    #[test]
+    fn shares_are_numbers_or_percent() {
         for (text, share) in [("0.05", 0.05), ("5%", 0.05), ("0.5 %", 0.005), ("1e-3", 1e-3), ("150%", 1.5)] {
             assert!((parse_share(text).unwrap() - share).abs() < 1e-15, "{text}");
         }
@@ -84,7 +147,7 @@ mod tests {
             );
         }
         assert!(parse_share("5").unwrap_err().starts_with("5 means 500 %"));
-        for text in ["", "%", "5%%", "5 per cent", "-5%", "0%", "nan%", "inf", "%5"] {
+        for text in ["", "%", "5%%", "5 percent", "-5%", "0%", "nan%", "inf", "%5"] {
             assert!(parse_share(text).unwrap_err().contains("0.05 or 5%"), "{text}");
         }
     }

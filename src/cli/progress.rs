@@ -11,7 +11,7 @@ pub struct Progress {
 
 impl Progress {
     pub fn new() -> Self {
-        Self { bar: Bar::new(1000), lines: (!Bar::is_watched()).then(|| Waiting::new("reading")) }
+        Self { bar: Bar::new(1000), lines: (!Bar::is_watched()).then(|| Waiting::new("loading")) }
     }
 
     /// What is being done, before it is known how long it takes.

@@ -1,15 +1,16 @@
 //! `firstlight render SCENE -o out.png`: a picture without a window, and the film that it can go on from.
 
 use super::animate::{animate, frames};
-use super::console::{print, remark};
+use super::args::replaced;
+use super::console::{inform, print, prints_to_terminal, remark};
 use super::failure::Failure;
 use super::job::{RenderJob, room_to_write};
+use super::number::percent;
 use super::progress::Progress;
-use super::render_args::RenderArgs;
+use super::render_args::{RenderArgs, RenderCommand};
 use super::stop::Stop;
 use firstlight::frame::{
-    OfflineReport, PictureFormat, Target, read_film_file, render_offline_until, render_region_until, write_errors,
-    write_film_into,
+    OfflineReport, Target, read_film_file, render_offline_until, render_region_until, write_errors, write_film_into,
 };
 use firstlight::render::{BadSample, Film, Region};
 use firstlight::report::cpu_seconds;
@@ -20,8 +21,28 @@ use glam::{UVec2, Vec3};
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
-pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
-    PictureFormat::of(&args.output).map_err(Failure::Usage)?;
+/// Renders each scene in turn.
+pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
+    let jobs = command.jobs()?;
+    // A mistake in the last name should not cost the wait for the others.
+    for job in &jobs {
+        job.scene.source()?;
+        job.picture_format()?;
+    }
+    for (i, job) in jobs.iter().enumerate() {
+        run_one(job, stop)?;
+        if job.has_next {
+            stop.has_saved(format!("{} of {} pictures are saved", i + 1, jobs.len()));
+            stop.rest();
+        }
+    }
+    Ok(())
+}
+
+/// Renders one scene.
+pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
+    args.picture_format()?;
+    check_stdout(args)?;
     let film_path = film_path(args)?;
     // A picture that cannot be written is not worth the wait.
     let mut files = args.overwrite.files();
@@ -33,21 +54,19 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         Some(path) if args.resume => Some(files.go_on(&path)?),
         Some(path) if path.exists() && files.replace() == Replace::AllButFilms => {
             let message =
-                "is there already: go on with it by --resume, name another file, or replace it by --overwrite";
+                "already exists: continue it with --resume, replace it with --overwrite, or choose another name";
             return Err(Failure::Failed(format!("{}: {message}", path.display())));
         }
         Some(path) => Some(files.claim(&path, files.replace())?),
     };
     match frames(args) {
         Some(frames) => files.write_all(frames)?,
+        None if args.to_stdout() => {}
         None => files.write(&args.output)?,
     }
     if let Some(path) = &args.error_picture {
         if !is_exr(path) {
-            return Err(Failure::Usage(format!(
-                "{}: errors are written as OpenEXR: end the name in .exr",
-                path.display()
-            )));
+            return Err(Failure::Usage(format!("{}: the name of an error picture must end in .exr", path.display())));
         }
         files.write(path)?;
     }
@@ -58,8 +77,24 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
-        .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
+        .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;
     pool.install(|| render(args, film, &mut files, stop))
+}
+
+/// Standard output takes one picture and nothing else.
+fn check_stdout(args: &RenderArgs) -> Result<(), Failure> {
+    let message = if !args.to_stdout() {
+        return Ok(());
+    } else if args.json {
+        "-o - and --json both write to standard output: write the picture to a file"
+    } else if args.turntable.is_some() || args.bookmarks.is_some() {
+        "-o - takes one picture: write the frames to files"
+    } else if prints_to_terminal() {
+        "standard output is a terminal: redirect it, or write the picture to a file"
+    } else {
+        return Ok(());
+    };
+    Err(Failure::Usage(message.to_owned()))
 }
 
 fn is_exr(path: &Path) -> bool {
@@ -70,13 +105,13 @@ fn is_exr(path: &Path) -> bool {
 fn film_path(args: &RenderArgs) -> Result<Option<PathBuf>, Failure> {
     match &args.film {
         Some(path) if !is_exr(path) => {
-            Err(Failure::Usage(format!("{}: films are OpenEXR pictures: end the name in .exr", path.display())))
+            Err(Failure::Usage(format!("{}: the name of a film must end in .exr", path.display())))
         }
         Some(path) => Ok(Some(path.clone())),
         None if !args.resume => Ok(None),
         None => match args.scene.source()? {
             SceneSource::Picture(path) if is_exr(&path) => Ok(Some(path)),
-            _ => Err(Failure::Usage("--resume goes on with a film: name it with --film FILE.exr".to_owned())),
+            _ => Err(Failure::Usage("--resume needs a film: name it with --film FILE.exr".to_owned())),
         },
     }
 }
@@ -97,7 +132,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
     let job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
-        let message = format!("the picture was stopped in the middle of a pass; the new one has {} samples", shot.spp);
+        let message = format!("the picture was saved in the middle of a pass; the new one has {} samples", shot.spp);
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
     if args.turntable.is_some() || args.bookmarks.is_some() {
@@ -106,7 +141,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let mut film = job.film(args, kept)?;
     if let Some(path) = film_path.filter(|_| args.resume) {
         let (path, spp) = (path.display(), film.spp());
-        progress.suspend(|| remark(format_args!("going on with {path}, which has {spp} samples per pixel")));
+        progress.suspend(|| inform(format_args!("resuming {path}, which has {spp} samples per pixel")));
     }
     let room = room_to_write(args, job.size)?;
     let target = job.target(args);
@@ -144,7 +179,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let reached = target.reached(film.spp_in(region), report.seconds, error);
     let stopped = stop.is_asked() && !reached;
     if film.spp() == 0 {
-        let message = "stopped before every pixel had a sample: there is nothing to save";
+        let message = "stopped before every pixel had a sample: nothing was saved";
         return Err(Failure::Stopped(message.to_owned()));
     }
 
@@ -154,7 +189,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         let note = job.note(&film, file.path());
         write_film_into(&film, &note, file).map_err(Failure::Failed)?;
     }
-    job.write(&film, &args.output, files.replace())?;
+    job.write(args, &film, &args.output, files.replace())?;
     if let Some(path) = &args.error_picture {
         write_errors(&film, path, files.replace()).map_err(Failure::Failed)?;
     }
@@ -162,22 +197,22 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         let total = report.rays.camera;
         let n_bad = film.n_bad() - bad_before;
         remark(format_args!(
-            "warning: {n_bad} of {total} samples were not finite and were left out{}",
+            "warning: {n_bad} of {total} samples were not finite and were discarded{}",
             first_of(&report.bad)
         ));
     }
     if is_dark {
         let spp = film.spp();
         remark(format_args!(
-            "warning: none of {spp} samples per pixel found any light, so the error is not known: take more samples, or \
-             check that the camera sees something lit"
+            "warning: none of {spp} samples per pixel found any light, so the error is unknown: use more samples, or check \
+             that the camera sees something lit"
         ));
     }
     if report.n_above > 0 {
         let (n_above, total) = (report.n_above, report.rays.camera);
         remark(format_args!(
-            "warning: {n_above} of {total} samples are brighter than anything in the scene can be{}: \
-             this is a fault of the program, please report it with the scene",
+            "warning: {n_above} of {total} samples are brighter than the scene allows{}: \
+             this is a bug in firstlight, please report it with the scene",
             first_of(&report.above)
         ));
     }
@@ -185,35 +220,40 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         && error > wanted
     {
         remark(format_args!(
-            "warning: the error is {error:.3} still, not {wanted}: more time or samples would lower it"
+            "warning: the estimated error is {}, above the target of {}: allow more time or samples",
+            percent(error),
+            percent(wanted)
         ));
     }
     if args.json {
         print(json(&job, &report, cpu_seconds, (&film, is_dark), files.replaced(), stopped))?;
     } else {
-        let (output, (width, height)) = (args.output.display(), job.size);
+        let (output, (width, height)) = (args.output_name(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
         let error = error.filter(|_| !is_dark);
-        let error = error.map_or(String::new(), |error| format!(", error about {:.2} %", 100.0 * error));
-        let kept = film_path.map_or(String::new(), |path| format!(", the film kept in {}", path.display()));
+        let error = error.map_or(String::new(), |error| format!(", estimated error {}", percent(error)));
+        let kept = film_path.map_or(String::new(), |path| format!(", film saved to {}", path.display()));
         let replaced = replaced(files.replaced(), &args.output);
-        remark(format_args!(
+        inform(format_args!(
             "{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{kept}{replaced}"
         ));
+    }
+    if args.has_next {
+        drop(ManuallyDrop::into_inner(job));
     }
     match (stopped, film_path) {
         (false, _) => Ok(()),
         (true, Some(path)) => Err(Failure::Stopped(format!(
-            "stopped after {} samples per pixel; {} and the film {} are saved: go on with --resume --film {}",
+            "stopped after {} samples per pixel; saved {} and the film {}: continue with --resume --film {}",
             film.spp(),
-            args.output.display(),
+            args.output_name(),
             path.display(),
             path.display()
         ))),
         (true, None) => Err(Failure::Stopped(format!(
-            "stopped after {} samples per pixel; {} is saved (keep a film with --film to be able to go on)",
+            "stopped after {} samples per pixel; saved {} (to be able to resume, save a film with --film)",
             film.spp(),
-            args.output.display()
+            args.output_name()
         ))),
     }
 }
@@ -223,7 +263,7 @@ fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Fai
     let start = UVec2::new(x, y);
     film.region(start, start.saturating_add(UVec2::new(width, height))).ok_or_else(|| {
         let (width, height) = (film.width(), film.height());
-        Failure::Usage(format!("--region: begins at {x},{y}, but the picture has {width} x {height} pixels"))
+        Failure::Usage(format!("--region: {x},{y} is outside of the picture of {width} x {height} pixels"))
     })
 }
 
@@ -231,18 +271,6 @@ fn region_in(film: &Film, [x, y, width, height]: [u32; 4]) -> Result<Region, Fai
 fn first_of(samples: &[BadSample]) -> String {
     let place = |&BadSample { x, y, sample }: &BadSample| format!(" (pixel {x},{y}, sample {sample})");
     samples.first().map(place).unwrap_or_default()
-}
-
-/// Tells which files are not there any more.
-fn replaced(paths: &[PathBuf], output: &Path) -> String {
-    match paths {
-        [] => String::new(),
-        [path] if path == output => ", in place of the file that was there".to_owned(),
-        paths => {
-            let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-            format!(", in place of what was there: {}", names.join(", "))
-        }
-    }
 }
 
 fn is_black(film: &Film) -> bool {

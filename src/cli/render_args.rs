@@ -1,101 +1,232 @@
 //! What `firstlight render` is asked for.
 
-use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs};
+use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
+use super::failure::Failure;
 use super::number::{parse_positive, parse_share, parse_size, parse_stops};
-use clap::Args;
+use clap::{Args, ValueEnum};
+use firstlight::frame::PictureFormat;
 use firstlight::render::Film;
+use std::ffi::{OsStr, OsString};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Samples per pixel when neither a number, a time nor an error is given.
 pub const DEFAULT_SPP: u32 = 256;
 
+/// What is to be rendered, and where to.
+#[derive(Args, Clone, Debug)]
+pub struct RenderCommand {
+    #[command(flatten)]
+    scenes: ScenesArgs,
+    /// Picture file, replaced if it exists; a folder for several scenes; - for standard output.
+    ///
+    /// .png is tone-mapped, .exr holds linear light (HDR). By default a new file firstlight-NAME.png in the current
+    /// folder.
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    render: RenderArgs,
+}
+
+/// How one scene is rendered.
 #[derive(Args, Clone, Debug)]
 pub struct RenderArgs {
-    #[command(flatten)]
+    #[arg(skip)]
     pub scene: SceneArgs,
-    /// The picture: .png is developed, .exr is linear light.
-    #[arg(short, long, value_name = "FILE")]
+    /// The picture; [`STDOUT`] for standard output.
+    #[arg(skip)]
     pub output: PathBuf,
-    /// Width and height in pixels; the scene's own when not given.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    /// Picture format [default: from the name of the output, else png].
+    #[arg(long, value_enum, help_heading = "Output")]
+    pub format: Option<FormatArg>,
+    /// Width and height in pixels [default: from the scene].
+    #[arg(help_heading = "Output", long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
-    /// So many times as wide and as high.
-    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
+    /// Scale width and height.
+    #[arg(help_heading = "Output", long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
-    /// Samples per pixel; 256 unless a time or an error is given.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
+    /// Samples per pixel [default: 256, unless --time or --error is given].
+    #[arg(help_heading = "When to stop", long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
     pub spp: Option<u32>,
-    /// Samples A to B-1 of each pixel: ranges that do not overlap can be added up with `firstlight merge`.
-    #[arg(long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
+    /// Render samples A to B-1 of each pixel; `firstlight merge` combines films of disjoint ranges.
+    #[arg(help_heading = "Films and parts", long, value_name = "A..B", value_parser = parse_range, conflicts_with_all = ["spp", "resume"])]
     pub samples: Option<Range<u32>>,
-    /// Keep the film as well, an .exr to go on from.
-    #[arg(long, value_name = "FILE.exr")]
+    /// Save the render state (film) as well, for --resume and `firstlight merge`.
+    #[arg(help_heading = "Films and parts", long, value_name = "FILE.exr")]
     pub film: Option<PathBuf>,
-    /// The relative error of each pixel as well, as the picture itself tells it: an .exr in which 0.05 is 5 %, the mean over
-    /// 5 x 5 pixels. The root of the mean of its squares is the error of the whole picture.
-    #[arg(long, value_name = "FILE.exr", conflicts_with_all = ["turntable", "bookmarks", "region"])]
+    /// Save the estimated relative error of each pixel as an .exr in which 0.05 is 5 %
+    ///
+    /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole picture.
+    #[arg(help_heading = "Output", long, value_name = "FILE.exr", conflicts_with_all = ["turntable", "bookmarks", "region"])]
     pub error_picture: Option<PathBuf>,
-    /// Once around what the camera looks at, in so many pictures: FILE-0001.png and so on.
-    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
+    /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
+    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
-    /// Left, top, width and height of a part of the picture, pixels: it gets all samples but the first, with whole tiles
-    /// of 32 pixels around it, and what is left is as it was, with --resume too.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_region, conflicts_with_all = ["turntable", "bookmarks", "samples"])]
+    /// Render only a rectangle: left, top, width and height in pixels, enlarged to whole tiles of 32 pixels
+    ///
+    /// Pixels outside of it get one sample, or keep their samples with --resume.
+    #[arg(help_heading = "Films and parts", long, value_name = "X,Y,W,H", value_parser = parse_region, conflicts_with_all = ["turntable", "bookmarks", "samples"])]
     pub region: Option<[u32; 4]>,
-    /// From bookmark to bookmark of the scene, by their numbers: 1,2,3.
-    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
+    /// Move the camera through bookmarks of the scene, such as 1,2,3.
+    #[arg(help_heading = "Animation", long, value_name = "NUMBERS", value_delimiter = ',', requires = "frames", conflicts_with_all = ["turntable", "film", "resume", "samples", "json"])]
     pub bookmarks: Option<Vec<u8>>,
-    /// In how many pictures.
-    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "bookmarks")]
+    /// Number of frames for --bookmarks.
+    #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "bookmarks")]
     pub frames: Option<u32>,
-    /// Go on with the film that is there: with --film, or with the film that is named as the scene.
-    #[arg(long)]
+    /// Resume the film given by --film, or a film given as the scene.
+    #[arg(long, help_heading = "Films and parts")]
     pub resume: bool,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Stop after so many seconds of rendering.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
+    /// Stop after this many seconds of rendering.
+    #[arg(help_heading = "When to stop", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     pub time: Option<f64>,
-    /// Stop when the picture's relative error, by its own estimate, is down to this: 0.01 or 1% is one per cent.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = parse_share)]
+    /// Stop when the estimated relative error of the picture is at most this: 1% or 0.01.
+    #[arg(help_heading = "When to stop", long, value_name = "ERROR", allow_negative_numbers = true, value_parser = parse_share)]
     pub error: Option<f64>,
-    /// Worker threads; all cores when not given. The picture does not depend on it.
+    /// Number of worker threads [default: all cores]; the picture does not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Another seed gives other noise; 0 when not given.
+    /// Random seed [default: from the scene, else 0].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub seed: Option<u32>,
-    /// The light model; the scene's own when not given.
+    /// Light transport [default: from the scene].
     #[arg(long, value_enum)]
     pub integrator: Option<IntegratorArg>,
-    /// How the light around a pixel is weighted; the scene's own when not given.
+    /// Pixel reconstruction filter [default: from the scene].
     #[arg(long, value_enum)]
     pub filter: Option<FilterArg>,
-    /// Longest path in segments; 1 shows lights alone.
+    /// Maximum path length in segments; 1 shows only emitters.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: Option<u32>,
-    /// Brighter or darker by factors of two, on top of the scene's own exposure; .exr keeps the linear light.
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0, value_parser = parse_stops)]
+    /// Exposure in stops, added to that of the scene; does not affect .exr.
+    #[arg(help_heading = "Output", long, value_name = "STOPS", allow_negative_numbers = true, default_value_t = 0.0, value_parser = parse_stops)]
     pub exposure: f32,
-    /// Print one JSON object with times and counts as the last line.
-    #[arg(long)]
+    /// Print times and counts as one line of JSON.
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// Said once the scene has been read.
+    /// Printed once the scene has been read.
     #[arg(skip)]
     pub announcement: Option<String>,
+    /// Other scenes are rendered after this one.
+    #[arg(skip)]
+    pub has_next: bool,
+}
+
+/// An output that is no file.
+pub const STDOUT: &str = "-";
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormatArg {
+    /// 8 bits, tone-mapped.
+    Png,
+    /// Linear light (HDR).
+    Exr,
+}
+
+impl RenderCommand {
+    /// One for each scene.
+    pub fn jobs(&self) -> Result<Vec<RenderArgs>, Failure> {
+        let scenes: Vec<SceneArgs> = self.scenes.each().collect();
+        let several = scenes.len() > 1;
+        let one_only = [
+            ("-o -", several && self.output.as_deref() == Some(Path::new(STDOUT))),
+            ("--film", self.render.film.is_some()),
+            ("--resume", self.render.resume),
+            ("--error-picture", self.render.error_picture.is_some()),
+        ];
+        if let Some((option, _)) = one_only.iter().find(|(_, is_given)| several && *is_given) {
+            return Err(Failure::Usage(format!("{option} works with one scene only, but {} are given", scenes.len())));
+        }
+        let n = scenes.len();
+        let mut jobs: Vec<RenderArgs> = Vec::new();
+        for (i, scene) in scenes.into_iter().enumerate() {
+            let output = match &self.output {
+                Some(folder) if several => self.in_folder(folder, &scene)?,
+                Some(output) => output.clone(),
+                None => free_name(&scene.scene, self.render.default_format().extension(), &jobs),
+            };
+            if several && jobs.iter().any(|other| other.output == output) {
+                let name = output.display();
+                return Err(Failure::Usage(format!("{name}: two scenes would be rendered to the same file")));
+            }
+            jobs.push(RenderArgs { scene, output, has_next: i + 1 < n, ..self.render.clone() });
+        }
+        Ok(jobs)
+    }
+
+    /// Where the picture of one of several scenes goes.
+    fn in_folder(&self, folder: &Path, scene: &SceneArgs) -> Result<PathBuf, Failure> {
+        if !folder.is_dir() {
+            let (name, n) = (folder.display(), self.scenes.scenes.len());
+            return Err(Failure::Usage(format!("{name}: not a folder: {n} scenes need -o FOLDER")));
+        }
+        let mut name = file_stem(&scene.scene);
+        name.push(".");
+        name.push(self.render.default_format().extension());
+        Ok(folder.join(name))
+    }
+}
+
+impl RenderArgs {
+    /// Whether the picture goes to standard output.
+    pub fn to_stdout(&self) -> bool {
+        self.output == Path::new(STDOUT)
+    }
+
+    /// The output in words.
+    pub fn output_name(&self) -> String {
+        if self.to_stdout() { "standard output".to_owned() } else { self.output.display().to_string() }
+    }
+
+    /// Of the picture: as asked for, and not another than its name says.
+    pub fn picture_format(&self) -> Result<PictureFormat, Failure> {
+        if self.to_stdout() {
+            return Ok(self.default_format());
+        }
+        let of_name = PictureFormat::of(&self.output).map_err(Failure::Usage)?;
+        if self.format.is_some() && of_name != self.default_format() {
+            let (name, extension) = (self.output.display(), self.default_format().extension());
+            return Err(Failure::Usage(format!("{name}: --format {extension} needs a name that ends in .{extension}")));
+        }
+        Ok(of_name)
+    }
+
+    /// Where no name says it.
+    fn default_format(&self) -> PictureFormat {
+        match self.format {
+            Some(FormatArg::Exr) => PictureFormat::Exr,
+            _ => PictureFormat::Png,
+        }
+    }
+}
+
+fn file_stem(scene: &OsStr) -> OsString {
+    Path::new(scene).file_stem().unwrap_or(OsStr::new("scene")).to_owned()
+}
+
+/// `firstlight-NAME.png` in the current folder, with a number when that is taken, also by one of the `others`.
+pub fn free_name(scene: &OsStr, extension: &str, others: &[RenderArgs]) -> PathBuf {
+    let name = |end: String| {
+        let mut name = OsString::from("firstlight-");
+        name.push(file_stem(scene));
+        name.push(end);
+        PathBuf::from(name)
+    };
+    let ends = std::iter::once(format!(".{extension}")).chain((2_u64..).map(|number| format!("-{number}.{extension}")));
+    let is_free = |path: &PathBuf| !path.exists() && others.iter().all(|other| other.output != *path);
+    ends.map(name).find(is_free).expect("numbers do not end")
 }
 
 /// `64..128` as sample numbers.
 fn parse_range(text: &str) -> Result<Range<u32>, String> {
-    let (start, end) =
-        text.split_once("..").ok_or("write it as A..B, such as 64..128: from A up to, not including, B")?;
-    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not the number of a sample"));
+    let (start, end) = text.split_once("..").ok_or("expected A..B, such as 64..128: from A up to, not including, B")?;
+    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a sample number"));
     let range = number(start)?..number(end)?;
     if range.is_empty() {
-        Err(format!("there is no sample from {} up to {}", range.start, range.end))
+        Err(format!("the range {}..{} is empty", range.start, range.end))
     } else if range.end > Film::MAX_SAMPLES {
-        Err(format!("samples are numbered below {}", Film::MAX_SAMPLES))
+        Err(format!("sample numbers must be below {}", Film::MAX_SAMPLES))
     } else {
         Ok(range)
     }
@@ -103,7 +234,7 @@ fn parse_range(text: &str) -> Result<Range<u32>, String> {
 
 /// `X,Y,W,H` as four numbers of pixels.
 fn parse_region(text: &str) -> Result<[u32; 4], String> {
-    let wrong = || format!("`{text}` is not a rectangle: write it as X,Y,W,H in pixels, such as 640,360,200,100");
+    let wrong = || format!("`{text}` is not a rectangle: expected X,Y,W,H in pixels, such as 640,360,200,100");
     let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     let region = numbers.and_then(|numbers| <[u32; 4]>::try_from(numbers).ok()).ok_or_else(wrong)?;
     if region[2] == 0 || region[3] == 0 { Err(wrong()) } else { Ok(region) }

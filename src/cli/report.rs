@@ -1,7 +1,7 @@
 //! `firstlight report [SCENES]`: speed against error, as a page, a table and a few lines of text.
 
 use super::args::{OverwriteArgs, SceneArgs};
-use super::console::{Bar, lines, print, remark};
+use super::console::{Bar, inform, lines, print, remark};
 use super::failure::Failure;
 use super::number::{parse_positive, parse_size};
 use super::stop::Stop;
@@ -32,33 +32,35 @@ const DEFAULT_PIXELS: f64 = 50_000.0;
 
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// Built-in scenes, scene files (.ron) or models (.obj); all built-in scenes when not given.
+    /// Built-in scenes, scene files (.ron) or models (.obj) [default: all built-in scenes].
     #[arg(value_name = "SCENES")]
     scenes: Vec<OsString>,
-    /// A converged linear picture (.exr) of the one scene; a long render of its own, kept for next time, when not given:
-    /// 16 times the samples of the last step, and so about 16 times as long.
+    /// Converged linear picture (.exr) of the scene [default: rendered with 16 times the samples and cached].
+    ///
+    /// Rendering the default reference takes about 16 times as long as the last step; it is cached for the next report.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Folder for the page, the table and the plots; made when it is not there.
+    /// Output folder for the HTML page and the CSV table.
     #[arg(long, value_name = "DIR", default_value = "report")]
     out: PathBuf,
-    /// Most samples per pixel; 256 unless a time is given.
+    /// Maximum samples per pixel [default: 256, unless --time is given].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
-    /// Most seconds of rendering for a scene; the same again for each technique that is switched off, and 16 times as long
-    /// for the scene's own reference, unless it is given or was kept.
+    /// Maximum seconds of rendering per scene.
+    ///
+    /// Each disabled technique takes as long again, and a reference that is neither given nor cached 16 times as long.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive)]
     time: Option<f64>,
-    /// Width and height in pixels; that of the reference, or the scene's own shape with about 50,000 pixels.
+    /// Width and height in pixels [default: that of the reference, else about 50,000 pixels].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
-    /// Worker threads; all cores when not given.
+    /// Number of worker threads [default: all cores].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Another seed gives other noise.
+    /// Random seed.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     seed: u32,
-    /// Leave out what each technique is worth.
+    /// Skip the comparison with each technique disabled.
     #[arg(long)]
     no_ablation: bool,
 }
@@ -71,7 +73,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     };
     if args.reference.is_some() && names.len() != 1 {
         return Err(Failure::Usage(format!(
-            "--reference is a picture of one scene, but there are {}: name the scene it shows",
+            "--reference is a picture of one scene, but {} scenes are given: name the scene it shows",
             names.len()
         )));
     }
@@ -86,10 +88,10 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
-        .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
+        .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;
     let (outcomes, missing) = pool.install(|| measure_all(args, &names, given.as_ref(), &mut files, stop))?;
     if let (true, Some(missing)) = (outcomes.is_empty(), &missing) {
-        return Err(Failure::Stopped(format!("stopped before anything was measured: nothing is written ({missing})")));
+        return Err(Failure::Stopped(format!("stopped before anything was measured: nothing was written ({missing})")));
     }
     folder.keep();
 
@@ -102,7 +104,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     }
     match missing {
         None => Ok(()),
-        Some(missing) => Err(Failure::Stopped(format!("stopped: what was measured is written; {missing}"))),
+        Some(missing) => Err(Failure::Stopped(format!("stopped: the measurements so far were written; {missing}"))),
     }
 }
 
@@ -149,7 +151,7 @@ fn measure_all(
     // Every scene is read first: a mistake in the last name should not cost the wait for the others.
     let mut scenes = Vec::new();
     for name in names {
-        let scene = SceneArgs { scene: name.clone(), up: None };
+        let scene = SceneArgs { scene: name.clone(), ..SceneArgs::default() };
         scenes.push(ReportScene::new(args, &scene.load(None, files, &|_| ())?, given)?);
     }
     let limits = CurveLimits {
@@ -159,8 +161,8 @@ fn measure_all(
     let mut progress = ReportProgress::new(&scenes, !args.no_ablation, given.is_some());
     if let (Some(seconds), None) = (limits.seconds, given) {
         let longest = duration(f64::from(REFERENCE_FACTOR) * seconds * scenes.len() as f64);
-        let message = format!("references that were not kept take up to {longest} in all, beside --time");
-        progress.bar.suspend(|| remark(message));
+        let message = format!("references that are not cached take up to {longest} in total, in addition to --time");
+        progress.bar.suspend(|| inform(message));
     }
     stop.attend();
     let mut outcomes = Vec::new();
@@ -170,7 +172,8 @@ fn measure_all(
         outcomes.extend(outcome);
         if let Some(lacks) = lacks {
             let others: Vec<&str> = scenes[i + 1..].iter().map(|scene| scene.title.as_str()).collect();
-            let others = if others.is_empty() { String::new() } else { format!("; not begun: {}", others.join(", ")) };
+            let others =
+                if others.is_empty() { String::new() } else { format!("; not started: {}", others.join(", ")) };
             missing = Some(format!("{}: {lacks}{others}", scene.title));
             break;
         }
@@ -213,7 +216,7 @@ impl ReportScene {
         let size = match (args.size, of_reference) {
             (Some(size), Some(other)) if size != other => {
                 return Err(Failure::Usage(format!(
-                    "--size is {}x{}, but the reference has {}x{} pixels: leave --size out",
+                    "--size is {}x{}, but the reference has {}x{} pixels: omit --size",
                     size.0, size.1, other.0, other.1
                 )));
             }
@@ -245,13 +248,14 @@ impl ReportScene {
         stop: &Stop,
     ) -> (Option<SceneOutcome>, Option<String>) {
         let rungs = self.measure_curve(limits, Techniques::default(), "all techniques", progress, stop);
-        let mut missing = stop.is_asked().then(|| "its later steps, and what each technique is worth".to_owned());
-        let Some(last_rung) = rungs.last() else { return (None, Some("no step was finished".to_owned())) };
+        let mut missing =
+            stop.is_asked().then(|| "its later steps and the comparison of techniques are missing".to_owned());
+        let Some(last_rung) = rungs.last() else { return (None, Some("no step was completed".to_owned())) };
         let reference = match given {
             Some(given) => given.clone(),
             None => match self.reference(last_rung, progress, stop) {
                 Some(reference) => reference,
-                None => return (None, Some("it has no reference to be measured against yet".to_owned())),
+                None => return (None, Some("its reference was not completed".to_owned())),
             },
         };
         let display = self.developing.0;
@@ -268,8 +272,9 @@ impl ReportScene {
                         self.measure_curve(limits, techniques, &format!("without {technique}"), progress, stop);
                     // Half a ladder would be compared with a whole one.
                     if stop.is_asked() {
-                        missing
-                            .get_or_insert_with(|| format!("what {technique} and the techniques after it are worth"));
+                        missing.get_or_insert_with(|| {
+                            format!("the comparison of {technique} and later techniques is missing")
+                        });
                         return None;
                     }
                     // Only a step that both have can tell.

@@ -1,7 +1,7 @@
 //! `firstlight save SCENE -o out.ron`: a model, a built-in scene or what a picture shows, as a scene file.
 
-use super::args::{OverwriteArgs, SceneArgs};
-use super::console::remark;
+use super::args::{OverwriteArgs, SceneArgs, replaced};
+use super::console::inform;
 use super::failure::Failure;
 use clap::Args;
 use firstlight::scene::save_scene;
@@ -11,14 +11,14 @@ use std::path::PathBuf;
 pub struct SaveArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// The scene file; meshes and pictures are named by their paths from it.
+    /// Scene file; mesh and image paths in it are relative to its folder.
     #[arg(short, long, value_name = "OUT.ron")]
     output: PathBuf,
 }
 
 pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ron")) {
-        return Err(Failure::Usage(format!("{}: scene files end in .ron", args.output.display())));
+        return Err(Failure::Usage(format!("{}: the name of a scene file must end in .ron", args.output.display())));
     }
     let mut files = OverwriteArgs::default().files();
     files.write(&args.output)?;
@@ -26,11 +26,9 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
     let saved = save_scene(&mut world, Some(&scene), &args.output).map_err(Failure::Failed)?;
-    if !files.replaced().is_empty() {
-        remark(format_args!("{}: written in place of the file that was there", args.output.display()));
-    }
+    inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced(), &args.output)));
     for note in &saved.notes {
-        remark(format_args!("note: {note}"));
+        inform(format_args!("note: {note}"));
     }
     Ok(())
 }

@@ -1,51 +1,49 @@
 //! `firstlight [SCENE|MODEL]`: a window, or a picture where there is no display.
 
 use super::args::{OverwriteArgs, SceneArgs};
-use super::console::remark;
+use super::console::{inform, remark};
 use super::failure::Failure;
 use super::render;
-use super::render_args::RenderArgs;
+use super::render_args::{RenderArgs, free_name};
 use super::stop::Stop;
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
 use firstlight::scene::ImageSamples;
-use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
 pub struct ShowArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Size of the window, or of the picture where there is no display.
+    /// Size of the window in pixels; of the picture if there is no display.
     #[arg(long, value_name = "WxH", value_parser = super::number::parse_size)]
     size: Option<(u32, u32)>,
-    /// Worker threads; one for each processor when not given.
+    /// Number of worker threads [default: all cores].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Another number, another noise.
+    /// Random seed [default: 0].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u32>,
-    /// Write down what is done in the window, for --replay.
-    #[arg(long, value_name = "FILE")]
+    /// Record the session to a file, for --replay.
+    #[arg(long, value_name = "FILE", conflicts_with = "env")]
     record: Option<PathBuf>,
-    /// Play a recording without a window, and render the picture at its end.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["record", "scene", "size", "seed"])]
+    /// Replay a recording without a window and render its final picture.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["record", "scene", "size", "seed", "env"])]
     replay: Option<PathBuf>,
-    /// The picture of --replay.
+    /// Picture file for --replay.
     #[arg(short, long, value_name = "FILE", default_value = "replay.png", requires = "replay")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: OverwriteArgs,
-    /// Samples per pixel of that picture; as many as when it was recorded when not given.
+    /// Samples per pixel for --replay [default: as recorded].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)), requires = "replay")]
     spp: Option<u32>,
-    /// Print at the end how promptly the window reacted and how many paths it traced, as one JSON object; until then no
-    /// picture is good enough to rest.
+    /// Print input latency and number of camera paths as JSON on exit; rendering does not stop at an error target.
     #[cfg(feature = "viewer")]
     #[arg(long)]
     figures: bool,
-    /// Where the pictures go that are kept from the window.
+    /// Folder for screenshots and saved scenes.
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     save_to: PathBuf,
@@ -96,6 +94,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
         threads,
         seed: args.seed.unwrap_or(0),
         up: args.scene.up(),
+        environment: args.scene.how.env.clone(),
         folder,
         record: args.record.clone(),
         print_figures: args.figures,
@@ -126,22 +125,24 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
     print.write(&args.output, files.replace()).map_err(Failure::Failed)?;
     if files.replaced().contains(&args.output) {
-        remark(format_args!("{}: written in place of the file that was there", args.output.display()));
+        inform(format_args!("{}: replaced the existing file", args.output.display()));
     }
     Ok(())
 }
 
 fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
     if args.record.is_some() {
-        let message = "there is no display, so there is no window whose use could be recorded";
+        let message = "--record needs a window, but there is no display";
         return Err(Failure::Failed(message.to_owned()));
     }
-    let output = free_name(&args.scene.scene);
+    let output = free_name(&args.scene.scene, "png", &[]);
     let announcement = Some(format!("no display: rendering to {} instead", output.display()));
     let args = RenderArgs {
         announcement,
         scene: args.scene.clone(),
         output,
+        format: None,
+        has_next: false,
         size: args.size,
         scale: None,
         samples: None,
@@ -164,18 +165,5 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         exposure: 0.0,
         json: false,
     };
-    render::run(&args, stop)
-}
-
-/// `firstlight-NAME.png` in the current folder, with a number when that is taken.
-fn free_name(scene: &OsStr) -> PathBuf {
-    let stem = Path::new(scene).file_stem().unwrap_or(OsStr::new("scene"));
-    let name = |end: &str| {
-        let mut name = OsString::from("firstlight-");
-        name.push(stem);
-        name.push(end);
-        PathBuf::from(name)
-    };
-    let ends = std::iter::once(".png".to_owned()).chain((2_u64..).map(|number| format!("-{number}.png")));
-    ends.map(|end| name(&end)).find(|name| !name.exists()).expect("numbers do not end")
+    render::run_one(&args, stop)
 }

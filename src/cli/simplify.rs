@@ -1,9 +1,9 @@
 //! `firstlight simplify IN.obj -o OUT.obj`: fewer triangles, with the error measured.
 
-use super::args::OverwriteArgs;
-use super::console::{print, remark};
+use super::args::{OverwriteArgs, replaced};
+use super::console::{inform, print, remark};
 use super::failure::Failure;
-use super::number::{parse_error, parse_faces, parse_ratio};
+use super::number::{Deviation as MaxDeviation, parse_error, parse_faces, parse_ratio, percent};
 use super::stop::Stop;
 use super::waiting::Waiting;
 use clap::{Args, ValueEnum};
@@ -16,33 +16,34 @@ use std::time::Instant;
 #[derive(Args, Clone, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct SimplifyArgs {
-    /// The model, a Wavefront OBJ file.
+    /// Model (Wavefront OBJ).
     #[arg(value_name = "IN.obj")]
     input: PathBuf,
-    /// Where to write the result; a file that is there is replaced once the new one is complete.
+    /// Output file; an existing file is replaced.
     #[arg(short, long, value_name = "OUT.obj")]
     output: PathBuf,
-    /// Keep this share of the triangles, above 0 and at most 1.
+    /// Keep this share of the triangles: 10% or 0.1.
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = parse_ratio, group = "target")]
     ratio: Option<f64>,
     /// Keep at most this many triangles.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_faces, group = "target")]
     faces: Option<usize>,
-    /// Keep as few triangles as this largest distance between the surfaces allows, in the file's unit.
+    /// Maximum deviation from the original surface: 0.5% of the diagonal, or 0.01 in the units of the file.
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_error, group = "target")]
-    error: Option<f64>,
+    error: Option<MaxDeviation>,
+    /// Cost function of the edge collapses.
     #[arg(long, value_enum, default_value = "quadric")]
     method: MethodArg,
-    /// Print one JSON object as the last line.
+    /// Print the result as one line of JSON.
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodArg {
-    /// Quadric error metric: the most accurate, on all threads.
+    /// Quadric error metric: most accurate, multithreaded.
     Quadric,
-    /// Edge length times bend (Melax 1998): keeps vertices where they are.
+    /// Edge length times curvature (Melax 1998): keeps vertex positions.
     Melax,
 }
 
@@ -50,11 +51,6 @@ enum MethodArg {
 const SAMPLES: usize = 200_000;
 
 pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
-    let target = match (args.ratio, args.faces, args.error) {
-        (Some(ratio), ..) => Target::Ratio(ratio),
-        (_, Some(faces), _) => Target::Faces(faces),
-        (.., error) => Target::Error(error.unwrap_or(0.0)),
-    };
     let method = match args.method {
         MethodArg::Quadric => Method::Quadric,
         MethodArg::Melax => Method::Melax,
@@ -62,7 +58,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
     // A result that cannot be written is not worth the wait.
     if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
-        let message = format!("{}: models are written as Wavefront OBJ: end the name in .obj", args.output.display());
+        let message = format!("{}: the output name must end in .obj (Wavefront OBJ)", args.output.display());
         return Err(Failure::Usage(message));
     }
     let mut files = OverwriteArgs::default().files();
@@ -83,6 +79,12 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         remark(format_args!("warning: {}: {fault}", args.input.display()));
     }
     let before = model.mesh.triangles.len();
+    let diagonal = model.mesh.bounds().size().as_dvec3().length();
+    let target = match (args.ratio, args.faces, args.error) {
+        (Some(ratio), ..) => Target::Ratio(ratio),
+        (_, Some(faces), _) => Target::Faces(faces),
+        (.., error) => Target::Error(error.map_or(0.0, |error| error.length(diagonal))),
+    };
     waiting.next(format!("simplifying {before} triangles"));
     let start = Instant::now();
     let result = simplify(&model.mesh, method, target).map_err(|error| match error {
@@ -97,17 +99,16 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         Target::Error(_) => false,
     };
     if missed {
-        remark(format_args!("warning: borders, seams and joints allow no fewer than {after} triangles"));
+        remark(format_args!("warning: borders, seams and non-manifold edges allow no fewer than {after} triangles"));
     }
     let names: Vec<String> = model.materials.iter().map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
     waiting.next(format!("writing {}", args.output.display()));
     save_obj(&args.output, &result, &extras).map_err(|error| failed(&error))?;
-    stop.has_saved(format!("{} is saved, how far it is from the original was not measured", args.output.display()));
-    waiting.next("measuring how far the two surfaces are apart");
+    stop.has_saved(format!("{} is saved; its deviation from the original was not measured", args.output.display()));
+    waiting.next("measuring the deviation");
     let deviation = Deviation::between(&model.mesh, &result, SAMPLES);
-    let diagonal = model.mesh.bounds().size().as_dvec3().length();
     let topology = Topology::of(&result);
     drop(waiting);
     if args.json {
@@ -129,11 +130,12 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
         });
         return print(report);
     }
+    inform(format_args!("{}: model saved{}", args.output.display(), replaced(files.replaced(), &args.output)));
     print(format_args!("{before} -> {after} triangles in {seconds:.3} s"))?;
     for (name, d) in [("original to result", deviation.forward), ("result to original", deviation.backward)] {
-        let percent = |length: f64| 100.0 * length / diagonal;
+        let percent = |length: f64| percent(length / diagonal);
         print(format_args!(
-            "{name}: mean {:.3e}, RMS {:.3e}, largest {:.3e} ({:.4} %, {:.4} %, {:.4} % of the diagonal)",
+            "{name}: mean {:.3e}, RMS {:.3e}, maximum {:.3e} ({}, {}, {} of the diagonal)",
             d.mean,
             d.rms,
             d.max,
@@ -151,11 +153,11 @@ fn faults(model: &ImportedObj) -> Vec<String> {
     let counted = |count: usize, fate: &str| (count > 0).then(|| format!("{count} {fate}"));
     let left_out = Faults { flat: 0, ..triangles };
     let kept = Faults { flat: triangles.flat, ..Faults::default() };
-    counted(model.polygons, "faces of more than three corners were cut into triangles")
+    counted(model.polygons, "faces with more than three corners were triangulated")
         .into_iter()
-        .chain(left_out.sentences().map(|fault| format!("{fault} and are left out")))
+        .chain(left_out.sentences().map(|fault| format!("{fault} and were removed")))
         .chain(kept.sentences())
-        .chain(counted(edges.non_manifold_edges, "edges of three or more triangles stay as they are"))
-        .chain(counted(edges.misoriented_edges, "edges between triangles that face opposite ways stay as they are"))
+        .chain(counted(edges.non_manifold_edges, "non-manifold edges (three or more triangles) are kept"))
+        .chain(counted(edges.misoriented_edges, "edges between triangles of opposite orientation are kept"))
         .collect()
 }

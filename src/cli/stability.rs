@@ -12,23 +12,22 @@ const USUAL_RAYS: u64 = 10_000_000;
 
 #[derive(Args, Clone, Debug)]
 pub struct StabilityArgs {
-    /// About how many rays the largest case traces; the others trace a share of it, and each as many as it needs at the
-    /// least. 1e9 is a long run.
+    /// Approximate number of rays of the largest case; the others trace a fixed share of it, but at least their minimum.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = USUAL_RAYS, value_parser = parse_rays)]
     rays: u64,
-    /// Only this case; may be given several times.
+    /// Run only this case; may be repeated.
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
-    /// Tell what cases there are.
+    /// List the cases.
     #[arg(long, conflicts_with_all = ["cases", "replay"])]
     list: bool,
-    /// Tell everything about one ray of one case, as a finding names it; with --rays as when it was found.
+    /// Trace one ray of a case in detail, as named by a finding; use the same --rays as the finding.
     #[arg(long, requires = "cases", value_name = "STAGE:RAY", value_parser = parse_ray)]
     replay: Option<(usize, u64)>,
-    /// Worker threads; all cores when not given. The counts do not depend on it.
+    /// Number of worker threads [default: all cores]; the counts do not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Print one JSON object.
+    /// Print the result as one line of JSON.
     #[arg(long)]
     json: bool,
 }
@@ -44,7 +43,7 @@ pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
-        .map_err(|error| Failure::Failed(format!("the worker threads cannot be started: {error}")))?;
+        .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;
     pool.install(|| count(args, &cases))
 }
 
@@ -60,7 +59,7 @@ fn list(as_json: bool) -> Result<(), Failure> {
 
 fn replay(args: &StabilityArgs, cases: &[&Case], stage: usize, ray: u64) -> Result<(), Failure> {
     let [case] = cases else {
-        return Err(Failure::Usage("--replay wants one --case NAME beside it, not several".to_owned()));
+        return Err(Failure::Usage("--replay needs exactly one --case NAME".to_owned()));
     };
     let told = case.replay(stage, ray, args.rays);
     let told = told.map_err(|error| Failure::Usage(format!("--replay: {}: {error}", case.name)))?;
@@ -86,7 +85,7 @@ fn chosen(args: &StabilityArgs) -> Result<Vec<&'static Case>, Failure> {
     }
     let find = |name: &String| {
         let hint = || firstlight::scene::suggestion(name, CASES.iter().map(|case| case.name));
-        Case::find(name).ok_or_else(|| Failure::Usage(format!("there is no case `{name}`{}; see --list", hint())))
+        Case::find(name).ok_or_else(|| Failure::Usage(format!("unknown case `{name}`{}; see --list", hint())))
     };
     args.cases.iter().map(find).collect()
 }
@@ -176,11 +175,11 @@ fn json(args: &StabilityArgs, case: &Case, tally: &Tally, seconds: f64) -> serde
 fn parse_rays(text: &str) -> Result<u64, String> {
     match text.parse::<f64>() {
         Ok(rays) if (1.0..=1e15).contains(&rays) => Ok(rays as u64),
-        _ => Err("must be a number of rays from 1 to 1e15, such as 1e8".to_owned()),
+        _ => Err("expected a number of rays from 1 to 1e15, such as 1e8".to_owned()),
     }
 }
 
 fn parse_ray(text: &str) -> Result<(usize, u64), String> {
     let parsed = text.split_once(':').and_then(|(stage, ray)| Some((stage.parse().ok()?, ray.parse().ok()?)));
-    parsed.ok_or_else(|| "write it as STAGE:RAY, such as 12:345, as a finding names it".to_owned())
+    parsed.ok_or_else(|| "expected STAGE:RAY as printed by a finding, such as 12:345".to_owned())
 }

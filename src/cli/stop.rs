@@ -58,7 +58,7 @@ impl Stop {
         });
         if let Err(error) = taken_over {
             // Ctrl+C then ends the program at once, as it would any other.
-            tracing::warn!("Ctrl+C will save nothing: {error}");
+            tracing::warn!("Ctrl+C will not save anything: {error}");
         }
         let of_work = stop.clone();
         let body = move || {
@@ -67,7 +67,7 @@ impl Stop {
             let _ = done.send(News::Done(result));
         };
         let worker = std::thread::Builder::new().name("command".to_owned()).stack_size(STACK).spawn(body);
-        let worker = worker.map_err(|error| Failure::Failed(format!("no thread can be started: {error}")))?;
+        let worker = worker.map_err(|error| Failure::Failed(format!("cannot start a thread: {error}")))?;
         while !worker.is_finished() {
             match news.recv_timeout(std::time::Duration::from_millis(200)) {
                 Ok(News::Done(result)) => return result,
@@ -90,6 +90,11 @@ impl Stop {
     /// From here on the command looks at [`is_asked`](Self::is_asked), and saves what it has when it is asked.
     pub fn attend(&self) {
         self.0.attended.store(true, Ordering::SeqCst);
+    }
+
+    /// From here on there is nothing to save until the command [attends](Self::attend) again: it may be left behind.
+    pub fn rest(&self) {
+        self.0.attended.store(false, Ordering::SeqCst);
     }
 
     /// What is there from here on, whatever becomes of the rest: `a.obj is saved`.

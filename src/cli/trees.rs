@@ -1,6 +1,6 @@
 //! `firstlight info --tree SCENE|MODEL`: what each way to split each mesh costs to build and to trace.
 
-use super::console::{lines, print, remark};
+use super::console::{inform, lines, print};
 use super::failure::Failure;
 use firstlight::kdtree::{self, BuildPreset};
 use firstlight::mesh::Mesh;
@@ -15,7 +15,9 @@ use std::sync::Arc;
 pub fn run(inputs: &SceneInputs, extraction: &Extraction, json: bool) -> Result<(), Failure> {
     let meshes = meshes(inputs, extraction);
     if meshes.is_empty() {
-        return Err(Failure::Failed("there is no mesh in it: trees are built over the triangles of meshes".to_owned()));
+        return Err(Failure::Failed(
+            "the scene has no mesh: --tree compares kd-trees over the triangles of meshes".to_owned(),
+        ));
     }
     let plans = tree_plans();
     let mut tables = Vec::new();
@@ -24,7 +26,7 @@ pub fn run(inputs: &SceneInputs, extraction: &Extraction, json: bool) -> Result<
         let table = TreeTable::measure(mesh, *world_from_mesh, &plans, |plan| {
             done += 1;
             let what = plan_name(plan);
-            remark(format_args!("{}: tree {done} of {}, {} {}", printable::name(name), plans.len(), what.0, what.1));
+            inform(format_args!("{}: tree {done} of {}, {} {}", printable::name(name), plans.len(), what.0, what.1));
         });
         if !json {
             print(lines(&text(&printable::name(name), &table)))?;
@@ -65,8 +67,8 @@ fn plan_name(plan: TreePlan) -> (&'static str, String) {
 
 fn text(name: &str, table: &TreeTable) -> String {
     let mut text = format!(
-        "{name}: {} triangles; seconds on {} threads, the lesser of two runs; views of 500 x 500 pixels, of fewer where \
-         they would take longer than half a second\n",
+        "{name}: {} triangles; seconds on {} threads, best of two runs; views have 500 x 500 pixels, or fewer if they \
+         would take more than 0.5 s\n",
         table.triangles, table.threads
     );
     let _ = writeln!(
@@ -111,15 +113,15 @@ fn text(name: &str, table: &TreeTable) -> String {
     let least = table.rows.iter().map(|row| row.view_seconds[0]).fold(f64::INFINITY, f64::min);
     let _ = writeln!(
         text,
-        "no tree: view 1 in about {without:.0} s ({} rays, {:.3e} s each on one thread), {:.0} times as long\n",
+        "without a tree: view 1 takes about {without:.0} s ({} rays, {:.3e} s each on one thread), {:.0} times as long\n",
         table.rays.total(),
         table.no_tree_seconds_per_ray,
         without / least
     );
     let _ = writeln!(
         text,
-        "inner nodes, leaves, blocks of 16 triangles that a ray through the box looks at; `expected` by the areas of\n\
-         the cells is what `lines`, which nothing stops, should count; camera rays and bounces end at their hits\n\
+        "inner nodes, leaves and blocks of 16 triangles visited per ray; `expected` by the surface area heuristic should match\n\
+         `lines`, which are not occluded; camera rays and bounces end at their hits\n\
          {:10} {:>7} {:>20} {:>20} {:>20} {:>20}",
         "split", "leaf", "expected", "lines", "camera", "bounces"
     );

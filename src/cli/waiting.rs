@@ -1,6 +1,6 @@
 //! What lasts, told to whoever waits: a line every few seconds, on a terminal and off it.
 
-use super::console::remark;
+use super::console::inform;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ impl Waiting {
     const EVERY: Duration = Duration::from_secs(5);
 
     pub fn new(stage: impl Into<String>) -> Self {
-        Self::telling(stage, Self::EVERY, remark)
+        Self::telling(stage, Self::EVERY, inform)
     }
 
     fn telling(stage: impl Into<String>, every: Duration, tell: impl Fn(String) + Send + 'static) -> Self {

@@ -74,10 +74,19 @@ impl BackgroundTasks {
     }
 
     /// Reads a scene; an earlier reading that is still under way is forgotten.
-    pub fn load(&self, source: SceneSource, up: Option<UpAxis>, aspect: f64, pool: Arc<rayon::ThreadPool>) {
+    ///
+    /// - `how`: which axis of models points up, and the image that takes the place of the environment.
+    pub fn load(
+        &self,
+        source: SceneSource,
+        how: (Option<UpAxis>, Option<PathBuf>),
+        aspect: f64,
+        pool: Arc<rayon::ThreadPool>,
+    ) {
+        let (up, environment) = how;
         let number = self.with(|board| {
             board.newest_load += 1;
-            board.progress = Some(format!("reading {}", source.title()));
+            board.progress = Some(format!("loading {}", source.title()));
             board.newest_load
         });
         let this = self.clone();
@@ -90,7 +99,14 @@ impl BackgroundTasks {
                 });
                 this.wake();
             };
-            let options = LoadOptions { up, aspect: Some(aspect), hasty: true, progress: Some(&say), known: None };
+            let options = LoadOptions {
+                up,
+                environment: environment.as_deref(),
+                aspect: Some(aspect),
+                hasty: true,
+                progress: Some(&say),
+                known: None,
+            };
             let result = guarded(|| {
                 pool.install(|| {
                     check_film_source(&source).map_err(SceneError::new)?;
@@ -220,7 +236,7 @@ impl BackgroundTasks {
     /// What is being read or built now, for people.
     pub fn progress(&self) -> Option<String> {
         self.with(|board| {
-            let building = (board.building > 0).then(|| "building a tree".to_owned());
+            let building = (board.building > 0).then(|| "building a kd-tree".to_owned());
             board.progress.clone().or_else(|| board.mesh_in_the_making()).or(building)
         })
     }
@@ -235,7 +251,7 @@ impl BackgroundTasks {
 
     fn spawn(&self, name: &str, work: impl FnOnce() + Send + 'static, on_error: impl FnOnce(&mut TaskBoard, String)) {
         if let Err(error) = std::thread::Builder::new().name(name.to_owned()).spawn(work) {
-            self.with(|board| on_error(board, format!("no thread can be started: {error}")));
+            self.with(|board| on_error(board, format!("cannot start a thread: {error}")));
         }
     }
 

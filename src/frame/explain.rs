@@ -112,7 +112,7 @@ impl SnapshotNames {
     }
 
     fn object(&self, object: u32) -> String {
-        self.names.get(object as usize).cloned().unwrap_or_else(|| "the rim of a lamp".to_owned())
+        self.names.get(object as usize).cloned().unwrap_or_else(|| "edge of a light".to_owned())
     }
 
     fn source(&self, source: LightSource) -> String {
@@ -263,7 +263,7 @@ pub fn explain_pixel(
     }
     let (Some(place), Some(extraction)) = (explaining.wanted.take(), &shown.extraction) else { return };
     if shown.integrator() != Integrator::Path {
-        status.say(clock.0, MessageKind::Note, "the classic model has no paths that could be told of");
+        status.say(clock.0, MessageKind::Note, "not available with the Phong integrator");
         return;
     }
     let generation = shown.generation();

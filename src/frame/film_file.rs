@@ -124,11 +124,11 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), S
     if !is_film(path) {
         return Ok(());
     }
-    const WHAT_TO_DO: &str = "name another file, or allow it by --overwrite";
-    let refused = |why: String| format!("{}: is a film {why}, and would be lost: {WHAT_TO_DO}", path.display());
+    const WHAT_TO_DO: &str = "choose another name, or use --overwrite";
+    let refused = |why: String| format!("{}: a film {why} would be lost: {WHAT_TO_DO}", path.display());
     let old = read(path, &Limits::of_this_process()).map_err(|reason| refused(format!("that {reason}")))?;
     if let Some(what) = ImageMetadata::from_note(note)?.differs_from(&old.shot) {
-        return Err(refused(format!("of another {what}")));
+        return Err(refused(format!("with a different {what}")));
     }
     if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
 }
@@ -158,7 +158,7 @@ pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, S
     read(path, limits).map_err(|reason| format!("{}: {reason}", path.display()))
 }
 
-const NO_FILM: &str = "is no film to go on with: those are written by render --film FILE.exr";
+const NO_FILM: &str = "is not a firstlight film: films are written by render --film FILE.exr";
 
 fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
     let limit = FileKind::Film.limit(limits);
@@ -179,7 +179,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
     if bytes.get(..4) != Some(&[0x76, 0x2f, 0x31, 0x01]) {
         return Err(NO_FILM.to_owned());
     }
-    let damaged = |error: &dyn std::fmt::Display| format!("is cut short or damaged, and no film any more: {error}");
+    let damaged = |error: &dyn std::fmt::Display| format!("is truncated or damaged: {error}");
     let meta = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(|error| damaged(&error))?;
     let header = meta.headers.first().ok_or(NO_FILM)?;
     let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
@@ -187,9 +187,9 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
     };
     let film: Header = ron::from_str(&string_of(text)).map_err(|error| damaged(&error))?;
     if film.format > FORMAT {
-        return Err("was written by a newer firstlight, in a way that this one does not know".to_owned());
+        return Err("was written by a newer version of firstlight".to_owned());
     }
-    const WRONG: &str = "its checksum is wrong";
+    const WRONG: &str = "checksum mismatch";
     if film.format >= FORMAT {
         let place = place_of_check(bytes).ok_or_else(|| damaged(&WRONG))?;
         if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
@@ -199,17 +199,17 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
     let FilmLayout { width, height, .. } = film.layout;
     check_film_size(width, height)?;
     if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {
-        return Err(damaged(&"its two sizes differ"));
+        return Err(damaged(&"inconsistent size"));
     }
     let n_pixels = u64::from(width) * u64::from(height);
     if n_pixels > limits.film_pixels {
         let most = limits.film_pixels;
-        return Err(format!("has {n_pixels} pixels, more than the {most} that may be read: {}", Limits::advice()));
+        return Err(format!("has {n_pixels} pixels, above the limit of {most}: {}", Limits::advice()));
     }
     // What claims to be larger than its bytes could unpack to is refused before any memory is asked for it.
     const MOST_UNPACKED: u64 = 1100;
     if n_pixels * BYTES_A_PIXEL > MOST_UNPACKED * bytes.len() as u64 {
-        return Err(damaged(&"it is far too short for its size"));
+        return Err(damaged(&"the file is too short for its size"));
     }
     drop(Room::for_files(width, height, &[Purpose::FilmFile]).map_err(|error| error.to_string())?);
     let image = exr::prelude::read()
@@ -226,7 +226,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
         let found = channels.iter().find(|channel| channel.name.to_string() == name);
         match found.map(|channel| &channel.sample_data) {
             Some(FlatSamples::U32(words)) => Ok(words),
-            _ => Err(damaged(&format!("the channel {name} is missing"))),
+            _ => Err(damaged(&format!("channel {name} is missing"))),
         }
     };
     let mut planes = Vec::with_capacity(N_PLANES);
@@ -242,14 +242,14 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
     }
     let film = Film::from_record(&record).map_err(|error| damaged(&error))?;
     let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
-    let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its note is missing or too long"))?)?;
+    let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its metadata is missing or too long"))?)?;
     let of_film = (film.width(), film.height(), film.first_sample(), film.spp());
     if (shot.film.width, shot.film.height, shot.first_sample, shot.spp) != of_film {
-        return Err(damaged(&"its note has another size or other samples"));
+        return Err(damaged(&"its metadata has a different size or number of samples"));
     }
     let warning = is_old.then(|| {
         let path = path.display();
-        format!("{path}: is a film of an older format, in which a change of its header or note is not noticed")
+        format!("{path}: is a film of an older format, whose metadata has no checksum")
     });
     Ok(FilmFile { film, shot, warning })
 }

@@ -35,6 +35,16 @@ pub fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * lens_radius)
 }
 
+/// The aperture as photographers write it, with two digits that mean something.
+pub fn f_number(stop: f64) -> String {
+    format!("f/{stop:.0$}", f_number_decimals(stop))
+}
+
+/// Decimals that leave an f-number two significant digits.
+pub fn f_number_decimals(stop: f64) -> usize {
+    if stop > 0.0 { (1.0 - stop.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 }
+}
+
 /// Metres.
 pub fn radius_of_f_stop(f_stop: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * f_stop)

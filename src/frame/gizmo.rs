@@ -22,7 +22,7 @@ impl Mode {
     pub fn label(self) -> &'static str {
         match self {
             Self::Move => "move",
-            Self::Turn => "turn",
+            Self::Turn => "rotate",
             Self::Scale => "scale",
         }
     }

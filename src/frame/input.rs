@@ -135,7 +135,7 @@ impl CommandParams<'_, '_> {
             Command::ToggleFocusLock => self.toggle_focus_lock(),
             Command::FocusFollows { x, y } if x.is_finite() && y.is_finite() => {
                 if !matches!(self.focus.target, FocusTarget::Cursor(_)) {
-                    self.note("focus tracks what is under the mouse".to_owned());
+                    self.note("focus follows the mouse".to_owned());
                 }
                 self.focus.target = FocusTarget::Cursor([x, y]);
             }
@@ -143,21 +143,21 @@ impl CommandParams<'_, '_> {
                 if let Some(rig) = self.rig()
                     && self.bookmarks.set(slot, rig)
                 {
-                    self.note(format!("view saved under {slot}"));
+                    self.note(format!("view saved as bookmark {slot}"));
                 }
             }
             Command::GoToBookmark { slot } => match self.bookmarks.get(slot) {
                 Some(rig) => self.set_rig(rig),
-                None => self.note(format!("no view is saved under {slot}: Ctrl+{slot} saves this one")),
+                None => self.note(format!("bookmark {slot} is empty: Ctrl+{slot} saves this view")),
             },
             Command::SetBookmarks(bookmarks) => drop(self.bookmarks.set_if_neq(*bookmarks)),
             Command::PreviousView => match self.trail.previous() {
                 Some(rig) => self.set_rig(rig),
-                None => self.note("no view before this one".to_owned()),
+                None => self.note("no previous view".to_owned()),
             },
             Command::NextView => match self.trail.forth() {
                 Some(rig) => self.set_rig(rig),
-                None => self.note("no view after this one".to_owned()),
+                None => self.note("no next view".to_owned()),
             },
             Command::Edit(edit) => self.edits.0.push(edit),
             Command::ToggleTurntable => {
@@ -183,14 +183,14 @@ impl CommandParams<'_, '_> {
             Command::Resize { width, height } => self.resize(PictureSize { width, height }),
             Command::Pause => drop(self.paused.set_if_neq(Paused(true))),
             Command::Resume => drop(self.paused.set_if_neq(Paused(false))),
-            Command::Restart => self.shown.restart = Some("asked for"),
+            Command::Restart => self.shown.restart = Some("requested"),
             Command::SetIntegrator(integrator) => {
                 let settings = crate::render::RenderSettings { integrator, ..self.rendering.0 };
                 self.rendering.set_if_neq(Rendering(settings));
             }
             Command::SetThreads { threads } => drop(self.threads.set_if_neq(Threads(threads.min(MAX_THREADS)))),
             Command::Open { path } => match SceneSource::parse(&path) {
-                Ok(source) => self.beside.load(source, self.up.0, self.size.aspect(), self.renderer.0.pool()),
+                Ok(source) => self.beside.load(source, (self.up.0, None), self.size.aspect(), self.renderer.0.pool()),
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
             Command::SaveScene { path } => self.saving.requests.push(path),
@@ -268,10 +268,10 @@ impl CommandParams<'_, '_> {
             _ => FocusTarget::Camera,
         };
         self.note(match self.focus.target {
-            FocusTarget::Camera => "focus keeps its distance".to_owned(),
-            FocusTarget::Point(_) => "focus tracks a point".to_owned(),
-            FocusTarget::Object(..) => "focus tracks the object".to_owned(),
-            FocusTarget::Cursor(_) => "focus tracks what is under the mouse".to_owned(),
+            FocusTarget::Camera => "focus at a fixed distance".to_owned(),
+            FocusTarget::Point(_) => "focus locked to a point".to_owned(),
+            FocusTarget::Object(..) => "focus locked to the object".to_owned(),
+            FocusTarget::Cursor(_) => "focus follows the mouse".to_owned(),
         });
     }
 

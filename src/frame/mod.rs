@@ -55,7 +55,7 @@ pub use film_file::{
     FilmFile, check_film_source, check_replaced_film, read_film_file, read_film_file_within, write_film_file,
     write_film_into,
 };
-pub use focus::{Focus, FocusTarget, SharpZone, f_stop, radius_of_f_stop, sharp_zone};
+pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;
 pub use latency::LatencyHistogram;
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};

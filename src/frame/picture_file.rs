@@ -2,7 +2,7 @@
 //!
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
-use crate::render::{Display, Film, Purpose, Room, develop, relative_errors};
+use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, relative_errors};
 use crate::scene::image_metadata::{NOTE_KEY, exr_text};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
@@ -26,14 +26,13 @@ impl PictureFormat {
         match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
             Some("png") => Ok(Self::Png),
             Some("exr") => Ok(Self::Exr),
-            Some(other) => {
-                Err(format!("{}: pictures of kind `.{other}` cannot be written: use .png or .exr", path.display()))
-            }
-            None => Err(format!("{}: the name says no kind of picture: end it in .png or .exr", path.display())),
+            Some(other) => Err(format!("{}: unsupported output format .{other}: use .png or .exr", path.display())),
+            None => Err(format!("{}: missing file extension: use .png or .exr", path.display())),
         }
     }
 
-    fn extension(self) -> &'static str {
+    /// The end of the names of such files.
+    pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
             Self::Exr => "exr",
@@ -63,7 +62,7 @@ pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), Str
 /// When it is not known yet, or the file cannot be written.
 pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), String> {
     let errors = relative_errors(film)
-        .ok_or_else(|| format!("{}: no error is known before every pixel has two samples", path.display()))?;
+        .ok_or_else(|| format!("{}: the error is unknown until every pixel has two samples", path.display()))?;
     let channel = |name: &str| AnyChannel::new(name, FlatSamples::F32(errors.clone()));
     let channels = ["R", "G", "B"].map(channel).into_iter().collect();
     let bytes = encode(film, channels, None).map_err(|error| unwritable(path, &error))?;
@@ -83,18 +82,35 @@ impl Print<'_> {
     pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, String> {
         let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
         let file = self.encode_beside(format, &name(0), Replace::AllButFilms)?;
-        let taken = || format!("{}: every number is taken: move some of the pictures away", name(u32::MAX).display());
+        let taken = || format!("{}: all numbers are in use: move some of the pictures", name(u32::MAX).display());
         file.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
+    }
+
+    /// The picture as the bytes of a file.
+    ///
+    /// # Errors
+    /// When there is not enough memory for them.
+    pub fn bytes(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
+        drop(self.room(format).map_err(|error| error.to_string())?);
+        let mut bytes = Vec::new();
+        match format {
+            PictureFormat::Png => self.png(&mut bytes).map_err(|error| error.to_string())?,
+            PictureFormat::Exr => bytes = self.exr().map_err(|error| error.to_string())?,
+        }
+        Ok(bytes)
+    }
+
+    /// Memory for what is written: the encoders do not ask whether it can be had.
+    fn room(&self, format: PictureFormat) -> Result<Room, NoRoom> {
+        match format {
+            PictureFormat::Png => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
+            PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr]),
+        }
     }
 
     /// The whole picture in a temporary file in the folder of `path`.
     fn encode_beside(&self, format: PictureFormat, path: &Path, replace: Replace) -> Result<WholeFile, String> {
-        // What is asked for below is not asked whether it can be had.
-        let room = match format {
-            PictureFormat::Png => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
-            PictureFormat::Exr => Room::for_files(self.film.width(), self.film.height(), &[Purpose::Exr]),
-        };
-        drop(room.map_err(|error| unwritable(path, &error))?);
+        drop(self.room(format).map_err(|error| unwritable(path, &error))?);
         let mut out = WholeFile::begin(path, replace)?;
         match format {
             PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, &error))?,

@@ -70,7 +70,7 @@ impl Recorder {
         // Plain enums, numbers and strings can always be written.
         let text = ron::to_string(line).expect("a line is plain data") + "\n";
         if let Err(error) = file.write_all(text.as_bytes()) {
-            self.trouble = Some(format!("{}: the recording ends here: {error}", path.display()));
+            self.trouble = Some(format!("{}: recording stopped: {error}", path.display()));
             self.out = None;
         }
     }
@@ -126,7 +126,7 @@ pub fn check_recordable(path: &Path) -> Result<(), String> {
     let is_recording = text.lines().next().is_some_and(|line| ron::from_str::<RecordingHeader>(line).is_ok());
     match read {
         Ok(_) if is_recording => Ok(()),
-        _ => Err(format!("{}: is there already and is no recording: name another file", path.display())),
+        _ => Err(format!("{}: exists and is not a recording: choose another name", path.display())),
     }
 }
 
@@ -137,14 +137,17 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
     let file = InputFile::open(path, FileKind::Recording).map_err(|error| failed(error.to_string()))?;
     let bytes = file.stopping(stop).bytes().map_err(|error| failed(error.to_string()))?;
     let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
-    let no_recording = || failed("is no recording: those are written by --record FILE".to_owned());
+    let no_recording = || failed("is not a recording: recordings are written by --record FILE".to_owned());
     let mut lines = bytes.split(|&byte| byte == b'\n').enumerate();
     let is_bearable = |line: &&[u8]| line.len() <= LONGEST_LINE;
     let (_, first) = lines.next().ok_or_else(no_recording)?;
     let first = Some(first).filter(is_bearable).and_then(|line| str::from_utf8(line).ok()).ok_or_else(no_recording)?;
     let header: RecordingHeader = ron::from_str(first).map_err(|_| no_recording())?;
     if header.format > FORMAT {
-        return Err(failed(format!("was written by {}, in a way that this program does not know", header.program)));
+        return Err(failed(format!(
+            "was written by {}, in a format that this version does not support",
+            header.program
+        )));
     }
     let RecordingHeader { width, height, up, .. } = header;
     // A window that had no size yet has it in a command.
@@ -163,14 +166,14 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
         let at = |reason: &dyn std::fmt::Display| format!("{}:{}: {reason}", path.display(), i + 1);
         let understood = match str::from_utf8(line) {
             _ if !is_bearable(&line) => {
-                return Err(at(&format!("the line is longer than {LONGEST_LINE} bytes: no recording has such lines")));
+                return Err(at(&format!("the line is longer than {LONGEST_LINE} bytes")));
             }
             Ok(text) => match ron::from_str(text) {
                 // Written to its end, so nothing was lost, and it is wrong wherever it stands.
                 Ok(RecordedLine::Do(_, _, command)) if command.check().is_err() => {
                     return Err(at(&command.check().map_or_else(|bad| bad.to_string(), |()| String::new())));
                 }
-                understood => understood.map_err(|error| at(&format!("cannot be understood: {error}"))),
+                understood => understood.map_err(|error| at(&format!("cannot be parsed: {error}"))),
             },
             Err(_) => Err(at(&"is not UTF-8 text")),
         };

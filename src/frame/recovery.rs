@@ -70,7 +70,7 @@ impl Recovery {
                 self.writer = Some(writer);
                 trouble
             }
-            Err(error) => Some(format!("unsaved edits are not kept: no thread can be started: {error}")),
+            Err(error) => Some(format!("unsaved edits are not backed up: cannot start a thread: {error}")),
         }
     }
 
@@ -94,7 +94,8 @@ impl Recovery {
         if let Some(place) = &self.place {
             return Ok(Some(place.scene.clone()));
         }
-        let failed = |error: std::io::Error| format!("{}: unsaved edits cannot be kept: {error}", folder.display());
+        let failed =
+            |error: std::io::Error| format!("{}: unsaved edits cannot be backed up: {error}", folder.display());
         std::fs::create_dir_all(folder).map_err(failed)?;
         for number in 0..1000 {
             let scene = folder.join(format!("{}-{number}.{SCENE}", std::process::id()));
@@ -104,7 +105,7 @@ impl Recovery {
                 return Ok(Some(scene));
             }
         }
-        Err(format!("{}: unsaved edits cannot be kept: too many are left behind there", folder.display()))
+        Err(format!("{}: unsaved edits cannot be backed up: the folder holds too many backups", folder.display()))
     }
 
     /// What was left behind, the oldest first.

@@ -75,7 +75,7 @@ pub fn reload(world: &mut World) {
     }
     if has_unsaved_changes(world, &current) {
         let names: Vec<String> = changed.iter().map(|path| path.display().to_string()).collect();
-        let message = "changed on disk, but the scene has changes that are not saved: save it, or open it again";
+        let message = "changed on disk, but the scene has unsaved changes: save it, or open it again";
         return world.resource_mut::<Status>().say(
             now,
             MessageKind::Warning,
@@ -91,11 +91,12 @@ pub fn reload(world: &mut World) {
     let source = saved_as.map_or_else(|| current.source.clone(), SceneSource::Scene);
     let options = world.resource::<ModelUp>().0;
     let work = move || {
-        let options = LoadOptions { up: current.up.or(options), known: Some(&current), ..LoadOptions::default() };
+        let (up, environment) = (current.up.or(options), current.environment.as_deref());
+        let options = LoadOptions { up, environment, known: Some(&current), ..LoadOptions::default() };
         let read = || pool.install(|| load(&source, &options));
         let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(read));
         let result = result.unwrap_or_else(|_| {
-            Err(SceneError::in_file(source.title(), "cannot be read again: this is a bug in firstlight"))
+            Err(SceneError::in_file(source.title(), "cannot be reloaded: this is a bug in firstlight"))
         });
         // A file that was only touched, or saved by this very session.
         let is_same = |scene: &LoadedScene| match saved {
@@ -109,7 +110,7 @@ pub fn reload(world: &mut World) {
     };
     if let Err(error) = std::thread::Builder::new().name("firstlight reload".to_owned()).spawn(work) {
         *lock(&world.resource::<HotReload>().busy) = false;
-        world.resource_mut::<Status>().say(now, MessageKind::Error, format!("no thread can be started: {error}"));
+        world.resource_mut::<Status>().say(now, MessageKind::Error, format!("cannot start a thread: {error}"));
     }
 }
 
@@ -135,7 +136,7 @@ fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<Pa
         match started {
             Ok(watch) => reload.watch = Some(watch),
             // Everything but this goes on without.
-            Err(error) => tracing::warn!("files are not looked after: {error}"),
+            Err(error) => tracing::warn!("files are not watched for changes: {error}"),
         }
     }
     if let Some(watch) = &reload.watch {
@@ -159,7 +160,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
         Ok(Some(scene)) => scene,
         Ok(None) => {
             if had_failed {
-                let text = format!("{} can be read again, and is what is shown", old.source.title());
+                let text = format!("{} can be read again; the picture is up to date", old.source.title());
                 world.resource_mut::<Status>().say(now, MessageKind::Note, text);
             }
             return;
@@ -167,7 +168,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
         Err(error) => {
             let mut status = world.resource_mut::<Status>();
             for problem in &error.problems {
-                status.say(now, MessageKind::Error, format!("{problem} (the scene stays as it was)"));
+                status.say(now, MessageKind::Error, format!("{problem} (the scene is unchanged)"));
             }
             return;
         }
@@ -184,7 +185,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
     let names = names_of(&world.resource::<HotReload>().reading);
     let mut shown = world.resource_mut::<RenderState>();
     shown.trees.extend(trees);
-    shown.adopted = Some(format!("{names} read again"));
+    shown.adopted = Some(format!("{names} reloaded"));
     if let Some(camera) = camera
         && let Some(new) = SceneInputs::of(world).camera
     {
@@ -196,7 +197,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
     if let Some(rendering) = rendering {
         world.insert_resource(rendering);
     }
-    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("{names} changed and was read again"));
+    world.resource_mut::<Status>().say(now, MessageKind::Note, format!("reloaded {names} (changed on disk)"));
 }
 
 /// Files by their names alone, no more than two of them.

@@ -71,7 +71,7 @@ impl Remake {
         let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = &self.source;
         match self.for_whom {
             ForWhom::Object(_) => format!("simplifying {name}"),
-            ForWhom::NewObject { .. } => format!("reading {name}"),
+            ForWhom::NewObject { .. } => format!("loading {name}"),
         }
     }
 }

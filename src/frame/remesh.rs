@@ -16,9 +16,9 @@ use glam::DVec3;
 /// Begins to make an object's mesh anew. An earlier one of the same object that is not done yet is forgotten.
 pub fn start(world: &mut World, entity: Entity, shading: MeshShading, ratio: f64) -> Result<(), String> {
     if !(ratio > 0.0 && ratio <= 1.0) {
-        return Err(format!("the share of faces to keep is above 0 and at most 1, not {ratio}"));
+        return Err(format!("the ratio of faces to keep is {ratio}, but must be above 0 and at most 1"));
     }
-    let origin = world.get::<MeshOrigin>(entity).ok_or("it is not known where this mesh came from")?;
+    let origin = world.get::<MeshOrigin>(entity).ok_or("the source of this mesh is unknown")?;
     let source = origin.source.clone();
     // A control that says again what is so, or is about to be, asks for nothing.
     if wanted_mesh(world, entity) != Some((shading, ratio)) {

@@ -129,16 +129,16 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
     session.update(Duration::MAX);
     let spp = options.spp.or(end).unwrap_or(0);
     if end.is_none() {
-        warnings.push("the recording breaks off: its last line is not the end of a session".to_owned());
+        warnings.push("the recording is incomplete: its last line is not the end of a session".to_owned());
     }
     if spp == 0 {
-        warnings.push("the recording does not say how many samples its picture had: one each is taken".to_owned());
+        warnings.push("the recording does not contain the number of samples: rendering 1 sample per pixel".to_owned());
     }
     let world = session.world();
     let PictureSize { width, height } = *world.resource();
     let extraction = world.resource::<RenderState>().extraction.as_ref();
     let prepared = extraction.map(|extraction| extraction.prepared.clone());
-    let prepared = prepared.ok_or_else(|| failed("nothing is open".to_owned()))?;
+    let prepared = prepared.ok_or_else(|| failed("no scene is open".to_owned()))?;
     let settings = world.resource::<Rendering>().0;
     check_film_size(width, height).map_err(|bad| failed(bad.to_string()))?;
     let mut film = Film::try_new(width, height).map_err(|error| failed(error.to_string()))?;
@@ -229,7 +229,7 @@ impl Player {
                 break;
             }
             if start.elapsed() > PATIENCE {
-                return Err("the scene did not come".to_owned());
+                return Err("the scene was not loaded".to_owned());
             }
             std::thread::sleep(Duration::from_millis(2));
         }
@@ -240,10 +240,10 @@ impl Player {
         let title = current.0.source.title();
         if now != print && was_edited {
             self.warnings.push(format!(
-                "{title} was edited while it was recorded, and is played as it is now: the picture is another one"
+                "{title} was edited during the recording and is replayed as it is now: the picture may differ"
             ));
         } else if now != print {
-            self.warnings.push(format!("{title} has changed since the recording, so the picture is another one"));
+            self.warnings.push(format!("{title} has changed since the recording: the picture may differ"));
         }
         Ok(())
     }
@@ -269,9 +269,7 @@ mod tests {
         std::fs::write(&scene, text).unwrap();
         let source = SceneSource::Scene(scene.clone());
         let mut first = session();
-        assert!(
-            first.record(&scene, &source, None).unwrap_err().contains("s.ron: is there already and is no recording")
-        );
+        assert!(first.record(&scene, &source, None).unwrap_err().contains("s.ron: exists and is not a recording"));
         assert_eq!(std::fs::read_to_string(&scene).unwrap(), text);
         // While it is written, no other process writes it.
         first.record(&target, &source, None).unwrap();

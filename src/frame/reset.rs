@@ -110,7 +110,7 @@ pub fn compare(old: &SceneInputs, new: &SceneInputs) -> Changes {
 /// What differs between two sets of settings.
 pub fn compare_settings(old: &RenderSettings, new: &RenderSettings, changes: &mut Changes) {
     if old.integrator != new.integrator {
-        changes.add(Level::Restart, "light model");
+        changes.add(Level::Restart, "integrator");
     }
     if old.max_depth != new.max_depth {
         changes.add(Level::Restart, "maximum depth");
@@ -174,7 +174,7 @@ fn compare_objects(old: &ObjectInput, new: &ObjectInput, label: &str, changes: &
     if old.shape != new.shape {
         match (&old.shape, &new.shape) {
             (_, Shape::Mesh(_)) => changes.add(Level::MeshTree, format!("mesh of {label}")),
-            (_, Shape::Spheres(_)) => changes.add(Level::MeshTree, format!("balls of {label}")),
+            (_, Shape::Spheres(_)) => changes.add(Level::MeshTree, format!("spheres of {label}")),
             _ => changes.add(Level::TopTree, format!("shape of {label}")),
         }
     }

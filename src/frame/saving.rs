@@ -89,7 +89,7 @@ pub fn save(world: &mut World) {
         let description = Description::of(world, current.as_deref());
         let content = SceneContent::of(world, &description);
         if let Some(title) = world.resource::<BackgroundTasks>().mesh_in_the_making() {
-            let text = format!("{title} is not done, so it is not in the file: save again when it is");
+            let text = format!("{title} has not finished and is not in the file: save again afterwards");
             world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
         }
         let mut saving = world.resource_mut::<Saving>();
@@ -106,7 +106,7 @@ pub fn save(world: &mut World) {
         match std::thread::Builder::new().name("firstlight save".to_owned()).spawn(work) {
             Ok(thread) => saving.threads.push(thread),
             Err(error) => {
-                let message = format!("{}: cannot be saved: no thread can be started: {error}", target.display());
+                let message = format!("{}: cannot be saved: cannot start a thread: {error}", target.display());
                 world.resource_mut::<Status>().say(now, MessageKind::Error, message);
             }
         }

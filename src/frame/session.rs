@@ -163,10 +163,15 @@ impl Session {
     /// Begins to read a scene beside the old picture. It takes its place in a later [`update`](Self::update); when it
     /// cannot be read, that is a message in the [`status`](Self::status), and the old scene stays.
     pub fn open(&mut self, source: SceneSource) {
+        self.open_lit_by(source, None);
+    }
+
+    /// The same with an image in place of the scene's own environment.
+    pub fn open_lit_by(&mut self, source: SceneSource, environment: Option<PathBuf>) {
         let aspect = self.world.resource::<PictureSize>().aspect();
         let up = self.world.resource::<ModelUp>().0;
         let pool = self.world.resource::<Renderer>().0.pool();
-        self.world.resource::<BackgroundTasks>().load(source, up, aspect, pool);
+        self.world.resource::<BackgroundTasks>().load(source, (up, environment), aspect, pool);
     }
 
     /// Takes over a scene that has been read already.

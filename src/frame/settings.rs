@@ -126,10 +126,10 @@ impl SettingsStore {
                 // Set aside, so that what is in it is not lost when new settings are kept.
                 let aside = path.with_extension("broken");
                 let kept = match std::fs::rename(&path, &aside) {
-                    Ok(()) => format!("set aside as {}", aside.display()),
-                    Err(_) => "left where it is".to_owned(),
+                    Ok(()) => format!("the file was renamed to {}", aside.display()),
+                    Err(_) => "the file was left in place".to_owned(),
                 };
-                (T::default(), Some(format!("{}:{error}; {kept}, and defaults are used", path.display())))
+                (T::default(), Some(format!("{}:{error}; using defaults, {kept}", path.display())))
             }
         }
     }
@@ -138,7 +138,7 @@ impl SettingsStore {
         let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return Ok(()) };
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder)
-                .map_err(|error| format!("{}: the folder cannot be made: {error}", folder.display()))?;
+                .map_err(|error| format!("{}: cannot create the folder: {error}", folder.display()))?;
         }
         let pretty = ron::ser::PrettyConfig::new()
             .indentor("    ")

@@ -98,7 +98,7 @@ pub fn edit(world: &mut World) {
                 for problem in &error.problems {
                     status.say(now, MessageKind::Error, problem.to_string());
                 }
-                tracing::debug!("{} could not be opened", source.title());
+                tracing::debug!("{} cannot be opened", source.title());
             }
         }
     }
@@ -173,7 +173,7 @@ pub fn rebuild(
     if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
         let mut inputs = queries.collect();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
-            status.say(clock.0, MessageKind::Error, format!("the camera stays where it was: {bad}"));
+            status.say(clock.0, MessageKind::Error, format!("the camera was not changed: {bad}"));
             inputs.camera = shown.inputs.camera;
         }
         let missing = missing_trees(&inputs, &mut shown.trees);

@@ -69,7 +69,7 @@ impl Watch {
         let thread = std::thread::Builder::new()
             .name("firstlight watch".to_owned())
             .spawn(work)
-            .map_err(|error| format!("no thread can be started: {error}"))?;
+            .map_err(|error| format!("cannot start a thread: {error}"))?;
         Ok(Self { sender: Some(sender), thread: Some(thread) })
     }
 

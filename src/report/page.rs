@@ -26,11 +26,11 @@ pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>)
          <style>\n{}</style>\n<h1>Speed against error</h1>\n\
          <p class=\"soft\">firstlight {} · {threads} threads · <code>{}</code></p>\n\
          <p>The error is √relMSE, the root of the mean of (x − ref)² / (ref² + 0.01) over pixels and channels of linear \
-         light. Seconds are CPU seconds a thread (wall time on a quiet machine) spent on rendering alone. Times in \
+         light. Seconds are CPU seconds per thread (wall time on an idle machine) spent on rendering alone. Times in \
          brackets lie beyond the measured steps and follow the slope, which is fitted to the later half of the steps. A slope \
          of −1 means: twice the time, half \
-         the squared error. Time foretold: by the renderer, when a tenth of the time had passed, until the error that \
-         it told in the end.</p>\n",
+         the squared error. Predicted time: by the renderer, when a tenth of the time had passed, to the error that \
+         it estimated at the end.</p>\n",
         include_str!("page.css"),
         env!("CARGO_PKG_VERSION"),
         escape(command),
@@ -54,7 +54,8 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
     for target in TARGETS {
         let _ = write!(text, "  {:>9}", format!("s to {}%", 100.0 * target));
     }
-    let _ = writeln!(text, "  {:>6}  {:>8}  {:>7}  {:>9}  foretold/taken", "slope", "Mrays/s", "error %", "est./true");
+    let _ =
+        writeln!(text, "  {:>6}  {:>8}  {:>7}  {:>9}  predicted/actual", "slope", "Mrays/s", "error %", "est./true");
     for outcome in outcomes {
         let ladder = &outcome.ladder;
         let _ = write!(
@@ -105,7 +106,7 @@ fn summary(outcomes: &[SceneOutcome]) -> String {
     format!(
         "<div class=\"wide\"><table>\n<tr><th>scene</th><th>pixels</th><th>s to 10 %</th><th>s to 3 %</th>\
          <th>s to 1 %</th><th>slope</th><th>M rays/s</th><th>M camera paths/s</th><th>last spp</th>\
-         <th>its error</th><th>time foretold / taken</th></tr>\n{rows}</table></div>\n"
+         <th>its error</th><th>time predicted / actual</th></tr>\n{rows}</table></div>\n"
     )
 }
 
@@ -154,11 +155,14 @@ fn about_reference(outcome: &SceneOutcome) -> String {
         let path = outcome.reference_path.as_ref().map_or(String::new(), |path| path.display().to_string());
         return format!("<p>Reference: <code>{}</code>.</p>\n", escape(&path));
     };
-    let own = made.relative_error.map_or(String::new(), |error| format!(", its own error {}", percent(error)));
-    let mut text = format!("<p>Reference: own render with another seed, {} samples per pixel{own}.", made.spp);
+    let own = made.relative_error.map_or(String::new(), |error| format!(", its error {}", percent(error)));
+    let mut text = format!("<p>Reference: rendered with a different seed, {} samples per pixel{own}.", made.spp);
     if let Some(share) = outcome.share_of_reference().filter(|share| *share > 0.1) {
-        let _ =
-            write!(text, " Up to {:.0} % of the last step’s relMSE is the reference’s own.", 100.0 * share.min(1.0));
+        let _ = write!(
+            text,
+            " Up to {:.0} % of the last step’s relMSE comes from the reference itself.",
+            100.0 * share.min(1.0)
+        );
     }
     text + "</p>\n"
 }
@@ -176,7 +180,7 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
         series: vec![
             series("true error", 0, Style::Measured, ladder.curve()),
             series(
-                "the renderer’s own estimate, with its 95 % interval",
+                "error estimate with its 95 % interval",
                 1,
                 Style::Dashed,
                 estimates().map(|(seconds, e)| (seconds, e.relative.powi(2))).collect(),
@@ -195,7 +199,7 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
         levels: outcome
             .reference_made
             .and_then(|made| made.relative_error)
-            .map(|error| (error * error, "the reference’s own error".to_owned()))
+            .map(|error| (error * error, "error of the reference".to_owned()))
             .into_iter()
             .collect(),
     }
@@ -211,7 +215,7 @@ fn ablation_plot(outcome: &SceneOutcome) -> Plot {
         points: ladder.curve(),
     });
     Plot {
-        title: "Each technique switched off alone".to_owned(),
+        title: "Each technique disabled alone".to_owned(),
         x_label: "seconds".to_owned(),
         y_label: "relMSE".to_owned(),
         series: std::iter::once(all).chain(without).collect(),
@@ -279,7 +283,7 @@ fn ablation_table(outcome: &SceneOutcome) -> String {
     }
     format!(
         "<div class=\"wide\"><table>\n<tr><th></th><th>spp</th><th>seconds</th><th>relMSE</th>\
-         <th>times as long for the same error</th></tr>\n{rows}</table></div>\n"
+         <th>time factor for the same error</th></tr>\n{rows}</table></div>\n"
     )
 }
 

@@ -27,7 +27,7 @@ impl LinearPicture {
         let limits = Limits::of_this_process();
         let reader = picture_reader(path, &limits).map_err(fail)?;
         if reader.format() != Some(image::ImageFormat::OpenExr) {
-            let reason = "is not an OpenEXR picture; a reference holds linear light, so it must be .exr";
+            let reason = "is not an OpenEXR image: a reference must be .exr (linear light)";
             return Err(fail(reason.to_owned()));
         }
         let picture = decode_picture(reader, &limits).map_err(fail)?.into_rgb32f();

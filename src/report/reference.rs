@@ -111,7 +111,7 @@ impl ReferenceStore {
         let made = Made { spp: film.spp(), relative_error: film.error_estimate().map(|estimate| estimate.relative) };
         let (path, trouble) = match if film.spp() < spp { Ok(None) } else { self.keep(key, &film, &made) } {
             Ok(path) => (path, None),
-            Err(reason) => (None, Some(format!("the reference could not be kept for next time: {reason}"))),
+            Err(reason) => (None, Some(format!("the reference could not be cached: {reason}"))),
         };
         Some((Reference { picture: LinearPicture::of(&film), made: Some(made), path }, trouble))
     }

@@ -75,7 +75,7 @@ fn check_not_parallel(view: DVec3, up: DVec3) -> Result<(), BadValue> {
     }
     Err(BadValue::unfit(
         "up",
-        format!("`up` is parallel to the view direction, to within {LEAST_SINE:e} rad: tilt one of them"),
+        format!("`up` is parallel to the view direction (within {LEAST_SINE:e} rad): tilt one of them"),
     ))
 }
 
@@ -107,12 +107,12 @@ impl CameraPart {
                 forward.ok()
             }
             (None, None) => {
-                let problem = "the camera looks nowhere: give `look_at`, a point, or `forward`, a direction";
+                let problem = "the camera has no direction: set `look_at` (a point) or `forward` (a direction)";
                 note(Err(BadValue::unfit("camera", problem)));
                 None
             }
             (Some(_), Some(_)) => {
-                let problem = "`look_at` and `forward` say the same thing: give one of them";
+                let problem = "`look_at` and `forward` exclude each other: set one of them";
                 note(Err(BadValue::unfit("forward", problem)));
                 None
             }
@@ -124,7 +124,7 @@ impl CameraPart {
         }
         if let Some(distance) = self.pivot_distance {
             if self.look_at.is_some() {
-                let problem = "`pivot_distance` goes with `forward`: here `look_at` says it";
+                let problem = "`pivot_distance` needs `forward`: with `look_at` it is already defined";
                 note(Err(BadValue::unfit("pivot_distance", problem)));
             } else {
                 note(check_size("pivot_distance", distance));
@@ -135,7 +135,7 @@ impl CameraPart {
         note(projection);
         match (self.lens_radius, self.f_stop) {
             (Some(_), Some(_)) => {
-                let problem = "`lens_radius` and `f_stop` say the same thing: give one of them";
+                let problem = "`lens_radius` and `f_stop` exclude each other: set one of them";
                 note(Err(BadValue::unfit("f_stop", problem)));
             }
             (Some(radius), None) => note(check_lens_radius("lens_radius", radius)),
@@ -145,7 +145,8 @@ impl CameraPart {
             (None, Some(stop)) if is_open => {
                 let radius = lens_radius_of(self.vfov, stop);
                 note(check_lens_radius("f_stop", radius).map_err(|_| {
-                    let opens = format!("`f_stop` is {}, which opens the lens to {} m", number(stop), number(radius));
+                    let opens =
+                        format!("`f_stop` is {}, which gives a lens radius of {} m", number(stop), number(radius));
                     BadValue::unfit("f_stop", format!("{opens}: use at most {MOST_LENS_RADIUS:e} m"))
                 }));
             }
@@ -188,7 +189,7 @@ impl View {
         for (field, axis) in [("forward", self.forward), ("up", self.up)] {
             check_direction(field, axis)?;
             if (axis.length() - 1.0).abs() > AXIS_SLACK {
-                return Err(BadValue::out_of_range(field, triple(axis), "be of length 1"));
+                return Err(BadValue::out_of_range(field, triple(axis), "have length 1"));
             }
         }
         if self.forward.dot(self.up).abs() > AXIS_SLACK {
@@ -256,7 +257,7 @@ impl FilmSize {
         if width > most || height > most || pixels > SceneFile::MAX_FILM_PIXELS {
             let gib = pixels as f64 * Film::BYTES_A_PIXEL as f64 / f64::from(1 << 30);
             let problem = format!(
-                "a film of {width} x {height} would take {gib:.1} GiB: use at most {} pixels, {most} a side",
+                "a film of {width} x {height} needs {gib:.1} GiB: use at most {} pixels in total and {most} per side",
                 SceneFile::MAX_FILM_PIXELS
             );
             return Err(BadValue::unfit("film", problem));

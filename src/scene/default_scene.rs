@@ -13,6 +13,7 @@ use glam::{DVec3, Vec3};
 
 /// Names of the parts, as a saved scene shows them.
 const CLAY: &str = "clay";
+const KEY_LIGHT: &str = "key light";
 
 /// The scene of a model that is opened by itself.
 ///
@@ -31,7 +32,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
     let mut materials = vec![
         ("ground".to_owned(), material(ColorValue::rgb(0.45, 0.45, 0.43))),
         // As large as the model and five radii away: about three times the light of the sky.
-        ("key light".to_owned(), MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }),
+        (KEY_LIGHT.to_owned(), MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }),
     ];
     if loaded.slots.is_empty() {
         materials.push((CLAY.to_owned(), material(ColorValue::rgb(0.72, 0.56, 0.45))));
@@ -71,15 +72,21 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
                 transform: TransformPart::default(),
             },
             ObjectPart::Sphere {
-                name: Some("key light".to_owned()),
+                name: Some(KEY_LIGHT.to_owned()),
                 center: key,
                 radius,
-                material: "key light".to_owned(),
+                material: KEY_LIGHT.to_owned(),
                 transform: TransformPart::default(),
             },
         ],
         lights: Vec::new(),
     }
+}
+
+/// Leaves the light to the environment.
+pub fn remove_key_light(file: &mut SceneFile) {
+    file.objects.retain(|object| !matches!(object, ObjectPart::Sphere { name: Some(name), .. } if name == KEY_LIGHT));
+    file.materials.0.retain(|(name, _)| name != KEY_LIGHT);
 }
 
 /// A three-quarter view from slightly above, as near as the box allows; `side` has the signs of where the front is.

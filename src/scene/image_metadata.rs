@@ -118,13 +118,15 @@ impl ImageMetadata {
     /// # Errors
     /// When the text is no note that this program knows.
     pub fn from_note(text: &str) -> Result<Self, String> {
-        let shot: Self = options()
-            .from_str(text)
-            .map_err(|error| format!("its note on how it was made cannot be understood: {error}"))?;
+        let shot: Self =
+            options().from_str(text).map_err(|error| format!("its firstlight metadata cannot be parsed: {error}"))?;
         if shot.format > FORMAT {
-            return Err(format!("it was made by {}, which writes notes that this program does not know", shot.program));
+            return Err(format!(
+                "it was made by {}, whose metadata format is not supported by this version",
+                shot.program
+            ));
         }
-        shot.check().map_err(|bad| format!("its note on how it was made cannot be right: {bad}"))?;
+        shot.check().map_err(|bad| format!("its firstlight metadata is invalid: {bad}"))?;
         Ok(shot)
     }
 
@@ -138,7 +140,7 @@ impl ImageMetadata {
         self.display.check()?;
         if self.first_sample.checked_add(self.spp).is_none_or(|end| end > Film::MAX_SAMPLES) {
             let (first, spp) = (self.first_sample, self.spp);
-            return Err(format!("{spp} samples from {first} on: they are numbered below {}", Film::MAX_SAMPLES));
+            return Err(format!("{spp} samples from {first} on: sample numbers must be below {}", Film::MAX_SAMPLES));
         }
         match self.scene {
             ImageScene::Model { up: Some(up), .. } if !matches!(up, 'y' | 'z') => {
@@ -161,7 +163,7 @@ impl ImageMetadata {
             let beside = from_picture.file_name().map(|name| folder.join(name));
             let found = [Some(folder.join(&from_picture)), beside].into_iter().flatten().find(|path| path.is_file());
             let name = from_picture.display();
-            found.ok_or_else(|| format!("the scene that it shows, {name}, is not there: put it beside the picture"))
+            found.ok_or_else(|| format!("its scene {name} was not found: put it next to the picture"))
         };
         Ok(match &self.scene {
             ImageScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
@@ -179,7 +181,7 @@ impl ImageMetadata {
         }
     }
 
-    /// What makes samples of the other picture useless for this one, if anything; in words that follow "another".
+    /// What makes samples of the other picture useless for this one, if anything; in words that follow "a different".
     pub fn differs_from(&self, other: &Self) -> Option<&'static str> {
         let seen = |shot: &Self| {
             let (view, projection, lens) = camera(&shot.camera);
@@ -193,10 +195,10 @@ impl ImageMetadata {
         };
         let checks = [
             (self.program != other.program, "version of firstlight"),
-            (self.fingerprint != other.fingerprint, "scene, or of this one before it was changed"),
+            (self.fingerprint != other.fingerprint, "scene or version of the scene"),
             ((self.film.width, self.film.height) != (other.film.width, other.film.height), "size"),
             (seen(self) != seen(other), "view"),
-            (self.integrator != other.integrator, "light model"),
+            (self.integrator != other.integrator, "integrator"),
             (self.max_depth != other.max_depth, "maximum depth"),
             (self.film.filter != other.film.filter, "pixel filter"),
             (self.seed != other.seed, "seed"),
@@ -250,7 +252,7 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, String> {
     let mut start = [0; 8];
     let n = file.read(&mut start).map_err(unreadable)?;
     file.rewind().map_err(unreadable)?;
-    let none = "it has no note on how it was made, so it cannot be opened as a scene: only pictures by firstlight can";
+    let none = "it has no embedded firstlight scene: only pictures rendered by firstlight can be opened";
     if start[..n] == *b"\x89PNG\r\n\x1a\n" {
         let unreadable = |error: png::DecodingError| format!("cannot be read: {error}");
         let most = usize::try_from(limits.note_bytes).unwrap_or(usize::MAX);
@@ -271,5 +273,5 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, String> {
             .map_err(|error| format!("cannot be read: {error}"))?;
         return note_in(&meta).ok_or_else(|| none.to_owned());
     }
-    Err("is neither a PNG nor an OpenEXR picture".to_owned())
+    Err("is neither a PNG nor an OpenEXR image".to_owned())
 }

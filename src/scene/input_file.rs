@@ -36,15 +36,15 @@ pub enum ReadError {
     Io(#[source] io::Error),
     #[error("cannot be read: it is a folder")]
     Folder,
-    #[error("cannot be read: it is not a regular file but {0}")]
+    #[error("cannot be read: it is not a regular file, but {0}")]
     NotRegular(&'static str),
-    #[error("is longer than {limit} bytes, the limit for {}: {}", kind.plural(), Limits::advice())]
+    #[error("is larger than {limit} bytes, the limit for {}: {}", kind.plural(), Limits::advice())]
     TooLong { kind: FileKind, limit: u64 },
     #[error("cannot be read: line {line} is not UTF-8 text")]
     NotText { line: usize },
-    #[error("cannot be read: it was not read to its end within {} s", DEADLINE.as_secs())]
+    #[error("cannot be read: reading took longer than {} s", DEADLINE.as_secs())]
     TooSlow,
-    #[error("was not read to its end: somebody asked to stop")]
+    #[error("reading was cancelled")]
     Stopped,
 }
 

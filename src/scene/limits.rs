@@ -52,7 +52,7 @@ impl Limits {
         let text = std::env::var_os(Self::VARIABLE)?;
         let text = text.to_string_lossy();
         factor_of(&text).is_none().then(|| {
-            format!("{} is `{}`, which is no positive number: the usual limits hold", Self::VARIABLE, name(&text))
+            format!("{} is `{}`, which is not a positive number: using the default limits", Self::VARIABLE, name(&text))
         })
     }
 

@@ -10,11 +10,12 @@ use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::picture::read_picture;
-use super::relative::{path_to_text, text_to_path};
+use super::relative::{path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
 use super::stamp::stamp;
-use glam::DVec3;
+use super::value::Rgb;
+use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,6 +26,8 @@ use std::time::Instant;
 pub struct LoadOptions<'a> {
     /// For models; guessed from how the model would stand when not given.
     pub up: Option<UpAxis>,
+    /// An image that takes the place of the scene's own environment.
+    pub environment: Option<&'a Path>,
     /// Width over height of the picture that a model is framed for; 16:9 when not given.
     pub aspect: Option<f64>,
     /// Large meshes get trees that are built in a hurry ([`super::trees::Trees::hasty`]), for a first picture.
@@ -48,7 +51,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     if let SceneSource::Picture(path) = source {
         return load_picture(path, options);
     }
-    options.say(&format!("reading {}", source.title()));
+    options.say(&format!("loading {}", source.title()));
     let start = Instant::now();
     let mut scene = match source {
         SceneSource::Builtin(name) => {
@@ -69,7 +72,11 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let mesh_source = MeshSource::Obj(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
             let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder), Ok)?;
-            let file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
+            let mut file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
+            if options.environment.is_some() {
+                // The image has lights of its own.
+                default_scene::remove_key_light(&mut file);
+            }
             let mut scene = LoadedScene::empty(source, file, folder);
             scene.meshes = scene.file.objects.iter().map(|_| None).collect();
             scene.balls = scene.file.objects.iter().map(|_| None).collect();
@@ -78,9 +85,12 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
             scene.add_mesh_pictures(options);
             scene.up = options.up;
+            if let Some(environment) = options.environment {
+                scene.light_by(environment, options)?;
+            }
             scene
         }
-        SceneSource::Picture(_) => unreachable!("has been opened as what it shows"),
+        SceneSource::Picture(_) => unreachable!("pictures were resolved above"),
     };
     scene.load_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
@@ -114,13 +124,11 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
             scene
         }
         (None, Some(source)) => load(&source, &options)?,
-        (None, None) => return Err(failed("its note names no scene".to_owned())),
+        (None, None) => return Err(failed("its metadata names no scene".to_owned())),
     };
     if scene.content_fingerprint().to_string() != shot.fingerprint {
         let (picture, title) = (path.display(), scene.source.title());
-        scene
-            .warnings
-            .push(format!("{picture}: {title} has changed since the picture was taken, so it looks different"));
+        scene.warnings.push(format!("{picture}: {title} has changed since the picture was rendered"));
     }
     shot.apply(&mut scene.file);
     scene.shot = Some(shot);
@@ -136,6 +144,9 @@ fn resolve(
     options: &LoadOptions,
 ) -> Result<LoadedScene, SceneError> {
     let mut scene = LoadedScene::empty(source, file, folder);
+    if let Some(environment) = options.environment {
+        scene.light_by(environment, options)?;
+    }
     let title = PathBuf::from(source.title());
     let (mut problems, mut untold) = (Vec::new(), 0);
     // An error inside a file that the scene points at names that file; the scene's line is told beside it.
@@ -157,7 +168,7 @@ fn resolve(
             ObjectPart::Mesh { source, shading, simplify, .. } => {
                 let read = || {
                     let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = source;
-                    options.say(&format!("reading {name}"));
+                    options.say(&format!("loading {name}"));
                     let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
                     let loaded = kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok);
                     let warnings = loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);
@@ -213,6 +224,17 @@ fn resolve(
 }
 
 impl LoadedScene {
+    /// Makes an image the environment, whatever the scene itself has.
+    fn light_by(&mut self, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
+        // The paths of a scene count from its folder; those of a scene without one, from the current folder.
+        let is_here = self.folder.as_os_str().is_empty();
+        let file = if is_here { path_to_text(path) } else { relative_path(&self.folder, path) };
+        self.add_picture(&file, path, options)?;
+        self.file.environment = EnvironmentSource::Image { file, scale: Rgb(Vec3::ONE), rotate: 0.0 };
+        self.environment = Some(path.to_path_buf());
+        Ok(())
+    }
+
     fn add_picture(&mut self, name: &str, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
         if self.pictures.contains_key(name) {
             return Ok(());
@@ -227,7 +249,7 @@ impl LoadedScene {
             self.picture_files.insert(name.to_owned(), (path.to_owned(), before));
             return Ok(());
         }
-        options.say(&format!("reading {name}"));
+        options.say(&format!("loading {name}"));
         // Also where it cannot be read: it may come to be.
         self.picture_files.insert(name.to_owned(), (path.to_owned(), before));
         let (picture, warning) = read_picture(path).map_err(|reason| SceneError::in_file(path, reason))?;
@@ -242,7 +264,7 @@ impl LoadedScene {
         let files: Vec<(String, PathBuf)> = textures.map(|(name, _, file)| (name.clone(), file.clone())).collect();
         for (name, path) in files {
             if let Err(error) = self.add_picture(&name, &path, options) {
-                self.warnings.push(format!("{error}; the surface is left plain"));
+                self.warnings.push(format!("{error}; the texture is omitted"));
             }
         }
     }
@@ -277,8 +299,8 @@ impl LoadedScene {
         for shape in shapes {
             if !self.trees.has(&shape) {
                 options.say(&match &shape {
-                    Shape::Mesh(mesh) => format!("building a tree over {} triangles", mesh.triangles.len()),
-                    Shape::Spheres(balls) => format!("building a tree over {} balls", balls.centers.len()),
+                    Shape::Mesh(mesh) => format!("building a kd-tree over {} triangles", mesh.triangles.len()),
+                    Shape::Spheres(balls) => format!("building a kd-tree over {} spheres", balls.centers.len()),
                     _ => String::new(),
                 });
             }

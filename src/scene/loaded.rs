@@ -31,6 +31,8 @@ pub struct LoadedScene {
     pub warnings: Vec<String>,
     /// Which axis of a model was asked to point up.
     pub up: Option<UpAxis>,
+    /// The image that took the place of the scene's own environment.
+    pub environment: Option<PathBuf>,
     /// What the picture said that this was opened by.
     pub shot: Option<ImageMetadata>,
     /// Reading and parsing.
@@ -52,6 +54,7 @@ impl LoadedScene {
             trees: Trees::default(),
             warnings: Vec::new(),
             up: None,
+            environment: None,
             shot: None,
             load_seconds: 0.0,
             build_seconds: 0.0,

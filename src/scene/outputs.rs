@@ -146,9 +146,7 @@ impl Files {
                 let (path, other) = (path.display(), other.display());
                 let both =
                     if path.to_string() == other.to_string() { format!("{path}") } else { format!("{path}, {other}") };
-                return Err(FilesError::Collision(format!(
-                    "{both}: is named twice: each output needs a name of its own"
-                )));
+                return Err(FilesError::Collision(format!("{both}: two outputs have the same name")));
             }
             None => {}
         }
@@ -163,7 +161,7 @@ impl Files {
 fn is_read(output: &Path, input: &Path) -> FilesError {
     let same = if output == input { String::new() } else { format!(", as {}", input.display()) };
     FilesError::Collision(format!(
-        "{}: is read by the same command{same}, and would be lost: name another file to write to",
+        "{}: is also an input of this command{same}: choose another output name",
         output.display()
     ))
 }
@@ -195,7 +193,9 @@ mod tests {
             // Also when the input is known later: the meshes of a scene.
             let mut files = Files::new(Replace::Anything);
             files.write(spelling).unwrap();
-            assert!(files.read(&root.join("in.obj")).unwrap_err().to_string().contains("is read by the same command"));
+            assert!(
+                files.read(&root.join("in.obj")).unwrap_err().to_string().contains("is also an input of this command")
+            );
         }
         // A slash at the end makes no other file of it.
         for folder_like in ["in.obj/", "in.obj/.", "new.obj/"] {
@@ -210,7 +210,7 @@ mod tests {
         let mut files = Files::default();
         files.write(&root.join("new.png")).unwrap();
         let error = files.write(&root.join("sub/../new.png")).unwrap_err();
-        assert!(error.to_string().contains("a name of its own"), "{error}");
+        assert!(error.to_string().contains("two outputs have the same name"), "{error}");
         files.write(&root.join("sub/new.png")).unwrap();
         assert_eq!(files.replaced(), [] as [PathBuf; 0]);
         assert_eq!(std::fs::read_to_string(root.join("in.obj")).unwrap(), "here");

@@ -23,7 +23,7 @@ pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), Strin
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), String> {
     let reader = picture_reader(path, limits)?;
     if reader.format().is_none() {
-        return Err("is no picture that can be read: use PNG, JPEG, HDR or EXR".to_owned());
+        return Err("unsupported image format: use PNG, JPEG, HDR or EXR".to_owned());
     }
     let picture = decode_picture(reader, limits)?;
     let (width, height) = (picture.width(), picture.height());
@@ -38,7 +38,7 @@ pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture
     let is_good = |texel: &Vec3| texel.is_finite() && texel.cmpge(Vec3::ZERO).all();
     let bad = texels.iter().filter(|texel| !is_good(texel)).count();
     texels.iter_mut().filter(|texel| !is_good(texel)).for_each(|texel| *texel = Vec3::ZERO);
-    let warning = (bad > 0).then(|| format!("{bad} pixels are negative or not finite and were made black"));
+    let warning = (bad > 0).then(|| format!("{bad} pixels are negative or not finite and were set to black"));
     Ok((ImageTexture { width, height, texels }, warning))
 }
 
@@ -71,7 +71,7 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
     let pixels = u64::from(width) * u64::from(height);
     if pixels > limits.picture_pixels {
         let (limit, advice) = (limits.picture_pixels, Limits::advice());
-        return Err(format!("has {width} x {height} pixels, but the limit for pictures is {limit}: {advice}"));
+        return Err(format!("has {width} x {height} pixels, above the limit of {limit} pixels for images: {advice}"));
     }
     DynamicImage::from_decoder(decoder).map_err(undecodable)
 }

@@ -53,7 +53,7 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
             let name = format!("{stem}-mesh-{number}.obj");
             // A file that is there may be another mesh of this scene: it is replaced by nothing but itself.
             match save_new_obj(&folder.join(text_to_path(&name)), mesh, &extras).map_err(|error| error.to_string())? {
-                NewObj::Written => notes.push(format!("a mesh that came from no file was saved as {name}")),
+                NewObj::Written => notes.push(format!("a mesh without a file was saved as {name}")),
                 NewObj::Same => {}
                 NewObj::Taken => continue,
             }
@@ -67,10 +67,10 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
     let text = description.file.to_ron();
     let again = SceneFile::parse(&text, path).map_err(|error| failed(&error))?;
     if again != description.file {
-        return Err(failed(&"it would not read back as the same scene; this is a bug in firstlight"));
+        return Err(failed(&"the saved scene would differ; this is a bug in firstlight"));
     }
     if InputFile::open(path, FileKind::Scene).and_then(InputFile::text).is_ok_and(|old| has_comments(&old)) {
-        notes.push("the comments of the old file are not kept".to_owned());
+        notes.push("comments of the previous file were removed".to_owned());
     }
     write_whole(path, text.as_bytes())?;
     Ok(SavedScene { text, notes })

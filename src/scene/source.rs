@@ -43,14 +43,20 @@ impl SceneSource {
             Some("png" | "exr") => Ok(Self::Picture(path.to_path_buf())),
             _ if path.is_dir() => Err(SceneError::in_file(
                 path,
-                "is a folder: name a scene (.ron), a model (.obj) or a picture (.png, .exr)",
+                "is a folder: expected a scene (.ron), a model (.obj) or a picture (.png, .exr)",
             )),
+            Some("hdr") if path.exists() => {
+                let message = "is an environment image: add it to a scene or a model with --env FILE.hdr";
+                Err(SceneError::in_file(path, message))
+            }
             _ if path.exists() => {
-                Err(SceneError::in_file(path, "cannot be opened: use a scene (.ron) or a model (.obj)"))
+                let message = "unsupported file format: expected a scene (.ron), a model (.obj) or a picture rendered by \
+                               firstlight (.png, .exr); convert other models to .obj";
+                Err(SceneError::in_file(path, message))
             }
             _ => {
                 let hint = suggestion(word, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
-                Err(SceneError::in_file(path, format!("neither a file nor a built-in scene{hint}")))
+                Err(SceneError::in_file(path, format!("no such file or built-in scene{hint}")))
             }
         }
     }

@@ -93,7 +93,7 @@ impl Trees {
     /// Why no tree could be built of this shape, if so.
     pub(super) fn reason(&self, shape: &Shape) -> String {
         let reason = shared(shape).and_then(|key| self.unfit.get(&key));
-        reason.map_or("its tree is not built yet".to_owned(), |(_, reason)| reason.clone())
+        reason.map_or("its kd-tree is not built yet".to_owned(), |(_, reason)| reason.clone())
     }
 
     /// Memory of all trees; of clouds, that of the balls in them.
@@ -153,10 +153,10 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
     }
     let per_vertex = |len: usize| len == 0 || len == n;
     if !per_vertex(mesh.normals.len()) || !per_vertex(mesh.uvs.len()) {
-        return Err("the mesh needs one normal and one texture coordinate a vertex, or none at all".to_owned());
+        return Err("the mesh needs one normal and one texture coordinate per vertex, or none".to_owned());
     }
     if !mesh.slots.is_empty() && mesh.slots.len() != mesh.triangles.len() {
-        return Err("the mesh needs one slot a triangle, or none at all".to_owned());
+        return Err("the mesh needs one material slot per triangle, or none".to_owned());
     }
     Ok(())
 }
@@ -166,7 +166,7 @@ fn check_balls(balls: &Balls) -> Result<(), String> {
         return Err(format!("there are {} centres and {} radii", balls.centers.len(), balls.radii.len()));
     }
     match balls.centers.iter().zip(&balls.radii).position(|(c, r)| !(c.is_finite() && r.is_finite() && *r > 0.0)) {
-        Some(i) => Err(format!("ball {i} needs a finite centre and a positive radius")),
+        Some(i) => Err(format!("sphere {i} needs a finite centre and a positive radius")),
         None => Ok(()),
     }
 }

@@ -69,7 +69,7 @@ struct AnyValue {
 fn narrow<E: Error>(value: f64) -> Result<f32, E> {
     let narrow = value as f32;
     if value.is_finite() && narrow.is_infinite() {
-        return Err(E::custom(format!("{value:e} is too large: the largest number here is {:e}", f32::MAX)));
+        return Err(E::custom(format!("{value:e} is too large: the maximum is {:e}", f32::MAX)));
     }
     Ok(narrow)
 }

@@ -59,7 +59,7 @@ impl InProgress {
     }
 
     fn check(&self) -> io::Result<()> {
-        if GIVEN_UP.load(Ordering::SeqCst) { Err(io::Error::other("the program is ending")) } else { Ok(()) }
+        if GIVEN_UP.load(Ordering::SeqCst) { Err(io::Error::other("the program is shutting down")) } else { Ok(()) }
     }
 }
 
@@ -239,10 +239,8 @@ pub fn unwritable(path: &Path, reason: &(dyn Error + 'static)) -> String {
     });
     match kind.flatten().next() {
         Some(ErrorKind::StorageFull) => cannot_be_written(path, &"the disk is full"),
-        Some(ErrorKind::QuotaExceeded) => {
-            cannot_be_written(path, &"no more of the disk may be used: its quota is full")
-        }
-        Some(ErrorKind::FileTooLarge) => cannot_be_written(path, &"it would be larger than a file may be here"),
+        Some(ErrorKind::QuotaExceeded) => cannot_be_written(path, &"the disk quota is exceeded"),
+        Some(ErrorKind::FileTooLarge) => cannot_be_written(path, &"the file would exceed the size limit"),
         _ => cannot_be_written(path, reason),
     }
 }
@@ -252,26 +250,26 @@ fn cannot_be_written(path: &Path, reason: &(impl Display + ?Sized)) -> String {
 }
 
 fn busy(path: &Path) -> String {
-    format!("{}: is being written by another process: wait until that has ended, or name another file", path.display())
+    format!("{}: is being written by another process: wait for it to end, or choose another name", path.display())
 }
 
 /// Whether what is there may be replaced.
 fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), String> {
     if is_named_as_folder(path) {
-        return Err(format!("{}: is the name of a folder, by its end: name a file", path.display()));
+        return Err(format!("{}: is the name of a folder: expected a file name", path.display()));
     }
     // All links have been followed.
     if target.is_symlink() {
-        return Err(cannot_be_written(path, &"its links lead nowhere"));
+        return Err(cannot_be_written(path, &"the symbolic link is broken"));
     }
     let Ok(info) = std::fs::metadata(target) else { return Ok(()) };
     if info.is_dir() {
-        return Err(format!("{}: is a folder: name a file", path.display()));
+        return Err(format!("{}: is a folder: expected a file name", path.display()));
     }
     if !info.is_file() {
-        return Err(format!("{}: is not a regular file, so it is not replaced: name another", path.display()));
+        return Err(format!("{}: is not a regular file and is not replaced: choose another name", path.display()));
     }
-    let read_only = || format!("{}: is read-only, so it is not replaced: name another file", path.display());
+    let read_only = || format!("{}: is read-only and is not replaced: choose another name", path.display());
     if info.permissions().readonly() {
         return Err(read_only());
     }
@@ -283,7 +281,7 @@ fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), Stri
     }
     if replace == Replace::AllButFilms && is_film(target) {
         return Err(format!(
-            "{}: is a film, and its samples would be lost: name another file, or allow it by --overwrite",
+            "{}: is a film whose samples would be lost: choose another name, or use --overwrite",
             path.display()
         ));
     }
@@ -390,9 +388,9 @@ fn cannot_begin(path: &Path, target: &Path, error: &io::Error) -> String {
         _ if folder.exists() && !folder.is_dir() => format!("{} is not a folder", folder.display()),
         ErrorKind::NotFound if !lies_in.is_dir() => format!("there is no folder {}", folder.display()),
         ErrorKind::StorageFull => "the disk is full".to_owned(),
-        ErrorKind::ReadOnlyFilesystem => format!("{} lies on a read-only disk", folder.display()),
+        ErrorKind::ReadOnlyFilesystem => format!("{} is on a read-only file system", folder.display()),
         // Some folders that the system makes up answer `not found` to whoever wants to write.
-        _ => format!("the folder {} takes no new files", folder.display()),
+        _ => format!("no permission to create files in {}", folder.display()),
     };
     cannot_be_written(path, &reason)
 }
@@ -502,7 +500,7 @@ mod tests {
         for (path, expected) in [
             (folder.path().join("gone/a.txt"), "there is no folder"),
             (plain.join("a.txt"), "is not a folder"),
-            (folder.path().to_path_buf(), "is a folder: name a file"),
+            (folder.path().to_path_buf(), "is a folder: expected a file name"),
         ] {
             let error = check_writable(&path, Replace::AllButFilms).unwrap_err();
             assert!(error.contains(expected) && !error.contains(".firstlight"), "{error}");
@@ -510,7 +508,7 @@ mod tests {
         #[cfg(target_os = "linux")]
         {
             let error = check_writable(Path::new("/proc/a.txt"), Replace::AllButFilms).unwrap_err();
-            assert!(error.contains("/proc takes no new files"), "{error}");
+            assert!(error.contains("no permission to create files in /proc"), "{error}");
         }
         // However deep a library has wrapped it.
         #[derive(Debug, thiserror::Error)]

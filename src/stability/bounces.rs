@@ -32,7 +32,7 @@ fn boxes() -> Vec<(&'static str, SceneTree)> {
         ("turned box of triangles", SceneTree::build(vec![Shape::Mesh { tree, world_from_object: turned }])),
         ("ball", SceneTree::build(vec![ball])),
         (
-            "ball of triangles",
+            "sphere of triangles",
             SceneTree::build(vec![Shape::Mesh { tree: hull, world_from_object: Affine3A::IDENTITY }]),
         ),
     ]

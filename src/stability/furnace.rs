@@ -144,11 +144,11 @@ pub fn nested() -> Vec<LightCase> {
         let two = |outer: Thing, inner: Thing| vec![outer, inner];
         let (o, r) = (Vec3::ZERO, 0.9);
         let cases: Vec<(&str, Vec<Thing>)> = vec![
-            ("overlapping balls", two(ball(Vec3::X * 0.4, 0.7, 0), ball(Vec3::X * -0.3, 0.6, 1))),
-            ("touching balls", two(ball(Vec3::X * 0.5, 0.5, 0), ball(Vec3::X * -0.5, 0.5, 1))),
-            ("a shared skin", two(ball(o, r, 0), ball(o, r, 1))),
-            ("a ball that touches from inside", two(ball(o, r, 0), ball(Vec3::Y * 0.4, 0.5, 1))),
-            ("a ball half out of another", two(ball(o, r, 0), ball(Vec3::Y * 0.9, 0.5, 1))),
+            ("overlapping spheres", two(ball(Vec3::X * 0.4, 0.7, 0), ball(Vec3::X * -0.3, 0.6, 1))),
+            ("touching spheres", two(ball(Vec3::X * 0.5, 0.5, 0), ball(Vec3::X * -0.5, 0.5, 1))),
+            ("a shared surface", two(ball(o, r, 0), ball(o, r, 1))),
+            ("a sphere that touches from inside", two(ball(o, r, 0), ball(Vec3::Y * 0.4, 0.5, 1))),
+            ("a sphere half outside of another", two(ball(o, r, 0), ball(Vec3::Y * 0.9, 0.5, 1))),
             ("boxes that share a wall", {
                 let mut walls = quad_box(vec3(-0.5, 0.0, 0.0), Vec3::splat(0.5), 0);
                 walls.extend(quad_box(vec3(0.5, 0.0, 0.0), Vec3::splat(0.5), 1));

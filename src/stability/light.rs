@@ -143,25 +143,25 @@ pub fn glass() -> Vec<LightCase> {
     let glass = |ior: f32| Material::Glass { ior, absorption: Vec3::ZERO };
     let mut pictures = vec![
         furnace(
-            "four nested balls",
+            "four nested spheres",
             (0..4).map(|i| (ball(Vec3::ZERO, 1.0 - 0.15 * i as f32), i)).collect(),
             [1.5, 1.2, 1.8, 1.0].map(glass).into(),
             1e-4,
         ),
         furnace(
-            "two balls that touch",
+            "two spheres that touch",
             vec![(ball(Vec3::X * 0.5, 0.5), 0), (ball(Vec3::X * -0.5, 0.5), 1)],
             vec![glass(1.5), glass(1.33)],
             1e-4,
         ),
         furnace(
-            "two balls that share a skin",
+            "two spheres that share a surface",
             vec![(ball(Vec3::ZERO, 0.8), 0), (ball(Vec3::ZERO, 0.8), 1)],
             vec![glass(1.5), glass(1.5)],
             1e-4,
         ),
         furnace(
-            "a ball in a ball that touches it",
+            "a sphere in a sphere that touches it",
             vec![(ball(Vec3::ZERO, 0.8), 0), (ball(Vec3::Y * 0.4, 0.4), 1)],
             vec![glass(1.5), glass(1.2)],
             1e-4,
@@ -181,7 +181,7 @@ pub fn glass() -> Vec<LightCase> {
     pictures.push(dense);
     // From inside a ball, at the radius where the flattest rays all but reach the angle of total reflection. What comes from
     // outside is n² as bright there.
-    let mut inside = furnace("inside a ball of glass", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1.5)], 1e-3);
+    let mut inside = furnace("inside a sphere of glass", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1.5)], 1e-3);
     // Total reflection keeps some paths for longer than roulette lets them live.
     inside.every_pixel = false;
     inside.scene = inside.scene.with_camera(camera(vec3(0.666_66, 0.0, 0.0), vec3(0.7, 1.0, 0.0), 150.0));
@@ -212,15 +212,15 @@ pub fn metal() -> Vec<LightCase> {
 /// radius r sees albedo · L · (r/d)² · cos θ while all of the ball is above its horizon.
 pub fn lights() -> Vec<LightCase> {
     let cases: [(&str, f32, f32, f32); 9] = [
-        ("a ball of 1 µm", 1e-6, 1.0, 0.3),
-        ("a ball of 0.1 mm", 1e-4, 1.0, 0.3),
-        ("a ball of 1 mm at 1 km", 1e-3, 1e3, 10.0),
-        ("a ball of 100 m", 100.0, 150.0, 20.0),
-        ("a ball of 10 km", 1e4, 1.5e4, 200.0),
-        ("a ball that touches, near", 1.0, 1.0, 0.01),
-        ("a ball that touches, far", 1.0, 1.0, 3.0),
-        ("a ball of 10 km that touches", 1e4, 1e4, 1e3),
-        ("a ball a hair above", 1.0, 1.000_001, 0.001),
+        ("a sphere of 1 µm", 1e-6, 1.0, 0.3),
+        ("a sphere of 0.1 mm", 1e-4, 1.0, 0.3),
+        ("a sphere of 1 mm at 1 km", 1e-3, 1e3, 10.0),
+        ("a sphere of 100 m", 100.0, 150.0, 20.0),
+        ("a sphere of 10 km", 1e4, 1.5e4, 200.0),
+        ("a sphere that touches, near", 1.0, 1.0, 0.01),
+        ("a sphere that touches, far", 1.0, 1.0, 3.0),
+        ("a sphere of 10 km that touches", 1e4, 1e4, 1e3),
+        ("a sphere slightly above", 1.0, 1.000_001, 0.001),
     ];
     cases
         .into_iter()

@@ -81,7 +81,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "tangent",
-        about: "balls that touch a floor, each other, and a floor that is a ball of 10 km",
+        about: "spheres that touch a floor, each other, and a floor that is a sphere of 10 km",
         share: 0.2,
         kind: Kind::RaySet(surfaces::tangent),
     },
@@ -117,7 +117,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "lights",
-        about: "tiny, huge and touching ball lights over a floor, against the closed form",
+        about: "tiny, huge and touching sphere lights over a floor, against the closed form",
         share: 0.02,
         kind: Kind::Pictures(light::lights),
     },

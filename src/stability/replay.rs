@@ -26,11 +26,11 @@ pub enum Told {
 /// Why there is nothing to replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReplayError {
-    #[error("has no rays of its own to replay; its findings say all that there is")]
+    #[error("has no rays to replay")]
     NoRays,
-    #[error("there is no stage {stage} to replay, only 0 to {last}")]
+    #[error("there is no stage {stage}, only 0 to {last}")]
     NoStage { stage: usize, last: usize },
-    #[error("stage {stage} is without rays: at its place single precision leaves nothing to aim from")]
+    #[error("stage {stage} has no rays: single precision does not suffice at its position")]
     EmptyStage { stage: usize },
     #[error("stage {stage} has no ray {ray}, only 0 to {last}; more --rays make it larger")]
     NoRay { stage: usize, ray: u64, last: u64 },

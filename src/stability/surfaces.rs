@@ -346,26 +346,26 @@ pub fn leaving() -> Vec<Plan> {
 /// Balls that touch: the floor, each other, and a floor that is a ball of 10 km; seen from all around the contact.
 pub fn tangent() -> Vec<Plan> {
     let kinds: [(&str, fn(SurfaceCase) -> Vec<Shape>); 4] = [
-        ("ball on a plane", |place| {
+        ("sphere on a plane", |place| {
             vec![
                 Shape::Plane { point: place.shift(), normal: Vec3::Y },
                 Shape::Sphere { center: place.apply(Vec3::Y), radius: place.scale },
             ]
         }),
-        ("ball on a quad", |place| {
+        ("sphere on a quad", |place| {
             let corner = place.apply(vec3(-3.0, 0.0, -3.0));
             vec![
                 Shape::Quad { corner, edge_u: Vec3::Z * 6.0 * place.scale, edge_v: Vec3::X * 6.0 * place.scale },
                 Shape::Sphere { center: place.apply(Vec3::Y), radius: place.scale },
             ]
         }),
-        ("ball on a ball of 10 km", |place| {
+        ("sphere on a sphere of 10 km", |place| {
             vec![
                 Shape::Sphere { center: place.apply(Vec3::NEG_Y * 1e4), radius: 1e4 * place.scale },
                 Shape::Sphere { center: place.apply(Vec3::Y), radius: place.scale },
             ]
         }),
-        ("three balls", |place| {
+        ("three spheres", |place| {
             let ball =
                 |center: Vec3, radius: f32| Shape::Sphere { center: place.apply(center), radius: radius * place.scale };
             vec![ball(Vec3::Y, 1.0), ball(vec3(2.0, 1.0, 0.0), 1.0), ball(vec3(0.0, 0.5, 0.0), 0.5)]

@@ -31,7 +31,7 @@ impl DialogPurpose {
         match self {
             Self::Open => "Open a scene, a model or a picture",
             Self::AddMesh => "Add a model",
-            Self::Texture { .. } => "A picture as a texture",
+            Self::Texture { .. } => "Choose a texture image",
         }
     }
 
@@ -90,7 +90,7 @@ impl Dialog {
     /// When this system has none, in words for people.
     pub fn ask(&self, purpose: DialogPurpose, folder: &Path) -> Result<(), String> {
         let path = std::env::var_os("PATH").unwrap_or_default();
-        let found = find(&path).ok_or("no file dialog here (zenity or kdialog): drop a file on the window")?;
+        let found = find(&path).ok_or("no file dialog found (install zenity or kdialog): drop a file on the window")?;
         if self.open.swap(true, Ordering::AcqRel) {
             return Ok(());
         }
@@ -108,7 +108,7 @@ impl Dialog {
         let spawned = std::thread::Builder::new().name("dialog".to_owned()).spawn(work);
         spawned.map(drop).map_err(|error| {
             self.open.store(false, Ordering::Release);
-            format!("no dialog can be shown: {error}")
+            format!("cannot show a dialog: {error}")
         })
     }
 

@@ -117,7 +117,7 @@ impl Handles {
         let across = egui::vec2(-way.y, way.x);
         let arrow = vec![tip, tip - 15.0 * way + 8.0 * across, tip - 15.0 * way - 8.0 * across];
         painter.add(egui::Shape::convex_polygon(arrow, SELECTED, Stroke::new(1.0, Color32::BLACK)));
-        let text = format!("{name} is out of view: F frames it");
+        let text = format!("{name} is out of view: press F to frame it");
         let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
         // A window this small shows the arrow alone.
         if inner.width() < galley.size().x + 8.0 || inner.height() < galley.size().y + 8.0 {

@@ -119,7 +119,8 @@ pub fn help(context: &Context, help: &mut Help) {
         .resizable(false)
         .fixed_size(Vec2::new(columns as f32 * column_width + 20.0, height))
         .show(context, |ui| {
-            let field = egui::TextEdit::singleline(search).hint_text("find: blur, undo, video …").desired_width(220.0);
+            let field =
+                egui::TextEdit::singleline(search).hint_text("search: blur, undo, video …").desired_width(220.0);
             let field = ui.add(field);
             if std::mem::take(fresh) {
                 field.request_focus();
@@ -136,7 +137,7 @@ pub fn help(context: &Context, help: &mut Help) {
                 .collect();
             egui::ScrollArea::vertical().auto_shrink([false, false]).max_height(height - 36.0).show(ui, |ui| {
                 if groups.is_empty() {
-                    ui.weak("nothing is called that");
+                    ui.weak("no matches");
                 }
                 ui.horizontal_top(|ui| {
                     for (i, groups) in in_columns(&groups, columns).into_iter().enumerate() {

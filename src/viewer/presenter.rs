@@ -15,12 +15,12 @@ use winit::window::Window;
 #[derive(Debug, Error)]
 pub enum PresentError {
     #[error(
-        "no graphics driver can draw in a window ({0}); install one (on Debian or Ubuntu: mesa-vulkan-drivers), or render without a window: firstlight render SCENE -o out.png"
+        "no usable graphics driver ({0}); install one (on Debian or Ubuntu: mesa-vulkan-drivers), or render without a window: firstlight render SCENE -o out.png"
     )]
     NoDriver(pixels::Error),
-    #[error("the window cannot be drawn: {0}")]
+    #[error("cannot draw the window: {0}")]
     Failed(#[from] pixels::Error),
-    #[error("the window cannot be drawn: {0}")]
+    #[error("cannot draw the window: {0}")]
     Texture(#[from] pixels::TextureError),
 }
 

@@ -33,11 +33,11 @@ impl Question {
         match self {
             Self::Leave { title, file, .. } => (
                 format!("Save the changes to {title}?"),
-                format!("Saving writes {file}. Without saving they are lost."),
+                format!("They will be saved to {file}. Otherwise they are lost."),
             ),
             Self::Restore(left) => (
                 format!("Restore the changes to {}?", left.title),
-                "firstlight ended before they were saved. They become a scene file of their own.".to_owned(),
+                "firstlight ended before they were saved. They are restored to a new scene file.".to_owned(),
             ),
         }
     }

@@ -61,7 +61,7 @@ impl Saver {
     ) {
         let (folder, stem) = (self.folder.clone(), file_stem(scene));
         self.spawn(move || {
-            let film = film.recv().map_err(|_| "there was no picture to be kept".to_owned())?;
+            let film = film.recv().map_err(|_| "there was no picture to save".to_owned())?;
             print(&folder, &stem, &film, draft, &display, size, format)
         });
     }
@@ -83,12 +83,12 @@ impl Saver {
             check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
             // Threads of its own: those of the window belong to what is seen, and must not wait for this.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let pool = pool.map_err(|error| failed(&format!("no threads can be started: {error}")))?;
+            let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
             let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(&error))?;
             let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
             pool.install(|| render_offline_until(&prepared, &settings, &mut film, target, &stop, |_| true));
             if film.spp() == 0 {
-                return Err(failed(&"the window was closed before each of its pixels had a sample"));
+                return Err(failed(&"the window was closed before every pixel had a sample"));
             }
             print(&folder, &stem, &film, draft, &display, size, format)
         });
@@ -104,8 +104,7 @@ impl Saver {
         match std::thread::Builder::new().name("save".to_owned()).spawn(work) {
             Ok(thread) => self.threads.push(thread),
             Err(error) => {
-                let _ =
-                    self.sender.send(Err(format!("the picture was not saved: no thread could be started: {error}")));
+                let _ = self.sender.send(Err(format!("the picture was not saved: cannot start a thread: {error}")));
             }
         }
         self.threads.retain(|thread| !thread.is_finished());
@@ -205,7 +204,7 @@ mod tests {
 
         let (_, never) = channel();
         saver.save(never, None, Display::default(), (1, 1), "gallery", PictureFormat::Png);
-        assert_eq!(saver.finish(), [Err("there was no picture to be kept".to_owned())]);
+        assert_eq!(saver.finish(), [Err("there was no picture to save".to_owned())]);
     }
 
     #[test]

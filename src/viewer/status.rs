@@ -1,6 +1,6 @@
 //! The status line in words: what the picture is worth so far, and what is seen.
 
-use crate::frame::Status;
+use crate::frame::{Status, f_number, f_stop};
 use crate::render::{Integrator, ToneCurve};
 use std::fmt::Write as _;
 
@@ -48,7 +48,8 @@ pub fn settings(status: &Status) -> String {
     }
     let lens = status.rig.lens;
     if lens.enabled {
-        parts.push(format!("focus {}, aperture {} wide", metres(lens.focus_distance), metres(2.0 * lens.radius)));
+        let aperture = f_number(f_stop(lens.radius, &status.rig.projection));
+        parts.push(format!("focus {}, {aperture}", metres(lens.focus_distance)));
     }
     if status.display.exposure_stops != 0.0 {
         parts.push(format!("{:+.1} stops", status.display.exposure_stops));
@@ -152,7 +153,7 @@ mod tests {
         assert_eq!(settings(&status), "N: panel, H: keys");
         status.rig.lens = Lens::thin(0.01, 2.5);
         status.display.exposure_stops = -1.0 / 3.0;
-        assert_eq!(settings(&status), "focus 2.50 m, aperture 2.0 cm wide   -0.3 stops   N: panel, H: keys");
+        assert_eq!(settings(&status), "focus 2.50 m, f/1.6   -0.3 stops   N: panel, H: keys");
     }
 
     #[test]

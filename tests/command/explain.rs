@@ -185,7 +185,8 @@ fn the_program_explains_a_pixel() {
     let scene = ["cornell", "--size", "64x48", "--pixel", "32,40", "--spp", "16"];
     let (code, text, errors) = run(&scene);
     assert_eq!(code, Some(0), "{errors}");
-    for word in ["pixel 32,40 of 64 x 48", "samples 0 to 15", "seen", "direct", "indirect", "by bounces", "100.0 %"] {
+    for word in ["pixel 32,40 of 64 x 48", "samples 0 to 15", "visible", "direct", "indirect", "by bounces", "100.0 %"]
+    {
         assert!(text.contains(word), "{word}: {text}");
     }
     let (_, text, _) = run(&[&scene[..], &["--json"]].concat());
@@ -202,7 +203,7 @@ fn the_program_explains_a_pixel() {
     }
     assert_eq!(json["paths"].as_array().unwrap().len(), 16);
     let (code, _, errors) = run(&["cornell", "--size", "64x48", "--pixel", "64,0"]);
-    assert!(code == Some(2) && errors.contains("the last one is 63,47"), "{code:?} {errors}");
+    assert!(code == Some(2) && errors.contains("the last pixel is 63,47"), "{code:?} {errors}");
     let (code, _, errors) = run(&["cornell", "--pixel", "middle"]);
     assert!(code == Some(2) && errors.contains("X,Y"), "{code:?} {errors}");
 }

@@ -9,3 +9,4 @@ mod explain;
 mod faults;
 mod report;
 mod terminal;
+mod usage;

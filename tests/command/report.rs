@@ -221,13 +221,13 @@ fn ctrl_c_writes_what_was_measured_and_leaves_no_empty_folder() {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(130), "{said}");
         if is_written {
-            assert!(said.contains("what was measured is written"), "{said}");
+            assert!(said.contains("the measurements so far were written"), "{said}");
             let page = std::fs::read_to_string(folder.path().join("deep/page/index.html")).unwrap();
             assert!(page.contains("was interrupted") && page.contains("<svg"), "{page}");
             let table = std::fs::read_to_string(folder.path().join("deep/page/steps.csv")).unwrap();
             assert!(table.lines().count() > 1, "{table}");
         } else {
-            assert!(said.contains("nothing is written"), "{said}");
+            assert!(said.contains("nothing was written"), "{said}");
             assert!(!folder.path().join("deep").exists(), "an empty folder is left");
         }
     }

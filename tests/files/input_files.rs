@@ -107,7 +107,7 @@ fn settings_and_views_that_are_no_files_stop_nothing() {
         kind.make(&file);
         let (status, said) = run(folder.path(), line);
         assert!(status == Some(1) && said.contains("cannot be read"), "{kind:?}: {said}");
-        assert!(said.contains("has no view under 1"), "{kind:?}: {said}");
+        assert!(said.contains("has no bookmark 1"), "{kind:?}: {said}");
     }
 }
 
@@ -127,7 +127,7 @@ fn what_is_too_long_is_refused_before_it_is_read() {
         file.set_len(1 << 40).unwrap();
         let (status, said) = run(folder.path(), line);
         assert_eq!(status, Some(1), "{line}: {said}");
-        assert!(said.contains("is longer than") && said.contains("FIRSTLIGHT_LIMITS"), "{line}: {said}");
+        assert!(said.contains("is larger than") && said.contains("FIRSTLIGHT_LIMITS"), "{line}: {said}");
     }
 }
 
@@ -140,12 +140,12 @@ fn recordings_with_endless_lines_are_refused_by_the_line() {
     let path = folder.path().join("a.rec");
     let long = "x".repeat(10 << 20);
     for (text, expected) in [
-        (long.clone(), "a.rec: is no recording"),
+        (long.clone(), "a.rec: is not a recording"),
         (format!("{HEADER}\n{long}"), "a.rec:2: the line is longer than"),
         (format!("{HEADER}\n{long}\nEnd(1,1)\n"), "a.rec:2: the line is longer than"),
         (format!("{HEADER}\nDo(1,0.0,Open(path:\"{long}\"))\nEnd(1,1)\n"), "a.rec:2: the line is longer than"),
-        (format!("{HEADER}\nDo(1,0.0,Nothing)\nEnd(1,1)\n"), "a.rec:2: cannot be understood"),
-        (String::new(), "a.rec: is no recording"),
+        (format!("{HEADER}\nDo(1,0.0,Nothing)\nEnd(1,1)\n"), "a.rec:2: cannot be parsed"),
+        (String::new(), "a.rec: is not a recording"),
     ] {
         std::fs::write(&path, text).unwrap();
         let (status, said) = run(folder.path(), "--replay a.rec -o out.png");
@@ -154,7 +154,7 @@ fn recordings_with_endless_lines_are_refused_by_the_line() {
         assert!(!folder.path().join("out.png").exists());
     }
     std::fs::write(&path, b"\xff\xfe(\n").unwrap();
-    assert!(run(folder.path(), "--replay a.rec -o out.png").1.contains("a.rec: is no recording"));
+    assert!(run(folder.path(), "--replay a.rec -o out.png").1.contains("a.rec: is not a recording"));
 }
 
 #[test]

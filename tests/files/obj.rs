@@ -151,7 +151,7 @@ fn refusals_name_the_file_the_line_and_what_was_expected() {
         (format!("{v}v 1 2\nf 1 2 3\n"), "model.obj:4: expected 3 numbers after `v`"),
         (format!("{v}v 1 two 3\nf 1 2 4\n"), "model.obj:4: `two` is not a finite number"),
         (format!("{v}v 1e300 0 0\nf 1 2 4\n"), "more than single precision"),
-        (format!("{v}f 1 1 2\n"), "none of its 1 triangles has an area"),
+        (format!("{v}f 1 1 2\n"), "all 1 triangles are degenerate"),
     ];
     for (text, expected) in cases {
         let found = message(&text);

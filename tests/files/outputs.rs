@@ -111,9 +111,13 @@ fn nothing_that_a_command_reads_is_written_over() {
     }
     for line in lines {
         let said = refused(&path, line, 2);
-        let why = ["is read by the same command", "a name of its own", "films are OpenEXR"];
+        let why = [
+            "is also an input of this command",
+            "two outputs have the same name",
+            "the name of a film must end in .exr",
+        ];
         assert!(why.iter().any(|why| said.contains(why)), "{line}: {said}");
-        assert!(said.contains("name another") || said.contains("a name of its own") || said.contains("end the name"));
+        assert!(why[1..].iter().any(|why| said.contains(why)) || said.contains("choose another output name"));
     }
 }
 
@@ -137,8 +141,8 @@ fn a_film_is_replaced_by_nothing_that_lacks_its_samples() {
         "merge b.exr c.exr -o ab.exr",
     ] {
         let said = refused(&path, line, 1);
-        assert!(said.contains("film") || said.contains("is there already"), "{line}: {said}");
-        assert!(said.contains("--overwrite") && said.contains("name another file"), "{line}: {said}");
+        assert!(said.contains("film") || said.contains("already exists"), "{line}: {said}");
+        assert!(said.contains("--overwrite") && said.contains("another name"), "{line}: {said}");
     }
     // One that is whole is made again, and one that has fewer samples is replaced.
     let before = std::fs::read(path.join("ab.exr")).unwrap();
@@ -163,16 +167,16 @@ fn a_film_is_replaced_by_nothing_that_lacks_its_samples() {
 fn a_render_says_what_it_replaces() {
     let (_folder, path) = room();
     let line = "render room.ron -o a.png --spp 2";
-    assert!(!does(&path, line).contains("in place of"));
-    assert!(does(&path, line).contains("in place of the file that was there"));
+    assert!(!does(&path, line).contains("replaced"));
+    assert!(does(&path, line).contains("replaced the existing file"));
     let out = run(&path, &format!("{line} --error-picture e.exr --json"));
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(json["replaced"], serde_json::json!(["a.png"]));
     let said = does(&path, &format!("{line} --error-picture e.exr"));
-    assert!(said.contains("in place of what was there: a.png, e.exr"), "{said}");
+    assert!(said.contains("replaced a.png, e.exr"), "{said}");
     std::fs::write(path.join("turn-0002.png"), "old").unwrap();
     let said = does(&path, "render room.ron -o turn.png --spp 1 --turntable 3");
-    assert!(said.contains("3 pictures, 1 of them in place of"), "{said}");
+    assert!(said.contains("3 frames, replacing 1 existing file"), "{said}");
 }
 
 #[cfg(unix)]
@@ -220,7 +224,7 @@ fn a_film_has_one_process_at_a_time() {
             let output = run(&path, &format!("render room.ron --spp 1 {other}"));
             let said = String::from_utf8_lossy(&output.stderr);
             let expected = said.contains("is being written by another process") || said.contains("is a film");
-            assert!(output.status.code() == Some(1) && (expected || said.contains("is there already")), "{said}");
+            assert!(output.status.code() == Some(1) && (expected || said.contains("already exists")), "{said}");
         }
         let kill = Command::new("kill").args(["-INT", &first.id().to_string()]).status().unwrap();
         assert!(kill.success());
@@ -332,7 +336,7 @@ fn names_of_any_bytes_are_read_and_written() {
         assert!(path.join(odd(name)).is_file(), "{name}");
     }
     assert!(std::fs::read(path.join(odd("m?.png"))).unwrap() == std::fs::read(path.join(odd("m2?.png"))).unwrap());
-    assert!(run("render r?.ron -o ./a?.exr --film a?.exr --resume", 2).contains("is read by the same command"));
+    assert!(run("render r?.ron -o ./a?.exr --film a?.exr --resume", 2).contains("is also an input of this command"));
     // From another folder, through the notes.
     std::fs::create_dir(path.join(odd("sub?"))).unwrap();
     run("render a?.png -o sub?/a.png", 0);
@@ -340,7 +344,7 @@ fn names_of_any_bytes_are_read_and_written() {
     assert!(std::fs::read(path.join(odd("a?.png"))).unwrap() == std::fs::read(path.join("again.png")).unwrap());
     // What is not there is said, without a panic.
     assert!(run("render none?.ron -o x.png", 1).contains("none\u{fffd}.ron: cannot be read: no such file"));
-    assert!(run("render none? -o x.png", 2).contains("neither a file nor a built-in scene"));
+    assert!(run("render none? -o x.png", 2).contains("no such file or built-in scene"));
     // Nothing has been written under a name that only looks the same.
     let mut names = std::fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().file_name());
     assert!(names.all(|name| !name.to_string_lossy().contains('\u{fffd}') || name.to_str().is_none()));
@@ -351,7 +355,7 @@ fn an_error_that_is_meant_in_per_cent_is_not_taken_for_a_share() {
     let (_folder, path) = room();
     let said = run(&path, "render room.ron -o a.png --error 5");
     let said = String::from_utf8(said.stderr).unwrap();
-    assert!(said.contains("5 means 500 %: write 5% for 5 per cent"), "{said}");
+    assert!(said.contains("5 means 500 %: write 5% for 5 percent"), "{said}");
     assert!(!path.join("a.png").exists());
     does(&path, "render room.ron -o a.png --error 5%");
 }

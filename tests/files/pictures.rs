@@ -88,7 +88,7 @@ fn a_picture_opens_as_the_scene_that_it_shows_and_renders_to_the_same_bytes() {
     std::fs::create_dir(path.join("elsewhere")).unwrap();
     std::fs::rename(path.join("first.png"), path.join("elsewhere/first.png")).unwrap();
     let said = fails(path, "render elsewhere/first.png -o c.png", 1);
-    assert!(said.contains("scenes/room.ron, is not there"), "{said}");
+    assert!(said.contains("scenes/room.ron was not found"), "{said}");
     write_room(&path.join("elsewhere"));
     let said = does(path, "render elsewhere/first.png -o elsewhere/c.png");
     assert!(!said.contains("changed"), "{said}");
@@ -106,7 +106,7 @@ fn a_scene_that_has_changed_since_the_picture_is_noticed() {
     assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");
     assert_equal(path, "a.png", "b.png");
     std::fs::write(path.join("room.ron"), ROOM.replace("radiance: 7", "radiance: 8")).unwrap();
-    assert!(does(path, "render a.png -o b.png").contains("room.ron has changed since the picture was taken"));
+    assert!(does(path, "render a.png -o b.png").contains("room.ron has changed since the picture was rendered"));
     // A vertex of the mesh moves.
     std::fs::write(path.join("room.ron"), ROOM).unwrap();
     assert_eq!(does(path, "render a.png -o b.png").lines().count(), 1, "nothing but what was written");
@@ -115,9 +115,9 @@ fn a_scene_that_has_changed_since_the_picture_is_noticed() {
     assert!(does(path, "render a.png -o b.png").contains("has changed since"));
     // What is no picture of ours says so.
     image::RgbImage::new(4, 4).save(path.join("plain.png")).unwrap();
-    assert!(fails(path, "render plain.png -o b.png", 1).contains("plain.png: it has no note on how it was made"));
+    assert!(fails(path, "render plain.png -o b.png", 1).contains("plain.png: it has no embedded firstlight scene"));
     std::fs::write(path.join("text.png"), "text").unwrap();
-    assert!(fails(path, "render text.png -o b.png", 1).contains("neither a PNG nor an OpenEXR picture"));
+    assert!(fails(path, "render text.png -o b.png", 1).contains("neither a PNG nor an OpenEXR image"));
 }
 
 #[test]
@@ -157,17 +157,17 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
     for (line, expected) in [
         ("merge a.exr whole.exr -o x.exr", "both films have the samples 0 to 63"),
         ("merge a.exr none.exr -o x.exr", "none.exr: cannot be read: no such file"),
-        ("merge a.exr whole.png -o x.exr", "whole.png: is no film to go on with"),
+        ("merge a.exr whole.png -o x.exr", "whole.png: is not a firstlight film"),
     ] {
         let said = fails(path, line, 1);
         assert!(said.contains(expected), "{line}: {said}");
     }
     for (change, expected) in [
-        ("--seed 1", "another seed"),
-        ("--size 40x32", "another size"),
-        ("--filter tent", "another pixel filter"),
-        ("--integrator phong", "another light model"),
-        ("--max-depth 3", "another maximum depth"),
+        ("--seed 1", "a different seed"),
+        ("--size 40x32", "a different size"),
+        ("--filter tent", "a different pixel filter"),
+        ("--integrator phong", "a different integrator"),
+        ("--max-depth 3", "a different maximum depth"),
     ] {
         let _ = std::fs::remove_file(path.join("other.exr"));
         let size = if change.contains("size") { "" } else { "--size 40x33" };
@@ -176,7 +176,7 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
         assert!(said.contains(expected), "{change}: {said}");
     }
     does(path, "render cornell -o o.png --film box.exr --samples 200..201 --size 40x33");
-    assert!(fails(path, "merge a.exr box.exr -o x.exr", 1).contains("another scene"));
+    assert!(fails(path, "merge a.exr box.exr -o x.exr", 1).contains("a different scene"));
     assert!(!path.join("x.exr").exists());
 }
 
@@ -200,9 +200,12 @@ fn a_film_is_gone_on_with_as_if_it_had_never_stopped() {
     // Nothing is lost by mistake.
     let before = bytes(path, "part.exr");
     for (line, expected) in [
-        ("render room.ron -o p.png --film part.exr --spp 1", "part.exr: is there already: go on with it by --resume"),
-        ("render cornell -o p.png --film part.exr --resume", "part.exr: is a film of another scene"),
-        ("render room.ron -o p.png --film part.exr --resume --seed 4", "part.exr: is a film of another seed"),
+        ("render room.ron -o p.png --film part.exr --spp 1", "part.exr: already exists: continue it with --resume"),
+        ("render cornell -o p.png --film part.exr --resume", "part.exr: the film was rendered with a different scene"),
+        (
+            "render room.ron -o p.png --film part.exr --resume --seed 4",
+            "part.exr: the film was rendered with a different seed",
+        ),
         ("render room.ron -o p.png --film none.exr --resume", "none.exr: cannot be read: no such file"),
     ] {
         let said = fails(path, line, 1);
@@ -210,7 +213,7 @@ fn a_film_is_gone_on_with_as_if_it_had_never_stopped() {
     }
     std::fs::write(path.join("room.ron"), ROOM.replace("radiance: 7", "radiance: 8")).unwrap();
     let said = fails(path, "render room.ron -o p.png --film part.exr --resume", 1);
-    assert!(said.contains("another scene, or of this one before it was changed"), "{said}");
+    assert!(said.contains("a different scene or version of the scene"), "{said}");
     assert!(bytes(path, "part.exr") == before, "nothing was lost");
     for line in ["render room.ron -o p.png --resume", "render room.ron -o p.png --film f.png"] {
         fails(path, line, 2);
@@ -226,7 +229,10 @@ fn a_film_that_is_cut_short_or_damaged_is_refused() {
     for length in [0, 3, 200, 1500, whole.len() / 2, whole.len() - 1] {
         std::fs::write(path.join("cut.exr"), &whole[..length]).unwrap();
         let said = fails(path, "render dof-balls -o b.png --film cut.exr --resume", 1);
-        assert!(said.contains("cut.exr: is cut short") || said.contains("cut.exr: is no film"), "{length}: {said}");
+        assert!(
+            said.contains("cut.exr: is truncated") || said.contains("cut.exr: is not a firstlight film"),
+            "{length}: {said}"
+        );
         assert_eq!(said.lines().count(), 1, "{said}");
     }
     // One bit of the light itself: the compressed rows lie at the end.
@@ -235,7 +241,7 @@ fn a_film_that_is_cut_short_or_damaged_is_refused() {
     damaged[at] ^= 4;
     std::fs::write(path.join("cut.exr"), &damaged).unwrap();
     let said = fails(path, "render dof-balls -o b.png --film cut.exr --resume", 1);
-    assert!(said.contains("is cut short or damaged"), "{said}");
+    assert!(said.contains("is truncated or damaged"), "{said}");
     // What is not light: the samples that it has, and the note.
     for (from, to) in [("samples:[(0,2)]", "samples:[(0,4)]"), ("seed: 0", "seed: 1"), ("spp: 2", "spp: 4")] {
         let place = whole.windows(from.len()).position(|part| part == from.as_bytes());
@@ -244,12 +250,12 @@ fn a_film_that_is_cut_short_or_damaged_is_refused() {
         edited.splice(place..place + from.len(), to.bytes());
         std::fs::write(path.join("cut.exr"), &edited).unwrap();
         let said = fails(path, "render dof-balls -o b.png --film cut.exr --resume", 1);
-        assert!(said.contains("its checksum is wrong"), "{from}: {said}");
+        assert!(said.contains("checksum mismatch"), "{from}: {said}");
     }
     // A picture without a film in it.
     does(path, "render dof-balls -o plain.exr --size 20x20 --spp 2");
     let said = fails(path, "render dof-balls -o b.png --film plain.exr --resume", 1);
-    assert!(said.contains("plain.exr: is no film to go on with"), "{said}");
+    assert!(said.contains("plain.exr: is not a firstlight film"), "{said}");
 }
 
 #[cfg(unix)]
@@ -274,13 +280,12 @@ fn ctrl_c_saves_what_is_there_and_it_can_be_gone_on_with() {
         assert!(pressed.elapsed() < Duration::from_secs(30), "{:?}", pressed.elapsed());
         output
     };
-    // A busy machine may need a while for the first sample; before that there is nothing to save, which is said.
+    // A busy machine may need a while for the first sample; before that there is nothing was saved, which is said.
     let mut waits = [1.0, 5.0, 25.0].into_iter();
     let output = loop {
         let output = pressed_after(waits.next().expect("a sample takes less than half a minute"));
         let said = String::from_utf8_lossy(&output.stderr);
-        let nothing_yet =
-            output.status.code().is_none() || said.contains("nothing to save") || said.contains("nothing was saved");
+        let nothing_yet = output.status.code().is_none() || said.contains("nothing was saved");
         if !nothing_yet {
             break output;
         }
@@ -288,7 +293,7 @@ fn ctrl_c_saves_what_is_there_and_it_can_be_gone_on_with() {
     };
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("a.png and the film a.exr are saved: go on with --resume"), "{said}");
+    assert!(said.contains("saved a.png and the film a.exr: continue with --resume"), "{said}");
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let spp = json["spp"].as_u64().unwrap();
     assert!(spp > 0 && json["stopped"] == true, "{json}");

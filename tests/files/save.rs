@@ -183,7 +183,7 @@ fn files_that_a_scene_points_at_are_found_from_its_new_place() {
 
     // Over the old file: paths stay as they were written, and the loss of comments is said.
     let saved = save_scene(&mut world, Some(&scene), &path.join("old/room.ron")).unwrap();
-    assert_eq!(saved.notes, ["the comments of the old file are not kept"]);
+    assert_eq!(saved.notes, ["comments of the previous file were removed"]);
     assert!(saved.text.contains("\"parts/tent.obj\""), "{}", saved.text);
 
     // A material of the mesh's own file is edited: all of them are then written, one for each slot.
@@ -204,7 +204,7 @@ fn what_a_program_spawned_is_saved_as_well() {
     world.spawn(Shape::Plane { normal: DVec3::Y });
     world.spawn(View { eye: DVec3::new(0.1, 1.0, 2.0), forward: DVec3::NEG_Z, up: DVec3::Y, pivot_distance: 3.0 });
     let saved = save_scene(&mut world, None, &path).unwrap();
-    assert_eq!(saved.notes, ["a mesh that came from no file was saved as made-mesh-1.obj"]);
+    assert_eq!(saved.notes, ["a mesh without a file was saved as made-mesh-1.obj"]);
     let (mut again, loaded) = open(SceneSource::Scene(path));
     assert_eq!(loaded.warnings, Vec::<String>::new());
     let inputs = SceneInputs::of(&mut again);
@@ -226,7 +226,7 @@ fn a_mesh_that_is_written_beside_a_scene_takes_the_place_of_no_other() {
     let mut world = World::new();
     world.spawn(Shape::Mesh(firstlight::mesh::procedural::torus(1.0, 0.3, 24, 12).into()));
     let saved = save_scene(&mut world, None, &path).unwrap();
-    assert_eq!(saved.notes, ["a mesh that came from no file was saved as made-mesh-2.obj"]);
+    assert_eq!(saved.notes, ["a mesh without a file was saved as made-mesh-2.obj"]);
     assert!(saved.text.contains("made-mesh-2.obj"));
     assert_eq!(std::fs::metadata(&other).unwrap().len(), 32);
     // Saved again, it is there already.

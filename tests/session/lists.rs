@@ -104,8 +104,8 @@ fn a_shared_material_changes_on_all_that_share_it_and_they_can_be_selected() {
     assert_eq!(driver.labels(&inventory, &selected(&driver)), ["one", "two", "three"]);
     let before = selected(&driver);
     driver.edit(Edit::SelectUsers { material: driver.material(&inventory, "spare").to_bits() });
-    assert_eq!(selected(&driver), before, "what nothing uses selects nothing, and says so");
-    assert!(driver.session.status().messages.back().is_some_and(|message| message.text.contains("nothing uses")));
+    assert_eq!(selected(&driver), before, "what no object uses selects nothing, and says so");
+    assert!(driver.session.status().messages.back().is_some_and(|message| message.text.contains("no object uses")));
     // One edit and one undo for all three.
     let restarts = driver.session.status().restarts;
     let value = DVec3::new(0.1, 0.8, 0.1);
@@ -138,7 +138,7 @@ fn lists_are_as_old_as_the_scene_and_not_as_the_camera() {
     let inventory = driver.session.inventory();
     let spare = driver.material(&inventory, "spare");
     driver.edit(Edit::Rename { id: spare.to_bits(), name: "silver".to_owned() });
-    assert_ne!(driver.session.revision(), revision, "nothing uses it, and it is in the list all the same");
+    assert_ne!(driver.session.revision(), revision, "no object uses it, and it is in the list all the same");
     driver.material(&driver.session.inventory(), "silver");
 }
 

@@ -107,7 +107,7 @@ fn a_film_opens_as_its_scene_only_if_it_is_whole() {
     driver.settle();
     let open = || Command::Open { path: film.clone() };
     driver.session.send(open());
-    driver.run_until_said(MessageKind::Error, "its checksum is wrong");
+    driver.run_until_said(MessageKind::Error, "checksum mismatch");
     std::fs::write(&film, whole).unwrap();
     driver.session.send(open());
     driver.run_until(|session| session.status().scene.contains("cornell"));
@@ -126,18 +126,18 @@ fn what_changes_on_disk_is_read_again_and_nothing_else_is() {
 
     // One mesh moves; the other, with its tree, the camera and the exposure stay.
     std::fs::write(path.join("tent.obj"), TENT.replace("v 0 1 0", "v 0 1.5 0")).unwrap();
-    driver.run_until_said(MessageKind::Note, "was read again");
+    driver.run_until_said(MessageKind::Note, "(changed on disk)");
     driver.settle();
     let after = driver.meshes();
     assert!(!Arc::ptr_eq(&before[0], &after[0]) && before[0].positions != after[0].positions);
     assert!(Arc::ptr_eq(&before[1], &after[1]), "what has not changed is not read again");
-    assert_eq!(driver.session.status().restart_cause, "tent.obj read again");
+    assert_eq!(driver.session.status().restart_cause, "tent.obj reloaded");
     assert_eq!((driver.eye(), driver.session.status().display.exposure_stops), (eye, 1.5));
 
     // A file that cannot be read is a message, and everything stays as it was.
     let restarts = driver.session.status().restarts;
     std::fs::write(path.join("tent.obj"), "v 0 0\nf 1 2 3\n").unwrap();
-    driver.run_until_said(MessageKind::Error, "(the scene stays as it was)");
+    driver.run_until_said(MessageKind::Error, "(the scene is unchanged)");
     driver.settle();
     let errors = driver.said(MessageKind::Error);
     assert!(errors.iter().all(|error| error.contains("tent.obj:1")), "{errors:?}");
@@ -175,12 +175,12 @@ fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
     driver.settle();
     // Somebody else changes the file: what was done here is not thrown away.
     std::fs::write(path.join("room.ron"), ROOM.replace("zenith: 1", "zenith: 2")).unwrap();
-    driver.run_until_said(MessageKind::Warning, "has changes that are not saved");
+    driver.run_until_said(MessageKind::Warning, "has unsaved changes");
 
     assert_eq!(driver.session.scene_file(), Some(path.join("room.ron")));
     let restarts = driver.session.status().restarts;
     driver.session.send(Command::SaveScene { path: path.join("room.ron") });
-    driver.run_until_said(MessageKind::Note, "the comments of the old file are not kept");
+    driver.run_until_said(MessageKind::Note, "comments of the previous file were removed");
     let text = std::fs::read_to_string(path.join("room.ron")).unwrap();
     assert!(text.contains("0.25") && text.contains("\"tent.obj\"") && !text.contains("zenith: 2"), "{text}");
     // Saving is no change: the samples stay, whatever the watch sees.
@@ -190,7 +190,7 @@ fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
 
     // From there on the file and the scene are one again.
     std::fs::write(path.join("room.ron"), text.replace("0.25", "0.75")).unwrap();
-    driver.run_until_said(MessageKind::Note, "was read again");
+    driver.run_until_said(MessageKind::Note, "(changed on disk)");
     driver.settle();
     let materials = SceneInputs::of(driver.session.world_mut()).materials;
     assert!(format!("{materials:?}").contains("0.75"), "{materials:?}");
@@ -245,7 +245,7 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     };
     let (status, said) = run(&["--replay", "session.rec", "-o", "a.exr", "--spp", "5", "--threads", "1"]);
-    let broken = "warning: the recording breaks off: its last line is not the end of a session\n";
+    let broken = "warning: the recording is incomplete: its last line is not the end of a session\n";
     assert_eq!((status, said.as_str()), (Some(0), broken));
     let picture = image::open(path.join("a.exr")).unwrap().into_rgb32f();
     assert!(picture.pixels().zip(shown.means()).all(|(pixel, mean)| pixel.0 == mean.to_array()));
@@ -255,19 +255,19 @@ fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {
     std::fs::write(&room, ROOM.replace("zenith: 1", "zenith: 2")).unwrap();
     let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
     assert!(status == Some(0) && said.contains("room.ron has changed since the recording"), "{said}");
-    // A scene that was edited while it was recorded does not come again: it is played as it is now, and that is told.
+    // A scene that was edited during the recording does not come again: it is played as it is now, and that is told.
     let edited = format!("{cut}\n").replace("End(", "Opened(99999,3,\"0123456789abcdef0123456789abcdef\")\nEnd(");
     std::fs::write(&recording, edited.lines().filter(|line| !line.starts_with("En")).collect::<Vec<_>>().join("\n"))
         .unwrap();
     let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
-    assert!(status == Some(0) && said.contains("was edited while it was recorded"), "{said}");
+    assert!(status == Some(0) && said.contains("was edited during the recording"), "{said}");
     // One that cannot be opened is no edited one.
     std::fs::remove_file(&room).unwrap();
     let (status, said) = run(&["--replay", "session.rec", "--spp", "1"]);
     assert!(status == Some(1) && said.contains("room.ron") && !said.contains("edited"), "{said}");
     std::fs::write(path.join("no.rec"), "hello").unwrap();
     let (status, said) = run(&["--replay", "no.rec"]);
-    assert!(status == Some(1) && said.contains("no.rec: is no recording"), "{said}");
+    assert!(status == Some(1) && said.contains("no.rec: is not a recording"), "{said}");
 }
 
 #[test]
@@ -295,7 +295,7 @@ fn a_camera_that_moves_is_rendered_to_numbered_pictures() {
     {
         use firstlight::frame::SettingsStore;
         let (status, said) = run("render room.ron -o way.png --bookmarks 1,2 --frames 3 --size 20x15 --spp 2");
-        assert!(status == Some(1) && said.contains("has no view under 1 (there are: none)"), "{said}");
+        assert!(status == Some(1) && said.contains("has no bookmark 1 (it has none)"), "{said}");
         let source = SceneSource::Scene(path.join("room.ron"));
         let store = SettingsStore::in_folder(&path.join("config/firstlight"));
         let mut bookmarks = store.bookmarks(&source).0;

@@ -180,7 +180,7 @@ pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
     let material = old.and_then(|old| SurfaceMaterial::of(world, old)).cloned().unwrap_or(GREY);
     let name = old.and_then(|old| world.get::<Name>(old)).map(|name| plain_name(name.as_str()).to_owned());
     let material = new_material(world, &name.unwrap_or_else(|| "material".to_owned()), material);
-    let mut slots = world.get_mut::<MaterialSlots>(object).ok_or("this has no material")?;
+    let mut slots = world.get_mut::<MaterialSlots>(object).ok_or("this object has no material")?;
     match slots.0.first_mut() {
         Some(first) => *first = material,
         None => slots.0.push(material),

@@ -179,7 +179,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             let material = existing(world, material)?;
             let users = users_of(world, &world.resource::<RenderState>().inputs, material);
             if users.is_empty() {
-                return Err("nothing uses this material".to_owned());
+                return Err("no object uses this material".to_owned());
             }
             world.resource_mut::<Selection>().0 = users;
         }
@@ -187,21 +187,22 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
         Edit::Begin => History::begin(world),
         Edit::End => History::end(world),
         Edit::Undo => {
-            super::remesh::take_back(world).or_else(|| History::step_back(world)).ok_or("there is nothing to undo")?;
+            super::remesh::take_back(world).or_else(|| History::step_back(world)).ok_or("nothing to undo")?;
         }
-        Edit::Redo => History::step_on(world).ok_or("there is nothing to redo")?,
+        Edit::Redo => History::step_on(world).ok_or("nothing to redo")?,
         Edit::Delete => add::delete(world),
         Edit::Duplicate => add::duplicate(world),
         Edit::Add(new) => add::add(world, &new),
         Edit::Move { by } => place::displace(world, |_| place::Change::Move(by)),
         Edit::Turn { axis, angle_deg } => {
-            let axis = axis.try_normalize().filter(|_| angle_deg.is_finite()).ok_or("this is no way to turn")?;
+            let axis =
+                axis.try_normalize().filter(|_| angle_deg.is_finite()).ok_or("invalid rotation axis or angle")?;
             place::displace(world, |center| place::Change::Turn { center, axis, angle_deg });
         }
         Edit::Scale { factors } => {
             // Flat or inside out is never meant.
             if !(factors.is_finite() && factors.min_element() > 0.0) {
-                return Err("sizes are multiplied by numbers above 0".to_owned());
+                return Err("scale factors must be above 0".to_owned());
             }
             place::displace(world, |center| place::Change::Scale { center, factors });
         }
@@ -234,11 +235,11 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
 
 fn existing(world: &World, id: Id) -> Result<Entity, String> {
     let entity = Entity::try_from_bits(id).filter(|&entity| world.get_entity(entity).is_ok());
-    entity.ok_or_else(|| "what was to be changed is gone".to_owned())
+    entity.ok_or_else(|| "the object no longer exists".to_owned())
 }
 
 /// An entity that stands in the scene.
 fn thing(world: &World, id: Id) -> Result<Entity, String> {
     let entity = existing(world, id)?;
-    if add::is_thing(world, entity) { Ok(entity) } else { Err("what was to be changed is gone".to_owned()) }
+    if add::is_thing(world, entity) { Ok(entity) } else { Err("the object no longer exists".to_owned()) }
 }

@@ -25,7 +25,7 @@ pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), St
         Property::SkyRotation => turned(&sky.light, radians(value.x)),
         _ => with_color(&sky.light, property, value.max(DVec3::ZERO).as_vec3()),
     };
-    let light = light.ok_or_else(|| format!("this sky has no {property:?}"))?;
+    let light = light.ok_or_else(|| format!("this environment has no {property:?}"))?;
     let angle_deg = (property == Property::SkyRotation).then_some(value.x);
     let changed = SceneEnvironment { part: part_of(&light, &sky.part, angle_deg), light, air: sky.air };
     if changed != sky {

@@ -27,7 +27,7 @@ pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
 /// One that the scene has, by name.
 pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), String> {
     let texture = textures(world).into_iter().find(|texture| texture.name == name);
-    let texture = texture.ok_or_else(|| format!("no material uses a texture `{name}`"))?;
+    let texture = texture.ok_or_else(|| format!("there is no texture `{name}`"))?;
     put(world, entity, texture)
 }
 
@@ -35,7 +35,7 @@ pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), 
 pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(), String> {
     let colored = SurfaceMaterial::of(world, entity).is_some_and(|material| material.color().is_some());
     if !colored {
-        return Err("this has no colour".to_owned());
+        return Err("this material has no colour".to_owned());
     }
     let known = match &part {
         TextureSource::Image { file, .. } => textures(world).into_iter().find_map(|texture| {
@@ -69,7 +69,7 @@ fn make(
     part: TextureSource,
     picture: Option<Arc<ImageTexture>>,
 ) -> Result<(), String> {
-    let texture = texture_of(&part, |_| picture).ok_or("the picture is not there")?;
+    let texture = texture_of(&part, |_| picture).ok_or("the image has not been loaded")?;
     // A texture that is only changed keeps its name.
     let old = SurfaceMaterial::of(world, entity).and_then(Material::color);
     let name = match (old, &part) {
@@ -92,7 +92,7 @@ fn same_source(a: &TextureSource, b: &TextureSource) -> bool {
 }
 
 fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Result<(), String> {
-    let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or("this is not a material")?;
+    let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or("not a material")?;
     *material.0.color_mut().ok_or("this material has no colour")? = ColorParam::Texture(texture);
     set_if_different(world, entity, material);
     Ok(())

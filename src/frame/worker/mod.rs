@@ -207,7 +207,7 @@ impl Worker {
                 let shared = shared.clone();
                 move || thread::Loop::new(&shared, target).run()
             })
-            .map_err(|error| format!("the render thread cannot be started: {error}"))?;
+            .map_err(|error| format!("cannot start the render thread: {error}"))?;
         Ok(Self { shared, thread: Some(thread) })
     }
 
@@ -333,7 +333,7 @@ fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<r
         })
         .build()
         .map(Arc::new)
-        .map_err(|error| format!("{threads} worker threads cannot be started: {error}"))
+        .map_err(|error| format!("cannot start {threads} worker threads: {error}"))
 }
 
 /// From now on this thread takes what others leave of the processor, most of it while there are others.

@@ -78,7 +78,7 @@ impl Loop<'_> {
             std::mem::swap(&mut outbox.picture, &mut self.spare);
             outbox.fresh = true;
         }
-        tracing::trace!("developed in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+        tracing::trace!("tone-mapped in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
         self.redraw = false;
         self.wake();
     }

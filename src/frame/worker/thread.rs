@@ -98,7 +98,7 @@ impl<'a> Loop<'a> {
         }
         let orders = inbox.orders;
         if let Some(posted) = inbox.posted {
-            tracing::trace!("dropped what it was at in {:.1} ms", posted.elapsed().as_secs_f64() * 1e3);
+            tracing::trace!("cancelled in {:.1} ms", posted.elapsed().as_secs_f64() * 1e3);
             lock(&self.shared.cancels).add(posted.elapsed());
         }
         if let Some(threads) = orders.threads {

@@ -20,9 +20,9 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
             format!("field `{field}`{} is given twice: remove one", of(outer))
         }
         Error::ExceededRecursionLimit => "brackets are nested too deeply".to_owned(),
-        Error::Eof => "the text ends too early: a bracket or a quote is not closed".to_owned(),
-        Error::TrailingCharacters => "the scene ends here, but more text follows".to_owned(),
-        other => lower_first(&other.to_string()),
+        Error::Eof => "unexpected end of file: a bracket or a quote is not closed".to_owned(),
+        Error::TrailingCharacters => "unexpected text after the end of the scene".to_owned(),
+        other => own_names(&lower_first(&other.to_string())),
     };
     // The parser stands behind the word it complains about.
     let at = match &error.code {
@@ -45,7 +45,15 @@ fn word_before(text: &str, (line, column): (usize, usize), word: &str) -> (usize
 
 /// Our own names for the parts: `CameraPart` is the camera.
 fn plain(name: &str) -> String {
-    name.trim_end_matches("Part").to_lowercase()
+    let name = if name == "SceneFile" { "scene" } else { name.trim_end_matches("Part") };
+    name.to_lowercase()
+}
+
+/// A message of the parser without the names of types: what it quotes of them becomes the plain name.
+fn own_names(message: &str) -> String {
+    let is_ours = |word: &str| word == "SceneFile" || word.ends_with("Part");
+    let words = message.split('`').map(|word| if is_ours(word) { plain(word) } else { word.to_owned() });
+    words.collect::<Vec<_>>().join("`").replace("struct `", "`")
 }
 
 fn lower_first(text: &str) -> String {

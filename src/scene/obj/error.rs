@@ -10,16 +10,16 @@ pub enum ObjError {
     /// A whole sentence.
     #[error("{0}")]
     Write(String),
-    #[error("{}: has no faces (lines that start with `f`): is it a Wavefront OBJ file?", path.display())]
+    #[error("{}: has no faces (lines starting with `f`): is it a Wavefront OBJ file?", path.display())]
     NoFaces { path: PathBuf },
     #[error(
-        "{}: none of its {triangles} triangles has an area: the corners of each lie on one line, so there is nothing to see",
+        "{}: all {triangles} triangles are degenerate (zero area)",
         path.display()
     )]
     NoArea { path: PathBuf, triangles: usize },
     #[error("{}:{line}: {problem}", path.display())]
     Line { path: PathBuf, line: usize, problem: LineProblem },
-    #[error("{}: uses more than 65536 materials", path.display())]
+    #[error("{}: uses more than 65,536 materials", path.display())]
     TooManyMaterials { path: PathBuf },
     #[error("{}: {source}", path.display())]
     Mesh { path: PathBuf, source: MeshError },
@@ -34,7 +34,7 @@ pub enum LineProblem {
     FewCorners { corners: usize },
     #[error("the face uses {what} {index}, but the file has {count}")]
     OutOfRange { what: &'static str, index: i64, count: usize },
-    #[error("the face uses {what} 0, but they count from 1 (or from -1 backwards)")]
+    #[error("the face uses {what} 0, but indices start at 1 (or at -1, counting backwards)")]
     IndexZero { what: &'static str },
     #[error("expected {expected} numbers after `{keyword}`")]
     Numbers { keyword: String, expected: usize },

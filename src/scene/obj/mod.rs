@@ -102,7 +102,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     }
     let mut warnings = Warnings::default();
     if parsed.lines_and_points > 0 {
-        warnings.push(format!("{}: {} lines or points were left out", path.display(), parsed.lines_and_points));
+        warnings.push(format!("{}: {} line or point elements were ignored", path.display(), parsed.lines_and_points));
     }
     if !matches!(options.normals, ObjNormals::FileOrComputed { .. }) {
         parsed.normals.clear();
@@ -110,7 +110,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     let corners = MeshCorners::of(&parsed);
     let (triangles, slots, dropped) = corners.triangles(&parsed);
     if dropped > 0 {
-        warnings.push(format!("{}: {dropped} triangles use a vertex twice and were left out", path.display()));
+        warnings.push(format!("{}: {dropped} triangles use a vertex twice and were removed", path.display()));
     }
     if triangles.is_empty() {
         return Err(ObjError::NoArea { path: path.into(), triangles: dropped });
@@ -296,7 +296,7 @@ fn find_materials(
     if !missing.is_empty() {
         let more = if missing.len() > 3 { ", …" } else { "" };
         warnings.push(format!(
-            "{}: {} materials were not found and get default values: {}{more}",
+            "{}: {} materials were not found and use default values: {}{more}",
             path.display(),
             missing.len(),
             missing[..missing.len().min(3)].join(", ")

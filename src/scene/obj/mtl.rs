@@ -37,7 +37,7 @@ pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings)
     let bytes = match InputFile::open_within(path, FileKind::Library, max_bytes).and_then(InputFile::bytes) {
         Ok(bytes) => bytes,
         Err(problem) => {
-            warn(format!("{problem}; its materials get default values"));
+            warn(format!("{problem}; its materials use default values"));
             return Vec::new();
         }
     };
@@ -48,7 +48,7 @@ pub(super) fn load_library(path: &Path, max_bytes: u64, warnings: &mut Warnings)
             materials.iter().map(|material| imported(material, folder, &mut warn)).collect()
         }
         Err(error) => {
-            warn(format!("cannot be parsed: {error}; its materials get default values"));
+            warn(format!("cannot be parsed: {error}; its materials use default values"));
             Vec::new()
         }
     }
@@ -88,8 +88,8 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
                 out.push_str(&line);
                 out.push('\n');
             }
-            Some(_) => warn(format!("line {}: `{keyword}` before any `newmtl` was left out", number + 1)),
-            None => warn(format!("line {}: `{line}` was not understood and left out", number + 1)),
+            Some(_) => warn(format!("line {}: `{keyword}` before any `newmtl` was ignored", number + 1)),
+            None => warn(format!("line {}: `{line}` cannot be parsed and was ignored", number + 1)),
         }
     }
     out
@@ -103,7 +103,7 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
         let value = Vec3::from_array(value?.map(single));
         let valid = value.is_finite() && value.min_element() >= 0.0;
         if !valid {
-            warn(format!("material `{name}`: `{keyword}` must not be negative and was left out"));
+            warn(format!("material `{name}`: `{keyword}` must not be negative and was ignored"));
         }
         valid.then_some(value)
     };
@@ -113,7 +113,7 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
     let mut number = |keyword: &str, value: Option<f32>, range: std::ops::RangeInclusive<f32>| {
         let value = value?;
         if !range.contains(&value) {
-            warn(format!("material `{name}`: `{keyword}` {value} is out of range and was left out"));
+            warn(format!("material `{name}`: `{keyword}` {value} is out of range and was ignored"));
         }
         range.contains(&value).then_some(value)
     };

@@ -18,7 +18,7 @@ impl Warnings {
 
     pub(super) fn into_list(mut self) -> Vec<String> {
         if self.more > 0 {
-            self.list.push(format!("and {} more warnings like these", self.more));
+            self.list.push(format!("and {} more warnings of this kind", self.more));
         }
         self.list
     }

@@ -72,7 +72,7 @@ impl App {
                 // Standard output may be closed; the window goes on.
                 match console::print(console::lines(&text)) {
                     Ok(()) => self.toasts.add(Tone::News, "camera printed to the terminal", now),
-                    Err(error) => self.toasts.add(Tone::Problem, format!("the camera was not printed: {error}"), now),
+                    Err(error) => self.toasts.add(Tone::Problem, format!("cannot print the camera: {error}"), now),
                 }
             }
             Action::Explain => {
@@ -90,7 +90,7 @@ impl App {
                 let shown = !self.session.world().resource::<ViewMode>().0.sharp_zone;
                 self.session.send(Command::SetSharpZone { shown });
                 if shown && !self.session.status().rig.lens.enabled {
-                    self.toasts.add(Tone::News, "all is sharp: O opens the lens", now);
+                    self.toasts.add(Tone::News, "depth of field is off: press O to enable it", now);
                 }
             }
             Action::NextGizmo => {
@@ -101,7 +101,7 @@ impl App {
                 };
                 let name = self.panel.gizmo.map_or("no handles", gizmo::Mode::label);
                 let hint =
-                    if self.session.world().resource::<Selection>().0.is_empty() { ": click on something" } else { "" };
+                    if self.session.world().resource::<Selection>().0.is_empty() { ": click an object" } else { "" };
                 self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
             }
             Action::ToggleSpin => self.input.toggle_spin(now),
@@ -152,7 +152,7 @@ impl App {
 
     fn toggle_drag(&mut self, now: Instant) {
         let orbits = self.input.toggle_orbits();
-        self.toasts.add(Tone::News, if orbits { "a drag orbits around the pivot" } else { "a drag looks around" }, now);
+        self.toasts.add(Tone::News, if orbits { "drag: orbit" } else { "drag: look around" }, now);
     }
 
     /// The mouse turns the view without a button from now on, or points again.
@@ -164,13 +164,13 @@ impl App {
         } else if let Err(error) =
             window.set_cursor_grab(CursorGrabMode::Locked).or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined))
         {
-            self.toasts.add(Tone::Problem, format!("the mouse cannot be captured here: {error}"), now);
+            self.toasts.add(Tone::Problem, format!("cannot capture the mouse: {error}"), now);
             return;
         }
         window.set_cursor_visible(!wanted);
         self.input.set_captured(wanted);
         if wanted {
-            self.toasts.add(Tone::News, "the mouse moves the view: Enter or Esc lets it go", now);
+            self.toasts.add(Tone::News, "mouse captured: Enter or Esc releases it", now);
         }
     }
 
@@ -198,7 +198,7 @@ impl App {
 
     fn toggle_brush(&mut self, now: Instant) {
         if self.brush.toggle() {
-            self.toasts.add(Tone::News, "region: drag a rectangle that gets all samples", now);
+            self.toasts.add(Tone::News, "region: drag a rectangle to render", now);
         }
     }
 
@@ -215,7 +215,7 @@ impl App {
         {
             let size = (size.0.saturating_mul(self.panel.scale), size.1.saturating_mul(self.panel.scale));
             let larger = Larger { prepared, settings, size, spp, threads: self.session.status().threads };
-            let news = format!("rendering {} × {} at {spp} spp beside the window", size.0, size.1);
+            let news = format!("rendering {} × {} with {spp} spp in the background", size.0, size.1);
             self.toasts.add(Tone::News, news, Instant::now());
             self.saver.save_larger(larger, draft, display, &scene, format);
             return;
@@ -227,9 +227,9 @@ impl App {
         let now = Instant::now();
         match saved {
             Ok(kept) => {
-                let coarse = if kept.coarse { ", coarse because the view changed at once" } else { "" };
+                let coarse = if kept.coarse { " (low resolution: the view changed too soon)" } else { "" };
                 let news = format!("saved {}{coarse}", kept.path.display());
-                console::remark(&news);
+                console::inform(&news);
                 self.toasts.add(Tone::News, news, now);
             }
             Err(error) => {

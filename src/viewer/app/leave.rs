@@ -154,6 +154,6 @@ impl App {
     /// What is said of it when the program was told to end.
     pub(super) fn stopped_message(&self) -> String {
         let kept = self.leaving.recovery.has_kept();
-        if kept { "stopped: unsaved changes are offered at the next start" } else { "stopped" }.to_owned()
+        if kept { "stopped: unsaved changes can be restored at the next start" } else { "stopped" }.to_owned()
     }
 }

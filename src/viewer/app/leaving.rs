@@ -63,6 +63,6 @@ impl Leaving {
             waker();
         };
         let spawned = std::thread::Builder::new().name("restore".to_owned()).spawn(work);
-        spawned.map(drop).map_err(|error| format!("nothing can be restored: no thread can be started: {error}"))
+        spawned.map(drop).map_err(|error| format!("nothing can be restored: cannot start a thread: {error}"))
     }
 }

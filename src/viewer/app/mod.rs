@@ -63,6 +63,8 @@ pub struct ViewerOptions {
     pub seed: u32,
     /// Which axis of models points up; guessed when not given.
     pub up: Option<UpAxis>,
+    /// An image that takes the place of the scene's own environment.
+    pub environment: Option<PathBuf>,
     /// Where kept pictures go.
     pub folder: PathBuf,
     /// Where to write down what is done.
@@ -75,14 +77,14 @@ pub struct ViewerOptions {
 #[derive(Debug, Error)]
 pub enum ViewerError {
     #[error(
-        "no window can be opened: the display does not answer; check DISPLAY or WAYLAND_DISPLAY, or render without a window: firstlight render SCENE -o out.png"
+        "cannot open a window: the display does not respond; check DISPLAY or WAYLAND_DISPLAY, or render without a window: firstlight render SCENE -o out.png"
     )]
     NoDisplay,
-    #[error("the connection to the display is lost; settings, bookmarks and unsaved changes are kept")]
+    #[error("lost the connection to the display; settings, bookmarks and unsaved changes are kept")]
     DisplayLost,
-    #[error("no window can be opened: {0}")]
+    #[error("cannot open a window: {0}")]
     NoWindow(winit::error::OsError),
-    #[error("the event loop ended by itself: {0}")]
+    #[error("the event loop ended unexpectedly: {0}")]
     EventLoop(winit::error::EventLoopError),
     #[error("{0}")]
     Session(String),
@@ -151,7 +153,7 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
         let _ = proxy.send_event(Wake);
     });
     if let Err(error) = taken_over {
-        log::warn!("Ctrl+C will keep no unsaved edits: {error}");
+        log::warn!("Ctrl+C will not keep unsaved edits: {error}");
     }
     let mut app = App::new(options, pending, waker, told_to_end)?;
     display::say_nothing_of_its_loss();
@@ -262,7 +264,7 @@ impl App {
         if let Some(path) = &options.record {
             session.record(path, &options.source, options.up).map_err(ViewerError::Session)?;
         }
-        session.open(options.source.clone());
+        session.open_lit_by(options.source.clone(), options.environment.clone());
         let memory = Memory::of_platform();
         let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();
@@ -315,7 +317,7 @@ impl App {
         overlay::style(presenter.egui_context());
         (self.window, self.presenter) = (Some(window), Some(presenter));
         self.resized();
-        self.toasts.add(Tone::News, "H shows the keys, N the panel", Instant::now());
+        self.toasts.add(Tone::News, "H: keys, N: panel", Instant::now());
         Ok(())
     }
 

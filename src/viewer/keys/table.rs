@@ -74,16 +74,16 @@ pub static BINDINGS: &[KeyGroup] = &[
                 triggers: &[hold(KeyCode::KeyE, Motion::Up), hold(KeyCode::KeyQ, Motion::Down)],
                 effect: "fly up, down",
             },
-            Binding { triggers: &[Trigger::Mouse("Shift")], effect: "four times as fast, while held" },
-            Binding { triggers: &[Trigger::Mouse("Wheel")], effect: "flying speed" },
+            Binding { triggers: &[Trigger::Mouse("Shift")], effect: "fly four times as fast, while held" },
+            Binding { triggers: &[Trigger::Mouse("Wheel")], effect: "change the flying speed" },
             Binding { triggers: &[Trigger::Mouse("Drag")], effect: "look around" },
             Binding {
                 triggers: &[named(NamedKey::Space, Action::ToggleDrag)],
-                effect: "a drag orbits around the pivot, or looks around again",
+                effect: "switch the drag between look around and orbit",
             },
             Binding {
                 triggers: &[named(NamedKey::Enter, Action::CaptureMouse)],
-                effect: "capture the mouse, which then needs no button; Esc or again lets it go",
+                effect: "capture the mouse to look around without a button; Enter or Esc releases it",
             },
         ],
     },
@@ -105,7 +105,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Right drag"), Trigger::Mouse("Shift+arrows")],
-                effect: "move sideways",
+                effect: "pan: move sideways, up, down",
             },
             Binding {
                 triggers: &[
@@ -114,7 +114,7 @@ pub static BINDINGS: &[KeyGroup] = &[
                     send("-", DOLLY_OUT),
                     Trigger::Mouse("Ctrl+wheel"),
                 ],
-                effect: "nearer to, farther from the pivot",
+                effect: "move nearer to, farther from the pivot",
             },
         ],
     },
@@ -128,31 +128,31 @@ pub static BINDINGS: &[KeyGroup] = &[
                     ctrl("-", Action::Send(ZOOM_OUT)),
                     Trigger::Mouse("Shift+wheel"),
                 ],
-                effect: "narrower, wider field of view",
+                effect: "zoom: narrower, wider field of view",
             },
             Binding {
                 triggers: &[hold(KeyCode::KeyZ, Motion::RollLeft), hold(KeyCode::KeyC, Motion::RollRight)],
-                effect: "roll (lean) left, right",
+                effect: "roll the camera left, right",
             },
             Binding { triggers: &[send("x", Command::Level)], effect: "level the horizon" },
             Binding {
                 triggers: &[send("t", Command::ToggleTurntable)],
-                effect: "keep the horizon while turning, or turn freely",
+                effect: "switch between turntable (level horizon) and free rotation",
             },
             Binding {
                 triggers: &[named(NamedKey::Home, Action::Send(Command::Home))],
-                effect: "the view that the scene opened with",
+                effect: "go to the initial view of the scene",
             },
             Binding {
                 triggers: &[send("f", Command::FrameAll)],
-                effect: "frame what is selected, or the whole scene, and focus on it",
+                effect: "frame the selection, or the whole scene, and focus on it",
             },
             Binding {
                 triggers: &[
                     shifted(Typed::Named(NamedKey::Backspace), false, Action::Send(Command::PreviousView)),
                     shifted(Typed::Named(NamedKey::Backspace), true, Action::Send(Command::NextView)),
                 ],
-                effect: "back to the view before, and forth again",
+                effect: "go to the previous view, and forward again",
             },
             Binding {
                 triggers: &[Trigger::Digit {
@@ -160,7 +160,7 @@ pub static BINDINGS: &[KeyGroup] = &[
                     shift: false,
                     action: |slot| Action::Send(Command::SetBookmark { slot }),
                 }],
-                effect: "save this view under a number",
+                effect: "save the view as bookmark 1 to 9",
             },
             Binding {
                 triggers: &[Trigger::Digit {
@@ -168,37 +168,46 @@ pub static BINDINGS: &[KeyGroup] = &[
                     shift: true,
                     action: |slot| Action::Send(Command::GoToBookmark { slot }),
                 }],
-                effect: "go to the view that is saved under that number",
+                effect: "go to the view saved as bookmark 1 to 9",
             },
-            Binding { triggers: &[text("u", Action::ToggleSpin)], effect: "turntable: go around the pivot, or stop" },
-            Binding { triggers: &[text("v", Action::PrintView)], effect: "print the view as a scene file's camera" },
+            Binding {
+                triggers: &[text("u", Action::ToggleSpin)],
+                effect: "turntable: start or stop orbiting the pivot",
+            },
+            Binding {
+                triggers: &[text("v", Action::PrintView)],
+                effect: "print the view as the camera of a scene file",
+            },
         ],
     },
     KeyGroup {
         title: "Lens",
         bindings: &[
-            Binding { triggers: &[send("[", NEARER), send("]", FARTHER)], effect: "focal plane nearer, farther" },
+            Binding {
+                triggers: &[send("[", NEARER), send("]", FARTHER)],
+                effect: "move the focal plane nearer, farther",
+            },
             Binding {
                 triggers: &[send("{", NARROWER), send("}", WIDER), send(",", NARROWER), send(".", WIDER)],
-                effect: "aperture narrower, wider",
+                effect: "narrow, widen the aperture",
             },
-            Binding { triggers: &[send("o", Command::ToggleDepthOfField)], effect: "depth of field on, off" },
+            Binding { triggers: &[send("o", Command::ToggleDepthOfField)], effect: "switch depth of field on, off" },
             Binding {
                 triggers: &[Trigger::Mouse("Shift+click"), Trigger::Mouse("Shift+drag")],
                 effect: "focus on what is under the mouse",
             },
-            Binding { triggers: &[Trigger::Mouse("Double click")], effect: "focus there, and orbit at that depth" },
+            Binding { triggers: &[Trigger::Mouse("Double click")], effect: "focus on it, and move the pivot there" },
             Binding {
                 triggers: &[shifted(Typed::Text("l"), false, Action::Send(Command::ToggleFocusLock))],
-                effect: "focus tracks what was focused on, or keeps its distance",
+                effect: "focus follows the point focused on last, or keeps its distance",
             },
             Binding {
                 triggers: &[shifted(Typed::Text("l"), true, Action::FocusFollows)],
-                effect: "focus tracks what is under the mouse, or stays where it is",
+                effect: "focus follows the mouse, or keeps its distance",
             },
             Binding {
                 triggers: &[text("y", Action::ToggleSharpZone)],
-                effect: "show what is sharp to a pixel, and the focal plane",
+                effect: "show what is sharp to within one pixel, and the focal plane",
             },
         ],
     },
@@ -206,44 +215,44 @@ pub static BINDINGS: &[KeyGroup] = &[
         title: "Select and edit",
         bindings: &[
             Binding { triggers: &[Trigger::Mouse("Click")], effect: "select what is under the mouse" },
-            Binding { triggers: &[Trigger::Mouse("Ctrl+click")], effect: "add it to the selection, or take it out" },
+            Binding { triggers: &[Trigger::Mouse("Ctrl+click")], effect: "add to, remove from the selection" },
             Binding { triggers: &[edit("a", None, Edit::SelectAll)], effect: "select everything" },
-            Binding {
-                triggers: &[text("g", Action::NextGizmo)],
-                effect: "handles to move, turn (rotate) or scale what is selected, or none",
-            },
+            Binding { triggers: &[text("g", Action::NextGizmo)], effect: "next handles: move, rotate, scale, none" },
             Binding {
                 triggers: &[Trigger::Mouse("Ctrl, dragging a handle")],
-                effect: "in steps: 15 degrees, a tenth of the size",
+                effect: "move in steps: 15 degrees, a tenth of the size",
             },
-            Binding { triggers: &[edit("d", None, Edit::Duplicate)], effect: "duplicate what is selected" },
+            Binding { triggers: &[edit("d", None, Edit::Duplicate)], effect: "duplicate the selection" },
             Binding {
                 triggers: &[named(NamedKey::Delete, Action::Send(Command::Edit(Edit::Delete)))],
-                effect: "delete what is selected",
+                effect: "delete the selection",
             },
             Binding { triggers: &[edit("z", Some(false), Edit::Undo)], effect: "undo" },
             Binding { triggers: &[edit("z", Some(true), Edit::Redo), edit("y", None, Edit::Redo)], effect: "redo" },
         ],
     },
     KeyGroup {
-        title: "See what is going on",
+        title: "Inspect",
         bindings: &[
-            Binding { triggers: &[inspect("1", Inspection::Normals)], effect: "normals" },
-            Binding { triggers: &[inspect("2", Inspection::Depth)], effect: "depth" },
-            Binding { triggers: &[inspect("3", Inspection::Albedo)], effect: "albedo: colour without light" },
-            Binding { triggers: &[inspect("4", Inspection::Error)], effect: "relative error of each pixel" },
-            Binding { triggers: &[inspect("5", Inspection::Samples)], effect: "samples of each pixel" },
-            Binding { triggers: &[inspect("6", Inspection::TreeSteps)], effect: "kd-tree nodes that a ray visits" },
+            Binding { triggers: &[inspect("1", Inspection::Normals)], effect: "show normals" },
+            Binding { triggers: &[inspect("2", Inspection::Depth)], effect: "show depth" },
+            Binding { triggers: &[inspect("3", Inspection::Albedo)], effect: "show albedo: colour without light" },
+            Binding { triggers: &[inspect("4", Inspection::Error)], effect: "show the relative error of each pixel" },
+            Binding { triggers: &[inspect("5", Inspection::Samples)], effect: "show the samples per pixel" },
+            Binding { triggers: &[inspect("6", Inspection::TreeSteps)], effect: "show kd-tree nodes visited per ray" },
             Binding {
                 triggers: &[inspect("7", Inspection::TriangleTests)],
-                effect: "blocks of triangles that a ray is tested against",
+                effect: "show triangle tests per ray, in blocks",
             },
-            Binding { triggers: &[inspect("8", Inspection::Bounces)], effect: "bounces of a path" },
-            Binding { triggers: &[inspect("9", Inspection::Luminance)], effect: "false colour: brightness in stops" },
-            Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "the picture" },
+            Binding { triggers: &[inspect("8", Inspection::Bounces)], effect: "show bounces per path" },
+            Binding {
+                triggers: &[inspect("9", Inspection::Luminance)],
+                effect: "show luminance in false colour, in stops",
+            },
+            Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "show the picture" },
             Binding {
                 triggers: &[text("j", Action::Explain)],
-                effect: "why the pixel under the mouse looks as it does: its paths, and what each light brings",
+                effect: "explain the pixel under the mouse: its paths, and what each light contributes",
             },
         ],
     },
@@ -255,40 +264,40 @@ pub static BINDINGS: &[KeyGroup] = &[
                     named(NamedKey::PageUp, Action::Send(Command::AdjustExposure { stops: EXPOSURE_STEP })),
                     named(NamedKey::PageDown, Action::Send(Command::AdjustExposure { stops: -EXPOSURE_STEP })),
                 ],
-                effect: "brighter, darker by a third of a stop",
+                effect: "increase, decrease the exposure by a third of a stop",
             },
             Binding { triggers: &[send("m", Command::NextToneCurve)], effect: "next tone curve" },
             Binding {
                 triggers: &[text("i", Action::ToggleIntegrator)],
-                effect: "path tracing or the classic Phong model",
+                effect: "switch between path tracing and Phong",
             },
             Binding { triggers: &[text("p", Action::TogglePause)], effect: "pause, resume" },
             Binding {
                 triggers: &[shifted(Typed::Text("b"), false, Action::Brush), Trigger::Mouse("then drag")],
-                effect: "region: give all samples to a rectangle",
+                effect: "region: render only a rectangle",
             },
             Binding {
                 triggers: &[shifted(Typed::Text("b"), true, Action::ClearRegion)],
-                effect: "no region: give them to the whole picture again",
+                effect: "no region: render the whole picture again",
             },
-            Binding { triggers: &[send("r", Command::Restart)], effect: "restart: drop all samples and begin again" },
+            Binding { triggers: &[send("r", Command::Restart)], effect: "restart: discard all samples" },
             Binding {
                 triggers: &[
                     shifted(Typed::Named(NamedKey::F12), false, Action::Screenshot { linear: false }),
                     shifted(Typed::Text("k"), false, Action::Screenshot { linear: false }),
                 ],
-                effect: "save the picture as a new PNG file (screenshot)",
+                effect: "save a screenshot as a new PNG file",
             },
             Binding {
                 triggers: &[
                     shifted(Typed::Named(NamedKey::F12), true, Action::Screenshot { linear: true }),
                     shifted(Typed::Text("k"), true, Action::Screenshot { linear: true }),
                 ],
-                effect: "save its linear light as a new EXR file",
+                effect: "save linear light (HDR) as a new EXR file",
             },
             Binding {
                 triggers: &[ctrl_shifted("s", false, Action::SaveScene { new: false })],
-                effect: "save the scene file, or the scene as a new one",
+                effect: "save the scene",
             },
             Binding {
                 triggers: &[ctrl_shifted("s", true, Action::SaveScene { new: true })],
@@ -296,11 +305,11 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[ctrl("o", Action::OpenDialog)],
-                effect: "ask for a file to open, where the system has a dialog (zenity or kdialog)",
+                effect: "open a file by dialog (needs zenity or kdialog)",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
-                effect: "open a scene (.ron), a model (.obj) or a picture that was saved (.png, .exr)",
+                effect: "open a scene (.ron), a model (.obj) or a saved picture (.png, .exr)",
             },
         ],
     },
@@ -309,17 +318,20 @@ pub static BINDINGS: &[KeyGroup] = &[
         bindings: &[
             Binding {
                 triggers: &[text("h", Action::ToggleHelp), named(NamedKey::F1, Action::ToggleHelp)],
-                effect: "show these keys, and find one by a word",
+                effect: "show or hide this list of keys",
             },
-            Binding { triggers: &[text("n", Action::TogglePanel)], effect: "panel: every setting, and figures" },
+            Binding {
+                triggers: &[text("n", Action::TogglePanel)],
+                effect: "show or hide the panel: all settings and statistics",
+            },
             Binding {
                 triggers: &[named(NamedKey::Tab, Action::ToggleOverlays)],
-                effect: "hide everything but the picture",
+                effect: "hide or show everything but the picture",
             },
-            Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen" },
+            Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen on, off" },
             Binding {
                 triggers: &[named(NamedKey::Escape, Action::Leave)],
-                effect: "close this list or the explanation, or select nothing, or close the window",
+                effect: "close this list, close the explanation, deselect, or quit",
             },
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
@@ -329,77 +341,74 @@ pub static BINDINGS: &[KeyGroup] = &[
         bindings: &[
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Render")],
-                effect: "light model, when to stop (error, time, samples), threads, size of pictures that are saved",
+                effect: "integrator, when to stop (error, time, samples), threads, size of saved pictures",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Camera")],
-                effect: "position, what it looks at, field of view, fly speed, what a drag does",
+                effect: "position, target it looks at, field of view, fly speed, drag",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Views")],
-                effect: "frame, home, level, previous and next view, turntable, saved views",
+                effect: "frame, home, level, previous and next view, turntable, bookmarks",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Lens")],
-                effect: "focus distance and what it tracks, f-stop, radius, blades of the aperture",
+                effect: "focus distance and what it follows, f-number, blades of the aperture",
             },
-            Binding {
-                triggers: &[Trigger::Mouse("Panel: Display")],
-                effect: "exposure, tone curve, what is shown in place of the picture",
-            },
+            Binding { triggers: &[Trigger::Mouse("Panel: Display")], effect: "exposure, tone curve, inspection view" },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Add")],
                 effect: "a sphere, a plane, a cube, a light, a built-in mesh or an OBJ file",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Selected")],
-                effect: "name, position, rotation, scale, material, texture and light of what is selected, by numbers",
+                effect: "name, position, rotation, scale, material, texture and light of the selection, as numbers",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Mesh")],
-                effect: "of what is selected: smooth or flat, simplified, and what that changes",
+                effect: "smooth or flat shading, simplify, and the resulting deviation",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Objects")],
-                effect: "all objects and lights: find one by name, select it",
+                effect: "all objects and lights: find by name, select",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Materials")],
-                effect: "all materials: edit one for all objects that share it, select or assign",
+                effect: "all materials: edit for all objects that share one, select, assign",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Lights")],
-                effect: "everything that emits light: colour and strength, select, add; strength of the sky",
+                effect: "all lights: colour and strength, select, add; strength of the environment",
             },
             Binding {
-                triggers: &[Trigger::Mouse("Panel: Sky")],
-                effect: "colours of the surroundings, or strength and rotation of their picture",
+                triggers: &[Trigger::Mouse("Panel: Environment")],
+                effect: "colours of the sky, or strength and rotation of the environment image",
             },
-            Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "a file by dialog, or what was open before" },
+            Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "open a file by dialog, or a recent file" },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Statistics")],
-                effect: "samples, rays, error, samples left out, reaction, triangles, memory, undo, last restart",
+                effect: "samples, rays, error estimate, discarded samples, latency, triangles, memory, undo, last restart",
             },
         ],
     },
     KeyGroup {
-        title: "Without the window",
+        title: "Command line",
         bindings: &[
             Binding {
                 triggers: &[Trigger::Mouse("render SCENE -o frame.png --turntable 120")],
-                effect: "numbered pictures of a camera that goes around the pivot, for a video",
+                effect: "render numbered frames of a turntable, for a video",
             },
             Binding {
                 triggers: &[Trigger::Mouse("render … --bookmarks 1,2,3 --frames 120")],
-                effect: "numbered pictures of a camera that goes through saved views",
+                effect: "render numbered frames of a camera path through bookmarks",
             },
             Binding {
                 triggers: &[Trigger::Mouse("render … --film FILE.exr"), Trigger::Mouse("--resume")],
-                effect: "a picture that can be gone on with later",
+                effect: "save the render state and resume it later",
             },
             Binding {
                 triggers: &[Trigger::Mouse("--record FILE"), Trigger::Mouse("--replay FILE")],
-                effect: "write down what is done in the window, and render it again",
+                effect: "record a session, and render it again",
             },
         ],
     },

@@ -2,7 +2,9 @@
 
 use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use super::{Around, Asked};
-use crate::frame::{Bookmarks, Command, Focus, FocusTarget, Session, ViewMode, f_stop, radius_of_f_stop, sharp_zone};
+use crate::frame::{
+    Bookmarks, Command, Focus, FocusTarget, Session, ViewMode, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone,
+};
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::status::metres;
 use egui::Ui;
@@ -16,7 +18,7 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
                 asked.send(Command::SetView(View { eye, ..rig.view }));
             }
         });
-        row_with_hint(ui, "look at", "the pivot, which orbiting goes around", |ui| {
+        row_with_hint(ui, "look at", "the pivot that orbiting moves around", |ui| {
             if let Some(target) = vector(ui, rig.view.pivot(), step)
                 && let Ok(view) = View::look_at(rig.view.eye, target, rig.view.up)
             {
@@ -29,7 +31,7 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
             }
         });
         row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
-        row_with_hint(ui, "drag", "what the left button of the mouse does on the picture (Space)", |ui| {
+        row_with_hint(ui, "drag", "left mouse drag (Space)", |ui| {
             ui.horizontal(|ui| {
                 for (label, orbits) in [("look around", false), ("orbit", true)] {
                     if ui.selectable_label(around.orbits == orbits, label).clicked() {
@@ -45,35 +47,35 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
 pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
         for (label, hint, command) in [
-            ("Frame", "what is selected, or the whole scene (F)", Command::FrameAll),
-            ("Home", "the view that the scene opened with", Command::Home),
-            ("Level", "makes the horizon horizontal (X)", Command::Level),
-            ("Previous", "the view before (Backspace)", Command::PreviousView),
-            ("Next", "the view after (Shift+Backspace)", Command::NextView),
+            ("Frame", "frame the selection, or the whole scene (F)", Command::FrameAll),
+            ("Home", "go to the initial view (Home)", Command::Home),
+            ("Level", "level the horizon", Command::Level),
+            ("Previous", "go to the previous view (Backspace)", Command::PreviousView),
+            ("Next", "go to the next view (Shift+Backspace)", Command::NextView),
         ] {
             if ui.button(label).on_hover_text(hint).clicked() {
                 asked.send(command);
             }
         }
         let turntable = ui.selectable_label(around.spinning, "Turntable");
-        asked.toggle_spin |= turntable.on_hover_text("goes around the pivot, or stops (U)").clicked();
+        asked.toggle_spin |= turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked();
     });
     let bookmarks = session.world().resource::<Bookmarks>();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.weak("saved");
+        ui.weak("bookmarks");
         for slot in 1..=9 {
             let kept = bookmarks.get(slot).is_some();
-            let hint = if kept { "go there; Ctrl+click saves this view here" } else { "click saves this view" };
+            let hint = if kept { "go to the bookmark; Ctrl+click replaces it by this view" } else { "save this view" };
             if ui.selectable_label(kept, slot.to_string()).on_hover_text(hint).clicked() {
                 let keep = !kept || ui.input(|input| input.modifiers.command);
                 asked.send(if keep { Command::SetBookmark { slot } } else { Command::GoToBookmark { slot } });
             }
         }
     });
-    let hint = "a video program makes a film of them: firstlight render SCENE -o frame.png --turntable 120, or \
-                --bookmarks 1,2,3 --frames 120 for a way through the saved views";
-    ui.weak("numbered frames: render --turntable, --frames").on_hover_text(hint);
+    let hint = "render frames for a video: firstlight render SCENE -o frame.png --turntable 120, or --bookmarks 1,2,3 \
+                --frames 120 for a path through the bookmarks";
+    ui.weak("video frames: render --turntable, --frames").on_hover_text(hint);
 }
 
 pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
@@ -88,7 +90,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
         let looking = session.world().resource::<ViewMode>().0;
         let mut shown = looking.sharp_zone;
         ui.add_enabled_ui(enabled, |ui| {
-            if ui.checkbox(&mut shown, "show sharp zone").changed() {
+            if ui.checkbox(&mut shown, "show depth of field").changed() {
                 asked.send(Command::SetSharpZone { shown });
             }
         });
@@ -102,7 +104,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 }
             })
         });
-        row_with_hint(ui, "track", "what the focal plane stays with", |ui| {
+        row_with_hint(ui, "track", "what the focal plane follows", |ui| {
             ui.horizontal(|ui| {
                 let kind = match session.world().resource::<Focus>().target {
                     FocusTarget::Camera => 0,
@@ -111,9 +113,9 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 };
                 let [x, y] = around.place;
                 for (i, (label, hint)) in [
-                    ("off", "the focus distance stays as it is"),
-                    ("object", "what was focused on last, however it and the camera move (L)"),
-                    ("mouse", "whatever is under the mouse (Shift+L)"),
+                    ("off", "keep the focus distance"),
+                    ("object", "follow the point focused on last, when it or the camera moves (L)"),
+                    ("mouse", "follow what is under the mouse (Shift+L)"),
                 ]
                 .into_iter()
                 .enumerate()
@@ -138,17 +140,12 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
         }
         row(ui, "aperture", |ui| {
             let stop = f_stop(lens.radius, &rig.projection);
-            let hint = "f-stop, for a film 24 mm high";
+            let hint = format!("f-number for a sensor 24 mm high; lens radius {}", metres(lens.radius));
             let mut new = stop;
-            let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6).max_decimals(3);
+            let drag = egui::DragValue::new(&mut new).prefix("f/").speed(0.01 * stop).range(1e-4..=1e6);
+            let drag = drag.max_decimals(f_number_decimals(stop));
             if ui.add(drag.update_while_editing(false)).on_hover_text(hint).changed() {
                 asked.send(Command::SetAperture { radius: radius_of_f_stop(new, &rig.projection) });
-            }
-        });
-        row(ui, "radius", |ui| {
-            // In the unit that scenes of any size need: millimetres have enough digits down to a mouse's eye.
-            if let Some(mm) = number(ui, 1e3 * lens.radius, proportional(1e3 * lens.radius), 1e-6..=1e9, " mm") {
-                asked.send(Command::SetAperture { radius: 1e-3 * mm });
             }
         });
         row(ui, "blades", |ui| {
@@ -167,10 +164,10 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                 }
             })
             .response
-            .on_disabled_hover_text("with 3 blades or more the aperture is a polygon that can be rotated");
+            .on_disabled_hover_text("needs 3 or more blades");
         });
         if let Some(zone) = sharp_zone(&lens, &rig.projection, session.picture().height) {
-            row_with_hint(ui, "in focus", "what is sharp to a pixel", |ui| {
+            row_with_hint(ui, "in focus", "range of distances that are sharp to within one pixel", |ui| {
                 ui.label(format!("{} – {}", metres(zone.near), metres(zone.far)))
             });
         }

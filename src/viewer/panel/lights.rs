@@ -39,9 +39,9 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
         });
     });
     let light = &session.inputs().environment.light;
-    rows(ui, "sky strength", |ui| {
-        let hint = "radiance of the brightest colour of the sky, or the factor of its picture";
-        row_with_hint(ui, "sky", hint, |ui| {
+    rows(ui, "environment strength", |ui| {
+        let hint = "radiance of the brightest colour, or scale factor of the image";
+        row_with_hint(ui, "environment", hint, |ui| {
             ui.horizontal(|ui| {
                 if let Some(strength) = strength_drag(ui, f64::from(sky_strength(light)), "× ", "") {
                     set_sky(asked, Property::SkyStrength, DVec3::splat(strength));
@@ -86,10 +86,10 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
 
 fn kind_of_sky(light: &Environment) -> &'static str {
     match light {
-        Environment::Black => "no sky",
-        Environment::Constant(_) => "one colour",
+        Environment::Black => "black",
+        Environment::Constant(_) => "constant",
         Environment::Gradient { .. } => "gradient",
-        Environment::Image { .. } => "picture",
+        Environment::Image { .. } => "image",
     }
 }
 
@@ -123,7 +123,7 @@ pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
                 EnvironmentSource::Image { file, rotate, .. } => (file.as_str(), *rotate),
                 _ => ("?", f64::from(rotation.to_degrees())),
             };
-            row(ui, "picture", |ui| ui.add(egui::Label::new(file).truncate()));
+            row(ui, "image", |ui| ui.add(egui::Label::new(file).truncate()));
             row(ui, "strength", |ui| {
                 if let Some(strength) = strength_drag(ui, f64::from(scale.max_element()), "× ", "") {
                     set_sky(asked, Property::SkyStrength, DVec3::splat(strength));

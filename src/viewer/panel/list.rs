@@ -53,7 +53,7 @@ pub fn list<T: Listed>(
         ui.horizontal(|ui| {
             let field = egui::TextEdit::singleline(&mut state.filter).hint_text("filter by name or kind");
             ui.add(field.desired_width(ui.available_width() - 26.0));
-            if !state.filter.is_empty() && ui.small_button("✖").on_hover_text("show all").clicked() {
+            if !state.filter.is_empty() && ui.small_button("✖").on_hover_text("clear the filter").clicked() {
                 state.filter.clear();
             }
         });
@@ -65,7 +65,7 @@ pub fn list<T: Listed>(
     let found = known.unwrap_or_else(|| (which.revision, state.filter.clone(), find(items, &state.filter)));
     let (_, _, found) = state.found.insert(found);
     if found.is_empty() {
-        ui.weak(if items.is_empty() { "none" } else { "nothing is called that" });
+        ui.weak(if items.is_empty() { "none" } else { "no matches" });
         return;
     }
     let text = ui.text_style_height(&egui::TextStyle::Body) + 4.0;
@@ -125,7 +125,7 @@ fn grip(ui: &mut Ui) -> f32 {
         let middle = rect.center() + vec2(0.0, y);
         ui.painter().hline(middle.x - 14.0..=middle.x + 14.0, middle.y, (1.0, color.gamma_multiply(strength)));
     }
-    let response = response.on_hover_cursor(CursorIcon::ResizeVertical).on_hover_text("drag: a taller list");
+    let response = response.on_hover_cursor(CursorIcon::ResizeVertical).on_hover_text("drag to resize the list");
     response.drag_delta().y
 }
 

@@ -65,16 +65,16 @@ fn open(ui: &mut Ui, session: &Session, inventory: &Inventory, entry: &MaterialE
         ui.weak(shared_by(entry));
         if !entry.blends.is_empty() {
             let names = entry.blends.iter().filter_map(|blend| Some(inventory.material(*blend)?.label.as_str()));
-            ui.weak(format!("a part of {}", names.collect::<Vec<_>>().join(", ")));
+            ui.weak(format!("part of {}", names.collect::<Vec<_>>().join(", ")));
         }
         ui.horizontal_wrapped(|ui| {
             let users = ui.add_enabled(!entry.users.is_empty(), egui::Button::new("Select users"));
-            if users.on_hover_text("select all objects that use it").clicked() {
+            if users.on_hover_text("select all objects with this material").clicked() {
                 asked.edit(Edit::SelectUsers { material: id });
             }
             let selected = &session.world().resource::<Selection>().0;
             let give = ui.add_enabled(!selected.is_empty(), egui::Button::new("Assign to selected"));
-            if give.on_hover_text("what is selected gets this material").clicked() {
+            if give.on_hover_text("assign this material to the selection").clicked() {
                 for object in selected {
                     asked.edit(Edit::Assign { id: object.to_bits(), material: id });
                 }

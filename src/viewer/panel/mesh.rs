@@ -12,7 +12,7 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
     let active = session.world().resource::<Selection>().active();
     let shape = active.and_then(|active| Some((active, session.world().get::<Shape>(active)?)));
     let Some((entity, Shape::Mesh(mesh))) = shape else {
-        ui.weak("no mesh is selected");
+        ui.weak("no mesh selected");
         return;
     };
     let id = entity.to_bits();
@@ -44,23 +44,23 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
             }
         });
         if let Some(measure) = session.world().get::<MeshMeasure>(entity).filter(|m| m.faces == mesh.triangles.len()) {
-            row(ui, "before", |ui| drop(ui.label(format!("{} faces", thousands(measure.whole_faces)))));
+            row(ui, "original", |ui| drop(ui.label(format!("{} faces", thousands(measure.whole_faces)))));
             if let Some(deviation) = measure.deviation {
                 row(ui, "deviation", |ui| {
-                    let hint = "between the two surfaces, measured at 20,000 points of each, before scaling";
-                    let text = format!("mean {}, largest {}", metres(deviation.mean()), metres(deviation.max()));
+                    let hint = "distance between the two surfaces, at 20,000 points of each, before scaling";
+                    let text = format!("mean {}, maximum {}", metres(deviation.mean()), metres(deviation.max()));
                     ui.label(text).on_hover_text(hint);
                 });
                 row(ui, "difference", |ui| match state.change.of(entity) {
                     Some(Difference { mean, plain, spp: [before, now] }) => {
                         let hint = format!(
-                            "of the picture to the one with the whole mesh ({before} samples, now {now}), noise \
-                             included: mean, and pixels that differ by more than a twentieth of white"
+                            "difference to the picture with the original mesh ({before} samples, now {now}), noise \
+                             included: mean, and share of pixels that differ by more than 5 %"
                         );
                         let text = format!("{} mean, {} of pixels", percent(mean), percent(plain));
                         ui.label(text).on_hover_text(hint);
                     }
-                    None => drop(ui.weak("–").on_hover_text("the whole mesh was not seen from here")),
+                    None => drop(ui.weak("–").on_hover_text("the original mesh was not rendered from this view")),
                 });
             }
         }

@@ -141,7 +141,7 @@ pub const SECTIONS: [&str; 14] = [
     "Objects",
     "Materials",
     "Lights",
-    "Sky",
+    "Environment",
     "Open",
     "Statistics",
 ];

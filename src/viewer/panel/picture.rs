@@ -10,7 +10,7 @@ use egui::Ui;
 pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, asked: &mut Asked) {
     let status = session.status();
     rows(ui, "render", |ui| {
-        row(ui, "light model", |ui| {
+        row(ui, "integrator", |ui| {
             ui.horizontal(|ui| {
                 for (integrator, label) in [(Integrator::Path, "path tracing"), (Integrator::Phong, "Phong")] {
                     if ui.selectable_label(status.integrator == integrator, label).clicked() {
@@ -52,25 +52,29 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
         if ui.button("Restart").clicked() {
             asked.send(Command::Restart);
         }
-        if ui.selectable_label(around.brush, "Region").on_hover_text("drag a rectangle that gets all samples").clicked()
+        if ui
+            .selectable_label(around.brush, "Region")
+            .on_hover_text("drag a rectangle to render only that region (B)")
+            .clicked()
         {
             asked.toggle_brush = true;
         }
         if status.region.is_some()
-            && ui.button("Whole picture").on_hover_text("samples for the whole picture").clicked()
+            && ui.button("Whole picture").on_hover_text("render the whole picture (Shift+B)").clicked()
         {
             asked.send(Command::SetRegion { region: None });
         }
     });
     ui.horizontal(|ui| {
-        if ui.button("Save PNG").on_hover_text("the picture as a new file, as it is seen (K)").clicked() {
+        if ui.button("Save PNG").on_hover_text("save the picture as displayed, in a new file (K)").clicked() {
             asked.screenshot = Some(false);
         }
-        if ui.button("Save EXR").on_hover_text("its linear light as a new file (Shift+K)").clicked() {
+        if ui.button("Save EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
             asked.screenshot = Some(true);
         }
         let drag = egui::DragValue::new(scale).speed(0.03).range(1..=16).prefix("× ").update_while_editing(false);
-        ui.add(drag).on_hover_text("so many times as wide and high as the window, rendered beside it");
+        ui.add(drag)
+            .on_hover_text("size of saved pictures relative to the window; larger ones are rendered in the background");
     });
 }
 

@@ -42,12 +42,12 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
 
 /// A file by dialog, or what was opened before, which a click opens again.
 pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
-    if ui.button("File …").on_hover_text("a scene, a model, or a picture that was kept (Ctrl+O)").clicked() {
+    if ui.button("File …").on_hover_text("open a scene, a model or a saved picture (Ctrl+O)").clicked() {
         asked.dialog = Some(DialogPurpose::Open);
     }
     let mut others = recent.iter().filter(|name| **name != session.status().scene).take(8).peekable();
     if others.peek().is_none() {
-        ui.weak("nothing else so far: drop a file on the window");
+        ui.weak("no recent files; you can also drop a file on the window");
     }
     for name in others {
         let short = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());

@@ -10,7 +10,7 @@ use glam::DVec3;
 pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut Asked) {
     let selection = session.world().resource::<Selection>();
     let Some(active) = selection.active() else {
-        ui.weak("nothing is selected: click on something");
+        ui.weak("nothing selected: click an object");
         return;
     };
     let inputs = session.inputs();
@@ -103,7 +103,7 @@ fn place(ui: &mut Ui, id: u64, placement: &Placement, asked: &mut Asked) {
                     }
                 });
             }
-            Linear::Matrix(_) => row(ui, "rotation", |ui| drop(ui.weak("given by a matrix"))),
+            Linear::Matrix(_) => row(ui, "rotation", |ui| drop(ui.weak("defined by a matrix"))),
         }
     });
 }

@@ -16,14 +16,14 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         let (camera, bounce, shadow) = (status.camera_mrays, status.bounce_mrays, status.shadow_mrays);
         figure("", format!("{camera:.2} camera, {bounce:.2} bounce"));
         figure("", format!("{shadow:.2} shadow"));
-        figure("error", status.estimated_error.map_or("–".to_owned(), percent));
-        figure("bad samples", format!("{} not finite, left out", status.n_bad));
+        figure("error estimate", status.estimated_error.map_or("–".to_owned(), percent));
+        figure("discarded", format!("{} non-finite samples", status.n_bad));
         if status.n_above > 0 {
-            figure("", format!("{} brighter than the scene can be", status.n_above));
+            figure("", format!("{} brighter than the scene allows", status.n_above));
         }
         let milliseconds = |waits: &LatencyHistogram| {
             let of = |share| waits.quantile(share).map(|wait| format!("{:.0} ms", wait.as_secs_f64() * 1e3));
-            of(0.5).zip(of(0.99)).map_or("–".to_owned(), |(half, most)| format!("{half}, 1 % over {most}"))
+            of(0.5).zip(of(0.99)).map_or("–".to_owned(), |(half, most)| format!("median {half}, 99 % {most}"))
         };
         figure("input latency", milliseconds(around.reaction.waits()));
         figure("cancel latency", milliseconds(&session.cancels()));

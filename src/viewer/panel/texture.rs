@@ -38,7 +38,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: 
             asked.dialog = Some(DialogPurpose::Texture { id });
             ui.close();
         }
-        if matches!(paint, ColorParam::Texture(_)) && ui.button("plain colour").clicked() {
+        if matches!(paint, ColorParam::Texture(_)) && ui.button("constant colour").clicked() {
             let value = DVec3::splat(0.5);
             asked.edit(Edit::Set { id, property: Property::Color, value });
             ui.close();

@@ -23,10 +23,10 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
         .show(context, |ui| {
             Frame::NONE.fill(GLASS).corner_radius(4.0).inner_margin(Margin::symmetric(10, 7)).show(ui, |ui| {
                 let (x, y, n) = (story.pixel.x, story.pixel.y, story.samples.len());
-                text(ui, format!("pixel {x}, {y}: {n} samples, brightness {all:.4}"), true);
+                text(ui, format!("pixel {x}, {y}: {n} samples, luminance {all:.4}"), true);
                 ui.add_space(3.0);
                 egui::Grid::new("story").num_columns(6).spacing([14.0, 2.0]).show(ui, |ui| {
-                    for title in ["light", "seen", "direct", "indirect", "together", "share"] {
+                    for title in ["light", "visible", "direct", "indirect", "total", "share"] {
                         cell(ui, title.to_owned(), title != "light", WEAK);
                     }
                     ui.end_row();
@@ -43,7 +43,7 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
                     }
                     if let Some(from_lamps) = story.from_lamps.filter(|light| *light != DVec3::ZERO) {
                         let total = brightness(from_lamps);
-                        cell(ui, "paths from the lamps".to_owned(), false, Color32::from_gray(228));
+                        cell(ui, "by light tracing".to_owned(), false, Color32::from_gray(228));
                         (0..3).for_each(|_| drop(ui.label("")));
                         cell(ui, figure(total), true, Color32::from_gray(228));
                         cell(ui, percent(total / all), true, Color32::from_gray(228));
@@ -54,7 +54,7 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
                 bounces(ui, story, shown);
                 ways(ui, shown);
                 if story.n_bad > 0 {
-                    text(ui, format!("{} samples were not finite and are left out", story.n_bad), false);
+                    text(ui, format!("{} samples were not finite and were discarded", story.n_bad), false);
                 }
             });
         });
@@ -70,7 +70,8 @@ fn row(ui: &mut Ui, name: &str, parts: [DVec3; 3], all: f64, chosen: Option<bool
     let clicked = match chosen {
         Some(chosen) => {
             let text = RichText::new(name).size(TEXT_SIZE).color(Color32::from_gray(228));
-            let label = ui.selectable_label(chosen, text).on_hover_text("draw only paths that bring its light, or all");
+            let label =
+                ui.selectable_label(chosen, text).on_hover_text("draw only paths from this light, or all paths");
             label.clicked()
         }
         None => {
@@ -100,15 +101,15 @@ fn ways(ui: &mut Ui, shown: &mut WaysShown) {
         }
     });
     let bounces = shown.bounces.map(|n| format!("after {n} bounces"));
-    let light = shown.light.as_ref().map(|name| format!("of {name}"));
+    let light = shown.light.as_ref().map(|name| format!("from {name}"));
     let filter: Vec<String> = light.into_iter().chain(bounces).collect();
     match filter.is_empty() {
         true => text(
             ui,
-            "click a light or a bounce count for its paths alone; J: another pixel, Esc: none".to_owned(),
+            "click a light or a number of bounces to filter the paths; J: other pixel, Esc: close".to_owned(),
             false,
         ),
-        false => text(ui, format!("only {}: click again for all", filter.join(", ")), true),
+        false => text(ui, format!("only {}: click again to show all", filter.join(", ")), true),
     }
 }
 
@@ -133,7 +134,7 @@ fn bounces(ui: &mut Ui, story: &PixelStory, shown: &mut WaysShown) {
         ui.painter().rect_filled(bar, 0.0, color.gamma_multiply(if is_dim { 0.35 } else { 0.85 }));
         let share = percent(part / sum);
         let response =
-            response.on_hover_text(format!("{share} after {bounces} bounces: draw only these paths, or all"));
+            response.on_hover_text(format!("{share} after {bounces} bounces: draw only these paths, or all paths"));
         if response.clicked() {
             shown.bounces = (!chosen).then_some(bounces);
         }
@@ -148,7 +149,7 @@ fn bounces(ui: &mut Ui, story: &PixelStory, shown: &mut WaysShown) {
     text(
         ui,
         format!(
-            "bounces   found by paths {}   by light sampling {}   noise of the mean {noise}",
+            "bounces   BSDF sampling {}   light sampling {}   noise of the mean {noise}",
             percent(itself),
             percent(asked)
         ),

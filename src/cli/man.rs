@@ -1,0 +1,46 @@
+//! `firstlight man [FOLDER]`: the manual page, or a page for each command.
+
+use super::CommandLine;
+use super::console::{inform, print_bytes};
+use super::failure::Failure;
+use clap::{Args, Command, CommandFactory};
+use clap_mangen::Man;
+use firstlight::scene::whole_file::write_whole;
+use std::path::PathBuf;
+
+#[derive(Args, Clone, Debug)]
+pub struct ManArgs {
+    /// Folder for firstlight.1, firstlight-render.1 and so on; created if missing [default: print the main page].
+    #[arg(value_name = "FOLDER")]
+    folder: Option<PathBuf>,
+}
+
+pub fn run(args: &ManArgs) -> Result<(), Failure> {
+    let mut main = CommandLine::command().disable_help_subcommand(true);
+    main.build();
+    let Some(folder) = &args.folder else {
+        return print_bytes(&page(&main)?);
+    };
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::Failed(format!("{}: cannot create the folder: {error}", folder.display())))?;
+    let pages: Vec<&Command> = std::iter::once(&main).chain(main.get_subcommands()).collect();
+    for command in &pages {
+        let path = folder.join(format!("{}.1", name(command)));
+        write_whole(&path, &page(command)?).map_err(Failure::Failed)?;
+    }
+    inform(format_args!("{}: {} manual pages saved", folder.display(), pages.len()));
+    Ok(())
+}
+
+/// `firstlight-render` of `render`.
+fn name(command: &Command) -> String {
+    command.get_display_name().unwrap_or(command.get_name()).to_owned()
+}
+
+fn page(command: &Command) -> Result<Vec<u8>, Failure> {
+    let mut page = Vec::new();
+    Man::new(command.clone())
+        .render(&mut page)
+        .map_err(|error| Failure::Failed(format!("the manual page cannot be made: {error}")))?;
+    Ok(page)
+}

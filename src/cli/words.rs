@@ -1,0 +1,99 @@
+//! The words of the command line as they were typed: options of every command that stand before it, and commands that
+//! are nearly one.
+
+use super::CommandLine;
+use clap::CommandFactory;
+use firstlight::printable;
+use firstlight::scene::{BUILTIN_SCENES, SceneSource, suggestion};
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
+
+/// What was typed, with the options that stand before a command behind it: `--quiet render` is `render --quiet`.
+pub fn typed() -> Vec<OsString> {
+    ordered(std::env::args_os().collect(), &commands())
+}
+
+/// What to say of the first word that is no option, if it cannot be opened and looks like a command.
+pub fn mistyped_command() -> Option<String> {
+    let words = typed();
+    mistyped(words.get(1 + n_leading_options(&words))?, &commands())
+}
+
+fn commands() -> Vec<String> {
+    let names = CommandLine::command();
+    names.get_subcommands().map(|command| command.get_name().to_owned()).chain(["help".to_owned()]).collect()
+}
+
+/// How many words after the first belong to options that every command has.
+fn n_leading_options(words: &[OsString]) -> usize {
+    let mut n = 0;
+    while let Some(word) = words.get(1 + n).and_then(|word| word.to_str()) {
+        match word {
+            "-q" | "--quiet" | "-v" | "--verbose" => n += 1,
+            "--simd" => n += 2,
+            _ if word.starts_with("--simd=") => n += 1,
+            _ => break,
+        }
+    }
+    n
+}
+
+fn ordered(mut words: Vec<OsString>, commands: &[String]) -> Vec<OsString> {
+    let n = n_leading_options(&words);
+    let is_command = words.get(1 + n).is_some_and(|word| commands.iter().any(|command| OsStr::new(command) == word));
+    if is_command {
+        words[1..2 + n].rotate_right(1);
+    }
+    words
+}
+
+fn mistyped(word: &OsStr, commands: &[String]) -> Option<String> {
+    let text = word.to_string_lossy();
+    let is_known = text.starts_with('-') || commands.iter().any(|command| *command == text);
+    if is_known || SceneSource::parse(word).is_ok() || Path::new(word).exists() {
+        return None;
+    }
+    let is_near = |hint: &str| hint.contains("did you mean");
+    let of_scenes = suggestion(&text, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
+    let of_commands = suggestion(&text, commands.iter().map(String::as_str));
+    let hint = Some(of_commands).filter(|hint| is_near(hint) && !is_near(&of_scenes))?;
+    Some(format!("unknown command `{}`{hint}", printable::name(&text)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn commands() -> Vec<String> {
+        ["render", "report", "info"].map(str::to_owned).to_vec()
+    }
+
+    #[test]
+    fn a_word_that_is_nearly_a_command_is_taken_for_one() {
+        let of = |word: &str| mistyped(OsStr::new(word), &commands());
+        assert_eq!(of("rendr").as_deref(), Some("unknown command `rendr` (did you mean `render`?)"));
+        assert_eq!(of("Info").as_deref(), Some("unknown command `Info` (did you mean `info`?)"));
+        for other in ["render", "--rendr", "cornell", "galery", "xyzzy", "room.ron", ""] {
+            assert_eq!(of(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn options_of_every_command_may_stand_before_it() {
+        let of = |line: &str| {
+            let words = line.split(' ').map(OsString::from).collect();
+            ordered(words, &commands()).join(OsStr::new(" ")).into_string().unwrap()
+        };
+        for (typed, meant) in [
+            ("x -q --simd avx2 render a", "x render -q --simd avx2 a"),
+            ("x --simd=avx2 info", "x info --simd=avx2"),
+            ("x render -q a", "x render -q a"),
+            ("x --quiet cornell", "x --quiet cornell"),
+            ("x --size 2x2 render", "x --size 2x2 render"),
+            ("x --simd", "x --simd"),
+            ("x", "x"),
+        ] {
+            assert_eq!(of(typed), meant);
+        }
+    }
+}

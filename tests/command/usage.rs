@@ -1,0 +1,190 @@
+//! What people of other programs try: completions, manual pages, pipes, several scenes, typing errors.
+
+use assert_cmd::Command;
+use std::path::Path;
+use std::process::Output;
+
+fn run(folder: &Path, line: &str) -> Output {
+    let mut command = Command::cargo_bin("firstlight").unwrap();
+    command.current_dir(folder).args(line.split(' ')).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.output().unwrap()
+}
+
+/// Standard output and standard error of a command that succeeds.
+fn does(folder: &Path, line: &str) -> (Vec<u8>, String) {
+    let output = run(folder, line);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{line}: {said}");
+    (output.stdout, said)
+}
+
+/// Standard error of a command that is not understood.
+fn refused(folder: &Path, line: &str) -> String {
+    let output = run(folder, line);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{line}: {said}");
+    said
+}
+
+#[test]
+fn every_shell_gets_completions_and_every_command_a_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let (script, _) = does(path, &format!("completions {shell}"));
+        let script = String::from_utf8(script).unwrap();
+        assert!(script.contains("turntable") && script.contains("simplify"), "{shell}");
+    }
+    let (page, _) = does(path, "man");
+    assert!(String::from_utf8(page).unwrap().contains(".TH firstlight 1"));
+    does(path, "man pages");
+    let (help, _) = does(path, "help");
+    let help = String::from_utf8(help).unwrap();
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    for command in commands.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help") {
+        let page = std::fs::read_to_string(path.join(format!("pages/firstlight-{command}.1")));
+        assert!(page.is_ok_and(|page| page.contains(".SH SYNOPSIS")), "{command}");
+    }
+}
+
+#[test]
+fn a_mistyped_command_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for line in ["rendr", "rendr cornell", "rendr cornell -o a.png", "--quiet rendr cornell"] {
+        let said = refused(folder.path(), line);
+        assert_eq!(said, "error: unknown command `rendr` (did you mean `render`?)\n", "{line}");
+    }
+    assert!(refused(folder.path(), "galery").contains("did you mean `gallery`?"));
+}
+
+#[test]
+fn a_picture_goes_to_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let line = "render cornell --size 20x10 --spp 2 -o";
+    for (options, file) in [("-", "a.png"), ("- --format exr", "a.exr")] {
+        let (bytes, said) = does(path, &format!("{line} {options}"));
+        assert!(said.contains("standard output: 20 x 10"), "{said}");
+        does(path, &format!("{line} {file}"));
+        assert!(bytes == std::fs::read(path.join(file)).unwrap(), "the same bytes as those of a file");
+    }
+    assert!(refused(path, &format!("{line} - --json")).contains("both write to standard output"));
+    assert!(refused(path, &format!("{line} - --turntable 3")).contains("takes one picture"));
+    assert!(refused(path, &format!("{line} b.png --format exr")).contains("a name that ends in .exr"));
+    assert!(!path.join("-").exists() && !path.join("b.png").exists());
+}
+
+#[test]
+fn several_scenes_in_one_call() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir(path.join("out")).unwrap();
+    let options = "--size 8x6 --spp 1";
+    does(path, &format!("render cornell ball {options} -o out"));
+    does(path, &format!("render cornell {options} -o one.png"));
+    assert!(path.join("out/ball.png").is_file());
+    let pixels = |name: &str| image::open(path.join(name)).unwrap().into_rgb8();
+    assert!(pixels("out/cornell.png") == pixels("one.png"));
+    // Without a name, new files.
+    does(path, &format!("render cornell ball {options}"));
+    does(path, &format!("render cornell {options}"));
+    for name in ["firstlight-cornell.png", "firstlight-ball.png", "firstlight-cornell-2.png"] {
+        assert!(path.join(name).is_file(), "{name}");
+    }
+    let before = std::fs::read_dir(path.join("out")).unwrap().count();
+    for (line, why) in [
+        ("render cornell ball -o one.png", "not a folder"),
+        ("render cornell ball -o out --film out/a.exr", "--film works with one scene only"),
+        ("render cornell cornell -o out", "same file"),
+        ("render cornell bal -o out", "did you mean `ball`?"),
+    ] {
+        let said = refused(path, line);
+        assert!(said.contains(why), "{line}: {said}");
+    }
+    assert_eq!(std::fs::read_dir(path.join("out")).unwrap().count(), before, "nothing is rendered by mistake");
+    let (told, _) = does(path, "info cornell ball --json");
+    let titles = String::from_utf8(told).unwrap();
+    let titles = titles.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()["scene"].clone());
+    assert_eq!(titles.collect::<Vec<_>>(), ["cornell", "ball"]);
+}
+
+#[test]
+fn an_environment_image_lights_any_scene_and_the_picture_knows_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let white = image::Rgb32FImage::from_pixel(8, 4, image::Rgb([0.5, 0.5, 0.5]));
+    image::DynamicImage::ImageRgb32F(white).save(path.join("sky.exr")).unwrap();
+    let scene = "(camera: (eye: (0, 0, 5), look_at: (0, 0, 0)), display: (tone_curve: linear))";
+    std::fs::write(path.join("empty.ron"), scene).unwrap();
+    let tent = "v 0 0 0\nv 1 0 0\nv 0 0 -1\nv 0 1 0\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    std::fs::write(path.join("tent.obj"), tent).unwrap();
+    let options = "--env sky.exr --size 16x8 --spp 4";
+    does(path, &format!("render empty.ron {options} -o a.png"));
+    let picture = image::open(path.join("a.png")).unwrap().into_rgb8();
+    assert!(picture.pixels().all(|pixel| pixel.0 == [188; 3]), "half the light is byte 188 in sRGB");
+    // A picture of it opens as what it shows, and so does a picture of that.
+    for (from, to) in [("a.png", "b.png"), ("b.png", "c.png")] {
+        let (_, said) = does(path, &format!("render {from} -o {to}"));
+        assert!(!said.contains("warning"), "{said}");
+        assert!(image::open(path.join(to)).unwrap().into_rgb8() == picture, "{to}");
+    }
+    // A model loses its lamp: all light is that of the image.
+    let (told, _) = does(path, "info tent.obj --env sky.exr --json");
+    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+    assert_eq!((told["emissive_objects"].as_u64(), told["environment"].as_str()), (Some(0), Some("image, 8 x 4")));
+    does(path, "save tent.obj --env sky.exr -o saved.ron");
+    assert!(std::fs::read_to_string(path.join("saved.ron")).unwrap().contains("\"sky.exr\""));
+    let output = run(path, "info empty.ron --env none.hdr");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && said.contains("none.hdr: cannot be read: no such file"), "{said}");
+    std::fs::write(path.join("sky.hdr"), "").unwrap();
+    assert!(String::from_utf8(run(path, "info sky.hdr").stderr).unwrap().contains("--env FILE.hdr"));
+}
+
+#[test]
+fn quiet_says_nothing_but_warnings_and_verbose_says_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let line = "render cornell --size 8x6 --spp 4 -o a.png";
+    for quiet in [format!("--quiet {line}"), format!("{line} -q")] {
+        assert_eq!(does(path, &quiet).1, "");
+    }
+    assert!(does(path, &format!("{line} -q --error 0.1%")).1.starts_with("warning: the estimated error is "));
+    let (_, said) = does(path, &format!("-v {line}"));
+    assert!(said.contains("cornell: loaded in") && said.contains("threads"), "{said}");
+    refused(path, &format!("{line} -q -v"));
+}
+
+#[test]
+fn colours_are_left_out_where_they_are_not_wanted() {
+    for (name, value, is_plain) in [("CLICOLOR_FORCE", "1", false), ("NO_COLOR", "1", true)] {
+        let mut command = Command::cargo_bin("firstlight").unwrap();
+        let output = command.arg("--help").env("CLICOLOR_FORCE", "1").env(name, value).output().unwrap();
+        assert_eq!(!output.stdout.contains(&0x1b), is_plain, "{name}");
+    }
+}
+
+#[test]
+fn a_deviation_in_percent_is_a_share_of_the_diagonal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    // A large flat grid, whose unit says nothing of how large it is.
+    let n = 12;
+    let points = (0..=n).flat_map(|y| (0..=n).map(move |x| format!("v {} {} {}\n", 100 * x, 100 * y, (x * y) % 2)));
+    let corner = |x: usize, y: usize| y * (n + 1) + x + 1;
+    let faces = (0..n).flat_map(|y| {
+        (0..n).map(move |x| {
+            format!("f {} {} {} {}\n", corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1))
+        })
+    });
+    std::fs::write(path.join("grid.obj"), points.chain(faces).collect::<String>()).unwrap();
+    let after = |error: &str| {
+        let (out, _) = does(path, &format!("simplify grid.obj -o out.obj --error {error} --json"));
+        let json: serde_json::Value = serde_json::from_slice(&out).unwrap();
+        (json["faces_after"].as_u64().unwrap(), json["diagonal"].as_f64().unwrap())
+    };
+    let (faces, diagonal) = after("0.5%");
+    assert!(faces < 2 * (n * n) as u64);
+    assert_eq!(after(&format!("{}", 0.005 * diagonal)).0, faces);
+    assert!(refused(path, "simplify grid.obj -o out.obj --error half%").contains("percentage of the diagonal"));
+}
