@@ -101,12 +101,8 @@ impl LightTree {
             if sum == 0.0 {
                 return None;
             }
-            let share = bounds[0] / sum;
-            // What is left of the number serves further down. Rounding must not lead to a child that sends nothing.
-            let second = u >= share && bounds[1] > 0.0 || bounds[0] == 0.0;
-            let part = if second { bounds[1] / sum } else { share };
-            u = ((if second { u - share } else { u }) / part).clamp(0.0, 1.0f32.next_down());
-            pmf *= part;
+            let (second, part, rest) = step_down(bounds, u);
+            (u, pmf) = (rest, pmf * part);
             node = children[usize::from(second)];
         }
         Some((node.link & !LEAF, pmf))
@@ -188,6 +184,19 @@ impl<R: Real> NodeBound<R> {
         // Within the ball anything can happen; on average the lights are about a radius away.
         select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
     }
+}
+
+/// One step down from a node whose children have these bounds, of which not both are zero: whether it leads to the second, the
+/// probability of that, and what is left of the uniform number `u`, for the steps further down.
+#[inline(always)]
+pub(crate) fn step_down<R: Real>([first, second]: [R; 2], u: R) -> (R::Mask, R, R) {
+    let sum = first + second;
+    let share = first / sum;
+    // Rounding must not lead to a child that sends nothing.
+    let take = (share.le(u) & second.is_positive()) | first.is_zero();
+    let part = select(take, second / sum, share);
+    let rest = (select(take, u - share, u) / part).at_least(0.0).at_most(1.0f32.next_down());
+    (take, part, rest)
 }
 
 impl LightItem {

@@ -3,7 +3,7 @@
 //! The numbers are those of the scalar walk, bit for bit. Nodes are numbered by level here: the first levels, which all
 //! lanes pass, fit into registers.
 
-use crate::prepare::light::tree::{LEAF, LightTree, NodeBound};
+use crate::prepare::light::tree::{LEAF, LightTree, NodeBound, step_down};
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, Word, padded, select};
 
 #[derive(Debug, Default)]
@@ -72,14 +72,10 @@ impl LightTreeArrays {
             let rows = self.rows(open, node);
             let first = rows.bounds(node, position, normal);
             let second = rows.bounds(node + 1, position, normal);
-            let sum = first + second;
-            let none = open & sum.is_zero();
+            let none = open & (first + second).is_zero();
             found &= !none;
             open &= !none;
-            let share = first / sum;
-            let take = (share.le(u) & second.is_positive()) | first.is_zero();
-            let part = select(take, second / sum, share);
-            let rest = (select(take, u - share, u) / part).at_least(0.0).at_most(1.0f32.next_down());
+            let (take, part, rest) = step_down([first, second], u);
             u = select(open, rest, u);
             pmf = select(open, pmf * part, pmf);
             node = rows.children(open, take, node);
