@@ -132,7 +132,7 @@ impl RenderJob {
         self.draft.note(path, self.size, samples, self.display.into())
     }
 
-    /// An empty film, or the one that is gone on with.
+    /// An empty film, or the one that is resumed.
     pub fn film(&self, args: &RenderArgs, kept: Option<(FilmFile, &Path)>) -> Result<Film, Failure> {
         let shot = self.scene.shot.as_ref();
         let first = args.samples.as_ref().map(|samples| samples.start).or(shot.map(|shot| shot.first_sample));

@@ -247,10 +247,10 @@ impl ReportScene {
         progress: &mut ReportProgress,
         stop: &Stop,
     ) -> (Option<SceneOutcome>, Option<String>) {
-        let rungs = self.measure_curve(limits, Techniques::default(), "all techniques", progress, stop);
+        let steps = self.measure_curve(limits, Techniques::default(), "all techniques", progress, stop);
         let mut missing =
             stop.is_asked().then(|| "its later steps and the comparison of techniques are missing".to_owned());
-        let Some(last_rung) = rungs.last() else { return (None, Some("no step was completed".to_owned())) };
+        let Some(last_rung) = steps.last() else { return (None, Some("no step was completed".to_owned())) };
         let reference = match given {
             Some(given) => given.clone(),
             None => match self.reference(last_rung, progress, stop) {
@@ -259,9 +259,9 @@ impl ReportScene {
             },
         };
         let display = self.developing.0;
-        let measure = |rungs: &[CurveStep]| ConvergenceCurve::measure(rungs, &reference.picture, &display);
-        let picture = |rung: Option<&CurveStep>| rung.map(|rung| rung.picture.clone());
-        let last: LinearPicture = picture(rungs.last()).expect("a ladder has at least one step");
+        let measure = |steps: &[CurveStep]| ConvergenceCurve::measure(steps, &reference.picture, &display);
+        let picture = |step: Option<&CurveStep>| step.map(|step| step.picture.clone());
+        let last: LinearPicture = picture(steps.last()).expect("a curve has at least one step");
         let ablations = if args.no_ablation {
             Vec::new()
         } else {
@@ -270,7 +270,7 @@ impl ReportScene {
                 .map_while(|(technique, techniques)| {
                     let others =
                         self.measure_curve(limits, techniques, &format!("without {technique}"), progress, stop);
-                    // Half a ladder would be compared with a whole one.
+                    // Half a curve would be compared with a whole one.
                     if stop.is_asked() {
                         missing.get_or_insert_with(|| {
                             format!("the comparison of {technique} and later techniques is missing")
@@ -278,8 +278,8 @@ impl ReportScene {
                         return None;
                     }
                     // Only a step that both have can tell.
-                    let is_unused = rungs.iter().zip(&others).all(|(a, b)| a.picture == b.picture);
-                    Some(Ablation { technique, ladder: measure(&others), is_unused })
+                    let is_unused = steps.iter().zip(&others).all(|(a, b)| a.picture == b.picture);
+                    Some(Ablation { technique, curve: measure(&others), is_unused })
                 })
                 .collect()
         };
@@ -288,9 +288,9 @@ impl ReportScene {
             width: self.size.0,
             height: self.size.1,
             display,
-            ladder: measure(&rungs),
+            curve: measure(&steps),
             ablations,
-            early: picture(rungs.iter().rfind(|rung| rung.spp <= 4)).unwrap_or_else(|| last.clone()),
+            early: picture(steps.iter().rfind(|step| step.spp <= 4)).unwrap_or_else(|| last.clone()),
             foreign_share: given.map(|given| foreign_share(&last, &given.picture)),
             last,
             reference: reference.picture,
@@ -315,7 +315,7 @@ impl ReportScene {
         stop: &Stop,
     ) -> Vec<CurveStep> {
         let settings = RenderSettings { techniques, ..self.settings };
-        let mut tell = progress.task(format!("{}, {what}", self.title), ReportProgress::LADDER, self.size);
+        let mut tell = progress.task(format!("{}, {what}", self.title), ReportProgress::CURVE, self.size);
         measure_curve(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
 
@@ -352,19 +352,19 @@ fn modest(width: u32, height: u32) -> (u32, u32) {
     (scaled(width), scaled(height))
 }
 
-/// How far all of it is; a ladder's share is its pixels, and a reference is as long as many ladders.
+/// Progress of the whole report; a curve counts by its pixels, and a reference as many curves.
 struct ReportProgress {
     bar: Bar,
     done: f64,
 }
 
 impl ReportProgress {
-    const LADDER: f64 = 1.0;
+    const CURVE: f64 = 1.0;
     const REFERENCE: f64 = REFERENCE_FACTOR as f64;
 
     fn new(scenes: &[ReportScene], ablation: bool, given: bool) -> Self {
-        let ladders = 1 + if ablation { Techniques::ablations().len() } else { 0 };
-        let weight = Self::LADDER * ladders as f64 + if given { 0.0 } else { Self::REFERENCE };
+        let curves = 1 + if ablation { Techniques::ablations().len() } else { 0 };
+        let weight = Self::CURVE * curves as f64 + if given { 0.0 } else { Self::REFERENCE };
         let pixels: f64 = scenes.iter().map(|scene| f64::from(scene.size.0) * f64::from(scene.size.1)).sum();
         Self { bar: Bar::new((weight * pixels) as u64), done: 0.0 }
     }

@@ -5,7 +5,7 @@ use super::{Distance, LinearPicture};
 use crate::render::{Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance};
 use std::time::{Duration, Instant};
 
-/// Where a ladder ends: at the last power of two that both allow, but never before the first step.
+/// Where a curve ends: at the last power of two that both allow, but never before the first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurveLimits {
     /// Samples per pixel.
@@ -61,7 +61,7 @@ pub fn measure_curve(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<CurveStep> {
     let mut film = Film::new(width, height);
-    let mut rungs: Vec<CurveStep> = Vec::new();
+    let mut steps: Vec<CurveStep> = Vec::new();
     let mut rays = RayCounts::default();
     let mut pace = Pace::default();
     let (mut wall, mut cpu) = (Duration::ZERO, cpu_seconds().map(|_| 0.0));
@@ -73,7 +73,7 @@ pub fn measure_curve(
             let before = film.spp();
             rays += advance(prepared, settings, &mut film, goal, stop).rays;
             if stop() && film.spp() < goal {
-                return rungs;
+                return steps;
             }
             let elapsed = start.elapsed();
             wall += elapsed;
@@ -89,7 +89,7 @@ pub fn measure_curve(
             camera_paths: rays.camera,
             rays: rays.total(),
         };
-        rungs.push(CurveStep { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
+        steps.push(CurveStep { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
         // The next step takes as long as all before it.
         let too_long = limits.seconds.is_some_and(|seconds| 2.0 * spent.wall_seconds > seconds);
         match spp.checked_mul(2) {
@@ -98,7 +98,7 @@ pub fn measure_curve(
         }
     }
     progress(1.0);
-    rungs
+    steps
 }
 
 /// How many samples to ask for at once, so that progress is told a few times a second.
@@ -154,24 +154,24 @@ pub struct ConvergenceCurve {
 }
 
 impl ConvergenceCurve {
-    /// At least one rung, all of the size of `reference`.
-    pub fn measure(rungs: &[CurveStep], reference: &LinearPicture, display: &Display) -> Self {
-        assert!(!rungs.is_empty(), "a ladder has at least one rung");
-        let step = |rung: &CurveStep| Step {
-            spp: rung.spp,
-            spent: rung.spent,
-            distance: Distance::between(&rung.picture, reference, display),
-            estimate: rung.estimate,
+    /// At least one step, all of the size of `reference`.
+    pub fn measure(steps: &[CurveStep], reference: &LinearPicture, display: &Display) -> Self {
+        assert!(!steps.is_empty(), "a curve has at least one step");
+        let measured = |step: &CurveStep| Step {
+            spp: step.spp,
+            spent: step.spent,
+            distance: Distance::between(&step.picture, reference, display),
+            estimate: step.estimate,
         };
-        Self { steps: rungs.iter().map(step).collect() }
+        Self { steps: steps.iter().map(measured).collect() }
     }
 
     pub fn last(&self) -> &Step {
-        self.steps.last().expect("a ladder has at least one step")
+        self.steps.last().expect("a curve has at least one step")
     }
 
     /// Seconds and relMSE of each step.
-    pub fn curve(&self) -> Vec<(f64, f64)> {
+    pub fn points(&self) -> Vec<(f64, f64)> {
         self.steps.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect()
     }
 
@@ -199,7 +199,7 @@ impl ConvergenceCurve {
 
     /// Seconds until the relative error is down to `error`; `None` where the curve does not lead there.
     pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
-        seconds_to(&self.curve(), self.slope(), error * error)
+        seconds_to(&self.points(), self.slope(), error * error)
     }
 }
 

@@ -12,7 +12,7 @@ pub struct SceneOutcome {
     pub height: u32,
     /// How its pictures are developed.
     pub display: Display,
-    pub ladder: ConvergenceCurve,
+    pub curve: ConvergenceCurve,
     pub ablations: Vec<Ablation>,
     pub reference: LinearPicture,
     /// Of an own reference; `None` for a given one.
@@ -26,12 +26,12 @@ pub struct SceneOutcome {
     pub last: LinearPicture,
 }
 
-/// A ladder with one technique switched off.
+/// A curve with one technique switched off.
 #[derive(Clone, Debug)]
 pub struct Ablation {
     /// What is missing.
     pub technique: &'static str,
-    pub ladder: ConvergenceCurve,
+    pub curve: ConvergenceCurve,
     /// Not a bit of the picture changed: the scene does not use it.
     pub is_unused: bool,
 }
@@ -39,7 +39,7 @@ pub struct Ablation {
 impl Ablation {
     /// How many times as long the same error takes without it, by relMSE times seconds at the last step.
     pub fn cost(&self, with: &ConvergenceCurve) -> f64 {
-        self.ladder.last().inefficiency() / with.last().inefficiency()
+        self.curve.last().inefficiency() / with.last().inefficiency()
     }
 }
 
@@ -59,6 +59,6 @@ impl SceneOutcome {
     /// The part of the last step's relMSE that may be the reference's own.
     pub fn share_of_reference(&self) -> Option<f64> {
         let error = self.reference_made?.relative_error?;
-        Some(error * error / self.ladder.last().distance.relative_mse)
+        Some(error * error / self.curve.last().distance.relative_mse)
     }
 }

@@ -19,7 +19,7 @@ const CALIBRATION: f64 = 1.25;
 /// The page; `command` is what was asked for, so that it can be asked for again. `interrupted` says what is missing where
 /// the report was stopped before its end.
 pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>) -> String {
-    let threads = outcomes.first().map_or(0, |outcome| outcome.ladder.last().spent.threads);
+    let threads = outcomes.first().map_or(0, |outcome| outcome.curve.last().spent.threads);
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>Speed against error</title>\n\
@@ -57,7 +57,7 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
     let _ =
         writeln!(text, "  {:>6}  {:>8}  {:>7}  {:>9}  predicted/actual", "slope", "Mrays/s", "error %", "est./true");
     for outcome in outcomes {
-        let ladder = &outcome.ladder;
+        let curve = &outcome.curve;
         let _ = write!(
             text,
             "{:width$}  {:>9}",
@@ -65,17 +65,17 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
             format!("{}x{}", outcome.width, outcome.height)
         );
         for target in TARGETS {
-            let _ = write!(text, "  {:>9}", seconds(ladder.seconds_to(target)));
+            let _ = write!(text, "  {:>9}", seconds(curve.seconds_to(target)));
         }
-        let last = ladder.last();
+        let last = curve.last();
         let _ = writeln!(
             text,
             "  {:>6}  {:>8}  {:>7}  {:>9}  {}",
-            ladder.slope().map_or("-".to_owned(), |slope| format!("{slope:.2}")),
+            curve.slope().map_or("-".to_owned(), |slope| format!("{slope:.2}")),
             number(last.spent.rays_per_second() * 1e-6),
             number(100.0 * last.error()),
             last.calibration().map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
-            ladder.foresight().map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
+            curve.foresight().map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
         );
     }
     text
@@ -84,9 +84,9 @@ pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
 fn summary(outcomes: &[SceneOutcome]) -> String {
     let mut rows = String::new();
     for outcome in outcomes {
-        let (ladder, last) = (&outcome.ladder, outcome.ladder.last());
+        let (curve, last) = (&outcome.curve, outcome.curve.last());
         let times: String =
-            TARGETS.iter().map(|&target| format!("<td>{}</td>", seconds(ladder.seconds_to(target)))).collect();
+            TARGETS.iter().map(|&target| format!("<td>{}</td>", seconds(curve.seconds_to(target)))).collect();
         let _ = writeln!(
             rows,
             "<tr><td><a href=\"#{id}\">{}</a></td><td>{} × {}</td>{times}<td>{}</td><td>{}</td><td>{}</td>\
@@ -94,12 +94,12 @@ fn summary(outcomes: &[SceneOutcome]) -> String {
             escape(&outcome.title),
             outcome.width,
             outcome.height,
-            ladder.slope().map_or("–".to_owned(), |slope| format!("{slope:.2}")),
+            curve.slope().map_or("–".to_owned(), |slope| format!("{slope:.2}")),
             number(last.spent.rays_per_second() * 1e-6),
             number(last.spent.paths_per_second() * 1e-6),
             last.spp,
             percent(last.error()),
-            ladder.foresight().map_or("–".to_owned(), |ratio| format!("{ratio:.2}")),
+            curve.foresight().map_or("–".to_owned(), |ratio| format!("{ratio:.2}")),
             id = anchor(&outcome.title),
         );
     }
@@ -114,8 +114,8 @@ fn section(outcome: &SceneOutcome) -> String {
     let title = escape(&outcome.title);
     let mut html = format!("<h2 id=\"{}\">{title}</h2>\n", anchor(&outcome.title));
     html.push_str(&about_reference(outcome));
-    let spp = |wanted: u32| outcome.ladder.steps.iter().map(|step| step.spp).filter(|&spp| spp <= wanted).max();
-    let last = outcome.ladder.last();
+    let spp = |wanted: u32| outcome.curve.steps.iter().map(|step| step.spp).filter(|&spp| spp <= wanted).max();
+    let last = outcome.curve.last();
     html.push_str("<div class=\"pictures\">\n");
     for (picture, caption) in [
         (&outcome.early, format!("{} samples per pixel", spp(4).unwrap_or(1))),
@@ -140,7 +140,7 @@ fn section(outcome: &SceneOutcome) -> String {
         let _ = write!(html, "<figure><h3>{}</h3>\n{}{}</figure>\n", escape(&plot.title), plot.svg(), plot.legend());
     }
     html.push_str("</div>\n");
-    html.push_str(&steps_table(&outcome.ladder));
+    html.push_str(&steps_table(&outcome.curve));
     if !outcome.ablations.is_empty() {
         html.push_str(&ablation_table(outcome));
     }
@@ -168,9 +168,9 @@ fn about_reference(outcome: &SceneOutcome) -> String {
 }
 
 fn error_plot(outcome: &SceneOutcome) -> Plot {
-    let ladder = &outcome.ladder;
-    let estimates = || ladder.steps.iter().filter_map(|step| step.estimate.map(|e| (step.spent.seconds(), e)));
-    let first = ladder.steps.iter().find(|step| step.spp >= 4).unwrap_or(ladder.last());
+    let curve = &outcome.curve;
+    let estimates = || curve.steps.iter().filter_map(|step| step.estimate.map(|e| (step.spent.seconds(), e)));
+    let first = curve.steps.iter().find(|step| step.spp >= 4).unwrap_or(curve.last());
     let ideal = |seconds: f64| (seconds, first.distance.relative_mse * first.spent.seconds() / seconds);
     let series = |label: &str, color, style, points| Series { label: label.to_owned(), color, style, points };
     Plot {
@@ -178,19 +178,14 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
         x_label: "seconds".to_owned(),
         y_label: "relMSE".to_owned(),
         series: vec![
-            series("true error", 0, Style::Measured, ladder.curve()),
+            series("true error", 0, Style::Measured, curve.points()),
             series(
                 "error estimate with its 95 % interval",
                 1,
                 Style::Dashed,
                 estimates().map(|(seconds, e)| (seconds, e.relative.powi(2))).collect(),
             ),
-            series(
-                "slope −1",
-                7,
-                Style::Thin,
-                vec![ideal(first.spent.seconds()), ideal(ladder.last().spent.seconds())],
-            ),
+            series("slope −1", 7, Style::Thin, vec![ideal(first.spent.seconds()), ideal(curve.last().spent.seconds())]),
         ],
         band: Some(Band {
             color: 1,
@@ -206,13 +201,13 @@ fn error_plot(outcome: &SceneOutcome) -> Plot {
 }
 
 fn ablation_plot(outcome: &SceneOutcome) -> Plot {
-    let all = Series { label: "all".to_owned(), color: 0, style: Style::Measured, points: outcome.ladder.curve() };
+    let all = Series { label: "all".to_owned(), color: 0, style: Style::Measured, points: outcome.curve.points() };
     let used = outcome.ablations.iter().enumerate().filter(|(_, ablation)| !ablation.is_unused);
-    let without = used.map(|(i, Ablation { technique, ladder, .. })| Series {
+    let without = used.map(|(i, Ablation { technique, curve, .. })| Series {
         label: format!("without {technique}"),
         color: 1 + i % 7,
         style: Style::Thin,
-        points: ladder.curve(),
+        points: curve.points(),
     });
     Plot {
         title: "Each technique disabled alone".to_owned(),
@@ -224,9 +219,9 @@ fn ablation_plot(outcome: &SceneOutcome) -> Plot {
     }
 }
 
-fn steps_table(ladder: &ConvergenceCurve) -> String {
+fn steps_table(curve: &ConvergenceCurve) -> String {
     let mut rows = String::new();
-    for step in &ladder.steps {
+    for step in &curve.steps {
         let estimate = step.estimate.map_or("<td>–</td><td>–</td>".to_owned(), |e| {
             let interval = format!("{} ({} – {})", percent(e.relative), percent(e.low), percent(e.high));
             let Some(ratio) = step.calibration() else { return format!("<td>{interval}</td><td>–</td>") };
@@ -262,7 +257,7 @@ fn steps_table(ladder: &ConvergenceCurve) -> String {
 
 fn ablation_table(outcome: &SceneOutcome) -> String {
     let mut rows = String::new();
-    let all = outcome.ladder.last();
+    let all = outcome.curve.last();
     let row = |name: &str, step: &super::Step, cost: String| {
         format!(
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{cost}</td></tr>\n",
@@ -277,9 +272,9 @@ fn ablation_table(outcome: &SceneOutcome) -> String {
         let cost = if ablation.is_unused {
             "<span class=\"soft\">not used here</span>".to_owned()
         } else {
-            format!("{:.2}", ablation.cost(&outcome.ladder))
+            format!("{:.2}", ablation.cost(&outcome.curve))
         };
-        rows.push_str(&row(&format!("without {}", ablation.technique), ablation.ladder.last(), cost));
+        rows.push_str(&row(&format!("without {}", ablation.technique), ablation.curve.last(), cost));
     }
     format!(
         "<div class=\"wide\"><table>\n<tr><th></th><th>spp</th><th>seconds</th><th>relMSE</th>\

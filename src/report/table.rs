@@ -11,17 +11,17 @@ const HEADER: &str = "scene,width,height,without,spp,wall_s,cpu_s,threads,camera
 pub fn csv(outcomes: &[SceneOutcome]) -> String {
     let mut text = HEADER.to_owned();
     for outcome in outcomes {
-        write_ladder(&mut text, outcome, "", &outcome.ladder);
+        write_ladder(&mut text, outcome, "", &outcome.curve);
         for ablation in &outcome.ablations {
-            write_ladder(&mut text, outcome, ablation.technique, &ablation.ladder);
+            write_ladder(&mut text, outcome, ablation.technique, &ablation.curve);
         }
     }
     text
 }
 
-fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, ladder: &ConvergenceCurve) {
+fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, curve: &ConvergenceCurve) {
     let optional = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value}"));
-    for step in &ladder.steps {
+    for step in &curve.steps {
         let (spent, distance, estimate) = (step.spent, step.distance, step.estimate);
         let _ = writeln!(
             text,

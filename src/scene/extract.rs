@@ -198,7 +198,7 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
     }
     let point = |p: DVec3| (world.transform_point3(p) - origin).as_vec3();
     let vector = |v: DVec3| world.transform_vector3(v).as_vec3();
-    let even = |placement: &Placement| placement.even_scale().ok_or("balls must be scaled evenly".to_owned());
+    let even = |placement: &Placement| placement.even_scale().ok_or("spheres must be scaled evenly".to_owned());
     let shape = match &object.shape {
         Shape::Sphere { radius } => {
             let radius = (radius * even(placement)?) as f32;

@@ -64,7 +64,7 @@ impl Replay {
             CheckResult::WrongT(ratio) => ("wrong t", Some(ratio)),
             CheckResult::Missed => ("missed", None),
         };
-        self.push("verdict", Told::Text(text.to_owned()));
+        self.push("result", Told::Text(text.to_owned()));
         if let Some(ratio) = ratio {
             self.push("error_of_bound", Told::Double(ratio));
         }

@@ -271,7 +271,7 @@ fn a_ray_is_replayed_for_people_and_for_machines() {
         assert_eq!(bits(of_text), bits(of_json), "{label}:\n{told}");
     }
     assert_eq!(value("t").parse::<f32>().unwrap(), json["t"].as_f64().unwrap() as f32);
-    assert_eq!((value("verdict"), json["verdict"].as_str()), ("right", Some("right")));
+    assert_eq!((value("result"), json["result"].as_str()), ("right", Some("right")));
     assert_eq!((value("must_hit"), json["must_hit"].as_bool()), ("yes", Some(true)));
     for (args, expected) in [
         (&["--case", "closed", "--replay", "0:99999999999"][..], "stage 0 has no ray 99999999999, only 0 to "),

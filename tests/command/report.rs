@@ -68,12 +68,12 @@ fn every_technique_switched_off_leaves_the_mean_alone() {
 }
 
 #[test]
-fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
+fn a_curve_climbs_to_its_limit_and_its_error_falls() {
     let room = room();
     let settings = RenderSettings { seed: 1, ..RenderSettings::default() };
     let size = (32, 24);
     let mut told = Vec::new();
-    let rungs = measure_curve(
+    let steps = measure_curve(
         &room,
         &settings,
         size,
@@ -81,22 +81,22 @@ fn a_ladder_climbs_to_its_limit_and_its_error_falls() {
         &mut |share| told.push(share),
         &|| false,
     );
-    assert_eq!(rungs.iter().map(|rung| rung.spp).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
+    assert_eq!(steps.iter().map(|step| step.spp).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
     assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
     let truth = LinearPicture::of(&render(&room, &RenderSettings { seed: 2, ..settings }, size.0, size.1, 2048).0);
-    let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
-    // A rung is what a render of so many samples gives, to the bit.
-    assert_eq!(rungs[3].picture, LinearPicture::of(&render(&room, &settings, size.0, size.1, 8).0));
+    let curve = ConvergenceCurve::measure(&steps, &truth, &Display::default());
+    // A step is what a render of so many samples gives, to the bit.
+    assert_eq!(steps[3].picture, LinearPicture::of(&render(&room, &settings, size.0, size.1, 8).0));
     // Against samples, which take no notice of what else the machine does; against its time, only which way it goes.
-    let fall = ladder.steps[2].distance.relative_mse / ladder.last().distance.relative_mse;
+    let fall = curve.steps[2].distance.relative_mse / curve.last().distance.relative_mse;
     assert!((8f64.powf(0.6)..8f64.powf(1.6)).contains(&fall), "from 4 to 32 samples: {fall}");
-    let slope = ladder.slope().expect("four steps make a line");
+    let slope = curve.slope().expect("four steps make a line");
     assert!(slope < 0.0, "{slope}");
-    for pair in ladder.steps.windows(2) {
+    for pair in curve.steps.windows(2) {
         assert!(pair[1].spent.wall_seconds >= pair[0].spent.wall_seconds);
         assert_eq!(pair[1].spent.camera_paths, 2 * pair[0].spent.camera_paths);
     }
-    assert!(ladder.last().distance.flip < ladder.steps[0].distance.flip);
+    assert!(curve.last().distance.flip < curve.steps[0].distance.flip);
     let short =
         measure_curve(&room, &settings, size, CurveLimits { spp: 1 << 20, seconds: Some(1e-9) }, &mut |_| (), &|| {
             false
@@ -252,7 +252,7 @@ fn estimated_error_is_the_true_error_where_no_rare_light_rules() {
         let mut sums = [(0.0, 0.0); 8];
         for seed in 0..6 {
             let settings = RenderSettings { seed, ..settings };
-            let rungs = measure_curve(
+            let steps = measure_curve(
                 &prepared,
                 &settings,
                 size,
@@ -260,8 +260,8 @@ fn estimated_error_is_the_true_error_where_no_rare_light_rules() {
                 &mut |_| (),
                 &|| false,
             );
-            let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
-            for (sum, step) in sums.iter_mut().zip(&ladder.steps) {
+            let curve = ConvergenceCurve::measure(&steps, &truth, &Display::default());
+            for (sum, step) in sums.iter_mut().zip(&curve.steps) {
                 sum.0 += step.estimate.map_or(0.0, |estimate| estimate.relative.powi(2));
                 sum.1 += step.distance.relative_mse;
             }
@@ -292,9 +292,9 @@ fn the_interval_holds_the_true_error_from_few_samples_on() {
         for seed in 0..seeds {
             let settings = RenderSettings { seed, ..settings };
             let limits = CurveLimits { spp: 32, seconds: None };
-            let rungs = measure_curve(&prepared, &settings, size, limits, &mut |_| (), &|| false);
-            let ladder = ConvergenceCurve::measure(&rungs, &truth, &Display::default());
-            for step in ladder.steps.iter().filter(|step| step.spp >= 4) {
+            let steps = measure_curve(&prepared, &settings, size, limits, &mut |_| (), &|| false);
+            let curve = ConvergenceCurve::measure(&steps, &truth, &Display::default());
+            for step in curve.steps.iter().filter(|step| step.spp >= 4) {
                 let (k, told) = (step.spp.ilog2() as usize - 2, step.estimate.unwrap());
                 held[k] += u32::from((told.low..=told.high).contains(&step.error()));
                 widths[k] += (told.high / told.low).sqrt() / f64::from(seeds);

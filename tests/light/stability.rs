@@ -84,7 +84,7 @@ fn names_are_unique_and_rays_can_be_replayed() {
     }
     let closed = Case::find("closed").unwrap();
     let told = closed.replay(0, 7, 10_000_000).unwrap();
-    assert_eq!(told.get("verdict"), Some(&Told::Text("right".to_owned())), "{told}");
+    assert_eq!(told.get("result"), Some(&Told::Text("right".to_owned())), "{told}");
     assert_eq!(told, closed.replay(0, 7, 1_000_000_000).unwrap(), "a ray is the same one in a longer run");
 }
 

@@ -76,9 +76,9 @@ impl Primitives for BallPrimitives<'_> {
 impl SphereTree {
     /// One radius per centre; radii positive, all numbers finite.
     pub fn build(centers: &[Vec3], radii: &[f32]) -> Self {
-        assert_eq!(centers.len(), radii.len(), "each ball needs a centre and a radius");
+        assert_eq!(centers.len(), radii.len(), "each sphere needs a centre and a radius");
         let (centers, radii) = (centers.to_vec(), radii.to_vec());
-        assert!(centers.len() < MAX_PRIMS, "a cloud of more than 2^31 balls");
+        assert!(centers.len() < MAX_PRIMS, "a cloud of more than 2^31 spheres");
         let balls = BallPrimitives { centers: &centers, radii: &radii };
         let make_block = |prims: &[u32]| SphereBlock::new(prims, |prim| balls.ball(prim));
         let tree = BlockTree::build(&balls, &BuildPreset::Best.config(BLOCK), make_block, |_| Vec::new());

@@ -54,13 +54,13 @@ pub fn add(world: &mut World, new: &NewThing) {
         }
         NewThing::AreaLight => {
             let radiance = ColorParam::Rgb(Vec3::new(12.0, 11.0, 9.5));
-            let material = new_material(world, "lamp", Material::Emissive { radiance });
+            let material = new_material(world, "light", Material::Emissive { radiance });
             let edge = 2.0 * size;
             // u × v looks down.
             let shape = Shape::Quad { edge_u: edge * DVec3::X, edge_v: edge * DVec3::Z };
             let corner =
                 place + spot::headroom(world, place, 6.0 * size) * DVec3::Y - 0.5 * edge * (DVec3::X + DVec3::Z);
-            spawn(world, "lamp", (shape, Placement::at(corner), MaterialSlots(vec![material])))
+            spawn(world, "area light", (shape, Placement::at(corner), MaterialSlots(vec![material])))
         }
         NewThing::PointLight => {
             let intensity = Vec3::splat((50.0 * size * size) as f32);

@@ -220,7 +220,7 @@ impl Check<'_> {
         if must_scale_evenly && placement.is_some_and(|placement| placement.even_scale().is_none()) {
             self.wrong(
                 &format!("{path}/transform"),
-                "balls stay round: scale them by one factor, or use a mesh for an ellipsoid",
+                "spheres stay round: scale them by one factor, or use a mesh for an ellipsoid",
             );
         }
         match object {
@@ -279,7 +279,7 @@ impl Check<'_> {
         let reach = steps.iter().map(|(count, step)| f64::from(*count) * step.abs()).fold(first.abs(), |a, b| a + b);
         if n == 0 || n > SceneFile::MAX_GRID_BALLS || steps.len() > 3 {
             let message =
-                format!("a grid has one to three rows and up to {} balls, not {n}", SceneFile::MAX_GRID_BALLS);
+                format!("a grid has one to three rows and up to {} spheres, not {n}", SceneFile::MAX_GRID_BALLS);
             self.wrong(&format!("{path}/steps"), message);
         } else {
             self.point(&format!("{path}/first"), first);
@@ -289,7 +289,7 @@ impl Check<'_> {
 
     fn balls(&mut self, path: &str, centers: &[DVec3], radii: &RadiiPart) {
         if centers.is_empty() {
-            self.wrong(&format!("{path}/centers"), "there are no balls: give at least one centre");
+            self.wrong(&format!("{path}/centers"), "there are no spheres: give at least one centre");
         }
         if let Some(i) = centers.iter().position(|center| !is_coordinate(*center)) {
             self.point(&format!("{path}/centers/{i}"), centers[i]);

@@ -48,7 +48,7 @@ impl Techniques {
             ("even samples (Owen-Sobol\u{2019})", Self { even_samples: false, ..all }),
             ("lights by solid angle", Self { solid_angle: false, ..all }),
             ("choice of lights by contribution", Self { light_selection: false, ..all }),
-            ("paths from the lamps", Self { caustics: false, ..all }),
+            ("light paths", Self { caustics: false, ..all }),
             ("Russian roulette", Self { roulette: false, ..all }),
         ]
     }
