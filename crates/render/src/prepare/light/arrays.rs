@@ -4,14 +4,12 @@
 
 use crate::core::material::ColorInput;
 use crate::prepare::light::emitter::Light;
-use crate::prepare::light::shape::{
-    CLOSE, LARGE_SOLID_ANGLE, LightShape, SMALL_SOLID_ANGLE, cos_at_center, pdf_by_area, sample_sphere,
-};
-use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc, uniform_triangle};
-use crate::sampling::{SphericalQuad, SphericalTriangle};
+use crate::prepare::light::flat::{FlatPoint, QuadLight, TriangleLight, pdf_by_area};
+use crate::prepare::light::shape::{CLOSE, LightShape, cos_at_center, sample_sphere};
+use crate::sampling::warp::{cone_pdf, one_minus_cos_from_sin2, uniform_disc};
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{
-    Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, frame_around, padded, select, select_vector,
+    Bits, Elementary, Float, LANES, Mask, Real, Simd, Vector, Vector3, frame_around, padded, select, select_vector,
 };
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -69,24 +67,23 @@ impl LightArrays {
             let ColorInput::Constant(radiance) = light.emission.radiance else { return None };
             let radiance = light.emission.scale * radiance;
             let (flag, origin, u, v, normal, rest) = match &light.shape {
-                LightShape::Triangle { vertices: [a, b, c], normal, area: _ } => {
-                    let error = gamma(7) * (a.abs() + b.abs() + c.abs());
-                    (TRIANGLE, *a, *b - *a, *c - *a, *normal, [0.0, 0.0, 0.0, normal.abs().dot(error)])
+                LightShape::Triangle { light, .. } => {
+                    let [e1, e2] = light.edges;
+                    (TRIANGLE, light.first, e1, e2, light.normal, [0.0, 0.0, 0.0, light.lift])
                 }
                 LightShape::Sphere { center, radius } => {
-                    (SPHERE, *center, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, [0.0, 0.0, *radius, 0.0])
+                    let nowhere = Vec3::ZERO.into();
+                    (SPHERE, Vector3::from(*center), nowhere, nowhere, nowhere, [0.0, 0.0, *radius, 0.0])
                 }
-                LightShape::Quad { corner, edge_u, edge_v, normal, area: _, rectangle } => {
-                    let (length_u, length_v) = (edge_u.length(), edge_v.length());
-                    let error = gamma(8) * (corner.abs() + edge_u.abs() + edge_v.abs());
-                    let rest = [length_u, length_v, 0.0, normal.abs().dot(error)];
-                    let flag = if rectangle.is_some() { RECTANGLE } else { 0 };
-                    (flag, *corner, *edge_u / length_u, *edge_v / length_v, *normal, rest)
+                LightShape::Quad { light, .. } => {
+                    let ([u, v], [length_u, length_v]) = (light.units, light.lengths);
+                    let flag = if light.is_rectangle { RECTANGLE } else { 0 };
+                    (flag, light.corner, u, v, light.normal, [length_u, length_v, 0.0, light.lift])
                 }
             };
             flags.push(if light.is_point { flag | POINT } else { flag });
             let [length_u, length_v, radius, lift] = rest;
-            let vectors = [origin, u, v, normal, radiance].map(|v| v.to_array());
+            let vectors = [origin, u, v, normal, radiance.into()].map(|v| Vec3::from(v).to_array());
             let values = vectors.as_flattened().iter().copied();
             let values = values.chain([length_u, length_v, radius, light.shape.area(), lift]);
             rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
@@ -151,11 +148,11 @@ impl LightArrays {
             all = Some(self.spheres(by_angle, id, spheres, position, u));
         }
         if triangles != 0 {
-            let found = self.triangles(by_angle, id, triangles, position, u);
+            let found = LightLanes::of(self.triangle(id).sample(by_angle, triangles, position, u));
             all = Some(all.map_or(found, |all| found.over(triangles, all)));
         }
         if quads != 0 && self.has_quads {
-            let found = self.quads(by_angle, id, quads, position, u);
+            let found = LightLanes::of(self.quad(id).sample(by_angle, quads, position, u));
             all = Some(all.map_or(found, |all| found.over(quads, all)));
         }
         let zero = u[0].all(0.0);
@@ -175,27 +172,15 @@ impl LightArrays {
     ) -> Float<S> {
         let flags = Bits::gather(&self.flags, id);
         let origin = Vector::gather(&self.origin, id);
-        let area = Float::gather(&self.area, id);
         let relative = origin - position;
-        let (zero, one) = (distance.all(0.0), distance.all(1.0));
+        let zero = distance.all(0.0);
         let mut pdf = zero;
-        if self.has_quads || self.has_triangles {
-            let normal = Vector::gather(&self.normal, id);
-            let cos = -wi.dot(normal);
-            let by_area = pdf_by_area(distance, cos, area);
-            pdf = select(cos.is_positive() & area.is_positive(), by_area, zero);
-            if by_angle && self.has_triangles {
-                let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
-                let angle = SphericalTriangle::new(relative, e1, e2).solid_angle();
-                pdf = select(flags.has(TRIANGLE) & large_enough(angle), one / angle, pdf);
-            }
-            if by_angle && self.has_quads {
-                let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
-                let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
-                let corner = Vector { x: relative.dot(unit_u), y: relative.dot(unit_v), z: relative.dot(normal) };
-                let angle = SphericalQuad::new(corner, [length_u, length_v], area).solid_angle();
-                pdf = select(flags.has(RECTANGLE) & one.all(SMALL_SOLID_ANGLE).le(angle), one / angle, pdf);
-            }
+        if self.has_quads {
+            pdf = self.quad(id).pdf(by_angle, position, wi, distance);
+        }
+        if self.has_triangles {
+            let of_triangle = self.triangle(id).pdf(by_angle, position, wi, distance);
+            pdf = select(flags.has(TRIANGLE), of_triangle, pdf);
         }
         if self.has_spheres {
             let radius = Float::gather(&self.radius, id);
@@ -203,6 +188,7 @@ impl LightArrays {
             let of_sphere = if by_angle {
                 cone_pdf(one_minus_cos_from_sin2(r2 / distance2))
             } else {
+                let area = Float::gather(&self.area, id);
                 let cos = wi.dot(relative - wi * distance) / radius;
                 select(cos.is_positive(), pdf_by_area(distance, cos, area), zero)
             };
@@ -212,93 +198,27 @@ impl LightArrays {
     }
 
     #[inline(always)]
-    pub fn quads<S: Simd>(
-        &self,
-        by_angle: bool,
-        id: Bits<S>,
-        mask: Mask,
-        position: Vector<S>,
-        u: [Float<S>; 2],
-    ) -> LightLanes<S> {
-        let corner = Vector::gather(&self.origin, id);
-        let (unit_u, unit_v) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
-        let (length_u, length_v) = (Float::gather(&self.length_u, id), Float::gather(&self.length_v, id));
-        let (normal, area) = (Vector::gather(&self.normal, id), Float::gather(&self.area, id));
-        let relative = corner - position;
-        let height = relative.dot(normal);
-        let zero = height.all(0.0);
-        let seen = mask & height.lt(zero);
-        let mut uv = u;
-        let (mut angle, mut solid_angle) = (0, area);
-        if by_angle {
-            let corner = Vector { x: relative.dot(unit_u), y: relative.dot(unit_v), z: height };
-            let quad = SphericalQuad::new(corner, [length_u, length_v], area);
-            let rectangle = Bits::gather(&self.flags, id).has(RECTANGLE);
-            solid_angle = quad.solid_angle();
-            angle = rectangle & zero.all(SMALL_SOLID_ANGLE).le(solid_angle);
-            if angle & seen != 0 {
-                let [x, y] = quad.sample(u);
-                uv = [select(angle, x, u[0]), select(angle, y, u[1])];
-            }
+    fn quad<S: Simd>(&self, id: Bits<S>) -> QuadLight<Float<S>> {
+        QuadLight {
+            corner: Vector::gather(&self.origin, id),
+            units: [Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id)],
+            lengths: [Float::gather(&self.length_u, id), Float::gather(&self.length_v, id)],
+            normal: Vector::gather(&self.normal, id),
+            area: Float::gather(&self.area, id),
+            lift: Float::gather(&self.lift, id),
+            is_rectangle: Bits::gather(&self.flags, id).has(RECTANGLE),
         }
-        let point = corner + unit_u * (uv[0] * length_u) + unit_v * (uv[1] * length_v);
-        let offset = point - position;
-        let distance = offset.length();
-        let wi = offset * (distance.all(1.0) / distance);
-        let cos = -wi.dot(normal);
-        let by_area = pdf_by_area(distance, cos, area);
-        let pdf = select(angle, zero.all(1.0) / solid_angle, by_area);
-        let found = seen & zero.lt(distance) & (angle | zero.lt(cos));
-        // The rounding of the point, and what the kernel loses over the distance.
-        let lift =
-            Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
-        LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi }
     }
 
     #[inline(always)]
-    pub fn triangles<S: Simd>(
-        &self,
-        by_angle: bool,
-        id: Bits<S>,
-        mask: Mask,
-        position: Vector<S>,
-        u: [Float<S>; 2],
-    ) -> LightLanes<S> {
-        let first = Vector::gather(&self.origin, id);
-        let (e1, e2) = (Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id));
-        let (normal, area) = (Vector::gather(&self.normal, id), Float::gather(&self.area, id));
-        let relative = first - position;
-        let (zero, one) = (area.all(0.0), area.all(1.0));
-        let mut found = mask & relative.dot(normal).lt(zero);
-        let mut weights = uniform_triangle(u);
-        let (mut angle, mut solid_angle) = (0, one);
-        if by_angle {
-            let triangle = SphericalTriangle::new(relative, e1, e2);
-            solid_angle = triangle.solid_angle();
-            angle = large_enough(solid_angle);
-            if angle & found != 0 {
-                let (dir, seen) = triangle.sample(u);
-                found &= !angle | seen;
-                // Where the direction meets the plane (Möller and Trumbore 1997).
-                let p = dir.cross(e2);
-                let per_determinant = one / p.dot(e1);
-                let from = -relative;
-                let b1 = (from.dot(p) * per_determinant).at_least(0.0).at_most(1.0);
-                let b2 = (dir.dot(from.cross(e1)) * per_determinant).at_least(0.0).at_most(1.0);
-                let over = (b1 + b2).at_least(1.0);
-                weights = [select(angle, b1 / over, weights[0]), select(angle, b2 / over, weights[1])];
-            }
+    fn triangle<S: Simd>(&self, id: Bits<S>) -> TriangleLight<Float<S>> {
+        TriangleLight {
+            first: Vector::gather(&self.origin, id),
+            edges: [Vector::gather(&self.unit_u, id), Vector::gather(&self.unit_v, id)],
+            normal: Vector::gather(&self.normal, id),
+            area: Float::gather(&self.area, id),
+            lift: Float::gather(&self.lift, id),
         }
-        let point = first + e1 * weights[0] + e2 * weights[1];
-        let offset = point - position;
-        let distance = offset.length();
-        let wi = offset * (one / distance);
-        let cos = -wi.dot(normal);
-        let pdf = select(angle, one / solid_angle, pdf_by_area(distance, cos, area));
-        let found = found & zero.lt(distance) & (angle | (zero.lt(cos) & zero.lt(area)));
-        let lift =
-            Float::gather(&self.lift, id) + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
-        LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi }
     }
 
     #[inline(always)]
@@ -362,6 +282,11 @@ impl LightArrays {
 }
 
 impl<S: Simd> LightLanes<S> {
+    #[inline(always)]
+    fn of(FlatPoint { found, target, wi, pdf, uv: _ }: FlatPoint<Float<S>>) -> Self {
+        Self { found, target, wi, pdf, radiance: wi }
+    }
+
     /// These where the bit is set, else the others.
     #[inline(always)]
     pub fn over(self, mask: Mask, other: Self) -> Self {
@@ -373,12 +298,6 @@ impl<S: Simd> LightLanes<S> {
             radiance: other.radiance,
         }
     }
-}
-
-/// Triangles that are sampled by solid angle.
-#[inline(always)]
-fn large_enough<S: Simd>(solid_angle: Float<S>) -> Mask {
-    solid_angle.all(SMALL_SOLID_ANGLE).le(solid_angle) & solid_angle.le(solid_angle.all(LARGE_SOLID_ANGLE))
 }
 
 /// Puts in what [`sample_sphere`] finds for the lanes of `close`.

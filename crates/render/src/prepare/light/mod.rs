@@ -5,6 +5,7 @@
 
 pub(crate) mod arrays;
 pub(crate) mod emitter;
+pub(crate) mod flat;
 mod sample_simd;
 mod selection;
 pub(crate) mod shape;

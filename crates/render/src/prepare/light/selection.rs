@@ -146,7 +146,7 @@ impl LightBounds {
                 let radius = 0.5 * (edge_u + edge_v).length().max((edge_u - edge_v).length());
                 (corner + 0.5 * (edge_u + edge_v), radius, normal, area)
             }
-            LightShape::Triangle { vertices, normal, area } => {
+            LightShape::Triangle { vertices, normal, area, .. } => {
                 let center = (vertices[0] + vertices[1] + vertices[2]) / 3.0;
                 let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f32::max);
                 (center, radius, normal, area)

@@ -1,8 +1,7 @@
 //! Points on spheres, quads and triangles as seen from a shading point, by solid angle where that is stable.
 
-use crate::sampling::{
-    SphericalQuad, SphericalTriangle, cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle,
-};
+use crate::prepare::light::flat::{FlatPoint, QuadLight, TriangleLight, pdf_by_area};
+use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle};
 use firstlight_kdtree::geometry::{Frame, robust};
 use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
@@ -20,22 +19,16 @@ pub(crate) enum LightShape {
         edge_v: Vec3,
         normal: Vec3,
         area: f32,
-        /// Unit edges and their lengths when they are at right angles.
-        rectangle: Option<Rectangle>,
+        /// The same as it is sampled.
+        light: QuadLight<f32>,
     },
     Triangle {
         vertices: [Vec3; 3],
         normal: Vec3,
         area: f32,
+        /// As of a quad.
+        light: TriangleLight<f32>,
     },
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rectangle {
-    unit_u: Vec3,
-    unit_v: Vec3,
-    length_u: f32,
-    length_v: f32,
 }
 
 /// A sampled point on a light.
@@ -61,39 +54,39 @@ pub(crate) struct SurfaceOfLight {
     pub uv: Vec2,
 }
 
-/// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
-/// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
-pub(crate) const SMALL_SOLID_ANGLE: f32 = 1e-3;
-
-/// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
-pub(crate) const LARGE_SOLID_ANGLE: f32 = 6.0;
-
-impl Rectangle {
-    /// - `corner`: relative to the point that it is seen from.
-    #[inline]
-    fn seen(self, corner: Vec3) -> SphericalQuad<f32> {
-        let Self { unit_u, unit_v, length_u, length_v } = self;
-        let corner = Vec3::new(corner.dot(unit_u), corner.dot(unit_v), corner.dot(unit_u.cross(unit_v)));
-        SphericalQuad::new(corner.into(), [length_u, length_v], length_u * length_v)
-    }
-}
-
 impl LightShape {
     pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Self {
         let cross = edge_u.cross(edge_v);
         let area = cross.length();
         let (length_u, length_v) = (edge_u.length(), edge_v.length());
-        // At right angles as far as the numbers can tell.
-        let square = edge_u.dot(edge_v).abs() <= 8.0 * f32::EPSILON * length_u * length_v;
-        let rectangle =
-            square.then(|| Rectangle { unit_u: edge_u / length_u, unit_v: edge_v / length_v, length_u, length_v });
-        Self::Quad { corner, edge_u, edge_v, normal: cross / area, area, rectangle }
+        let normal = cross / area;
+        let error = robust::gamma(8) * (corner.abs() + edge_u.abs() + edge_v.abs());
+        let light = QuadLight {
+            corner: corner.into(),
+            units: [(edge_u / length_u).into(), (edge_v / length_v).into()],
+            lengths: [length_u, length_v],
+            normal: normal.into(),
+            area,
+            lift: normal.abs().dot(error),
+            // At right angles as far as the numbers can tell.
+            is_rectangle: edge_u.dot(edge_v).abs() <= 8.0 * f32::EPSILON * length_u * length_v,
+        };
+        Self::Quad { corner, edge_u, edge_v, normal, area, light }
     }
 
     pub fn triangle(vertices: [Vec3; 3]) -> Self {
-        let cross = (vertices[1] - vertices[0]).cross(vertices[2] - vertices[0]);
-        let length = cross.length();
-        Self::Triangle { vertices, normal: cross.normalize_or(Vec3::Z), area: 0.5 * length }
+        let [a, b, c] = vertices;
+        let cross = (b - a).cross(c - a);
+        let (normal, area) = (cross.normalize_or(Vec3::Z), 0.5 * cross.length());
+        let error = robust::gamma(7) * (a.abs() + b.abs() + c.abs());
+        let light = TriangleLight {
+            first: a.into(),
+            edges: [(b - a).into(), (c - a).into()],
+            normal: normal.into(),
+            area,
+            lift: normal.abs().dot(error),
+        };
+        Self::Triangle { vertices, normal, area, light }
     }
 
     /// Square metres, of the side that emits.
@@ -157,59 +150,11 @@ impl LightShape {
         match *self {
             Self::Sphere { center, radius } if by_angle => sample_sphere(center, radius, position, u),
             Self::Sphere { center, radius } => sample_sphere_area(center, radius, position, u),
-            Self::Quad { corner, edge_u, edge_v, normal, area, rectangle } => {
-                let relative = corner - position;
-                if relative.dot(normal) >= 0.0 {
-                    return None;
-                }
-                let by_angle = rectangle
-                    .filter(|_| by_angle)
-                    .map(|r| r.seen(relative))
-                    .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
-                let uv = by_angle.map_or(u, |quad| quad.sample(u.to_array()).into());
-                let point = corner + uv.x * edge_u + uv.y * edge_v;
-                let (wi, distance) = direction(position, point)?;
-                let pdf = match by_angle {
-                    Some(quad) => 1.0 / quad.solid_angle(),
-                    None => area_pdf(distance, wi, normal, area)?,
-                };
-                let error = robust::gamma(4) * (corner.abs() + edge_u.abs() + edge_v.abs());
-                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv })
+            Self::Quad { light, normal, .. } => {
+                LightPoint::of(light.sample(by_angle, true, position.into(), u.to_array()), normal)
             }
-            Self::Triangle { vertices, normal, area } => {
-                let [a, b, c] = vertices;
-                let relative = vertices.map(|v| v - position);
-                if relative[0].dot(normal) >= 0.0 {
-                    return None;
-                }
-                let by_angle = by_angle.then(|| spherical_triangle(relative)).flatten();
-                let weights = match by_angle {
-                    Some(triangle) => {
-                        let (e1, e2) = (b - a, c - a);
-                        let (d, seen) = triangle.sample(u.to_array());
-                        if !seen {
-                            return None;
-                        }
-                        let d = Vec3::from(d);
-                        // Where the direction meets the plane (Möller and Trumbore 1997).
-                        let p = d.cross(e2);
-                        let determinant = p.dot(e1);
-                        let s = -relative[0];
-                        let (b1, b2) = (s.dot(p) / determinant, d.dot(s.cross(e1)) / determinant);
-                        let (b1, b2) = (b1.clamp(0.0, 1.0), b2.clamp(0.0, 1.0));
-                        let over = (b1 + b2).max(1.0);
-                        Vec2::new(b1, b2) / over
-                    }
-                    None => uniform_triangle(u.to_array()).into(),
-                };
-                let point = a + weights.x * (b - a) + weights.y * (c - a);
-                let (wi, distance) = direction(position, point)?;
-                let pdf = match by_angle {
-                    Some(triangle) => 1.0 / triangle.solid_angle(),
-                    None => area_pdf(distance, wi, normal, area)?,
-                };
-                let error = robust::gamma(7) * (a.abs() + b.abs() + c.abs());
-                Some(LightPoint { target: lifted(point, error, normal, distance), wi, pdf, normal, uv: weights })
+            Self::Triangle { light, normal, .. } => {
+                LightPoint::of(light.sample(by_angle, true, position.into(), u.to_array()), normal)
             }
         }
     }
@@ -230,24 +175,17 @@ impl LightShape {
                     area_pdf(distance, wi, normal, self.area()).unwrap_or(0.0)
                 }
             }
-            Self::Quad { corner, normal, area, rectangle, .. } => {
-                let by_angle = rectangle
-                    .filter(|_| by_angle)
-                    .map(|r| r.seen(corner - position))
-                    .filter(|quad| quad.solid_angle() >= SMALL_SOLID_ANGLE);
-                match by_angle {
-                    Some(quad) => 1.0 / quad.solid_angle(),
-                    None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
-                }
-            }
-            Self::Triangle { vertices, normal, area } => {
-                let by_angle = by_angle.then(|| spherical_triangle(vertices.map(|v| v - position))).flatten();
-                match by_angle {
-                    Some(triangle) => 1.0 / triangle.solid_angle(),
-                    None => area_pdf(distance, wi, normal, area).unwrap_or(0.0),
-                }
-            }
+            Self::Quad { light, .. } => light.pdf(by_angle, position.into(), wi.into(), distance),
+            Self::Triangle { light, .. } => light.pdf(by_angle, position.into(), wi.into(), distance),
         }
+    }
+}
+
+impl LightPoint {
+    /// `None` where the point is not seen.
+    #[inline]
+    fn of(FlatPoint { found, target, wi, pdf, uv }: FlatPoint<f32>, normal: Vec3) -> Option<Self> {
+        found.then(|| Self { target: target.into(), wi: wi.into(), pdf, normal, uv: uv.into() })
     }
 }
 
@@ -378,14 +316,6 @@ fn area_pdf(distance: f32, wi: Vec3, normal: Vec3, area: f32) -> Option<f32> {
     (cos > 0.0 && area > 0.0).then(|| pdf_by_area(distance, cos, area))
 }
 
-/// Per steradian, of points that are even over an area.
-///
-/// - `distance`: metres; `cos`: at the light; `area`: square metres.
-#[inline(always)]
-pub(crate) fn pdf_by_area<R: Real>(distance: R, cos: R, area: R) -> R {
-    distance * distance / (cos * area)
-}
-
 /// Cosine of the angle at the centre of a sphere between the point that is seen and the one that looks (Pharr et al., section
 /// 6.2.4), written so that nothing cancels for a sphere of few pixels.
 ///
@@ -394,12 +324,6 @@ pub(crate) fn pdf_by_area<R: Real>(distance: R, cos: R, area: R) -> R {
 pub(crate) fn cos_at_center<R: Real>(sin2: R, cos: R, sin2_max: R) -> R {
     let rest = (cos.all(1.0) - sin2 / sin2_max).at_least(0.0);
     (sin2 / sin2_max.sqrt() + cos * rest.sqrt()).at_most(1.0)
-}
-
-#[inline]
-fn spherical_triangle([a, b, c]: [Vec3; 3]) -> Option<SphericalTriangle<f32>> {
-    let triangle = SphericalTriangle::new(a.into(), (b - a).into(), (c - a).into());
-    (SMALL_SOLID_ANGLE..=LARGE_SOLID_ANGLE).contains(&triangle.solid_angle()).then_some(triangle)
 }
 
 #[cfg(test)]
@@ -445,7 +369,7 @@ mod tests {
                     let point = corner.as_dvec3() + a * edge_u.as_dvec3() + b * edge_v.as_dvec3();
                     (point, normal.as_dvec3(), f64::from(area))
                 }
-                LightShape::Triangle { vertices, normal, area } => {
+                LightShape::Triangle { vertices, normal, area, .. } => {
                     let [p, q, r] = vertices.map(Vec3::as_dvec3);
                     let (s, t) = (1.0 - a.sqrt(), b * a.sqrt());
                     (p + s * (q - p) + t * (r - p), normal.as_dvec3(), f64::from(area))

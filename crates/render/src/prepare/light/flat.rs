@@ -1,0 +1,192 @@
+//! Quads and triangles that shine, as seen from one point or from sixteen.
+
+use crate::sampling::{SphericalQuad, SphericalTriangle, uniform_triangle};
+use firstlight_kdtree::geometry::robust::{gamma, offset_along};
+use firstlight_simd::{Elementary, Real, Truth, Vector3, select};
+
+/// Below this solid angle (steradians) flat lights are sampled by area: seen so small, the two densities hardly
+/// differ, while the inversion of angles loses its last digits. Both are exact; sampling and pdf agree on the choice.
+const SMALL_SOLID_ANGLE: f32 = 1e-3;
+
+/// Above it (half a sphere and more) the spherical triangle formulas lose theirs.
+const LARGE_SOLID_ANGLE: f32 = 6.0;
+
+/// A parallelogram.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct QuadLight<R: Real> {
+    pub corner: Vector3<R>,
+    /// Unit, along the edges.
+    pub units: [Vector3<R>; 2],
+    /// Of the edges, metres.
+    pub lengths: [R; 2],
+    /// Unit, on the side that shines.
+    pub normal: Vector3<R>,
+    /// Square metres.
+    pub area: R,
+    /// Bound on the error of its points along the normal, metres.
+    pub lift: R,
+    /// Whether its edges are at right angles.
+    pub is_rectangle: R::Mask,
+}
+
+/// A triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleLight<R> {
+    pub first: Vector3<R>,
+    /// From the first vertex to the others.
+    pub edges: [Vector3<R>; 2],
+    /// As of [`QuadLight`].
+    pub normal: Vector3<R>,
+    pub area: R,
+    pub lift: R,
+}
+
+/// A sampled point.
+pub(crate) struct FlatPoint<R: Real> {
+    /// Whether there is one that is seen.
+    pub found: R::Mask,
+    /// Where a shadow ray ends, off the light by the bound on its error.
+    pub target: Vector3<R>,
+    /// Unit.
+    pub wi: Vector3<R>,
+    /// Per steradian.
+    pub pdf: R,
+    /// Along the edges, 0..1.
+    pub uv: [R; 2],
+}
+
+impl<R: Elementary> QuadLight<R> {
+    /// A point of the front: even over the solid angle of rectangles where that is stable and `by_angle`, else over the area.
+    ///
+    /// - `asked`: for which lanes; `u`: two independent uniform numbers in `[0, 1)`.
+    #[inline(always)]
+    pub fn sample(&self, by_angle: bool, asked: R::Mask, position: Vector3<R>, u: [R; 2]) -> FlatPoint<R> {
+        let Self { corner, units, lengths, normal, .. } = *self;
+        let relative = corner - position;
+        let seen = asked & relative.dot(normal).is_negative();
+        let (mut uv, mut angle) = (u, None);
+        if by_angle {
+            let quad = self.seen_from(relative);
+            let large = self.is_rectangle & is_large(quad.solid_angle());
+            if (large & seen).any() {
+                let [x, y] = quad.sample(u);
+                uv = [select(large, x, u[0]), select(large, y, u[1])];
+            }
+            angle = Some((large, quad.solid_angle()));
+        }
+        let point = corner + units[0] * (uv[0] * lengths[0]) + units[1] * (uv[1] * lengths[1]);
+        flat_point([point, position, normal], uv, [self.area, self.lift], seen, angle)
+    }
+
+    /// Density of [`Self::sample`], per steradian.
+    ///
+    /// - `wi`, `distance`: to the point, unit and in metres.
+    #[inline(always)]
+    pub fn pdf(&self, by_angle: bool, position: Vector3<R>, wi: Vector3<R>, distance: R) -> R {
+        let pdf = front_pdf(distance, -wi.dot(self.normal), self.area);
+        if !by_angle {
+            return pdf;
+        }
+        let angle = self.seen_from(self.corner - position).solid_angle();
+        select(self.is_rectangle & is_large(angle), angle.all(1.0) / angle, pdf)
+    }
+
+    /// - `relative`: the corner about the point that it is seen from.
+    #[inline(always)]
+    fn seen_from(&self, relative: Vector3<R>) -> SphericalQuad<R> {
+        let (x, y) = (relative.dot(self.units[0]), relative.dot(self.units[1]));
+        SphericalQuad::new(Vector3 { x, y, z: relative.dot(self.normal) }, self.lengths, self.area)
+    }
+}
+
+impl<R: Elementary> TriangleLight<R> {
+    /// As [`QuadLight::sample`].
+    #[inline(always)]
+    pub fn sample(&self, by_angle: bool, asked: R::Mask, position: Vector3<R>, u: [R; 2]) -> FlatPoint<R> {
+        let Self { first, edges: [e1, e2], normal, area, .. } = *self;
+        let (relative, one) = (first - position, area.all(1.0));
+        let mut seen = asked & relative.dot(normal).is_negative();
+        let (mut uv, mut angle) = (uniform_triangle(u), None);
+        if by_angle {
+            let triangle = SphericalTriangle::new(relative, e1, e2);
+            let stable = is_stable(triangle.solid_angle());
+            if (stable & seen).any() {
+                let (dir, has_area) = triangle.sample(u);
+                seen &= !stable | has_area;
+                // Where the direction meets the plane (Möller and Trumbore 1997).
+                let p = dir.cross(e2);
+                let per_determinant = one / p.dot(e1);
+                let from = -relative;
+                let b1 = (from.dot(p) * per_determinant).at_least(0.0).at_most(1.0);
+                let b2 = (dir.dot(from.cross(e1)) * per_determinant).at_least(0.0).at_most(1.0);
+                let over = (b1 + b2).at_least(1.0);
+                uv = [select(stable, b1 / over, uv[0]), select(stable, b2 / over, uv[1])];
+            }
+            angle = Some((stable, triangle.solid_angle()));
+        }
+        let point = first + e1 * uv[0] + e2 * uv[1];
+        flat_point([point, position, normal], uv, [area, self.lift], seen, angle)
+    }
+
+    /// As [`QuadLight::pdf`].
+    #[inline(always)]
+    pub fn pdf(&self, by_angle: bool, position: Vector3<R>, wi: Vector3<R>, distance: R) -> R {
+        let pdf = front_pdf(distance, -wi.dot(self.normal), self.area);
+        if !by_angle {
+            return pdf;
+        }
+        let angle = SphericalTriangle::new(self.first - position, self.edges[0], self.edges[1]).solid_angle();
+        select(is_stable(angle), angle.all(1.0) / angle, pdf)
+    }
+}
+
+/// A point that was chosen, as seen from `position`.
+///
+/// - `angle`: whether it was chosen by solid angle, and that.
+#[inline(always)]
+fn flat_point<R: Real>(
+    [point, position, normal]: [Vector3<R>; 3],
+    uv: [R; 2],
+    [area, lift]: [R; 2],
+    seen: R::Mask,
+    angle: Option<(R::Mask, R)>,
+) -> FlatPoint<R> {
+    let offset = point - position;
+    let distance = offset.length();
+    let one = distance.all(1.0);
+    let wi = offset * (one / distance);
+    let cos = -wi.dot(normal);
+    let front = cos.is_positive() & area.is_positive();
+    let (mut pdf, mut valid) = (pdf_by_area(distance, cos, area), front);
+    if let Some((by_angle, solid_angle)) = angle {
+        (pdf, valid) = (select(by_angle, one / solid_angle, pdf), by_angle | front);
+    }
+    // The rounding of the point, and what the kernel loses when it works out where a ray from so far away crosses the light.
+    let lift = lift + distance * gamma(16) * (normal.x.abs() + normal.y.abs() + normal.z.abs());
+    let found = seen & distance.is_positive() & valid;
+    FlatPoint { found, target: offset_along(point, lift, normal), wi, pdf, uv }
+}
+
+/// [`pdf_by_area`] of the front; 0 of the back.
+#[inline(always)]
+fn front_pdf<R: Real>(distance: R, cos: R, area: R) -> R {
+    select(cos.is_positive() & area.is_positive(), pdf_by_area(distance, cos, area), distance.all(0.0))
+}
+
+/// Per steradian, of points that are even over an area.
+///
+/// - `distance`: metres; `cos`: at the light; `area`: square metres.
+#[inline(always)]
+pub(crate) fn pdf_by_area<R: Real>(distance: R, cos: R, area: R) -> R {
+    distance * distance / (cos * area)
+}
+
+#[inline(always)]
+fn is_large<R: Real>(solid_angle: R) -> R::Mask {
+    solid_angle.all(SMALL_SOLID_ANGLE).le(solid_angle)
+}
+
+#[inline(always)]
+fn is_stable<R: Real>(solid_angle: R) -> R::Mask {
+    is_large(solid_angle) & solid_angle.le(solid_angle.all(LARGE_SOLID_ANGLE))
+}
