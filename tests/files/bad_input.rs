@@ -198,7 +198,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     let before = entries();
     // Usage.
     for args in [
-        &["render", "cornell"][..],
+        &["render", "cornell", "-o"][..],
         &["render", "cornell", "-o", "a.png", "--spp", "0"],
         &["render", "cornell", "-o", "a.png", "--spp", "many"],
         &["render", "cornell", "-o", "a.png", "--size", "0x10"],
