@@ -355,7 +355,7 @@ impl<'a> Writer<'a> {
                 EnvironmentPart::Image { file: file.clone(), scale: Rgb(*scale), rotate }
             }
             (Environment::Image { .. }, _) => {
-                self.losses.push("the picture around the scene came from no file and is left out".to_owned());
+                self.losses.push("the environment image came from no file and was omitted".to_owned());
                 EnvironmentPart::Black
             }
         }

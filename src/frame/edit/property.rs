@@ -78,7 +78,7 @@ impl MaterialKind {
 
     pub fn label(self) -> &'static str {
         match self {
-            Self::Diffuse => "matte",
+            Self::Diffuse => "diffuse",
             Self::Mirror => "mirror",
             Self::Metal => "metal",
             Self::Glass => "glass",

@@ -38,7 +38,7 @@ pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: 
             if let Some(current) = current {
                 ui.weak(shared_by(current));
             }
-            let hint = "gives this object a copy of the material, so that a change does not show on others";
+            let hint = "give this object its own copy of the material, so that changes do not affect others";
             if ui.small_button("Make unique").on_hover_text(hint).clicked() {
                 asked.edit(Edit::OwnMaterial { id });
             }
@@ -141,7 +141,7 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
     match material {
         Material::Metal { alpha, fresnel, .. } => {
             if let Some(alpha) = number(alpha) {
-                let hint = "0: a mirror, 1: matte; its square is the width α of the GGX lobe";
+                let hint = "0: mirror, 1: rough; its square is the width α of the GGX lobe";
                 Scale::new("roughness", hint, Property::Alpha, 0.032..=1.0).show(ui, id, alpha, asked);
             }
             row(ui, "Fresnel", |ui| {
@@ -163,17 +163,17 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
         }
         Material::Phong { ambient, specular, shininess, transparency, ior, .. } => {
             let share = |name, hint, property| Scale::new(name, hint, property, 0.0..=1.0);
-            share("ambient", "share of the ambient light", Property::Ambient).show(ui, id, f64::from(*ambient), asked);
+            share("ambient", "ambient reflectance", Property::Ambient).show(ui, id, f64::from(*ambient), asked);
             if let Some(specular) = number(specular) {
-                share("specular", "share of mirrored light", Property::Specular).show(ui, id, specular, asked);
+                share("specular", "specular reflectance", Property::Specular).show(ui, id, specular, asked);
             }
-            Scale::new("shininess", "exponent of the highlight", Property::Shininess, 1.0..=10_000.0).show(
+            Scale::new("shininess", "Phong exponent", Property::Shininess, 1.0..=10_000.0).show(
                 ui,
                 id,
                 f64::from(*shininess),
                 asked,
             );
-            let hint = "share of light that passes through";
+            let hint = "transmittance";
             share("transparency", hint, Property::Transparency).show(ui, id, f64::from(*transparency), asked);
             IOR.show(ui, id, f64::from(*ior), asked);
         }
@@ -181,10 +181,10 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
             let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
             row(ui, "of", |ui| {
                 let text = format!("{} and {}", name(a), name(b));
-                ui.add(egui::Label::new(text).truncate()).on_hover_text("each has an editor in the list of materials");
+                ui.add(egui::Label::new(text).truncate()).on_hover_text("edit them in the list of materials");
             });
             if let Some(weight) = number(weight) {
-                let hint = "0: the first of the two alone, 1: the second alone";
+                let hint = "0: only the first, 1: only the second";
                 Scale::new("weight", hint, Property::Weight, 0.0..=1.0).show(ui, id, weight, asked);
             }
         }
