@@ -11,6 +11,16 @@ use firstlight::render::{Integrator, RenderSettings, explain, light_from_lamps};
 use firstlight::scene::{Extraction, Files, FilmSize, Rendering, SceneInputs};
 use glam::{DVec3, UVec2};
 
+pub const COLUMNS: &str = "\
+Columns, as luminance:
+  visible   light that reaches the camera from the emitter without a bounce
+  direct    light after one bounce
+  indirect  light after two or more bounces
+  total     their sum
+  share     part of the luminance of the pixel
+
+`sampled by` splits the light between BSDF sampling and light sampling, as weighted by multiple importance sampling.";
+
 #[derive(Args, Clone, Debug)]
 pub struct ExplainArgs {
     #[command(flatten)]

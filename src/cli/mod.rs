@@ -80,6 +80,7 @@ impl SimdArg {
 #[derive(Subcommand)]
 enum CliCommand {
     /// Render a scene to a picture file, without a window.
+    #[command(after_help = render_args::EXAMPLES)]
     Render(Box<render_args::RenderCommand>),
     /// Measure error against time, and the benefit of each sampling technique.
     Report(report::ReportArgs),
@@ -92,8 +93,10 @@ enum CliCommand {
     /// Show what a scene contains, which features it uses and what is not modelled.
     Info(info::InfoArgs),
     /// Explain a pixel: which lights contribute to it, after how many bounces, along which paths.
+    #[command(after_help = explain::COLUMNS)]
     Explain(explain::ExplainArgs),
     /// Reduce the number of triangles of a model and measure the deviation from the original.
+    #[command(after_help = simplify::EXAMPLES)]
     Simplify(simplify::SimplifyArgs),
     /// Print a completion script for a shell.
     Completions(completions::CompletionsArgs),
@@ -204,6 +207,9 @@ fn builtin_help() -> String {
         "Built-in scenes:{rows}\n\nEnvironment variables:\n  \
          NO_COLOR           Print help and errors without colours\n  \
          RUST_LOG           Log filter, such as info or firstlight=debug\n  \
-         FIRSTLIGHT_LIMITS  Factor for the limits on input size, such as 2"
+         FIRSTLIGHT_LIMITS  Factor for the limits on input size, such as 2\n\n\
+         Exit status:\n  \
+         0 success, 1 failure, 2 usage error, 130 stopped by Ctrl+C (what was rendered is saved)\n\n\
+         Settings and bookmarks of the window are kept in $XDG_CONFIG_HOME/firstlight (Linux)"
     )
 }

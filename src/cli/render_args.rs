@@ -13,6 +13,16 @@ use std::path::{Path, PathBuf};
 /// Samples per pixel when neither a number, a time nor an error is given.
 pub const DEFAULT_SPP: u32 = 256;
 
+pub const EXAMPLES: &str = "\
+Examples:
+  firstlight render cornell -o cornell.png --spp 64
+  firstlight render model.obj --env sky.hdr -o model.exr --error 1%
+  firstlight render scene.ron -o scene.png --film scene.exr --time 60
+  firstlight render scene.ron -o scene.png --film scene.exr --resume --time 60
+  firstlight render picture.png -o larger.png --scale 2
+
+`firstlight --help` lists the built-in scenes.";
+
 /// What is to be rendered, and where to.
 #[derive(Args, Clone, Debug)]
 pub struct RenderCommand {

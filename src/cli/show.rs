@@ -10,7 +10,7 @@ use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
 use firstlight::render::Film;
 use firstlight::scene::ImageSamples;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Args, Clone, Debug)]
 pub struct ShowArgs {
@@ -70,7 +70,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     let source = args.scene.source()?;
     if let Some(record) = &args.record {
         let mut files = OverwriteArgs::default().files();
-        files.read_all(source.path().map(Path::to_path_buf))?;
+        files.read_all(source.path().map(std::path::Path::to_path_buf))?;
         check_recordable(record).map_err(Failure::Failed)?;
         files.write(record)?;
     }

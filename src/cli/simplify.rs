@@ -13,6 +13,11 @@ use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, loa
 use std::path::PathBuf;
 use std::time::Instant;
 
+pub const EXAMPLES: &str = "\
+Examples:
+  firstlight simplify bunny.obj -o small.obj --ratio 10%
+  firstlight simplify bunny.obj -o close.obj --error 0.1%";
+
 #[derive(Args, Clone, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct SimplifyArgs {

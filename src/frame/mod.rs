@@ -72,7 +72,7 @@ pub use scene_bounds::SceneBounds;
 pub use scheduler::{RenderStep, Scheduler, StepReport};
 pub use selection::{OwnBox, Picked, Projector, Selection, pick};
 pub use session::{Session, SessionOptions, Stage};
-pub use settings::{SceneBookmarks, Settings, SettingsStore};
+pub use settings::{Navigation, SceneBookmarks, Settings, SettingsStore};
 pub use status::{Message, MessageKind, Picture, Status};
 pub use views::{Bookmarks, ViewTrail};
 pub use worker::{ViewOptions, Waker};

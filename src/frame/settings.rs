@@ -22,6 +22,30 @@ pub struct Settings {
     pub display: Option<DisplayPart>,
     /// What was opened last comes first: built-in names and whole paths.
     pub recent: Vec<String>,
+    /// Keys and gestures.
+    pub navigation: Navigation,
+}
+
+/// Whose keys and gestures the window obeys.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Navigation {
+    #[default]
+    Firstlight,
+    Blender,
+    Maya,
+}
+
+impl Navigation {
+    pub const ALL: [Self; 3] = [Self::Firstlight, Self::Blender, Self::Maya];
+
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Firstlight => "firstlight",
+            Self::Blender => "Blender",
+            Self::Maya => "Maya",
+        }
+    }
 }
 
 impl Settings {

@@ -61,9 +61,7 @@ impl Extraction {
         let mut materials = MaterialIds::default();
         let mut problems = Vec::new();
         if let Some(bad) = inputs.camera.and_then(|camera| camera.check().err()) {
-            problems.push(format!(
-                "the camera is left out, and the picture is taken from where it would be without one: {bad}"
-            ));
+            problems.push(format!("the camera is ignored, and the default camera is used: {bad}"));
         }
         let mut geometry = (Vec::new(), Vec::new());
         let mut entities = Vec::new();
@@ -86,7 +84,7 @@ impl Extraction {
                 }
                 Err(reason) => {
                     let name = object.name.clone().unwrap_or_else(|| object.entity.to_string());
-                    problems.push(format!("object `{name}` is left out: {reason}"));
+                    problems.push(format!("object `{name}` is ignored: {reason}"));
                 }
             }
         }
@@ -94,7 +92,7 @@ impl Extraction {
             let center = (light.placement.translation - origin).as_vec3();
             let radius = light.light.radius as f32;
             if !(radius.is_normal() && radius > 0.0 && center.is_finite()) {
-                problems.push(format!("point light {} is left out: its radius is {radius}", light.entity));
+                problems.push(format!("point light {} is ignored: its radius is {radius}", light.entity));
                 continue;
             }
             geometry.0.push(kdtree::Shape::Sphere { center, radius });
@@ -194,11 +192,11 @@ fn shape_of(object: &ObjectInput, trees: &Trees, origin: DVec3) -> Result<(kdtre
     let world = placement.affine();
     let determinant = world.matrix3.determinant();
     if !world.is_finite() || !determinant.is_finite() || determinant == 0.0 {
-        return Err("its placement is not finite or squeezes it flat".to_owned());
+        return Err("its transform is not finite or flattens it".to_owned());
     }
     let point = |p: DVec3| (world.transform_point3(p) - origin).as_vec3();
     let vector = |v: DVec3| world.transform_vector3(v).as_vec3();
-    let even = |placement: &Placement| placement.even_scale().ok_or("spheres must be scaled evenly".to_owned());
+    let even = |placement: &Placement| placement.even_scale().ok_or("spheres need a uniform scale".to_owned());
     let shape = match &object.shape {
         Shape::Sphere { radius } => {
             let radius = (radius * even(placement)?) as f32;

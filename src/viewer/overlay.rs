@@ -1,7 +1,8 @@
 //! What is written over the picture: the status line, messages, and the list of keys.
 
-use super::keys::{BINDINGS, Binding, KeyGroup, finds};
+use super::keys::{Binding, finds, shown};
 use super::toasts::{Toast, Tone};
+use crate::frame::Navigation;
 use crate::printable;
 use crate::render::{Legend, scale_color};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
@@ -92,11 +93,25 @@ pub struct Help {
     search: String,
     /// Just opened: the search field takes the keyboard.
     fresh: bool,
+    /// Somebody has typed into the search field or clicked it: letters are meant for it.
+    touched: bool,
+    /// The search field has the keyboard, though perhaps only because the list was opened.
+    focused: bool,
 }
 
 impl Help {
     pub fn toggle(&mut self) {
-        *self = Self { open: !self.open, search: String::new(), fresh: true };
+        *self = Self { open: !self.open, search: String::new(), fresh: true, touched: false, focused: false };
+    }
+
+    /// Somebody has typed a letter, which the search field gets when it is drawn next.
+    pub fn note_letter(&mut self) {
+        self.touched |= self.open && (self.fresh || self.focused);
+    }
+
+    /// The letter that opened it closes it again, until letters are meant for the search field.
+    pub fn closes_by_its_letter(&self) -> bool {
+        self.open && !self.touched && (self.fresh || self.focused)
     }
 
     /// It is about to be drawn for the first time.
@@ -106,12 +121,12 @@ impl Help {
 }
 
 /// The list of keys, in the middle, to be searched and scrolled.
-pub fn help(context: &Context, help: &mut Help) {
+pub fn help(context: &Context, help: &mut Help, navigation: Navigation) {
     let screen = context.content_rect();
     let column_width = 430.0_f32.min(screen.width() - 60.0).max(120.0);
     let columns = if screen.width() >= 2.0 * column_width + 80.0 { 2 } else { 1 };
     let height = (screen.height() - 130.0).max(60.0);
-    let Help { open, search, fresh } = help;
+    let Help { open, search, fresh, touched, focused } = help;
     egui::Window::new("Keys and mouse")
         .open(open)
         .anchor(Align2::CENTER_CENTER, Vec2::new(0.0, -8.0))
@@ -125,16 +140,14 @@ pub fn help(context: &Context, help: &mut Help) {
             if std::mem::take(fresh) {
                 field.request_focus();
             }
+            *touched |= field.changed() || field.clicked();
+            *focused = field.has_focus() || field.gained_focus();
             ui.add_space(4.0);
-            let found = |group: &KeyGroup| -> Vec<&'static Binding> {
-                let is_found = |binding: &&Binding| finds(&binding.line(group.title), search);
-                group.bindings.iter().filter(is_found).collect()
-            };
-            let groups: Vec<(&str, Vec<&Binding>)> = BINDINGS
-                .iter()
-                .map(|group| (group.title, found(group)))
-                .filter(|(_, found)| !found.is_empty())
-                .collect();
+            let mut groups = shown(navigation);
+            for (title, bindings) in &mut groups {
+                bindings.retain(|binding| finds(&binding.line(title), search));
+            }
+            groups.retain(|(_, found)| !found.is_empty());
             egui::ScrollArea::vertical().auto_shrink([false, false]).max_height(height - 36.0).show(ui, |ui| {
                 if groups.is_empty() {
                     ui.weak("no matches");

@@ -72,8 +72,11 @@ fn values_out_of_range_are_named_with_what_is_expected() {
         (object(r#"sphere(radius: NaN, material: "red")"#), "the radius is NaN"),
         (object(r#"sphere(center: (inf, 0, 0), radius: 1, material: "red")"#), "must be finite"),
         (object(r#"sphere(center: (1e300, 0, 0), radius: 1, material: "red")"#), "must be finite and within"),
-        (object(r#"sphere(radius: 1, material: "red", transform: (scale: (1, 2, 1)))"#), "spheres stay round"),
-        (object(r#"sphere(radius: 1, material: "red", transform: (scale: 0))"#), "squeezes the object flat"),
+        (
+            object(r#"sphere(radius: 1, material: "red", transform: (scale: (1, 2, 1)))"#),
+            "spheres need a uniform scale",
+        ),
+        (object(r#"sphere(radius: 1, material: "red", transform: (scale: 0))"#), "flattens the object"),
         (object(r#"plane(normal: (0, 0, 0), material: "red")"#), "the normal is (0, 0, 0)"),
         (object(r#"quad(edge_u: (1, 0, 0), edge_v: (2, 0, 0), material: "red")"#), "the quad has no area"),
         (object(r#"triangle(vertices: ((0, 0, 0), (1, 0, 0), (2, 0, 0)), material: "red")"#), "triangle has no area"),
@@ -88,8 +91,8 @@ fn values_out_of_range_are_named_with_what_is_expected() {
         (material("diffuse(albedo: (0.5, NaN, 0.5))"), "between 0 and 1"),
         (material("metal(alpha: 2, reflectance: 1)"), "`alpha` is 2"),
         (material("glass(ior: 0)"), "`ior` is 0, but must be positive"),
-        (material("emissive(radiance: (1, -1, 0))"), "nowhere negative"),
-        (material("blend(weight: 0.5, a: \"m\", b: \"m\")"), "blends itself"),
+        (material("emissive(radiance: (1, -1, 0))"), "not negative"),
+        (material("blend(weight: 0.5, a: \"m\", b: \"m\")"), "contains itself"),
         (with(&["film: (width: 0, height: 4)"]), "has no pixels"),
         (with(&["film: (width: 60000, height: 60000)"]), "GiB"),
         (with(&["film: (width: 4000000000, height: 4000000000)"]), "GiB"),
@@ -198,7 +201,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     let before = entries();
     // Usage.
     for args in [
-        &["render", "cornell"][..],
+        &["render", "cornell", "-o"][..],
         &["render", "cornell", "-o", "a.png", "--spp", "0"],
         &["render", "cornell", "-o", "a.png", "--spp", "many"],
         &["render", "cornell", "-o", "a.png", "--size", "0x10"],
@@ -226,7 +229,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     for (args, expected) in [
         (&["render", "none.ron", "-o", "a.png"][..], "no such file"),
         (&["render", "none.obj", "-o", "a.png"], "no such file"),
-        (&["render", "notes.txt", "-o", "a.png"], "use a scene (.ron) or a model (.obj)"),
+        (&["render", "notes.txt", "-o", "a.png"], "expected a scene (.ron), a model (.obj)"),
         (&["render", "cornell", "-o", "nowhere/a.png"], "there is no folder nowhere"),
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),

@@ -4,5 +4,6 @@
 mod desktop;
 
 mod guest;
+mod navigation;
 mod tools;
 mod window;

@@ -17,8 +17,8 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
         return sky::set(world, property, value);
     }
     let entity = entity.filter(|&entity| world.get_entity(entity).is_ok());
-    let entity = entity.ok_or("what was to be changed is gone")?;
-    let wrong = || format!("this has no {property:?}");
+    let entity = entity.ok_or("the object no longer exists")?;
+    let wrong = || format!("this object has no {property:?}");
     if let Some(placement) = world.get::<Placement>(entity).copied()
         && let Some(placement) = with_placement(placement, property, value)
     {
@@ -26,7 +26,7 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
         return Ok(());
     }
     if property == Property::Radius && !(value.x > 0.0) {
-        return Err("a radius is above 0".to_owned());
+        return Err("a radius must be above 0".to_owned());
     }
     if let (Some(Shape::Sphere { .. }), Property::Radius) = (world.get::<Shape>(entity), property) {
         set_if_different(world, entity, Shape::Sphere { radius: value.x });
@@ -103,7 +103,7 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
 
 /// Keeps the colour, where both have one.
 pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result<(), String> {
-    let old = SurfaceMaterial::of(world, entity).ok_or("this is not a material")?;
+    let old = SurfaceMaterial::of(world, entity).ok_or("not a material")?;
     if old.kind() == kind {
         return Ok(());
     }

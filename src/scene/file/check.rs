@@ -155,7 +155,9 @@ impl Check<'_> {
                 Param::Part(part) => {
                     self.material_name(&path, part);
                     if self.reaches(part, name) {
-                        let message = format!("material `{name}` blends itself: a blend must end in plain materials");
+                        let message = format!(
+                            "material `{name}` contains itself: a blend must end in materials that are not blends"
+                        );
                         self.wrong(&path, message);
                         return;
                     }
@@ -220,7 +222,7 @@ impl Check<'_> {
         if must_scale_evenly && placement.is_some_and(|placement| placement.even_scale().is_none()) {
             self.wrong(
                 &format!("{path}/transform"),
-                "spheres stay round: scale them by one factor, or use a mesh for an ellipsoid",
+                "spheres need a uniform scale: use one factor, or a mesh for an ellipsoid",
             );
         }
         match object {
@@ -246,7 +248,10 @@ impl Check<'_> {
             }
             ObjectPart::Mesh { source, simplify, material, materials, .. } => {
                 if material.is_some() && materials.is_some() {
-                    self.wrong(&format!("{path}/materials"), "`material` and `materials` say the same thing: give one");
+                    self.wrong(
+                        &format!("{path}/materials"),
+                        "`material` and `materials` exclude each other: set one of them",
+                    );
                 }
                 for (i, name) in materials.iter().flatten().enumerate() {
                     self.material_name(&format!("{path}/materials/{i}"), name);
@@ -262,7 +267,9 @@ impl Check<'_> {
                 {
                     self.wrong(
                         &format!("{path}/simplify"),
-                        format!("`simplify` is {ratio}, but is the share of faces to keep: above 0, at most 1"),
+                        format!(
+                            "`simplify` is {ratio}, but must be above 0 and at most 1: it is the ratio of faces to keep"
+                        ),
                     );
                 }
             }
@@ -289,7 +296,7 @@ impl Check<'_> {
 
     fn balls(&mut self, path: &str, centers: &[DVec3], radii: &RadiiPart) {
         if centers.is_empty() {
-            self.wrong(&format!("{path}/centers"), "there are no spheres: give at least one centre");
+            self.wrong(&format!("{path}/centers"), "there are no spheres: add at least one centre");
         }
         if let Some(i) = centers.iter().position(|center| !is_coordinate(*center)) {
             self.point(&format!("{path}/centers/{i}"), centers[i]);
@@ -298,7 +305,11 @@ impl Check<'_> {
             RadiiPart::All(radius) => self.size(&format!("{path}/radii"), "the radius", *radius),
             RadiiPart::Each(radii) if radii.len() != centers.len() => self.wrong(
                 &format!("{path}/radii"),
-                format!("there are {} radii for {} centres: give one each, or all(radius)", radii.len(), centers.len()),
+                format!(
+                    "there are {} radii for {} centres: use one per centre, or all(radius)",
+                    radii.len(),
+                    centers.len()
+                ),
             ),
             RadiiPart::Each(radii) => {
                 if let Some(i) = radii.iter().position(|radius| !is_size(*radius)) {
@@ -311,7 +322,10 @@ impl Check<'_> {
     /// The placement that the transform means, when it means one.
     fn transform(&mut self, path: &str, part: &TransformPart) -> Option<Placement> {
         if part.matrix.is_some() && (part.translate.is_some() || part.rotate.is_some() || part.scale.is_some()) {
-            self.wrong(&format!("{path}/matrix"), "a matrix says all: remove `translate`, `rotate` and `scale`, or it");
+            self.wrong(
+                &format!("{path}/matrix"),
+                "`matrix` excludes `translate`, `rotate` and `scale`: use one or the others",
+            );
             return None;
         }
         let placement = Placement::from_part(part);
@@ -324,7 +338,7 @@ impl Check<'_> {
             );
             None
         } else if !(SceneFile::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant.abs()) {
-            self.wrong(path, "the transform squeezes the object flat: no scale may be 0");
+            self.wrong(path, "the transform flattens the object: no scale may be 0");
             None
         } else {
             Some(placement)
@@ -369,7 +383,7 @@ impl Check<'_> {
     fn light(&mut self, path: &str, Rgb(rgb): Rgb) {
         if !(rgb.is_finite() && rgb.cmpge(Vec3::ZERO).all()) {
             let Vec3 { x, y, z } = rgb;
-            self.wrong(path, format!("({x}, {y}, {z}) must be finite and nowhere negative"));
+            self.wrong(path, format!("({x}, {y}, {z}) must be finite and not negative"));
         }
     }
 

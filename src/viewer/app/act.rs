@@ -2,7 +2,9 @@
 
 use super::App;
 use crate::console;
-use crate::frame::{Command, Edit, Explaining, Focus, FocusTarget, PictureFormat, Selection, ViewMode, gizmo};
+use crate::frame::{
+    Command, Edit, Explaining, Focus, FocusTarget, Navigation, PictureFormat, Selection, ViewMode, gizmo,
+};
 use crate::render::{Inspection, Integrator};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
@@ -35,6 +37,9 @@ impl App {
         }
         if asked.toggle_drag {
             self.toggle_drag(now);
+        }
+        if let Some(navigation) = asked.navigation {
+            self.set_navigation(navigation, now);
         }
         if let Some(purpose) = asked.dialog {
             self.ask_for_file(purpose, now);
@@ -99,10 +104,11 @@ impl App {
                     None => Some(modes[0]),
                     Some(mode) => modes.into_iter().skip_while(|other| *other != mode).nth(1),
                 };
-                let name = self.panel.gizmo.map_or("no handles", gizmo::Mode::label);
-                let hint =
-                    if self.session.world().resource::<Selection>().0.is_empty() { ": click an object" } else { "" };
-                self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
+                self.tell_handles(now);
+            }
+            Action::Gizmo(mode) => {
+                self.panel.gizmo = mode;
+                self.tell_handles(now);
             }
             Action::ToggleSpin => self.input.toggle_spin(now),
             Action::ToggleDrag => self.toggle_drag(now),
@@ -148,6 +154,23 @@ impl App {
     pub(super) fn scene_path(&self, new: bool) -> PathBuf {
         let known = self.session.scene_file().filter(|_| !new);
         known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene))
+    }
+
+    fn tell_handles(&mut self, now: Instant) {
+        let name = self.panel.gizmo.map_or("none", gizmo::Mode::label);
+        let is_empty = self.session.world().resource::<Selection>().0.is_empty();
+        let hint = if is_empty && self.panel.gizmo.is_some() { " (click an object)" } else { "" };
+        self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
+    }
+
+    /// Keys and gestures from now on, and in the next window.
+    fn set_navigation(&mut self, navigation: Navigation, now: Instant) {
+        self.input.set_navigation(navigation, now);
+        let trouble = self.memory.keep_navigation(navigation);
+        self.toasts.add(Tone::News, format!("navigation: {} (H lists the keys)", navigation.label()), now);
+        if let Some(trouble) = trouble {
+            self.toasts.add(Tone::Problem, trouble, now);
+        }
     }
 
     fn toggle_drag(&mut self, now: Instant) {
@@ -203,6 +226,11 @@ impl App {
     }
 
     pub(super) fn screenshot(&mut self, linear: bool) {
+        // The film comes when the workers have a moment; that the key was seen is said at once.
+        self.toasts.add(Tone::News, "screenshot: saving …", Instant::now());
+        if let Some(window) = &self.window {
+            window.request_redraw();
+        }
         let format = if linear { PictureFormat::Exr } else { PictureFormat::Png };
         let status = self.session.status();
         let picture = self.session.picture();
@@ -215,7 +243,7 @@ impl App {
         {
             let size = (size.0.saturating_mul(self.panel.scale), size.1.saturating_mul(self.panel.scale));
             let larger = Larger { prepared, settings, size, spp, threads: self.session.status().threads };
-            let news = format!("rendering {} × {} with {spp} spp in the background", size.0, size.1);
+            let news = format!("screenshot: rendering {} × {} with {spp} spp in the background", size.0, size.1);
             self.toasts.add(Tone::News, news, Instant::now());
             self.saver.save_larger(larger, draft, display, &scene, format);
             return;
@@ -230,7 +258,8 @@ impl App {
                 let coarse = if kept.coarse { " (low resolution: the view changed too soon)" } else { "" };
                 let news = format!("saved {}{coarse}", kept.path.display());
                 console::inform(&news);
-                self.toasts.add(Tone::News, news, now);
+                // In place of the word that it is under way.
+                self.toasts.add(Tone::News, format!("screenshot: {news}"), now);
             }
             Err(error) => {
                 console::remark(format_args!("error: {error}"));

@@ -47,12 +47,14 @@ impl App {
             speed: self.input.speed(),
             spinning: self.input.is_spinning(),
             orbits: self.input.orbits(),
+            navigation: self.input.navigation(),
             place: self.input.place(),
             memory: panel.shown.then(memory_of_process).flatten(),
             brush: brush.is_armed(),
             recent: self.memory.recent(),
         };
         let mut asked = panel::Asked::default();
+        let navigation = self.input.navigation();
         let (question, mut answer) = (&self.leaving.question, None);
         let (left, right) = figures.split_once('\n').unwrap_or((&figures, ""));
         let (toasts, help, overlays) = (self.toasts.at(now), &mut self.help, self.overlays);
@@ -86,7 +88,7 @@ impl App {
                 overlay::toasts(context, toasts);
             }
             if help.open {
-                overlay::help(context, help);
+                overlay::help(context, help, navigation);
             }
             if let Some(question) = question {
                 answer = question.show(context);

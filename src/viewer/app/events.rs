@@ -38,6 +38,11 @@ impl ApplicationHandler<Wake> for App {
             self.draw_or_leave(event_loop);
             return;
         }
+        if self.closes_help(&event) {
+            self.repaint_at = Some(now);
+            self.stirred = true;
+            return;
+        }
         let Some(presenter) = &mut self.presenter else { return };
         let response = presenter.on_window_event(&event);
         // Overlays take the keyboard only while somebody types into them; they always want Tab, which is ours.
@@ -75,6 +80,9 @@ impl ApplicationHandler<Wake> for App {
                 let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
                 let is_for_help = self.help.is_fresh() && matches!(event.logical_key, Key::Character(_));
                 if pressed && (typing || is_for_help) && !(leaves && self.help.open) {
+                    if matches!(event.logical_key, Key::Character(_)) {
+                        self.help.note_letter();
+                    }
                     return;
                 }
                 if pressed {
@@ -179,5 +187,22 @@ impl ApplicationHandler<Wake> for App {
         // The device goes before the display does.
         self.presenter = None;
         self.window = None;
+    }
+}
+
+impl App {
+    /// H closes the list that H opened, as long as nobody types into its search field; before overlays see the letter.
+    fn closes_help(&mut self, event: &WindowEvent) -> bool {
+        let WindowEvent::KeyboardInput { event, is_synthetic: false, .. } = event else { return false };
+        let modifiers = self.input.modifiers();
+        let is_plain = !modifiers.control_key() && !modifiers.alt_key() && !modifiers.super_key();
+        let is_letter = matches!(&event.logical_key, Key::Character(text) if text.eq_ignore_ascii_case("h"));
+        let closes = event.state.is_pressed() && is_letter && is_plain && self.help.closes_by_its_letter();
+        let closes = closes && self.leaving.question.is_none();
+        // A key that is held down neither opens and closes it again and again nor types.
+        if closes && !event.repeat {
+            self.help.toggle();
+        }
+        closes
     }
 }

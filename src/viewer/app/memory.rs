@@ -1,6 +1,6 @@
 //! What is kept from one run to the next: the bookmarks of each scene, what was opened lately, the window's size.
 
-use crate::frame::{Bookmarks, Command, CurrentScene, Recovery, SceneBookmarks, Session, SettingsStore};
+use crate::frame::{Bookmarks, Command, CurrentScene, Navigation, Recovery, SceneBookmarks, Session, SettingsStore};
 use crate::scene::SceneSource;
 
 /// What the store has, as far as it is known here.
@@ -91,6 +91,18 @@ impl Memory {
         unreadable.into_iter().chain(unkept).collect()
     }
 
+    /// Keys and gestures, as they were chosen last.
+    pub fn navigation(&self) -> Navigation {
+        self.store.settings().0.navigation
+    }
+
+    /// For the next window.
+    pub fn keep_navigation(&self, navigation: Navigation) -> Option<String> {
+        let mut settings = self.store.settings().0;
+        settings.navigation = navigation;
+        self.store.keep_settings(&settings).err()
+    }
+
     /// For the next window, logical pixels.
     pub fn keep_window(&self, size: (u32, u32)) -> Option<String> {
         let mut settings = self.store.settings().0;
@@ -158,7 +170,9 @@ mod tests {
         session.adopt(load(&SceneSource::Scene(path), &LoadOptions::default()).unwrap());
         follow(&mut session, &mut third);
         assert_eq!(*session.world().resource::<Bookmarks>(), kept);
-        assert_eq!(second.keep_window((700, 500)), None);
+        assert_eq!(second.navigation(), Navigation::Firstlight);
+        assert_eq!(second.keep_navigation(Navigation::Maya), None);
+        assert_eq!((second.keep_window((700, 500)), second.navigation()), (None, Navigation::Maya));
         assert_eq!(second.store.settings().0.window, Some((700, 500)));
         assert_eq!(second.store.settings().0.recent[1..], ["cornell", "ball"]);
     }

@@ -275,7 +275,7 @@ impl App {
             session,
             saver: Saver::new(&options.folder, waker.clone()),
             dialog: Dialog::new(waker),
-            input: Input::new(options.width, options.height),
+            input: Input::new(options.width, options.height, memory.navigation()),
             toasts: Toasts::default(),
             help: Help::default(),
             panel: PanelState::default(),

@@ -8,7 +8,7 @@ mod sum;
 mod tests;
 
 use super::keys::{Action, Motion, action_of, motion_of};
-use crate::frame::{Command, Edit};
+use crate::frame::{Command, Edit, Navigation};
 use std::time::{Duration, Instant};
 use sum::{Sum, add};
 use winit::event::MouseButton;
@@ -29,6 +29,8 @@ const TAP: f64 = 1.0 / 30.0;
 /// Degrees for a drag over the picture's height.
 const LOOK_DRAG_DEG: f64 = 90.0;
 const ORBIT_DRAG_DEG: f64 = 240.0;
+/// A drag over the picture's height divides the distance to the pivot by e to this.
+const ZOOM_DRAG: f64 = 2.0;
 /// Pixels that a pressed mouse may tremble without turning the view.
 const CLICK_SLACK: f64 = 4.0;
 const DOUBLE_CLICK: Duration = Duration::from_millis(400);
@@ -42,6 +44,7 @@ const SPEED_RANGE: (f64, f64) = (1.0 / 256.0, 256.0);
 /// What is being pressed and dragged, and what that adds up to since it was last asked.
 #[derive(Debug)]
 pub struct Input {
+    navigation: Navigation,
     modifiers: ModifiersState,
     held: Vec<Held>,
     drag: Option<Drag>,
@@ -73,8 +76,12 @@ struct Held {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DragKind {
     Look,
+    /// Looks about, and letters fly as long as it lasts.
+    Fly,
     Orbit,
     Pan,
+    /// Nearer to the pivot or farther from it.
+    Zoom,
     Focus,
 }
 
@@ -85,14 +92,15 @@ struct Drag {
     /// Where the mouse was last; until it `moved` out of the slack, where it was pressed.
     last: [f64; 2],
     moved: bool,
-    /// Of a click: select beside what is selected.
-    add: bool,
+    /// Begun with Ctrl: a click selects beside what is selected, a drag orbits.
+    ctrl: bool,
 }
 
 impl Input {
     /// For a window of this size, physical pixels.
-    pub fn new(width: u32, height: u32) -> Self {
+    pub fn new(width: u32, height: u32, navigation: Navigation) -> Self {
         Self {
+            navigation,
             modifiers: ModifiersState::empty(),
             held: Vec::new(),
             drag: None,
@@ -116,6 +124,24 @@ impl Input {
         // What was held so far was held with the old ones.
         self.count(now);
         self.modifiers = modifiers;
+    }
+
+    /// Keys and gestures.
+    pub fn navigation(&self) -> Navigation {
+        self.navigation
+    }
+
+    /// Other keys and gestures from now on.
+    pub fn set_navigation(&mut self, navigation: Navigation, now: Instant) {
+        self.release_motions(now, |_| true);
+        self.drag = None;
+        self.navigation = navigation;
+    }
+
+    /// Whether holding this key moves: under a preset, letters fly only while a drag does.
+    fn moves(&self, motion: Motion) -> bool {
+        let flies = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
+        self.navigation == Navigation::Firstlight || !motion.flies() || flies
     }
 
     /// Strides a second.
@@ -216,7 +242,7 @@ impl Input {
                 return None;
             }
             // With Ctrl or Super, letters are commands of the program or of the desktop.
-            if !self.modifiers.control_key() && !self.modifiers.super_key() {
+            if self.moves(motion) && !self.modifiers.control_key() && !self.modifiers.super_key() {
                 let flies = |motion| {
                     !matches!(motion, Motion::OrbitLeft | Motion::OrbitRight | Motion::OrbitUp | Motion::OrbitDown)
                 };
@@ -230,7 +256,7 @@ impl Input {
                 return None;
             }
         }
-        let action = pressed.then(|| action_of(physical, typed, self.modifiers)).flatten()?;
+        let action = pressed.then(|| action_of(self.navigation, physical, typed, self.modifiers)).flatten()?;
         // Only steps repeat: a toggle held down would flicker, a screenshot held down would fill the disk.
         let steps = matches!(
             action,
@@ -248,11 +274,37 @@ impl Input {
 
     /// The window lost the keyboard: whatever is let go now will not be told.
     pub fn release_all(&mut self, now: Instant) {
-        while let Some(held) = self.held.last() {
-            self.release(held.motion, now);
-        }
+        self.release_motions(now, |_| true);
         self.drag = None;
         self.modifiers = ModifiersState::empty();
+    }
+
+    fn release_motions(&mut self, now: Instant, which: impl Fn(Motion) -> bool) {
+        let motions: Vec<Motion> = self.held.iter().map(|held| held.motion).filter(|motion| which(*motion)).collect();
+        for motion in motions {
+            self.release(motion, now);
+        }
+    }
+
+    /// What a drag with this button does, if anything.
+    fn kind_of_drag(&self, button: MouseButton) -> Option<DragKind> {
+        use MouseButton::{Left, Middle, Right};
+        let Modifiers { ctrl, shift, alt } = Modifiers::of(self.modifiers);
+        Some(match (self.navigation, button) {
+            (Navigation::Blender, Left) if alt && shift => DragKind::Pan,
+            (Navigation::Blender, Left) if alt && ctrl => DragKind::Zoom,
+            (Navigation::Blender, Middle) if ctrl => DragKind::Zoom,
+            (Navigation::Maya, Middle) => DragKind::Pan,
+            (Navigation::Maya, Right) if alt || ctrl => DragKind::Zoom,
+            (Navigation::Blender | Navigation::Maya, Right) => DragKind::Fly,
+            (_, Left) if shift => DragKind::Focus,
+            (_, Left) if alt => DragKind::Orbit,
+            (_, Left) => DragKind::Look,
+            (_, Middle) if shift => DragKind::Pan,
+            (_, Middle) => DragKind::Orbit,
+            (_, Right) => DragKind::Pan,
+            _ => return None,
+        })
     }
 
     /// A mouse button went down or up.
@@ -261,26 +313,18 @@ impl Input {
             return;
         }
         if !pressed {
-            if let Some(drag) = self.drag.take_if(|drag| drag.button == button)
-                && drag.kind == DragKind::Look
-                && !drag.moved
-            {
+            let Some(drag) = self.drag.take_if(|drag| drag.button == button) else { return };
+            if drag.kind == DragKind::Look && !drag.moved {
                 // The second click of two focuses, and leaves the selection of the first.
                 let second = self.last_press.is_none();
-                self.sum.pick = (!second).then(|| (self.place(), drag.add)).or(self.sum.pick);
+                self.sum.pick = (!second).then(|| (self.place(), drag.ctrl)).or(self.sum.pick);
+            }
+            if drag.kind == DragKind::Fly {
+                self.release_motions(now, Motion::flies);
             }
             return;
         }
-        let (shift, alt) = (self.modifiers.shift_key(), self.modifiers.alt_key());
-        let kind = match button {
-            MouseButton::Left if shift => DragKind::Focus,
-            MouseButton::Left if alt => DragKind::Orbit,
-            MouseButton::Left => DragKind::Look,
-            MouseButton::Middle if shift => DragKind::Pan,
-            MouseButton::Middle => DragKind::Orbit,
-            MouseButton::Right => DragKind::Pan,
-            _ => return,
-        };
+        let Some(kind) = self.kind_of_drag(button) else { return };
         if kind == DragKind::Focus {
             self.sum.focus = Some(self.place());
         }
@@ -295,8 +339,8 @@ impl Input {
             // A third press begins anew.
             self.last_press = (!again).then_some((now, self.cursor));
         }
-        let add = self.modifiers.control_key();
-        self.drag = Some(Drag { kind, button, last: self.cursor, moved: false, add });
+        let ctrl = self.modifiers.control_key();
+        self.drag = Some(Drag { kind, button, last: self.cursor, moved: false, ctrl });
     }
 
     /// The mouse is at this place of the window, physical pixels.
@@ -317,9 +361,13 @@ impl Input {
         }
         let [dx, dy] = [(x - drag.last[0]) / height, (y - drag.last[1]) / height];
         drag.last = self.cursor;
-        let kind = drag.kind;
+        let (kind, ctrl) = (drag.kind, drag.ctrl);
         match kind {
-            DragKind::Look => self.turn([dx, dy], self.orbits),
+            // Window managers take drags with Alt, and leave those with Ctrl.
+            DragKind::Look => self.turn([dx, dy], self.orbits || ctrl),
+            DragKind::Fly => self.turn([dx, dy], false),
+            // Up and to the right is nearer.
+            DragKind::Zoom => self.sum.dolly -= (dx - dy) * ZOOM_DRAG,
             DragKind::Orbit => self.turn([dx, dy], true),
             // What is panned sticks to the mouse.
             DragKind::Pan => add(&mut self.sum.pan, [-dx, dy]),
@@ -329,7 +377,9 @@ impl Input {
 
     /// The wheel turned by so many notches, away from the person positive; true when the flying speed changed.
     pub fn wheel(&mut self, notches: f64, now: Instant) -> bool {
-        if self.modifiers.control_key() {
+        let flies = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
+        let zooms = self.navigation != Navigation::Firstlight && !flies && !self.modifiers.shift_key();
+        if zooms || self.modifiers.control_key() {
             self.sum.dolly -= notches * ZOOM_NOTCH.ln();
         } else if self.modifiers.shift_key() {
             self.sum.zoom -= notches * ZOOM_NOTCH.ln();
@@ -406,6 +456,19 @@ impl Input {
     /// The mouse as a fraction of the picture.
     pub fn place(&self) -> [f64; 2] {
         [0, 1].map(|i| (self.cursor[i] / self.size[i].max(1.0)).clamp(0.0, 1.0))
+    }
+}
+
+/// Modifier keys that gestures look at.
+struct Modifiers {
+    ctrl: bool,
+    shift: bool,
+    alt: bool,
+}
+
+impl Modifiers {
+    fn of(state: ModifiersState) -> Self {
+        Self { ctrl: state.control_key(), shift: state.shift_key(), alt: state.alt_key() }
     }
 }
 

@@ -4,7 +4,7 @@ use winit::keyboard::KeyCode;
 const NONE: ModifiersState = ModifiersState::empty();
 
 fn input() -> (Input, Instant) {
-    (Input::new(800, 400), Instant::now())
+    (Input::new(800, 400, Navigation::Firstlight), Instant::now())
 }
 
 fn after(start: Instant, ms: u64) -> Instant {
@@ -224,4 +224,88 @@ fn a_focus_that_follows_goes_where_the_mouse_goes() {
     assert_eq!(input.take(start), [Command::FocusFollows { x: 0.5, y: 0.25 }]);
     input.cursor(400.0, 100.0);
     assert_eq!(input.take(start), [], "a mouse that stands still asks for nothing");
+}
+
+#[test]
+fn a_drag_with_ctrl_orbits_and_a_click_with_ctrl_adds_to_the_selection() {
+    for navigation in Navigation::ALL {
+        let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());
+        input.set_modifiers(ModifiersState::CONTROL, start);
+        input.button(MouseButton::Left, true, start);
+        input.cursor(100.0, 0.0);
+        assert!(matches!(input.take(start)[..], [Command::Orbit { .. }]));
+        input.button(MouseButton::Left, false, start);
+        assert_eq!(input.take(start), []);
+        input.button(MouseButton::Left, true, start);
+        input.button(MouseButton::Left, false, start);
+        assert!(matches!(input.take(start)[..], [Command::Edit(Edit::PickAt { add: true, .. })]));
+    }
+}
+
+/// What a drag to the right does with these modifiers.
+fn dragged(navigation: Navigation, button: MouseButton, modifiers: ModifiersState) -> Vec<Command> {
+    let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());
+    input.set_modifiers(modifiers, start);
+    input.button(button, true, start);
+    input.cursor(100.0, 0.0);
+    input.take(start)
+}
+
+#[test]
+fn drags_are_those_of_the_program_that_was_chosen() {
+    use MouseButton::{Left, Middle, Right};
+    use Navigation::{Blender, Firstlight, Maya};
+    let (ctrl, alt, shift) = (ModifiersState::CONTROL, ModifiersState::ALT, ModifiersState::SHIFT);
+    for (navigation, button, modifiers) in [
+        (Firstlight, Middle, NONE),
+        (Firstlight, Left, alt),
+        (Blender, Middle, NONE),
+        (Blender, Left, alt),
+        (Maya, Left, alt),
+    ] {
+        let commands = dragged(navigation, button, modifiers);
+        assert!(matches!(commands[..], [Command::Orbit { .. }]), "{navigation:?} {button:?}: {commands:?}");
+    }
+    for (navigation, button, modifiers) in [
+        (Firstlight, Right, NONE),
+        (Blender, Middle, shift),
+        (Blender, Left, alt | shift),
+        (Maya, Middle, alt),
+        (Maya, Middle, ctrl),
+    ] {
+        let commands = dragged(navigation, button, modifiers);
+        assert!(matches!(commands[..], [Command::Pan { .. }]), "{navigation:?} {button:?}: {commands:?}");
+    }
+    for (navigation, button, modifiers) in
+        [(Blender, Middle, ctrl), (Blender, Left, alt | ctrl), (Maya, Right, alt), (Maya, Right, ctrl)]
+    {
+        let commands = dragged(navigation, button, modifiers);
+        let [Command::Dolly { factor }] = commands[..] else { panic!("{navigation:?} {button:?}: {commands:?}") };
+        assert!(factor < 1.0, "to the right is nearer");
+    }
+}
+
+#[test]
+fn under_a_preset_the_wheel_zooms_and_letters_fly_only_with_the_right_button() {
+    for navigation in [Navigation::Blender, Navigation::Maya] {
+        let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());
+        assert!(!input.wheel(1.0, start));
+        assert!(matches!(input.take(start)[..], [Command::Dolly { factor }] if factor < 1.0));
+        // A letter alone is a tool, and moves nothing.
+        let (code, text) = if navigation == Navigation::Maya { (KeyCode::KeyW, "w") } else { (KeyCode::KeyS, "s") };
+        assert!(matches!(press(&mut input, code, text, true, start), Some(Action::Gizmo(Some(_)))));
+        press(&mut input, code, text, false, after(start, 50));
+        assert_eq!(input.take(after(start, 100)), []);
+        // With the right button it flies, as fast as the wheel says, until that is let go.
+        input.button(MouseButton::Right, true, start);
+        assert!(input.wheel(1.0, start));
+        assert_eq!(press(&mut input, KeyCode::KeyW, "w", true, start), None);
+        input.button(MouseButton::Right, false, after(start, 1000));
+        let commands = input.take(after(start, 5000));
+        let Some(Command::Fly { forward, .. }) = commands.last() else { panic!("{commands:?}") };
+        assert!((forward - SPEED_NOTCH).abs() < 1e-9 && !input.is_moving(), "{forward}");
+        // The arrows orbit as ever.
+        press(&mut input, KeyCode::ArrowLeft, "", true, start);
+        assert!(input.is_moving());
+    }
 }

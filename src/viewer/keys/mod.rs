@@ -1,18 +1,20 @@
 //! Every key and mouse gesture, in one [`table`].
 //!
-//! The window obeys [`BINDINGS`], the overlay on H shows it, and `docs/keys.md` is written from it, so the three
+//! The window obeys [`BINDINGS`] and, before it, the preset that was chosen; the overlay on H shows both, and `docs/keys.md` is written from it, so these
 //! cannot disagree. Keys that move are physical (WASD is the same block of keys on every layout); all others are
 //! what the key types.
 
 mod page;
+mod presets;
 mod table;
 mod words;
 
 pub use page::markdown;
+pub use presets::shown;
 pub use table::BINDINGS;
 pub use words::finds;
 
-use crate::frame::Command;
+use crate::frame::{Command, Navigation, gizmo};
 use crate::render::Inspection;
 use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 
@@ -104,6 +106,8 @@ pub enum Action {
     ToggleSharpZone,
     /// Moves, turns or scales; then none.
     NextGizmo,
+    /// These handles, or none.
+    Gizmo(Option<gizmo::Mode>),
     /// The camera goes around by itself.
     ToggleSpin,
     /// A drag looks about, or moves around the pivot.
@@ -135,10 +139,23 @@ pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
     })
 }
 
-/// What pressing this key does; digits count where they are on the keyboard, since Shift types something else there.
-pub fn action_of(physical: PhysicalKey, key: &Key, modifiers: ModifiersState) -> Option<Action> {
+impl Motion {
+    /// Moves the camera along its own axes.
+    pub fn flies(self) -> bool {
+        matches!(self, Self::Forward | Self::Back | Self::Left | Self::Right | Self::Up | Self::Down)
+    }
+}
+
+/// What pressing this key does under a preset; digits count where they are on the keyboard, since Shift types something else there.
+pub fn action_of(
+    navigation: Navigation,
+    physical: PhysicalKey,
+    key: &Key,
+    modifiers: ModifiersState,
+) -> Option<Action> {
     let digit = digit_of(physical).filter(|_| !modifiers.super_key() && !modifiers.alt_key());
-    triggers().find_map(|trigger| match trigger {
+    let own = presets::groups_of(navigation).iter().flat_map(|group| group.bindings);
+    own.flat_map(|binding| binding.triggers).chain(triggers()).find_map(|trigger| match trigger {
         Trigger::Press(chord, action) if chord.matches(key, modifiers) => Some(action.clone()),
         Trigger::Digit { ctrl, shift, action }
             if (*ctrl, *shift) == (modifiers.control_key(), modifiers.shift_key()) =>
@@ -157,6 +174,12 @@ fn digit_of(key: PhysicalKey) -> Option<u8> {
 }
 
 impl Chord {
+    /// Whether a press may be both.
+    fn overlaps(&self, other: &Self) -> bool {
+        let apart = self.shift.is_some() && other.shift.is_some() && self.shift != other.shift;
+        self.key == other.key && self.ctrl == other.ctrl && !apart
+    }
+
     fn matches(&self, key: &Key, modifiers: ModifiersState) -> bool {
         let same_key = match (self.key, key) {
             // With Shift or Caps Lock the same letter comes as a capital.
@@ -192,8 +215,7 @@ mod tests {
                 match (one, other) {
                     (Trigger::Hold(a, _), Trigger::Hold(b, _)) => assert_ne!(a, b),
                     (Trigger::Press(a, _), Trigger::Press(b, _)) => {
-                        let apart = a.shift.is_some() && b.shift.is_some() && a.shift != b.shift;
-                        assert!(a.key != b.key || a.ctrl != b.ctrl || apart, "{a:?} is there twice");
+                        assert!(!a.overlaps(b), "{a:?} is there twice");
                     }
                     _ => {}
                 }
@@ -214,8 +236,11 @@ mod tests {
     fn presses_find_their_actions() {
         let none = ModifiersState::empty();
         let key = |text: &str| Key::Character(text.into());
-        let pressed = |key: Key, modifiers| action_of(PhysicalKey::Code(KeyCode::F24), &key, modifiers);
-        let digit = |modifiers, typed: &str| action_of(PhysicalKey::Code(KeyCode::Digit3), &key(typed), modifiers);
+        let pressed =
+            |key: Key, modifiers| action_of(Navigation::Firstlight, PhysicalKey::Code(KeyCode::F24), &key, modifiers);
+        let digit = |modifiers, typed: &str| {
+            action_of(Navigation::Firstlight, PhysicalKey::Code(KeyCode::Digit3), &key(typed), modifiers)
+        };
         assert_eq!(digit(none, "3"), Some(Action::Inspect(Inspection::Albedo)));
         assert_eq!(digit(ModifiersState::CONTROL, "3"), Some(Action::Send(Command::SetBookmark { slot: 3 })));
         assert_eq!(digit(ModifiersState::SHIFT, "§"), Some(Action::Send(Command::GoToBookmark { slot: 3 })));

@@ -1,6 +1,8 @@
 //! The table as people read it: names of keys, and `docs/keys.md`.
 
+use super::presets::groups_of;
 use super::{BINDINGS, Binding, Chord, Trigger, Typed};
+use crate::frame::Navigation;
 use std::fmt::Write as _;
 use winit::keyboard::{KeyCode, NamedKey};
 
@@ -47,9 +49,11 @@ pub fn markdown() -> String {
     let mut page = String::from(
         "# Keys and mouse\n\n\
          H shows this list in the window. It is written from the table in `src/viewer/keys/table.rs`, which the window obeys;\n\
-         after a change there, `FIRSTLIGHT_BLESS=1 cargo test keys_page` writes it again.\n",
+         after a change there, `FIRSTLIGHT_BLESS=1 cargo test keys_page` writes it again. The groups at the end are those of the\n\
+         presets that are chosen in the panel under Camera; they take the place of Fly, Orbit and the same keys.\n",
     );
-    for group in BINDINGS {
+    let presets = Navigation::ALL.into_iter().flat_map(groups_of);
+    for group in BINDINGS.iter().chain(presets) {
         write!(page, "\n## {}\n\n| keys | what they do |\n|---|---|\n", group.title).expect("a string takes all");
         for binding in group.bindings {
             let keys = binding.keys();

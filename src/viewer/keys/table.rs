@@ -9,15 +9,15 @@ const fn hold(key: KeyCode, motion: Motion) -> Trigger {
     Trigger::Hold(key, motion)
 }
 
-const fn text(key: &'static str, action: Action) -> Trigger {
+pub(super) const fn text(key: &'static str, action: Action) -> Trigger {
     Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, shift: None }, action)
 }
 
-const fn named(key: NamedKey, action: Action) -> Trigger {
+pub(super) const fn named(key: NamedKey, action: Action) -> Trigger {
     Trigger::Press(Chord { key: Typed::Named(key), ctrl: false, shift: None }, action)
 }
 
-const fn shifted(key: Typed, shift: bool, action: Action) -> Trigger {
+pub(super) const fn shifted(key: Typed, shift: bool, action: Action) -> Trigger {
     Trigger::Press(Chord { key, ctrl: false, shift: Some(shift) }, action)
 }
 
@@ -29,7 +29,7 @@ const fn ctrl_shifted(key: &'static str, shift: bool, action: Action) -> Trigger
     Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift: Some(shift) }, action)
 }
 
-const fn edit(key: &'static str, shift: Option<bool>, edit: Edit) -> Trigger {
+pub(super) const fn edit(key: &'static str, shift: Option<bool>, edit: Edit) -> Trigger {
     Trigger::Press(Chord { key: Typed::Text(key), ctrl: true, shift }, Action::Send(Command::Edit(edit)))
 }
 
@@ -37,7 +37,7 @@ const fn inspect(key: &'static str, inspection: Inspection) -> Trigger {
     Trigger::Press(Chord { key: Typed::Text(key), ctrl: false, shift: Some(false) }, Action::Inspect(inspection))
 }
 
-const fn send(key: &'static str, command: Command) -> Trigger {
+pub(super) const fn send(key: &'static str, command: Command) -> Trigger {
     text(key, Action::Send(command))
 }
 
@@ -100,7 +100,7 @@ pub static BINDINGS: &[KeyGroup] = &[
                 effect: "orbit around the pivot",
             },
             Binding {
-                triggers: &[Trigger::Mouse("Middle drag"), Trigger::Mouse("Alt+drag")],
+                triggers: &[Trigger::Mouse("Middle drag"), Trigger::Mouse("Alt+drag"), Trigger::Mouse("Ctrl+drag")],
                 effect: "orbit around the pivot",
             },
             Binding {
@@ -345,7 +345,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Camera")],
-                effect: "position, target it looks at, field of view, fly speed, drag",
+                effect: "position, target it looks at, field of view, fly speed, drag, navigation preset (firstlight, Blender, Maya)",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Views")],

@@ -3,7 +3,8 @@
 use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use super::{Around, Asked};
 use crate::frame::{
-    Bookmarks, Command, Focus, FocusTarget, Session, ViewMode, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone,
+    Bookmarks, Command, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals, f_stop, radius_of_f_stop,
+    sharp_zone,
 };
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::status::metres;
@@ -36,6 +37,16 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
                 for (label, orbits) in [("look around", false), ("orbit", true)] {
                     if ui.selectable_label(around.orbits == orbits, label).clicked() {
                         asked.toggle_drag |= around.orbits != orbits;
+                    }
+                }
+            })
+        });
+        row_with_hint(ui, "navigation", "keys and mouse as in this program; H lists them", |ui| {
+            ui.horizontal(|ui| {
+                for navigation in Navigation::ALL {
+                    let is_chosen = around.navigation == navigation;
+                    if ui.selectable_label(is_chosen, navigation.label()).clicked() && !is_chosen {
+                        asked.navigation = Some(navigation);
                     }
                 }
             })

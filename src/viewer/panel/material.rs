@@ -38,7 +38,7 @@ pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: 
             if let Some(current) = current {
                 ui.weak(shared_by(current));
             }
-            let hint = "gives this object a copy of the material, so that a change does not show on others";
+            let hint = "give this object its own copy of the material, so that changes do not affect others";
             if ui.small_button("Make unique").on_hover_text(hint).clicked() {
                 asked.edit(Edit::OwnMaterial { id });
             }
@@ -118,14 +118,14 @@ impl Scale {
     fn of(property: Property) -> Option<Self> {
         let (name, hint, range) = match property {
             Property::Alpha => {
-                ("roughness", "0: a mirror, 1: diffuse; its square is the width α of the GGX lobe", 0.032..=1.0)
+                ("roughness", "0: mirror, 1: rough; its square is the width α of the GGX lobe", 0.032..=1.0)
             }
             Property::Ior => ("IOR", "index of refraction: water 1.33, glass 1.5, diamond 2.4", 1.0..=2.5),
-            Property::Ambient => ("ambient", "share of the ambient light", 0.0..=1.0),
-            Property::Specular => ("specular", "share of mirrored light", 0.0..=1.0),
-            Property::Shininess => ("shininess", "exponent of the highlight", 1.0..=10_000.0),
-            Property::Transparency => ("transparency", "share of light that passes through", 0.0..=1.0),
-            Property::Weight => ("weight", "0: the first of the two alone, 1: the second alone", 0.0..=1.0),
+            Property::Ambient => ("ambient", "ambient reflectance", 0.0..=1.0),
+            Property::Specular => ("specular", "specular reflectance", 0.0..=1.0),
+            Property::Shininess => ("shininess", "Phong exponent", 1.0..=10_000.0),
+            Property::Transparency => ("transparency", "transmittance", 0.0..=1.0),
+            Property::Weight => ("weight", "0: only the first, 1: only the second", 0.0..=1.0),
             _ => return None,
         };
         Some(Self { name, hint, property, range })
@@ -150,7 +150,7 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
         let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
         row(ui, "of", |ui| {
             let text = format!("{} and {}", name(a), name(b));
-            ui.add(egui::Label::new(text).truncate()).on_hover_text("each has an editor in the list of materials");
+            ui.add(egui::Label::new(text).truncate()).on_hover_text("edit them in the list of materials");
         });
     }
     for (name, param) in material.params() {

@@ -32,7 +32,7 @@ mod widgets;
 use super::change::PictureChange;
 use super::dialog::DialogPurpose;
 use super::reaction::Reaction;
-use crate::frame::{Command, Edit, Session, gizmo};
+use crate::frame::{Command, Edit, Navigation, Session, gizmo};
 use crate::scene::Inventory;
 use bevy_ecs::prelude::Entity;
 use egui::{Context, RichText, Ui};
@@ -95,6 +95,8 @@ pub struct Around<'a> {
     pub spinning: bool,
     /// A drag moves around the pivot.
     pub orbits: bool,
+    /// Keys and gestures.
+    pub navigation: Navigation,
     /// The mouse, in fractions of the picture.
     pub place: [f64; 2],
     /// Bytes of the process, where that can be known.
@@ -112,6 +114,7 @@ pub struct Asked {
     pub speed: Option<f64>,
     pub toggle_spin: bool,
     pub toggle_drag: bool,
+    pub navigation: Option<Navigation>,
     pub screenshot: Option<bool>,
     pub toggle_brush: bool,
     /// A dialog for a file, and what it is for.

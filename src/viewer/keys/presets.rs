@@ -1,0 +1,179 @@
+//! Keys and gestures of other programs, in front of those of the [`table`](super::table): what a preset names takes the
+//! place of what the table has under the same key, and its first groups that of the table's [`REPLACED`] groups.
+
+use super::table::{BINDINGS, edit, named, send, shifted, text};
+use super::{Action, Binding, KeyGroup, Trigger, Typed};
+use crate::frame::{Command, Edit, Navigation, gizmo};
+use winit::keyboard::NamedKey;
+
+/// Groups of the table that a preset has in its own way.
+const REPLACED: [&str; 2] = ["Fly", "Orbit"];
+
+const DELETE: Action = Action::Send(Command::Edit(Edit::Delete));
+
+static BLENDER: &[KeyGroup] = &[
+    KeyGroup {
+        title: "Blender: navigate",
+        bindings: &[
+            Binding {
+                triggers: &[Trigger::Mouse("Middle drag"), Trigger::Mouse("Alt+drag"), Trigger::Mouse("Ctrl+drag")],
+                effect: "orbit around the pivot",
+            },
+            Binding {
+                triggers: &[Trigger::Mouse("Shift+middle drag"), Trigger::Mouse("Shift+Alt+drag")],
+                effect: "pan: move sideways, up, down",
+            },
+            Binding {
+                triggers: &[
+                    Trigger::Mouse("Wheel"),
+                    Trigger::Mouse("Ctrl+middle drag"),
+                    Trigger::Mouse("Ctrl+Alt+drag"),
+                ],
+                effect: "zoom: move nearer to, farther from the pivot",
+            },
+            FLY,
+            FLY_SPEED,
+        ],
+    },
+    KeyGroup {
+        title: "Blender: edit",
+        bindings: &[
+            Binding { triggers: &[text("g", Action::Gizmo(Some(gizmo::Mode::Move)))], effect: "handles: move" },
+            Binding { triggers: &[text("r", Action::Gizmo(Some(gizmo::Mode::Turn)))], effect: "handles: rotate" },
+            Binding { triggers: &[text("s", Action::Gizmo(Some(gizmo::Mode::Scale)))], effect: "handles: scale" },
+            Binding { triggers: &[text("x", DELETE), named(NamedKey::Delete, DELETE)], effect: "delete the selection" },
+            Binding {
+                triggers: &[shifted(Typed::Text("a"), false, Action::Send(Command::Edit(Edit::SelectAll)))],
+                effect: "select everything",
+            },
+            Binding {
+                triggers: &[
+                    shifted(Typed::Text("d"), true, Action::Send(Command::Edit(Edit::Duplicate))),
+                    edit("d", None, Edit::Duplicate),
+                ],
+                effect: "duplicate the selection",
+            },
+        ],
+    },
+];
+
+static MAYA: &[KeyGroup] = &[
+    KeyGroup {
+        title: "Maya: navigate",
+        bindings: &[
+            Binding {
+                triggers: &[Trigger::Mouse("Alt+drag"), Trigger::Mouse("Ctrl+drag")],
+                effect: "orbit around the pivot",
+            },
+            Binding {
+                triggers: &[
+                    Trigger::Mouse("Alt+middle drag"),
+                    Trigger::Mouse("Ctrl+middle drag"),
+                    Trigger::Mouse("Middle drag"),
+                ],
+                effect: "pan: move sideways, up, down",
+            },
+            Binding {
+                triggers: &[
+                    Trigger::Mouse("Wheel"),
+                    Trigger::Mouse("Alt+right drag"),
+                    Trigger::Mouse("Ctrl+right drag"),
+                ],
+                effect: "zoom: move nearer to, farther from the pivot",
+            },
+            FLY,
+            FLY_SPEED,
+        ],
+    },
+    KeyGroup {
+        title: "Maya: edit",
+        bindings: &[
+            Binding { triggers: &[text("q", Action::Gizmo(None))], effect: "handles: none" },
+            Binding { triggers: &[text("w", Action::Gizmo(Some(gizmo::Mode::Move)))], effect: "handles: move" },
+            Binding { triggers: &[text("e", Action::Gizmo(Some(gizmo::Mode::Turn)))], effect: "handles: rotate" },
+            Binding { triggers: &[text("r", Action::Gizmo(Some(gizmo::Mode::Scale)))], effect: "handles: scale" },
+            Binding { triggers: &[send("a", Command::FrameAll)], effect: "frame the selection, or the whole scene" },
+        ],
+    },
+];
+
+const FLY: Binding = Binding {
+    triggers: &[Trigger::Mouse("Right drag"), Trigger::Mouse("with W A S D Q E")],
+    effect: "look around and fly; Shift: four times as fast",
+};
+const FLY_SPEED: Binding =
+    Binding { triggers: &[Trigger::Mouse("Right drag + wheel")], effect: "change the flying speed" };
+
+/// What a preset has before the table.
+pub fn groups_of(navigation: Navigation) -> &'static [KeyGroup] {
+    match navigation {
+        Navigation::Firstlight => &[],
+        Navigation::Blender => BLENDER,
+        Navigation::Maya => MAYA,
+    }
+}
+
+/// Every key and gesture that counts under a preset, as people read them.
+pub fn shown(navigation: Navigation) -> Vec<(&'static str, Vec<&'static Binding>)> {
+    let own = groups_of(navigation);
+    let chords: Vec<_> = own.iter().flat_map(|group| group.bindings).flat_map(chords_of).collect();
+    let is_taken =
+        |binding: &&Binding| chords_of(binding).any(|chord| chords.iter().any(|other| chord.overlaps(other)));
+    let rest = BINDINGS
+        .iter()
+        .filter(|group| own.is_empty() || !REPLACED.contains(&group.title))
+        .map(|group| (group.title, group.bindings.iter().filter(|binding| !is_taken(binding)).collect()));
+    own.iter().map(|group| (group.title, group.bindings.iter().collect())).chain(rest).collect()
+}
+
+fn chords_of(binding: &Binding) -> impl Iterator<Item = &super::Chord> {
+    binding.triggers.iter().filter_map(|trigger| match trigger {
+        Trigger::Press(chord, _) => Some(chord),
+        _ => None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Typed, action_of};
+    use super::*;
+    use winit::keyboard::{Key, KeyCode, ModifiersState, PhysicalKey};
+
+    fn pressed(navigation: Navigation, key: &str, modifiers: ModifiersState) -> Option<Action> {
+        action_of(navigation, PhysicalKey::Code(KeyCode::F24), &Key::Character(key.into()), modifiers)
+    }
+
+    #[test]
+    fn a_preset_takes_the_place_of_what_the_table_has() {
+        let none = ModifiersState::empty();
+        let modes = |navigation, keys: &str| -> Vec<Option<Action>> {
+            keys.chars().map(|key| pressed(navigation, &key.to_string(), none)).collect()
+        };
+        let handles = gizmo::Mode::ALL.map(|mode| Some(Action::Gizmo(Some(mode))));
+        assert_eq!(modes(Navigation::Blender, "grs"), handles);
+        assert_eq!(modes(Navigation::Maya, "wer"), handles);
+        assert_eq!(pressed(Navigation::Blender, "X", ModifiersState::SHIFT), Some(DELETE));
+        assert_eq!(pressed(Navigation::Firstlight, "x", none), Some(Action::Send(Command::Level)));
+        assert_eq!(pressed(Navigation::Maya, "x", none), Some(Action::Send(Command::Level)));
+        // The rest is as it was.
+        for navigation in Navigation::ALL {
+            assert_eq!(pressed(navigation, "k", none), Some(Action::Screenshot { linear: false }));
+            let undo = Some(Action::Send(Command::Edit(Edit::Undo)));
+            assert_eq!(pressed(navigation, "z", ModifiersState::CONTROL), undo);
+        }
+    }
+
+    #[test]
+    fn the_list_has_each_key_of_a_preset_once() {
+        for navigation in Navigation::ALL {
+            let shown = shown(navigation);
+            let chords: Vec<_> = shown.iter().flat_map(|(_, bindings)| bindings).flat_map(|it| chords_of(it)).collect();
+            for (i, one) in chords.iter().enumerate() {
+                assert!(chords[i + 1..].iter().all(|other| !one.overlaps(other)), "{navigation:?}: {one:?}");
+            }
+            let has = |title: &str| shown.iter().any(|(known, _)| *known == title);
+            assert_eq!(has("Fly"), navigation == Navigation::Firstlight);
+            assert!(has("Window") && chords.iter().any(|chord| chord.key == Typed::Text("h")));
+        }
+    }
+}
