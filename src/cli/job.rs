@@ -143,7 +143,7 @@ impl RenderJob {
         match ours.differs_from(&shot) {
             None => Ok(film),
             Some(what) => Err(Failure::Failed(format!(
-                "{}: the film was rendered with a different {what}; resume it with the original {what}, or choose a new --film",
+                "{}: the film was rendered with a different {what}; resume it as it was begun, or choose a new --film",
                 path.display()
             ))),
         }

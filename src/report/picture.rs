@@ -56,7 +56,7 @@ mod tests {
         }
         let read = LinearPicture::read_exr(&exr).unwrap();
         assert_eq!(read, LinearPicture { width: 5, height: 3, pixels: vec![Vec3::ZERO; 15] });
-        assert!(LinearPicture::read_exr(&png).unwrap_err().contains("not an OpenEXR picture"));
+        assert!(LinearPicture::read_exr(&png).unwrap_err().contains("not an OpenEXR image"));
         std::fs::write(&exr, b"text").unwrap();
         assert!(LinearPicture::read_exr(&exr).is_err());
         assert!(LinearPicture::read_exr(&folder.path().join("none.exr")).unwrap_err().contains("none.exr"));

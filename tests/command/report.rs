@@ -133,7 +133,7 @@ fn references_are_kept_and_found_again() {
     let (unkept, trouble) =
         ReferenceStore::in_folder(&path).make(&key, &room, &settings, 16, &mut |_| (), &|| false).unwrap();
     assert_eq!(unkept.picture, made.picture);
-    assert!(trouble.is_some_and(|text| text.contains("could not be kept")));
+    assert!(trouble.is_some_and(|text| text.contains("could not be cached")));
 }
 
 #[test]

@@ -107,7 +107,8 @@ impl App {
                 self.tell_handles(now);
             }
             Action::Gizmo(mode) => {
-                self.panel.gizmo = mode;
+                // The same key again takes them away.
+                self.panel.gizmo = mode.filter(|_| self.panel.gizmo != mode);
                 self.tell_handles(now);
             }
             Action::ToggleSpin => self.input.toggle_spin(now),

@@ -106,7 +106,7 @@ pub enum Action {
     ToggleSharpZone,
     /// Moves, turns or scales; then none.
     NextGizmo,
-    /// These handles, or none.
+    /// These handles, or none where they are shown already.
     Gizmo(Option<gizmo::Mode>),
     /// The camera goes around by itself.
     ToggleSpin,

@@ -345,7 +345,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Camera")],
-                effect: "position, target it looks at, field of view, fly speed, drag, navigation preset (firstlight, Blender, Maya)",
+                effect: "position, target, field of view, fly speed, drag, navigation preset (Blender, Maya)",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Views")],
@@ -387,7 +387,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             Binding { triggers: &[Trigger::Mouse("Panel: Open")], effect: "open a file by dialog, or a recent file" },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Statistics")],
-                effect: "samples, rays, error estimate, discarded samples, latency, triangles, memory, undo, last restart",
+                effect: "samples, rays, error, discarded samples, latency, triangles, memory, undo, last restart",
             },
         ],
     },

@@ -36,7 +36,7 @@ const SYNONYMS: &[(&str, &[&str])] = &[
     ("lamp", &["light"]),
     ("load", &["open"]),
     ("lod", &["simplify"]),
-    ("lookat", &["looks at", "pivot"]),
+    ("lookat", &["target", "pivot"]),
     ("lens", &["aperture", "focal", "focus"]),
     ("magnify", &["nearer", "narrower"]),
     ("manipulator", &["handles"]),

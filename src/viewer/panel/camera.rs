@@ -101,7 +101,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
         let looking = session.world().resource::<ViewMode>().0;
         let mut shown = looking.sharp_zone;
         ui.add_enabled_ui(enabled, |ui| {
-            if ui.checkbox(&mut shown, "show depth of field").changed() {
+            if ui.checkbox(&mut shown, "show focus range").changed() {
                 asked.send(Command::SetSharpZone { shown });
             }
         });
