@@ -272,3 +272,24 @@ fn glass_that_bends_nothing_takes_no_light_where_it_touches_something() {
         assert!((mean - truth).abs() < 4.0 * error.hypot(truth_error), "{name}: {mean} ± {error} for {truth}");
     }
 }
+
+/// A coarse mesh with smooth normals: shading and true normals differ by much.
+fn smooth_body(material: u32) -> (Shape, Object) {
+    let mesh = Arc::new(procedural::icosphere(2).with_vertex_normals());
+    let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
+    let world_from_object = Affine3A::from_scale(Vec3::splat(0.8));
+    (Shape::Mesh { tree, world_from_object }, Object { mesh: Some(mesh), ..Object::plain(material) })
+}
+
+#[test]
+fn smooth_normals_gather_as_much_light_from_both_ends() {
+    let scene = bench(vec![smooth_body(2)], 1.5);
+    let (truth, truth_error) = mean_of_renders(&scene, settings(100, false), (16, 16), 4096, 8);
+    for lanes in [None, RenderSettings::default().lanes] {
+        let settings = RenderSettings { lanes, ..settings(11, true) };
+        let (mean, error) = mean_of_renders(&scene, settings, (16, 16), 1024, 8);
+        println!("{lanes:?}: {mean:.5} ± {error:.5} for {truth:.5} ± {truth_error:.5}");
+        assert!(error.hypot(truth_error) < 0.01 * truth, "too noisy to tell: {error} {truth_error}");
+        assert!((mean - truth).abs() < 4.0 * error.hypot(truth_error), "{lanes:?}: {mean} ± {error} for {truth}");
+    }
+}

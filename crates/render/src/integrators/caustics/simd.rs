@@ -222,7 +222,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             }
         }
         let (cos_i, cos_o) = (place.wo.dot(normal), along.abs());
-        let gain = etendue_gain(normal, place.normal, wi, place.wo);
+        let gain = etendue_gain(normal, place.normal, place.wo, wi);
         // Radiance is squeezed on its way into glass, flux is not.
         let white = Vector::splat(s, Vec3::ONE);
         let mut factor = if KIND == GLASS { white } else { bounce.weight } * gain;

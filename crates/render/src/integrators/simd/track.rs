@@ -60,7 +60,7 @@ impl<S: Simd> BounceMisStates<'_, S> {
                 let known = !ratio.is_nan() & go_on & reversible & !specular;
                 ratio * self.reverse_pdf::<KIND>(s, known) * along.abs() / (cos_o * bounce.pdf)
             };
-            select(specular, ratio / etendue_gain(normal, place.normal, wo, wi), scattered)
+            select(specular, ratio / etendue_gain(normal, place.normal, wi, wo), scattered)
         };
         let ratio = select(reversible, ratio, lost);
         let ratios = ratio.to_array();
