@@ -13,7 +13,9 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
             format!("unknown field `{found}`{}{}", of(outer), suggestion(found, expected.iter().copied()))
         }
         Error::NoSuchEnumVariant { expected, found, .. } => {
-            format!("unknown kind `{found}`{}", suggestion(found, expected.iter().copied()))
+            // Capitals stand in what other versions wrote: read, but not to be learnt.
+            let words = expected.iter().copied().filter(|word| word.starts_with(char::is_lowercase));
+            format!("unknown kind `{found}`{}", suggestion(found, words))
         }
         Error::MissingStructField { field, outer } => format!("field `{field}`{} is missing", of(outer)),
         Error::DuplicateStructField { field, outer } => {
