@@ -67,7 +67,7 @@ pub struct RenderArgs {
     /// Save the estimated relative error of each pixel as an .exr in which 0.05 is 5 %
     ///
     /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole picture.
-    #[arg(help_heading = "Output", long, value_name = "FILE.exr", conflicts_with_all = ["turntable", "bookmarks", "region"])]
+    #[arg(help_heading = "Output", long, value_name = "FILE.exr", visible_alias = "error-image", conflicts_with_all = ["turntable", "bookmarks", "region"])]
     pub error_picture: Option<PathBuf>,
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
     #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]

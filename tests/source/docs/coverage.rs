@@ -75,14 +75,15 @@ fn every_option_is_described() {
     let page = read("docs/command-line.md").text;
     let folder = TempFolder::new("options");
     let mut problems = Vec::new();
-    let commands = ["", "render", "info", "merge", "save", "explain", "simplify", "stability", "report"];
+    let commands =
+        ["", "render", "info", "merge", "save", "explain", "simplify", "stability", "report", "completions", "man"];
     for command in commands {
         let words: Vec<String> =
             [command, "--help"].into_iter().filter(|word| !word.is_empty()).map(str::to_owned).collect();
         let output = folder.run(&words, &[]);
         let help = String::from_utf8_lossy(&output.stdout).into_owned();
         let words = help.lines().filter(|line| line.trim_start().starts_with('-')).flat_map(str::split_whitespace);
-        for option in words.filter(|word| word.starts_with("--")).map(|word| word.trim_end_matches(',')) {
+        for option in words.filter(|word| word.starts_with("--")).map(|word| word.trim_end_matches([',', ']'])) {
             if !page.contains(&format!("`{option}`")) && !page.contains(&format!("`{option} ")) {
                 problems.push(format!("docs/command-line.md: `{option}` of `firstlight {command}` is not described"));
             }
