@@ -14,8 +14,10 @@ pub enum Error {
     /// An option or a value of the world is out of range.
     #[error(transparent)]
     Value(#[from] BadValue),
+    /// The settings of the light model are out of range.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// No picture can be taken with the camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// There is not enough memory for an image of that size.

@@ -34,6 +34,7 @@ impl fmt::Display for Problem {
 /// Why a scene could not be had: at least one problem, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct SceneError {
+    /// All that is wrong, in the order of the file.
     pub problems: Vec<Problem>,
 }
 

@@ -128,6 +128,7 @@ impl MeshBase {
         finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
     }
 
+    /// The mesh that [`Self::finish`] begins with.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }

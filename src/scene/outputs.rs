@@ -31,6 +31,7 @@ pub enum FilesError {
     /// One file stands for two things in the command.
     #[error("{0}")]
     Collision(String),
+    /// A whole sentence: the output is there and may not be replaced, or cannot be written.
     #[error("{0}")]
     Unwritable(String),
 }
@@ -57,6 +58,7 @@ impl Identity {
 }
 
 impl Files {
+    /// No files yet; outputs may take the place of what `replace` says.
     pub fn new(replace: Replace) -> Self {
         Self { replace, ..Self::default() }
     }

@@ -27,6 +27,7 @@ pub enum Replace {
     /// Of any file but a film: its samples took long and are nowhere else.
     #[default]
     AllButFilms,
+    /// Of any file, films included.
     Anything,
 }
 
