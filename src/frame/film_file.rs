@@ -24,7 +24,9 @@ use std::path::Path;
 /// A film and what it is a film of.
 #[derive(Clone, Debug)]
 pub struct FilmFile {
+    /// The film, with all of its numbers.
     pub film: Film,
+    /// Scene, view and settings that it was rendered with.
     pub shot: ImageMetadata,
     /// What cannot be known of it; for people, with its name.
     pub warning: Option<String>,

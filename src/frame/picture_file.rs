@@ -43,7 +43,9 @@ impl PictureFormat {
 /// A film as a picture.
 #[derive(Clone, Copy)]
 pub struct Print<'a> {
+    /// The film, linear.
     pub film: &'a Film,
+    /// Exposure and tone curve of a PNG.
     pub display: &'a Display,
     /// Pixels of a PNG, which a coarser film is stretched to; linear light stays as it was measured.
     pub size: (u32, u32),

@@ -71,6 +71,7 @@ pub struct Replayed {
 /// How to play a recording.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReplayOptions {
+    /// Worker threads; one for each processor when not given.
     pub threads: Option<usize>,
     /// Samples per pixel at the end, in place of those of the recording.
     pub spp: Option<u32>,

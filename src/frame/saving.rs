@@ -14,7 +14,9 @@ use std::thread::JoinHandle;
 /// Where the open scene was saved last, and what it was then; forgotten when another is opened.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
 pub struct SavedAs {
+    /// The scene file; `None` if the scene was not saved.
     pub path: Option<PathBuf>,
+    /// Fingerprint of the scene as it was saved.
     pub content: Option<Fingerprint>,
 }
 

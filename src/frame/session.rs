@@ -37,12 +37,15 @@ use std::time::Duration;
 /// How to start.
 #[derive(Clone, Default)]
 pub struct SessionOptions {
-    /// Pixels of the picture; 0 means that there is none yet, and the session waits for a size.
+    /// Width of the picture in pixels; 0 means that there is none yet, and the session waits for a size.
     pub width: u32,
+    /// Height of the picture in pixels.
     pub height: u32,
     /// One a processor when not given.
     pub threads: Option<usize>,
+    /// Seed of the random numbers.
     pub seed: u32,
+    /// When the picture is good enough; without a target it is rendered for ever.
     pub target: Target,
     /// Workers give way to other threads, for one that draws a window too.
     pub yielding: bool,
@@ -208,14 +211,17 @@ impl Session {
         self.world.resource::<Renderer>().0.note_seen(number);
     }
 
+    /// How rendering is getting on, and what there is to tell.
     pub fn status(&self) -> &Status {
         self.world.resource()
     }
 
+    /// The world with the scene's entities and the session's resources.
     pub fn world(&self) -> &World {
         &self.world
     }
 
+    /// The world, to be changed; the next [`Self::update`] finds what has changed.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }

@@ -30,15 +30,20 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Navigation {
+    /// The program's own.
     #[default]
     Firstlight,
+    /// Those of Blender.
     Blender,
+    /// Those of Maya.
     Maya,
 }
 
 impl Navigation {
+    /// All of them, in the order of menus.
     pub const ALL: [Self; 3] = [Self::Firstlight, Self::Blender, Self::Maya];
 
+    /// Name for the user.
     pub fn label(self) -> &'static str {
         match self {
             Self::Firstlight => "firstlight",
@@ -103,6 +108,7 @@ impl SettingsStore {
         Self { folder: folders.map(|folders| folders.config_dir().to_path_buf()) }
     }
 
+    /// In a folder of the caller's choice.
     pub fn in_folder(folder: &Path) -> Self {
         Self { folder: Some(folder.to_path_buf()) }
     }

@@ -22,13 +22,15 @@ use glam::DVec3;
 /// What the amounts of a command are measured by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
-    /// A sphere around everything finite in the scene; radius 0 when there is nothing.
+    /// Centre of a sphere around everything finite in the scene, metres.
     pub center: DVec3,
+    /// Radius of that sphere, metres; 0 when there is nothing finite.
     pub radius: f64,
     /// Where [`Command::Home`] leads.
     pub home: Rig,
     /// Width of the picture by its height.
     pub aspect: f64,
+    /// What a turn keeps level.
     pub turning: Turning,
     /// Metres to what a person flies towards, if that is known.
     pub pace: Option<f64>,
