@@ -100,9 +100,9 @@ fn literals(source: &str) -> Vec<(usize, String)> {
             rest.find('\n').unwrap_or(rest.len())
         } else if rest.starts_with("'\"'") || rest.starts_with("b'\"'") {
             rest.find("\"'").map_or(1, |at| at + 2)
-        } else if rest.starts_with("r#\"") {
-            rest[3..].find("\"#").map_or(rest.len(), |at| {
-                found.push((line, rest[3..3 + at].to_owned()));
+        } else if let Some(raw) = rest.strip_prefix("r#\"") {
+            raw.find("\"#").map_or(rest.len(), |at| {
+                found.push((line, raw[..at].to_owned()));
                 at + 5
             })
         } else if c == '"' {
