@@ -15,7 +15,7 @@ use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// What can be added. It comes to stand where [`spot`] finds room for it.
+/// What can be added. It comes to stand where `spot` finds room for it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NewThing {
     /// A diffuse sphere on the ground.

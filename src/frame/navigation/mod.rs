@@ -4,7 +4,7 @@
 //! amounts that make no sense (not finite, a factor of zero) with the view it was given. All is f64 in the scene's
 //! own frame, so a camera a million metres from the origin moves as smoothly as one at it.
 //!
-//! Here is what commands mean; [`moves`] has the steps of a view, [`lens`] those of what is sharp. Start reading at
+//! Here is what commands mean; `moves` has the steps of a view, `lens` those of what is sharp. Start reading at
 //! [`steer`].
 
 mod lens;

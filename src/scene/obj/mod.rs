@@ -1,6 +1,6 @@
 //! Wavefront OBJ and MTL: any file in, one mesh with material slots out, or an error that names the line.
 //!
-//! The file is parsed in `f64` ([`parse`]; materials by tobj), and assembled: polygons are cut into triangles,
+//! The file is parsed in `f64` (`parse`; materials by tobj), and assembled: polygons are cut into triangles,
 //! corners that share position, texture coordinate and normal share a vertex (across groups too), and normals that
 //! the file lacks are computed. Start reading at [`load_obj`]; [`save_obj`] is
 //! the way back.
