@@ -1,7 +1,7 @@
 //! What can go wrong with a scene or an image.
 
 use crate::render::{CameraError, NoRoom, SettingsError};
-use crate::scene::{BadValue, SceneError};
+use crate::scene::{BadValue, SceneError, WriteError};
 use thiserror::Error;
 
 /// Why there is no scene or no image; each says what is wrong, where, and what would be right.
@@ -30,6 +30,6 @@ pub enum Error {
     #[error("the worker threads cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A file cannot be written.
-    #[error("{0}")]
-    Write(String),
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

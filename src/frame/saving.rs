@@ -5,7 +5,7 @@ use super::background::BackgroundTasks;
 use super::history::{Content, History};
 use super::resources::{Clock, CurrentScene};
 use super::status::{MessageKind, Status};
-use crate::scene::{Description, Fingerprint, SavedScene, SceneContent};
+use crate::scene::{Description, Fingerprint, SavedScene, SceneContent, WriteError};
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,7 +22,7 @@ pub struct SavedAs {
 
 struct Saved {
     path: PathBuf,
-    result: Result<SavedScene, String>,
+    result: Result<SavedScene, WriteError>,
     content: Fingerprint,
     clean: Content,
 }

@@ -1,5 +1,5 @@
 use crate::mesh::MeshError;
-use crate::scene::ReadError;
+use crate::scene::{ReadError, WriteError};
 use std::path::PathBuf;
 
 /// Why an OBJ file could not be loaded: which file, which line, what was expected.
@@ -13,9 +13,9 @@ pub enum ObjError {
         /// Why.
         source: ReadError,
     },
-    /// The file cannot be written; a whole sentence.
-    #[error("{0}")]
-    Write(String),
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
     /// No line describes a face.
     #[error("{}: has no faces (lines starting with `f`): is it a Wavefront OBJ file?", path.display())]
     NoFaces {
