@@ -37,18 +37,30 @@ pub use firstlight_mesh as mesh;
 pub use firstlight_render::{self as render, sampling};
 pub use glam;
 
+// Hidden: the program, its tests and its benchmarks use these modules, a library has no use for them.
 #[cfg(feature = "cli")]
+#[doc(hidden)]
+#[allow(missing_docs)]
 pub mod console;
 pub mod embed;
 pub mod frame;
 pub mod prelude;
 pub mod printable;
+// Hidden as `console` is.
 #[cfg(feature = "cli")]
+#[doc(hidden)]
+#[allow(missing_docs)]
 pub mod report;
 pub mod scene;
+// Hidden as `console` is.
 #[cfg(feature = "cli")]
+#[doc(hidden)]
+#[allow(missing_docs)]
 pub mod stability;
+// Hidden as `console` is.
 #[cfg(feature = "viewer")]
+#[doc(hidden)]
+#[allow(missing_docs)]
 pub mod viewer;
 
 /// The Rust code of the guide and the README is compiled and run.

@@ -2,7 +2,7 @@
 //!
 //! Names of materials and objects, paths, and lines of files of unknown origin may hold anything: escape sequences that
 //! rewrite what stands on a terminal, marks that turn the order of letters round, line ends that forge a message.
-//! Everything that the program says passes [`line`], which the [`console`](crate::console) and the messages of a session
+//! Everything that the program says passes [`line()`], which the [`console`](crate::console) and the messages of a session
 //! see to; [`name`] is for a name that is set in columns or in a list of its own.
 
 use std::borrow::Cow;
@@ -53,7 +53,7 @@ pub fn name(text: &str) -> Cow<'_, str> {
     Cow::Owned(cut(&escape(&text), LONGEST_NAME).into_owned())
 }
 
-/// Lines that the program itself has put together, each as [`line`] has it.
+/// Lines that the program itself has put together, each as [`line()`] has it.
 pub fn lines(text: &str) -> String {
     text.split('\n').map(line).collect::<Vec<_>>().join("\n")
 }

@@ -1,6 +1,6 @@
 //! Why a command did not do its work.
 
-use firstlight::scene::{FilesError, SceneError};
+use firstlight::scene::{FilesError, SceneError, WriteError};
 
 /// Why a command did not do its work; a message of one line, but for [`Failure::Problems`].
 pub enum Failure {
@@ -23,7 +23,13 @@ impl From<FilesError> for Failure {
     fn from(error: FilesError) -> Self {
         match error {
             FilesError::Collision(message) => Self::Usage(message),
-            FilesError::Unwritable(message) => Self::Failed(message),
+            FilesError::Unwritable(error) => error.into(),
         }
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self::Failed(error.into())
     }
 }

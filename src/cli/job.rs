@@ -121,9 +121,9 @@ impl RenderJob {
         let note = self.note(film, path);
         let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
         if !args.to_stdout() {
-            return picture.write(path, replace).map_err(Failure::Failed);
+            return Ok(picture.write(path, replace)?);
         }
-        print_bytes(&picture.bytes(args.picture_format()?).map_err(Failure::Failed)?)
+        print_bytes(&picture.bytes(args.picture_format()?)?)
     }
 
     /// The note of a picture of this film at `path`.

@@ -26,7 +26,7 @@ pub fn run(args: &ManArgs) -> Result<(), Failure> {
     let pages: Vec<&Command> = std::iter::once(&main).chain(main.get_subcommands()).collect();
     for command in &pages {
         let path = folder.join(format!("{}.1", name(command)));
-        write_whole(&path, &page(command)?).map_err(Failure::Failed)?;
+        write_whole(&path, &page(command)?)?;
     }
     inform(format_args!("{}: {} manual pages saved", folder.display(), pages.len()));
     Ok(())

@@ -38,7 +38,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     // It may take the place of a film of which it has all samples, which is known only when it is there.
     let claim = files.claim(&args.output, Replace::Anything)?;
     if let Some(picture) = &args.picture {
-        PictureFormat::of(picture).map_err(Failure::Usage)?;
+        PictureFormat::of(picture).map_err(|error| Failure::Usage(error.into()))?;
         files.write(picture)?;
     }
     // In the order of their samples, so that the result does not depend on how they were named.
@@ -67,15 +67,13 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     };
     let note_of_film = note(&args.output);
     if !args.overwrite.overwrite {
-        check_replaced_film(&film, &note_of_film, &args.output).map_err(Failure::Failed)?;
+        check_replaced_film(&film, &note_of_film, &args.output)?;
     }
-    write_film_into(&film, &note_of_film, claim).map_err(Failure::Failed)?;
+    write_film_into(&film, &note_of_film, claim)?;
     if let Some(path) = &args.picture {
         let (size, note) = ((film.width(), film.height()), note(path));
         let display = shot.display.into();
-        Print { film: &film, display: &display, size, note: Some(&note) }
-            .write(path, files.replace())
-            .map_err(Failure::Failed)?;
+        Print { film: &film, display: &display, size, note: Some(&note) }.write(path, files.replace())?;
     }
     let error = film.error_estimate().map(|error| error.relative);
     if args.json {

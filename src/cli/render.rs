@@ -187,11 +187,11 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     // The film first: a picture can be made of it.
     if let Some(file) = film_file {
         let note = job.note(&film, file.path());
-        write_film_into(&film, &note, file).map_err(Failure::Failed)?;
+        write_film_into(&film, &note, file)?;
     }
     job.write(args, &film, &args.output, files.replace())?;
     if let Some(path) = &args.error_picture {
-        write_errors(&film, path, files.replace()).map_err(Failure::Failed)?;
+        write_errors(&film, path, files.replace())?;
     }
     if film.n_bad() > bad_before {
         let total = report.rays.camera;

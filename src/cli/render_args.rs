@@ -194,7 +194,7 @@ impl RenderArgs {
         if self.to_stdout() {
             return Ok(self.default_format());
         }
-        let of_name = PictureFormat::of(&self.output).map_err(Failure::Usage)?;
+        let of_name = PictureFormat::of(&self.output).map_err(|error| Failure::Usage(error.into()))?;
         if self.format.is_some() && of_name != self.default_format() {
             let (name, extension) = (self.output.display(), self.default_format().extension());
             return Err(Failure::Usage(format!("{name}: --format {extension} needs a name that ends in .{extension}")));

@@ -95,8 +95,8 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     }
     folder.keep();
 
-    write_whole(&html, page(&outcomes, &command_line(), missing.as_deref()).as_bytes()).map_err(Failure::Failed)?;
-    write_whole(&table, csv(&outcomes).as_bytes()).map_err(Failure::Failed)?;
+    write_whole(&html, page(&outcomes, &command_line(), missing.as_deref()).as_bytes())?;
+    write_whole(&table, csv(&outcomes).as_bytes())?;
     print(lines(summary_text(&outcomes).trim_end()))?;
     print(vec![html.display().to_string(), table.display().to_string()])?;
     for mismatch in outcomes.iter().filter_map(SceneOutcome::mismatch) {

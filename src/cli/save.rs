@@ -25,7 +25,7 @@ pub fn run(args: &SaveArgs) -> Result<(), Failure> {
     let scene = args.scene.load(None, &mut files, &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
-    let saved = save_scene(&mut world, Some(&scene), &args.output).map_err(Failure::Failed)?;
+    let saved = save_scene(&mut world, Some(&scene), &args.output)?;
     inform(format_args!("{}: scene saved{}", args.output.display(), replaced(files.replaced(), &args.output)));
     for note in &saved.notes {
         inform(format_args!("note: {note}"));

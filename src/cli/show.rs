@@ -71,7 +71,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     if let Some(record) = &args.record {
         let mut files = OverwriteArgs::default().files();
         files.read_all(source.path().map(std::path::Path::to_path_buf))?;
-        check_recordable(record).map_err(Failure::Failed)?;
+        check_recordable(record)?;
         files.write(record)?;
     }
     let store = SettingsStore::of_platform();
@@ -108,7 +108,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
 /// Plays a recording, and keeps the picture at its end.
 fn play(args: &ShowArgs) -> Result<(), Failure> {
     let Some(path) = &args.replay else { return Ok(()) };
-    PictureFormat::of(&args.output).map_err(Failure::Usage)?;
+    PictureFormat::of(&args.output).map_err(|error| Failure::Usage(error.into()))?;
     let mut files = args.overwrite.files();
     files.read(path)?;
     files.write(&args.output)?;
@@ -123,7 +123,7 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let samples = ImageSamples { first: 0, spp: film.spp(), uneven: false };
     let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
     let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
-    print.write(&args.output, files.replace()).map_err(Failure::Failed)?;
+    print.write(&args.output, files.replace())?;
     if files.replaced().contains(&args.output) {
         inform(format_args!("{}: replaced the existing file", args.output.display()));
     }

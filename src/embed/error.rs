@@ -1,7 +1,7 @@
 //! What can go wrong with a scene or an image.
 
 use crate::render::{CameraError, NoRoom, SettingsError};
-use crate::scene::{BadValue, SceneError};
+use crate::scene::{BadValue, SceneError, WriteError};
 use thiserror::Error;
 
 /// Why there is no scene or no image; each says what is wrong, where, and what would be right.
@@ -14,8 +14,10 @@ pub enum Error {
     /// An option or a value of the world is out of range.
     #[error(transparent)]
     Value(#[from] BadValue),
+    /// The settings of the light model are out of range.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// No picture can be taken with the camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// There is not enough memory for an image of that size.
@@ -28,6 +30,6 @@ pub enum Error {
     #[error("the worker threads cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A file cannot be written.
-    #[error("{0}")]
-    Write(String),
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

@@ -83,6 +83,6 @@ impl Image {
         let samples = ImageSamples { first: self.film.first_sample(), spp: self.film.spp(), uneven };
         let note = self.metadata.note(path, size, samples, self.display.into());
         let print = Print { film: &self.film, display: &self.display, size, note: Some(&note) };
-        print.write(path, Replace::AllButFilms).map_err(Error::Write)
+        Ok(print.write(path, Replace::AllButFilms)?)
     }
 }

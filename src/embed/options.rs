@@ -9,6 +9,7 @@ use std::fmt;
 /// Whether to go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
+    /// Take more samples until the target is reached.
     Continue,
     /// End the rendering; the image has the samples so far.
     Stop,
@@ -65,6 +66,7 @@ impl RenderOptions {
         self
     }
 
+    /// The light model, in place of the scene's.
     pub fn integrator(mut self, integrator: Integrator) -> Self {
         self.integrator = Some(integrator);
         self

@@ -20,40 +20,54 @@ use std::path::PathBuf;
 pub enum Command {
     /// Look about from where the eye is, degrees; positive yaw looks to the right, positive pitch upwards.
     Turn {
+        /// Degrees to the right.
         yaw_deg: f64,
+        /// Degrees upwards.
         pitch_deg: f64,
     },
     /// Move along the view's own axes, in strides (see [`super::navigation::stride`]), which fit the scene's size.
     Fly {
+        /// Strides to the right.
         right: f64,
+        /// Strides upwards.
         up: f64,
+        /// Strides forward.
         forward: f64,
     },
     /// From now on a stride is half of the way to what is at this place in the picture.
     PaceAt {
+        /// Fraction of the width of the picture, from the left.
         x: f64,
+        /// Fraction of its height, from the top.
         y: f64,
     },
     /// Move the eye around the pivot, degrees; positive yaw moves it to the right, positive pitch upwards.
     Orbit {
+        /// Degrees to the right.
         yaw_deg: f64,
+        /// Degrees upwards.
         pitch_deg: f64,
     },
     /// Move sideways, in heights of the picture at the pivot: what lies there moves with the mouse.
     Pan {
+        /// Heights of the picture to the right.
         right: f64,
+        /// Heights of the picture upwards.
         up: f64,
     },
     /// Multiply the distance to the pivot, which stays where it is; positive.
     Dolly {
+        /// Above 1 moves away from the pivot.
         factor: f64,
     },
     /// Multiply the size of what the picture takes in, by changing the field of view; positive.
     Zoom {
+        /// Above 1 takes in more of the scene.
         factor: f64,
     },
     /// Lean the head to the right, degrees.
     Roll {
+        /// Degrees, positive to the right.
         angle_deg: f64,
     },
     /// Take the roll out: the horizon is level again.
@@ -65,62 +79,85 @@ pub enum Command {
     /// Keep the direction, place the eye so that what is selected just fits into the picture, or else the whole scene
     /// but for what lies far off, and focus on its middle.
     FrameAll,
+    /// Set the pose of the camera.
     SetView(View),
+    /// Set the field of view.
     SetProjection(Projection),
+    /// Set aperture and focus.
     SetLens(Lens),
     /// Put the pivot at the depth of what is at this place in the picture.
     PivotAt {
+        /// Fraction of the width of the picture, from the left.
         x: f64,
+        /// Fraction of its height, from the top.
         y: f64,
     },
     /// Multiply the distance of the focal plane; positive.
     ScaleFocus {
+        /// Above 1 moves the focal plane away.
         factor: f64,
     },
     /// Metres along the view axis, positive, may be infinite.
     SetFocus {
+        /// Distance of the focal plane.
         distance: f64,
     },
     /// Put the focal plane through what is at this place in the picture.
     FocusAt {
+        /// Fraction of the width of the picture, from the left.
         x: f64,
+        /// Fraction of its height, from the top.
         y: f64,
     },
     /// Multiply the radius of the aperture; switches depth of field on.
     ScaleAperture {
+        /// Above 1 blurs more.
         factor: f64,
     },
     /// Metres, at least 0; switches depth of field on.
     SetAperture {
+        /// Radius of the aperture.
         radius: f64,
     },
+    /// Switch depth of field on or off.
     ToggleDepthOfField,
     /// Add to the exposure, factors of two.
     AdjustExposure {
+        /// Positive for a brighter picture.
         stops: f32,
     },
+    /// Set the exposure, factors of two.
     SetExposure {
+        /// 0 shows the light as it is; positive for a brighter picture.
         stops: f32,
     },
+    /// Set the tone curve.
     SetToneCurve(ToneCurve),
     /// The next tone curve of the list, and after the last the first.
     NextToneCurve,
     /// The size of the picture in pixels. A size without pixels (a minimised window) keeps the film and pauses.
     Resize {
+        /// Width in pixels.
         width: u32,
+        /// Height in pixels.
         height: u32,
     },
+    /// Rest until [`Command::Resume`]; what changes is still shown.
     Pause,
+    /// End a pause.
     Resume,
     /// Drop all samples and begin again.
     Restart,
+    /// Set the light model.
     SetIntegrator(Integrator),
     /// Worker threads; 0 is one for each processor.
     SetThreads {
+        /// How many; 0 for one per processor.
         threads: usize,
     },
     /// Save the scene as a scene file; one that is there is replaced.
     SaveScene {
+        /// The file to write.
         #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },
@@ -128,47 +165,60 @@ pub enum Command {
     SetTarget(Target),
     /// Nobody can see the picture: rest, without being paused.
     SetHidden {
+        /// Whether the picture is out of sight.
         hidden: bool,
     },
     /// What is shown in place of the picture, see [`Inspection`].
     SetInspection(Inspection),
     /// Tint what is sharp, and draw the focal plane.
     SetSharpZone {
+        /// Whether it is shown.
         shown: bool,
     },
     /// Tell why what is at this place in the picture looks as it does.
     ExplainAt {
+        /// Fraction of the width of the picture, from the left.
         x: f64,
+        /// Fraction of its height, from the top.
         y: f64,
     },
+    /// Forget the explanation of [`Command::ExplainAt`].
     ForgetExplanation,
     /// Give all samples to a part of the picture (left, top, right, bottom), or to all of it again.
     SetRegion {
+        /// Left, top, right and bottom as fractions of the picture; `None` for all of it.
         region: Option<[f64; 4]>,
     },
     /// The focal plane stays with the point that was focused on last, or moves with the camera again.
     ToggleFocusLock,
     /// The focal plane goes to what is at this place in the picture, and stays with whatever comes there.
     FocusFollows {
+        /// Fraction of the width of the picture, from the left.
         x: f64,
+        /// Fraction of its height, from the top.
         y: f64,
     },
     /// Keep the view under a number from 1 to 9.
     SetBookmark {
+        /// From 1 to 9.
         slot: u8,
     },
+    /// Set the camera to the view kept under a number from 1 to 9.
     GoToBookmark {
+        /// From 1 to 9.
         slot: u8,
     },
     /// All of them at once, as they were kept before.
     SetBookmarks(Box<Bookmarks>),
     /// To where the camera rested before.
     PreviousView,
+    /// To where the camera was before [`Command::PreviousView`].
     NextView,
     /// Change what the scene is made of.
     Edit(Edit),
     /// Open a scene file, a model or, when there is no such file, the built-in scene of that name.
     Open {
+        /// The file, or the name of a built-in scene.
         #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },

@@ -17,8 +17,11 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 /// What made a pixel what it is.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PixelStory {
+    /// The pixel, x and y from the upper left corner of the film.
     pub pixel: UVec2,
+    /// Width and height of the film in pixels.
     pub film_size: UVec2,
+    /// Numbers of the samples that were traced.
     pub samples: Range<u32>,
     /// Samples that were not finite, and are in none of the figures.
     pub n_bad: usize,
@@ -26,8 +29,9 @@ pub struct PixelStory {
     pub lights: Vec<LightRow>,
     /// All lights together: seen, after one bounce, after two…
     pub by_bounces: Vec<DVec3>,
-    /// What paths ran into, and what their vertices asked for.
+    /// Light that paths ran into, W·m⁻²·sr⁻¹.
     pub by_itself: DVec3,
+    /// Light that vertices found by light sampling, W·m⁻²·sr⁻¹.
     pub by_asking: DVec3,
     /// What the paths found: all lights together.
     pub mean: DVec3,
@@ -35,12 +39,14 @@ pub struct PixelStory {
     pub deviation: DVec3,
     /// What paths from the lamps brought beside that, as far as it is known.
     pub from_lamps: Option<DVec3>,
+    /// The path of each sample.
     pub ways: Vec<PathRecord>,
 }
 
 /// One light's part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightRow {
+    /// Name of the object or light, or its kind and number.
     pub name: String,
     /// Seen, after one bounce, after two… W·m⁻²·sr⁻¹.
     pub by_bounces: Vec<DVec3>,
@@ -49,16 +55,20 @@ pub struct LightRow {
 /// One path, in the world, metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathRecord {
+    /// Number of the sample.
     pub sample: u32,
+    /// What the pixel got of it, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
     /// On the lens.
     pub origin: DVec3,
+    /// Ends of its segments, in order.
     pub stops: Vec<Stop>,
 }
 
 /// The end of a segment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stop {
+    /// Where the segment ends.
     pub end: End,
     /// Of light that arrives here, the share that reaches the pixel.
     pub throughput: DVec3,
@@ -71,11 +81,22 @@ pub struct Stop {
 /// A place or a direction, and what is there.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    At { point: DVec3, what: String },
-    Sky { direction: DVec3 },
+    /// A point on a surface.
+    At {
+        /// In the world, metres.
+        point: DVec3,
+        /// Name of the object or light.
+        what: String,
+    },
+    /// Outside of the scene.
+    Sky {
+        /// Unit, from the scene outwards.
+        direction: DVec3,
+    },
 }
 
 impl LightRow {
+    /// Sum over all bounces, W·m⁻²·sr⁻¹.
     pub fn total(&self) -> DVec3 {
         self.by_bounces.iter().sum()
     }
@@ -100,6 +121,7 @@ pub struct SnapshotNames {
 }
 
 impl SnapshotNames {
+    /// The names of the objects of an extraction, looked up in the inputs that it was made from.
     pub fn of(extraction: &Extraction, inputs: &SceneInputs) -> Self {
         let objects: BTreeMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
         let lights: BTreeMap<_, _> = inputs.lights.iter().map(|light| (light.entity, light)).collect();
@@ -134,6 +156,7 @@ impl SnapshotNames {
 }
 
 impl PixelStory {
+    /// The story of an explanation, in the world and with the names of its objects.
     pub fn new(explanation: &Explanation, from_lamps: Option<DVec3>, names: &SnapshotNames) -> Self {
         let contributions = explanation.contributions();
         let mut by_light: BTreeMap<LightSource, Vec<DVec3>> = BTreeMap::new();
@@ -206,6 +229,7 @@ pub struct Explaining {
     /// A place that is to be explained: fractions of the picture.
     pub(super) wanted: Option<(f64, f64)>,
     waiting: Option<Waiting>,
+    /// The last answer, until another question is asked or it is forgotten.
     pub story: Option<PixelStory>,
 }
 

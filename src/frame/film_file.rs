@@ -11,7 +11,7 @@ use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
-use crate::scene::{FileKind, Fingerprint, ImageMetadata, InputFile, Limits, ReadError, SceneSource};
+use crate::scene::{FileKind, Fingerprint, ImageMetadata, InputFile, Limits, ReadError, SceneSource, WriteError};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
     ReadLayers, Text, WritableImage,
@@ -24,7 +24,9 @@ use std::path::Path;
 /// A film and what it is a film of.
 #[derive(Clone, Debug)]
 pub struct FilmFile {
+    /// The film, with all of its numbers.
     pub film: Film,
+    /// Scene, view and settings that it was rendered with.
     pub shot: ImageMetadata,
     /// What cannot be known of it; for people, with its name.
     pub warning: Option<String>,
@@ -56,21 +58,21 @@ const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * N_PLANES as u64);
 ///
 /// # Errors
 /// When samples would be lost, another process has the file, or it cannot be written.
-pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), String> {
+pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), WriteError> {
     let claim = WholeFile::claim(path, Replace::Anything)?;
     check_replaced_film(film, note, path)?;
     write_film_into(film, note, claim)
 }
 
 /// The same into a file that was claimed before, whatever it replaces.
-pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<(), String> {
+pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<(), WriteError> {
     let path = &out.path().to_path_buf();
-    drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, &error))?);
-    let mut bytes = encode(film, note, FORMAT, NO_CHECK).map_err(|error| unwritable(path, &error))?;
+    drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, error))?);
+    let mut bytes = encode(film, note, FORMAT, NO_CHECK).map_err(|error| unwritable(path, error))?;
     let place = place_of_check(&bytes).expect("the header has just been written");
     let check = checksum(&bytes, &place).to_string();
     bytes[place].copy_from_slice(check.as_bytes());
-    out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
+    out.write_all(&bytes).map_err(|error| unwritable(path, error))?;
     out.finish()
 }
 
@@ -120,14 +122,13 @@ fn checksum(bytes: &[u8], place: &Range<usize>) -> Fingerprint {
 ///
 /// # Errors
 /// When a film is there that has other samples, is of another picture, or cannot be read.
-pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), String> {
+pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), WriteError> {
     if !is_film(path) {
         return Ok(());
     }
-    const WHAT_TO_DO: &str = "choose another name, or use --overwrite";
-    let refused = |why: String| format!("{}: a film {why} would be lost: {WHAT_TO_DO}", path.display());
+    let refused = |film: String| WriteError::OtherFilm { path: path.to_path_buf(), film };
     let old = read(path, &Limits::of_this_process()).map_err(|reason| refused(format!("that {reason}")))?;
-    if let Some(what) = ImageMetadata::from_note(note)?.differs_from(&old.shot) {
+    if let Some(what) = ImageMetadata::from_note(note).map_err(WriteError::Metadata)?.differs_from(&old.shot) {
         return Err(refused(format!("with a different {what}")));
     }
     if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }

@@ -10,6 +10,7 @@ use glam::DVec3;
 /// Depths between which a lens blurs no more than asked, metres along the view axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpZone {
+    /// The nearest depth that is sharp.
     pub near: f64,
     /// May be infinite.
     pub far: f64,
@@ -69,8 +70,10 @@ pub enum FocusTarget {
     Cursor([f64; 2]),
 }
 
+/// What the focal plane stays with, and what was focused on last.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Focus {
+    /// What the focal plane stays with.
     pub target: FocusTarget,
     /// What was focused on last.
     pub last: Option<(Entity, DVec3)>,

@@ -10,15 +10,20 @@ use std::f64::consts::TAU;
 /// What the handles do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
+    /// Moves along axes and in planes.
     #[default]
     Move,
+    /// Turns about axes.
     Turn,
+    /// Scales along axes or evenly.
     Scale,
 }
 
 impl Mode {
+    /// All modes, in the order of menus.
     pub const ALL: [Self; 3] = [Self::Move, Self::Turn, Self::Scale];
 
+    /// Name for the user, lower case.
     pub fn label(self) -> &'static str {
         match self {
             Self::Move => "move",
@@ -42,15 +47,25 @@ pub enum Handle {
 /// What a drag amounts to since it began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drag {
+    /// By a vector in the world, metres.
     Move(DVec3),
-    Turn { axis: DVec3, angle_deg: f64 },
+    /// About an axis through the middle of the gizmo.
+    Turn {
+        /// Unit, in the world.
+        axis: DVec3,
+        /// Counter-clockwise about the axis, degrees.
+        angle_deg: f64,
+    },
+    /// By factors along the axes of the gizmo.
     Scale(DVec3),
 }
 
 /// The handles around a place in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gizmo {
+    /// What the handles do.
     pub mode: Mode,
+    /// Where they meet, in the world, metres.
     pub center: DVec3,
     /// Unit: the world's axes, or for scaling the thing's own.
     pub axes: [DVec3; 3],
@@ -61,6 +76,7 @@ pub struct Gizmo {
 /// What is drawn of a handle.
 #[derive(Clone, Debug)]
 pub struct Mark {
+    /// What it is a mark of.
     pub handle: Handle,
     /// Places in the window.
     pub line: Vec<DVec2>,

@@ -69,6 +69,7 @@ pub(super) struct Content {
     environment: Option<SceneEnvironment>,
 }
 
+/// The steps that can be undone and redone, and whether the scene has changes that are not saved.
 #[derive(Resource, Default)]
 pub struct History {
     now: Option<State>,
@@ -96,6 +97,7 @@ impl History {
         self.undo.last().map(|step| step.label.as_str())
     }
 
+    /// What the next redo does again.
     pub fn redo_label(&self) -> Option<&str> {
         self.redo.last().map(|step| step.label.as_str())
     }
@@ -108,6 +110,7 @@ impl History {
         history.begun = Some((entities, false));
     }
 
+    /// Ends the step that [`Self::begin`] began.
     pub fn end(world: &mut World) {
         Self::remember_now(world);
         world.resource_mut::<Self>().begun = None;

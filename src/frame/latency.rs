@@ -11,6 +11,7 @@ impl LatencyHistogram {
     /// As many as a minute of steady movement has, about.
     const KEPT: usize = 1000;
 
+    /// Adds a wait; beyond a thousand the oldest is dropped.
     pub fn add(&mut self, wait: Duration) {
         self.0.push_back(wait);
         if self.0.len() > Self::KEPT {
@@ -18,10 +19,12 @@ impl LatencyHistogram {
         }
     }
 
+    /// Number of waits that are kept.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
+    /// Whether there is no wait yet.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -71,7 +71,7 @@ pub use saving::SavedAs;
 pub use scene_bounds::SceneBounds;
 pub use scheduler::{RenderStep, Scheduler, StepReport};
 pub use selection::{OwnBox, Picked, Projector, Selection, pick};
-pub use session::{Session, SessionOptions, Stage};
+pub use session::{Session, SessionError, SessionOptions, Stage};
 pub use settings::{Navigation, SceneBookmarks, Settings, SettingsStore};
 pub use status::{Message, MessageKind, Picture, Status};
 pub use views::{Bookmarks, ViewTrail};

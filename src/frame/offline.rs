@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 pub struct Target {
     /// Samples per pixel.
     pub spp: Option<u32>,
+    /// Seconds of rendering.
     pub seconds: Option<f64>,
     /// Relative error of the whole picture, as it estimates it itself.
     pub error: Option<f64>,
@@ -44,8 +45,11 @@ impl Target {
 pub struct Progress {
     /// Samples that every pixel has.
     pub spp: u32,
+    /// Seconds of rendering so far.
     pub seconds: f64,
+    /// Rays traced so far, by class.
     pub rays: RayCounts,
+    /// Error of the film, as soon as it can be estimated.
     pub error: Option<ErrorEstimate>,
 }
 
@@ -54,6 +58,7 @@ pub struct Progress {
 pub struct OfflineReport {
     /// Wall time.
     pub seconds: f64,
+    /// Rays traced, by class.
     pub rays: RayCounts,
     /// Samples that were not finite and were left out.
     pub n_bad: u64,

@@ -3,6 +3,7 @@
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
 use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, relative_errors};
+use crate::scene::WriteError;
 use crate::scene::image_metadata::{NOTE_KEY, exr_text};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
@@ -22,12 +23,12 @@ pub enum PictureFormat {
 
 impl PictureFormat {
     /// The kind that a file name asks for.
-    pub fn of(path: &Path) -> Result<Self, String> {
+    pub fn of(path: &Path) -> Result<Self, WriteError> {
         match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
             Some("png") => Ok(Self::Png),
             Some("exr") => Ok(Self::Exr),
-            Some(other) => Err(format!("{}: unsupported output format .{other}: use .png or .exr", path.display())),
-            None => Err(format!("{}: missing file extension: use .png or .exr", path.display())),
+            Some(other) => Err(WriteError::Format { path: path.to_path_buf(), extension: other.to_owned() }),
+            None => Err(WriteError::NoExtension(path.to_path_buf())),
         }
     }
 
@@ -43,7 +44,9 @@ impl PictureFormat {
 /// A film as a picture.
 #[derive(Clone, Copy)]
 pub struct Print<'a> {
+    /// The film, linear.
     pub film: &'a Film,
+    /// Exposure and tone curve of a PNG.
     pub display: &'a Display,
     /// Pixels of a PNG, which a coarser film is stretched to; linear light stays as it was measured.
     pub size: (u32, u32),
@@ -52,7 +55,7 @@ pub struct Print<'a> {
 }
 
 /// Writes a film as its name asks, without a note.
-pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), String> {
+pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), WriteError> {
     Print { film, display, size: (film.width(), film.height()), note: None }.write(path, Replace::AllButFilms)
 }
 
@@ -60,29 +63,28 @@ pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), Str
 ///
 /// # Errors
 /// When it is not known yet, or the file cannot be written.
-pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), String> {
-    let errors = relative_errors(film)
-        .ok_or_else(|| format!("{}: the error is unknown until every pixel has two samples", path.display()))?;
+pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), WriteError> {
+    let errors = relative_errors(film).ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
     let channel = |name: &str| AnyChannel::new(name, FlatSamples::F32(errors.clone()));
     let channels = ["R", "G", "B"].map(channel).into_iter().collect();
-    let bytes = encode(film, channels, None).map_err(|error| unwritable(path, &error))?;
+    let bytes = encode(film, channels, None).map_err(|error| unwritable(path, error))?;
     let mut out = WholeFile::begin(path, replace)?;
-    out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
+    out.write_all(&bytes).map_err(|error| unwritable(path, error))?;
     out.finish()
 }
 
 impl Print<'_> {
     /// Writes the picture as its name asks: to a temporary name first, which then takes the place of `path`.
-    pub fn write(&self, path: &Path, replace: Replace) -> Result<(), String> {
+    pub fn write(&self, path: &Path, replace: Replace) -> Result<(), WriteError> {
         self.encode_beside(PictureFormat::of(path)?, path, replace)?.finish()
     }
 
     /// Writes the picture into `folder` as `STEM-0001`, or with the first higher number that is free: never over a
     /// file that is there, even one that another program makes at the same moment. Answers with the path.
-    pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, String> {
+    pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, WriteError> {
         let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
         let file = self.encode_beside(format, &name(0), Replace::AllButFilms)?;
-        let taken = || format!("{}: all numbers are in use: move some of the pictures", name(u32::MAX).display());
+        let taken = || WriteError::NoFreeName(name(u32::MAX));
         file.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
     }
 
@@ -90,12 +92,12 @@ impl Print<'_> {
     ///
     /// # Errors
     /// When there is not enough memory for them.
-    pub fn bytes(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
-        drop(self.room(format).map_err(|error| error.to_string())?);
+    pub fn bytes(&self, format: PictureFormat) -> Result<Vec<u8>, WriteError> {
+        drop(self.room(format)?);
         let mut bytes = Vec::new();
         match format {
-            PictureFormat::Png => self.png(&mut bytes).map_err(|error| error.to_string())?,
-            PictureFormat::Exr => bytes = self.exr().map_err(|error| error.to_string())?,
+            PictureFormat::Png => self.png(&mut bytes).map_err(|error| WriteError::Encode(Box::new(error)))?,
+            PictureFormat::Exr => bytes = self.exr().map_err(|error| WriteError::Encode(Box::new(error)))?,
         }
         Ok(bytes)
     }
@@ -109,14 +111,14 @@ impl Print<'_> {
     }
 
     /// The whole picture in a temporary file in the folder of `path`.
-    fn encode_beside(&self, format: PictureFormat, path: &Path, replace: Replace) -> Result<WholeFile, String> {
-        drop(self.room(format).map_err(|error| unwritable(path, &error))?);
+    fn encode_beside(&self, format: PictureFormat, path: &Path, replace: Replace) -> Result<WholeFile, WriteError> {
+        drop(self.room(format).map_err(|error| unwritable(path, error))?);
         let mut out = WholeFile::begin(path, replace)?;
         match format {
-            PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, &error))?,
+            PictureFormat::Png => self.png(&mut out).map_err(|error| unwritable(path, error))?,
             PictureFormat::Exr => {
-                let bytes = self.exr().map_err(|error| unwritable(path, &error))?;
-                out.write_all(&bytes).map_err(|error| unwritable(path, &error))?;
+                let bytes = self.exr().map_err(|error| unwritable(path, error))?;
+                out.write_all(&bytes).map_err(|error| unwritable(path, error))?;
             }
         }
         Ok(out)

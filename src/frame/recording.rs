@@ -9,7 +9,7 @@ use super::command::Command;
 use super::input::CommandQueue;
 use super::resources::{Clock, CurrentScene, SceneGeneration};
 use super::status::MessageKind;
-use crate::scene::{FileKind, InputFile, ReadError, check_film_size};
+use crate::scene::{FileKind, InputFile, ReadError, WriteError, check_film_size};
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -112,7 +112,7 @@ pub fn record(
 ///
 /// # Errors
 /// When another file is there.
-pub fn check_recordable(path: &Path) -> Result<(), String> {
+pub fn check_recordable(path: &Path) -> Result<(), WriteError> {
     let Ok(info) = std::fs::metadata(path) else { return Ok(()) };
     // What is no file at all is refused by the writer, in its own words.
     if !info.is_file() || info.len() == 0 {
@@ -126,7 +126,7 @@ pub fn check_recordable(path: &Path) -> Result<(), String> {
     let is_recording = text.lines().next().is_some_and(|line| ron::from_str::<RecordingHeader>(line).is_ok());
     match read {
         Ok(_) if is_recording => Ok(()),
-        _ => Err(format!("{}: exists and is not a recording: choose another name", path.display())),
+        _ => Err(WriteError::NotRecording(path.to_path_buf())),
     }
 }
 

@@ -61,9 +61,10 @@ impl Recovery {
             Err(error) => return Some(error),
         };
         let title = title.to_owned();
-        let work = move || {
+        let work = move || -> Result<(), String> {
             crate::scene::whole_file::write_whole(&scene.with_extension(TITLE), title.as_bytes())?;
-            description.save(&scene).map(drop)
+            description.save(&scene)?;
+            Ok(())
         };
         match std::thread::Builder::new().name("firstlight recovery".to_owned()).spawn(work) {
             Ok(writer) => {

@@ -10,7 +10,9 @@ use std::sync::Arc;
 /// How far a simplified mesh is from the whole one.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct MeshMeasure {
+    /// Triangles of the whole mesh.
     pub whole_faces: usize,
+    /// Triangles of the simplified mesh.
     pub faces: usize,
     /// Between the two surfaces; `None` for the whole one.
     pub deviation: Option<Deviation>,

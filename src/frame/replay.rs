@@ -7,7 +7,7 @@ use super::{Command, MessageKind, Session, SessionOptions, Target, render_offlin
 use crate::render::{Film, Room};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use crate::scene::{
-    DisplaySettings, Rendering, SceneSource, UpAxis, absolute, check_film_size, relative_path, text_to_path,
+    DisplaySettings, Rendering, SceneSource, UpAxis, WriteError, absolute, check_film_size, relative_path, text_to_path,
 };
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ impl Session {
     ///
     /// # Errors
     /// When the file cannot be made.
-    pub fn record(&mut self, path: &Path, source: &SceneSource, up: Option<UpAxis>) -> Result<(), String> {
+    pub fn record(&mut self, path: &Path, source: &SceneSource, up: Option<UpAxis>) -> Result<(), WriteError> {
         check_recordable(path)?;
         let mut out = WholeFile::claim(path, Replace::AllButFilms)?;
         let folder = folder_of(path);
@@ -41,7 +41,7 @@ impl Session {
         };
         // Only with its first line does it take the place of an older recording; the others are added one by one.
         let first = ron::to_string(&header).expect("a line is plain data") + "\n";
-        out.write_all(first.as_bytes()).map_err(|error| unwritable(path, &error))?;
+        out.write_all(first.as_bytes()).map_err(|error| unwritable(path, error))?;
         let file = out.finish_open()?;
         self.world_mut().insert_resource(Recorder { out: Some((file, path.to_path_buf())), ..Recorder::default() });
         Ok(())
@@ -71,6 +71,7 @@ pub struct Replayed {
 /// How to play a recording.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReplayOptions {
+    /// Worker threads; one for each processor when not given.
     pub threads: Option<usize>,
     /// Samples per pixel at the end, in place of those of the recording.
     pub spp: Option<u32>,
@@ -269,13 +270,25 @@ mod tests {
         std::fs::write(&scene, text).unwrap();
         let source = SceneSource::Scene(scene.clone());
         let mut first = session();
-        assert!(first.record(&scene, &source, None).unwrap_err().contains("s.ron: exists and is not a recording"));
+        assert!(
+            first
+                .record(&scene, &source, None)
+                .unwrap_err()
+                .to_string()
+                .contains("s.ron: exists and is not a recording")
+        );
         assert_eq!(std::fs::read_to_string(&scene).unwrap(), text);
         // While it is written, no other process writes it.
         first.record(&target, &source, None).unwrap();
         let begun = std::fs::read_to_string(&target).unwrap();
         assert!(begun.lines().count() == 1 && begun.contains("File(\"s.ron\")"), "{begun}");
-        assert!(session().record(&target, &source, None).unwrap_err().contains("is being written by another process"));
+        assert!(
+            session()
+                .record(&target, &source, None)
+                .unwrap_err()
+                .to_string()
+                .contains("is being written by another process")
+        );
         first.send(Command::Pause);
         first.update(Duration::ZERO);
         first.end_record();

@@ -22,18 +22,26 @@ use std::fmt;
 /// How much a change makes worthless. From `Restart` on, all samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
+    /// The film is developed again.
     Redraw,
+    /// What is rendered next is decided again.
     Reschedule,
+    /// The samples are dropped.
     Restart,
+    /// The tables of materials and lights are built again, and the samples dropped.
     Shading,
+    /// The tree over the objects is built again, with all of [`Self::Shading`].
     TopTree,
+    /// A mesh or a group of spheres needs a tree of its own, with all of [`Self::TopTree`].
     MeshTree,
+    /// The film gets another size and begins empty.
     Resize,
 }
 
 /// One thing that is not as it was.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
+    /// What it makes worthless.
     pub level: Level,
     /// For the log and the status line.
     pub cause: String,
@@ -46,6 +54,7 @@ pub struct Change {
 pub struct Changes(pub Vec<Change>);
 
 impl Changes {
+    /// Adds a change.
     pub fn add(&mut self, level: Level, cause: impl Into<String>) {
         self.0.push(Change { level, cause: cause.into(), is_all: false });
     }
@@ -55,6 +64,7 @@ impl Changes {
         self.0.push(Change { level: Level::Restart, cause: cause.into(), is_all: true });
     }
 
+    /// Whether some change has exactly this level.
     pub fn has(&self, level: Level) -> bool {
         self.0.iter().any(|change| change.level == level)
     }

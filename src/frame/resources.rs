@@ -16,11 +16,14 @@ pub struct Clock(pub Duration);
 /// The size of the picture, pixels. Without pixels (a minimised window) the last film is kept and rendering rests.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureSize {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
 }
 
 impl PictureSize {
+    /// Whether it has no pixels.
     pub fn is_empty(self) -> bool {
         self.width == 0 || self.height == 0
     }

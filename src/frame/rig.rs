@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 /// All that a person steers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rig {
+    /// Where the camera stands and looks.
     pub view: View,
+    /// Its field of view.
     pub projection: Projection,
+    /// Its aperture and focus.
     pub lens: Lens,
 }
 

@@ -5,7 +5,7 @@ use super::background::BackgroundTasks;
 use super::history::{Content, History};
 use super::resources::{Clock, CurrentScene};
 use super::status::{MessageKind, Status};
-use crate::scene::{Description, Fingerprint, SavedScene, SceneContent};
+use crate::scene::{Description, Fingerprint, SavedScene, SceneContent, WriteError};
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,13 +14,15 @@ use std::thread::JoinHandle;
 /// Where the open scene was saved last, and what it was then; forgotten when another is opened.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
 pub struct SavedAs {
+    /// The scene file; `None` if the scene was not saved.
     pub path: Option<PathBuf>,
+    /// Fingerprint of the scene as it was saved.
     pub content: Option<Fingerprint>,
 }
 
 struct Saved {
     path: PathBuf,
-    result: Result<SavedScene, String>,
+    result: Result<SavedScene, WriteError>,
     content: Fingerprint,
     clean: Content,
 }

@@ -64,6 +64,7 @@ pub enum RenderStep {
     ///
     /// A film of another divider than the one before, or the first after a restart, begins empty.
     Render {
+        /// What the sides of the film are divided by.
         divider: u32,
         /// Until every pixel has so many samples…
         target_spp: u32,
@@ -79,6 +80,7 @@ pub enum RenderStep {
 pub struct StepReport {
     /// Camera paths traced.
     pub paths: u64,
+    /// Seconds that the step took.
     pub seconds: f64,
     /// Samples that every pixel of the film has now, or of its region.
     pub spp: u32,
@@ -193,6 +195,7 @@ impl Scheduler {
         self.spent
     }
 
+    /// The next thing to do at the time `now`, on the clock that all times passed in are of.
     pub fn next(&mut self, now: Duration) -> RenderStep {
         // A pause still shows what has changed, as sharp as it can be.
         if self.paused && self.phase == Phase::Full && self.spp > 0 {

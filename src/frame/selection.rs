@@ -13,6 +13,7 @@ use glam::{DAffine3, DVec2, DVec3, Vec3};
 pub struct Selection(pub Vec<Entity>);
 
 impl Selection {
+    /// The active entity: the one chosen last.
     pub fn active(&self) -> Option<Entity> {
         self.0.last().copied()
     }
@@ -35,6 +36,7 @@ impl Selection {
 /// What a place in the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picked {
+    /// The object or light.
     pub entity: Entity,
     /// In the world.
     pub point: DVec3,
@@ -87,8 +89,11 @@ fn direction(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Vec3> {
 /// The box around a thing, along its own axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnBox {
+    /// Lower corner in the space of the box.
     pub min: DVec3,
+    /// Upper corner in the space of the box.
     pub max: DVec3,
+    /// Map from the space of the box to the world.
     pub world_from_box: DAffine3,
 }
 
@@ -101,6 +106,7 @@ impl OwnBox {
         })
     }
 
+    /// The middle of the box in the world, metres.
     pub fn middle(&self) -> DVec3 {
         self.world_from_box.transform_point3(0.5 * (self.min + self.max))
     }
@@ -182,6 +188,7 @@ impl Projector {
         self.forward + offset.x * self.right - offset.y * self.up
     }
 
+    /// Centre of the lens in the world, metres.
     pub fn eye(&self) -> DVec3 {
         self.eye
     }

@@ -23,8 +23,8 @@ use super::worker::{Waker, Worker};
 use super::{Command, LatencyHistogram, Target};
 use crate::render::{Film, Prepared, RenderSettings};
 use crate::scene::{
-    Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, Rendering, SceneInputs, SceneSource,
-    UpAxis, check_film_size,
+    BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, Rendering, SceneInputs,
+    SceneSource, UpAxis, check_film_size,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -37,12 +37,15 @@ use std::time::Duration;
 /// How to start.
 #[derive(Clone, Default)]
 pub struct SessionOptions {
-    /// Pixels of the picture; 0 means that there is none yet, and the session waits for a size.
+    /// Width of the picture in pixels; 0 means that there is none yet, and the session waits for a size.
     pub width: u32,
+    /// Height of the picture in pixels.
     pub height: u32,
     /// One a processor when not given.
     pub threads: Option<usize>,
+    /// Seed of the random numbers.
     pub seed: u32,
+    /// When the picture is good enough; without a target it is rendered for ever.
     pub target: Target,
     /// Workers give way to other threads, for one that draws a window too.
     pub yielding: bool,
@@ -50,6 +53,24 @@ pub struct SessionOptions {
     pub up: Option<UpAxis>,
     /// Called from another thread when [`Session::update`] would find something new.
     pub waker: Option<Waker>,
+}
+
+/// Why a session cannot start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The size of the picture or the target is out of range.
+    #[error(transparent)]
+    Value(#[from] BadValue),
+    /// The system starts no more threads; a whole sentence.
+    #[error("{0}")]
+    Threads(String),
+}
+
+impl From<SessionError> for String {
+    fn from(error: SessionError) -> Self {
+        error.to_string()
+    }
 }
 
 /// The parts of a frame, in the order in which they run. Systems of a user's own fit in with `.in_set(…)`.
@@ -85,13 +106,14 @@ impl Session {
     ///
     /// # Errors
     /// When the threads cannot be started, or no picture may have that size.
-    pub fn new(options: SessionOptions) -> Result<Self, String> {
+    pub fn new(options: SessionOptions) -> Result<Self, SessionError> {
         if options.width > 0 && options.height > 0 {
             check_film_size(options.width, options.height)?;
         }
         options.target.check()?;
         let threads = options.threads.unwrap_or(0).min(MAX_THREADS);
-        let worker = Worker::start(threads, options.yielding, options.target, options.waker.clone())?;
+        let worker = Worker::start(threads, options.yielding, options.target, options.waker.clone())
+            .map_err(SessionError::Threads)?;
         let mut world = World::new();
         world.insert_resource(Renderer(worker));
         let waker = options.waker;
@@ -208,14 +230,17 @@ impl Session {
         self.world.resource::<Renderer>().0.note_seen(number);
     }
 
+    /// How rendering is getting on, and what there is to tell.
     pub fn status(&self) -> &Status {
         self.world.resource()
     }
 
+    /// The world with the scene's entities and the session's resources.
     pub fn world(&self) -> &World {
         &self.world
     }
 
+    /// The world, to be changed; the next [`Self::update`] finds what has changed.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }

@@ -5,7 +5,8 @@ use super::navigation::Rig;
 use crate::scene::file::DisplayPart;
 use crate::scene::whole_file::write_whole;
 use crate::scene::{
-    BadValue, FileKind, Fingerprint, InputFile, ReadError, SceneSource, absolute, check_film_size, path_to_text,
+    BadValue, FileKind, Fingerprint, InputFile, ReadError, SceneSource, WriteError, absolute, check_film_size,
+    path_to_text,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -30,15 +31,20 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Navigation {
+    /// The program's own.
     #[default]
     Firstlight,
+    /// Those of Blender.
     Blender,
+    /// Those of Maya.
     Maya,
 }
 
 impl Navigation {
+    /// All of them, in the order of menus.
     pub const ALL: [Self; 3] = [Self::Firstlight, Self::Blender, Self::Maya];
 
+    /// Name for the user.
     pub fn label(self) -> &'static str {
         match self {
             Self::Firstlight => "firstlight",
@@ -103,6 +109,7 @@ impl SettingsStore {
         Self { folder: folders.map(|folders| folders.config_dir().to_path_buf()) }
     }
 
+    /// In a folder of the caller's choice.
     pub fn in_folder(folder: &Path) -> Self {
         Self { folder: Some(folder.to_path_buf()) }
     }
@@ -119,7 +126,7 @@ impl SettingsStore {
 
     /// # Errors
     /// When the file cannot be written.
-    pub fn keep_settings(&self, settings: &Settings) -> Result<(), String> {
+    pub fn keep_settings(&self, settings: &Settings) -> Result<(), WriteError> {
         self.write("settings.ron", settings)
     }
 
@@ -131,7 +138,7 @@ impl SettingsStore {
 
     /// # Errors
     /// When the file cannot be written.
-    pub fn keep_bookmarks(&self, source: &SceneSource, bookmarks: &SceneBookmarks) -> Result<(), String> {
+    pub fn keep_bookmarks(&self, source: &SceneSource, bookmarks: &SceneBookmarks) -> Result<(), WriteError> {
         let bookmarks = SceneBookmarks { scene: name_of(source), views: bookmarks.views.clone() };
         self.write(&bookmark_file(source), &bookmarks)
     }
@@ -158,11 +165,11 @@ impl SettingsStore {
         }
     }
 
-    fn write(&self, name: &str, value: &impl Serialize) -> Result<(), String> {
+    fn write(&self, name: &str, value: &impl Serialize) -> Result<(), WriteError> {
         let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)) else { return Ok(()) };
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder)
-                .map_err(|error| format!("{}: cannot create the folder: {error}", folder.display()))?;
+                .map_err(|source| WriteError::NoFolder { folder: folder.to_path_buf(), source })?;
         }
         let pretty = ron::ser::PrettyConfig::new()
             .indentor("    ")

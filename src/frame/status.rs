@@ -12,7 +12,9 @@ use std::time::Duration;
 pub struct Picture {
     /// sRGB-encoded, row by row from the top, 4 bytes a pixel; empty before the first picture.
     pub rgba: Vec<u8>,
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
     /// Grows with every restart.
     pub generation: u64,
@@ -35,7 +37,9 @@ pub struct Status {
     pub scene: String,
     /// The camera, as commands steer it.
     pub rig: Rig,
+    /// Exposure and tone curve.
     pub display: Display,
+    /// The light model.
     pub integrator: Integrator,
     /// Samples per pixel.
     pub spp: u32,
@@ -47,12 +51,15 @@ pub struct Status {
     pub rays: RayCounts,
     /// Seconds from the restart to the last of these rays, whatever they were spent on.
     pub elapsed: f64,
-    /// Millions of rays a second lately, by class.
+    /// Millions of camera rays per second, recently.
     pub camera_mrays: f64,
+    /// Millions of bounce rays per second, recently.
     pub bounce_mrays: f64,
+    /// Millions of shadow rays per second, recently.
     pub shadow_mrays: f64,
     /// Pixels of the film behind the picture.
     pub film_width: u32,
+    /// Height of that film in pixels.
     pub film_height: u32,
     /// By what its sides are divided; 1 is full resolution.
     pub divider: u32,
@@ -72,7 +79,9 @@ pub struct Status {
     pub bad: Vec<BadSample>,
     /// Samples brighter than anything in the scene can be: a fault of the program.
     pub n_above: u64,
+    /// Number of worker threads.
     pub threads: usize,
+    /// Whether rendering is paused by a command.
     pub paused: bool,
     /// The target is reached.
     pub done: bool,
@@ -83,14 +92,20 @@ pub struct Status {
 pub struct Message {
     /// When, on the clock of [`Session::update`](super::Session::update).
     pub at: Duration,
+    /// How serious it is.
     pub kind: MessageKind,
+    /// One line or several, safe to print.
     pub text: String,
 }
 
+/// How serious a [`Message`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessageKind {
+    /// Something to know; nothing is wrong.
     Note,
+    /// Something is not as asked, and the session continues.
     Warning,
+    /// Something asked for has failed.
     Error,
 }
 
@@ -103,6 +118,7 @@ impl Status {
         self.camera_mrays + self.bounce_mrays + self.shadow_mrays
     }
 
+    /// Adds a message, safe to print, at a time on the session's clock; beyond a hundred the oldest is dropped.
     pub fn say(&mut self, at: Duration, kind: MessageKind, text: impl Into<String>) {
         let text = printable::lines(&text.into());
         // Whoever holds the session tells people; the log only keeps it for those who look for it.

@@ -16,6 +16,7 @@ impl Bookmarks {
         *self.0.get(usize::from(slot).checked_sub(1)?)?
     }
 
+    /// Keeps a view under a number from 1 to 9; false for any other number.
     pub fn set(&mut self, slot: u8, rig: Rig) -> bool {
         let place = usize::from(slot).checked_sub(1).and_then(|i| self.0.get_mut(i));
         place.map(|place| *place = Some(rig)).is_some()
@@ -65,6 +66,7 @@ impl ViewTrail {
         Some(rig)
     }
 
+    /// The stop after; the camera is taken to be there from now on.
     pub fn forth(&mut self) -> Option<Rig> {
         let rig = self.ahead.pop()?;
         self.back.extend(self.now.replace(rig));

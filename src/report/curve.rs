@@ -50,7 +50,7 @@ pub fn seconds_at(steps: &[(f64, f64)], spp: f64) -> f64 {
 
 /// When `points` (seconds, error), rising in seconds, come down to `target`, and stay there.
 ///
-/// Between two points along the line that joins them, beyond them along `slope`; `None` where that hardly falls ([`STUCK`]).
+/// Between two points along the line that joins them, beyond them along `slope`; `None` where that hardly falls (`STUCK`).
 pub fn seconds_to(points: &[(f64, f64)], slope: Option<f64>, target: f64) -> Option<Seconds> {
     let along = |(seconds, error): (f64, f64), slope: f64| seconds * (target / error).powf(1.0 / slope);
     let falling = slope.filter(|slope| *slope < STUCK);

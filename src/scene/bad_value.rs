@@ -6,11 +6,24 @@ use thiserror::Error;
 /// A value that nothing is made from: which field, what it is, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum BadValue {
+    /// A field has a value outside of its range.
     #[error("`{field}` is {value}, but must {allowed}")]
-    OutOfRange { field: &'static str, value: String, allowed: String },
+    OutOfRange {
+        /// Name of the field, as in a scene file.
+        field: &'static str,
+        /// Its value, as text.
+        value: String,
+        /// What it must be instead, as the end of a sentence that begins with "must".
+        allowed: String,
+    },
     /// Values that do not go together.
     #[error("{problem}")]
-    Unfit { field: &'static str, problem: String },
+    Unfit {
+        /// Name of the field, as in a scene file; `camera` for the camera as a whole.
+        field: &'static str,
+        /// What is wrong; lower case, no full stop.
+        problem: String,
+    },
 }
 
 impl BadValue {

@@ -23,18 +23,24 @@ use std::sync::Arc;
 pub enum Shape {
     /// About the origin; metres. Its placement must scale evenly.
     Sphere {
+        /// Metres, positive.
         radius: f64,
     },
     /// Infinite, through the origin.
     Plane {
+        /// The direction of the front, any length but 0.
         normal: DVec3,
     },
     /// A parallelogram with a corner at the origin; its front looks along `edge_u` × `edge_v`.
     Quad {
+        /// From the corner to the one at `u = 1`, metres.
         edge_u: DVec3,
+        /// From the corner to the one at `v = 1`, metres.
         edge_v: DVec3,
     },
+    /// A single triangle; its front is where its vertices run counter-clockwise.
     Triangle {
+        /// The corners, metres.
         vertices: [DVec3; 3],
     },
     /// Shared by all objects that use it, together with its tree.
@@ -79,6 +85,7 @@ pub struct Balls {
     pub centers: Vec<Vec3>,
     /// Metres, one a ball.
     pub radii: Vec<f32>,
+    /// Metres: what is added to a centre to get its coordinates in the object's own space.
     pub center: DVec3,
 }
 
@@ -144,7 +151,9 @@ pub fn textures_of(material: &Material) -> impl Iterator<Item = &Arc<SurfaceText
 /// A colour, linear Rec. 709, or a texture.
 #[derive(Clone, Debug)]
 pub enum ColorParam {
+    /// The same colour everywhere.
     Rgb(Vec3),
+    /// The colour of a texture at the surface point.
     Texture(Arc<SurfaceTexture>),
 }
 
@@ -168,7 +177,9 @@ impl PartialEq for ColorParam {
 /// A number, or the red channel of a texture.
 #[derive(Clone, Debug)]
 pub enum ScalarParam {
+    /// The same number everywhere.
     Number(f32),
+    /// The red channel of a texture at the surface point.
     Texture(Arc<SurfaceTexture>),
 }
 
@@ -192,8 +203,11 @@ impl PartialEq for ScalarParam {
 /// A texture with the name and the description that a scene file has for it.
 #[derive(Clone, Debug)]
 pub struct SurfaceTexture {
+    /// Its name in the scene file.
     pub name: String,
+    /// Its description in the scene file.
     pub part: TextureSource,
+    /// The texture itself, ready to be looked up.
     pub texture: render::Texture,
 }
 
@@ -210,7 +224,9 @@ pub struct PointLight {
 /// Where the mesh of an object came from, for saving and reloading it.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct MeshOrigin {
+    /// The file or the built-in mesh.
     pub source: MeshSource,
+    /// How its normals are found.
     pub shading: MeshShading,
     /// Share of the faces that were kept, 0..1.
     pub simplify: Option<f64>,
@@ -227,6 +243,7 @@ pub struct Ordinal(pub u32);
 /// Light from infinitely far away.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct SceneEnvironment {
+    /// Radiance by direction, W·m⁻²·sr⁻¹.
     pub light: render::Environment,
     /// What the scene file says, for saving.
     pub part: EnvironmentSource,
@@ -258,7 +275,9 @@ impl PartialEq for SceneEnvironment {
 /// The size that the scene asks for, pixels. A window has a size of its own.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilmSize {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
 }
 

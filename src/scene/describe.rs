@@ -37,6 +37,7 @@ use std::sync::Arc;
 pub struct Description {
     /// Paths count from [`folder`](Self::folder).
     pub file: SceneFile,
+    /// The folder of the scene file that `file` is to be.
     pub folder: PathBuf,
     /// Meshes that came from no file: index of the object whose `source` has an empty name, and the mesh.
     pub loose_meshes: Vec<(usize, Arc<Mesh>)>,

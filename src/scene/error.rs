@@ -34,6 +34,7 @@ impl fmt::Display for Problem {
 /// Why a scene could not be had: at least one problem, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct SceneError {
+    /// All that is wrong, in the order of the file.
     pub problems: Vec<Problem>,
 }
 
@@ -84,7 +85,7 @@ impl fmt::Display for SceneError {
 
 /// ` (did you mean …?)` when one of `known` is close to `found`, else the list when it is short, else nothing.
 ///
-/// Names are compared in their order until [`MOST_CELLS`] are spent; those whose length alone rules them out are free.
+/// Names are compared in their order until `MOST_CELLS` are spent; those whose length alone rules them out are free.
 pub fn suggestion<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     suggestion_within(found, known, &mut { MOST_CELLS })
 }

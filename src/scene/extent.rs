@@ -8,6 +8,7 @@ use std::collections::{HashMap, HashSet};
 /// A sphere around the finite things of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extent {
+    /// Centre of the sphere in the world, metres.
     pub center: DVec3,
     /// Metres; 0 when there is nothing finite.
     pub radius: f64,

@@ -24,6 +24,7 @@ use std::sync::Arc;
 /// What of a snapshot is to be made anew; each includes the ones before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SnapshotPart {
+    /// The camera alone.
     Camera,
     /// Materials, textures, light table.
     Shading,
@@ -35,6 +36,7 @@ pub enum SnapshotPart {
 pub struct Extraction {
     /// Metres: the world point that is (0, 0, 0) of the snapshot.
     pub origin: DVec3,
+    /// The snapshot about `origin`, with its tables.
     pub prepared: Prepared,
     /// Objects that were left out, and why.
     pub problems: Vec<String>,

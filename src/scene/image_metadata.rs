@@ -31,18 +31,26 @@ pub(super) const FORMAT: u32 = 1;
 /// What is in a picture's note.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageMetadata {
+    /// Version of the format that the metadata is written in.
     pub format: u32,
     /// Name and version.
     pub program: String,
+    /// Which scene the picture shows.
     pub scene: ImageScene,
     /// Of the scene, without camera, film and display.
     pub fingerprint: String,
+    /// From where the scene is seen, and through which lens.
     pub camera: CameraPart,
+    /// Size and pixel filter.
     pub film: FilmPart,
+    /// The light model.
     pub integrator: Integrator,
+    /// Longest path in segments; `None` is unbounded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
+    /// Exposure and tone curve.
     pub display: DisplayPart,
+    /// Seed of the random numbers.
     pub seed: u32,
     /// The number of each pixel's first sample.
     pub first_sample: u32,
@@ -60,9 +68,13 @@ pub struct ImageMetadata {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImageScene {
+    /// A built-in scene, by name.
     Builtin(String),
+    /// A scene file, by path.
     Scene(String),
+    /// A model, framed as the program does.
     Model {
+        /// Path of the model.
         path: String,
         /// `y` or `z`, where it was asked for.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -173,6 +185,7 @@ impl ImageMetadata {
         })
     }
 
+    /// The axis of a model that was asked to point up; `None` where none was asked for.
     pub fn up(&self) -> Option<UpAxis> {
         match self.scene {
             ImageScene::Model { up: Some('z'), .. } => Some(UpAxis::Z),

@@ -32,18 +32,33 @@ pub enum FileKind {
 /// Why a file could not be read. The words follow the path.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
+    /// The system reports an error.
     #[error("cannot be read: {}", plain_io(.0))]
     Io(#[source] io::Error),
+    /// The path is that of a folder.
     #[error("cannot be read: it is a folder")]
     Folder,
+    /// The path leads to what the text says: a pipe, a socket or a device.
     #[error("cannot be read: it is not a regular file, but {0}")]
     NotRegular(&'static str),
+    /// The file is longer than files of its kind may be.
     #[error("is larger than {limit} bytes, the limit for {}: {}", kind.plural(), Limits::advice())]
-    TooLong { kind: FileKind, limit: u64 },
+    TooLong {
+        /// What the file is for.
+        kind: FileKind,
+        /// Bytes that it may have.
+        limit: u64,
+    },
+    /// The file is to be text and is not UTF-8.
     #[error("cannot be read: line {line} is not UTF-8 text")]
-    NotText { line: usize },
+    NotText {
+        /// The first line that is not, counted from 1.
+        line: usize,
+    },
+    /// Reading did not end before the deadline.
     #[error("cannot be read: reading took longer than {} s", DEADLINE.as_secs())]
     TooSlow,
+    /// The caller's `stop` said so.
     #[error("reading was cancelled")]
     Stopped,
 }

@@ -12,44 +12,67 @@ use std::collections::HashSet;
 /// All that a snapshot is built from. Cheap to copy: meshes, clouds and pictures are shared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneInputs {
+    /// All objects.
     pub objects: Vec<ObjectInput>,
     /// Those that the objects use, directly or in a blend.
     pub materials: Vec<MaterialInput>,
+    /// All point lights.
     pub lights: Vec<LightInput>,
     /// The first camera.
     pub camera: Option<CameraInput>,
+    /// Light from infinitely far away, and what the air absorbs.
     pub environment: SceneEnvironment,
 }
 
+/// What the picture depends on of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectInput {
+    /// The entity in the world.
     pub entity: Entity,
+    /// Its `Name`, if it has one.
     pub name: Option<String>,
+    /// Its surface in its own space.
     pub shape: Shape,
+    /// Where it stands in the world.
     pub placement: Placement,
+    /// Its material entities, by slot.
     pub slots: Vec<Entity>,
 }
 
+/// What the picture depends on of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialInput {
+    /// The entity in the world.
     pub entity: Entity,
+    /// Its `Name`, if it has one.
     pub name: Option<String>,
+    /// The material itself.
     pub material: Material,
 }
 
+/// What the picture depends on of a point light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightInput {
+    /// The entity in the world.
     pub entity: Entity,
+    /// Its `Name`, if it has one.
     pub name: Option<String>,
+    /// Intensity and radius.
     pub light: PointLight,
+    /// Where it stands in the world.
     pub placement: Placement,
 }
 
+/// What the picture depends on of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraInput {
+    /// The entity in the world.
     pub entity: Entity,
+    /// Where it stands and looks.
     pub view: View,
+    /// Its field of view.
     pub projection: Projection,
+    /// Its aperture and focus.
     pub lens: Lens,
 }
 
@@ -76,6 +99,7 @@ pub struct SceneQueries<'w, 's> {
 }
 
 impl SceneQueries<'_, '_> {
+    /// Copies of everything that the picture depends on, in the order of the scene file.
     pub fn collect(&self) -> SceneInputs {
         let text = |name: Option<&Name>| name.map(|name| name.as_str().to_owned());
         let objects = in_order(self.objects.iter(), |entity, name, (shape, placement, slots)| ObjectInput {

@@ -17,19 +17,25 @@ pub struct Inventory {
     pub objects: Vec<ObjectEntry>,
     /// Also those that nothing uses.
     pub materials: Vec<MaterialEntry>,
+    /// Everything that emits light, the environment aside.
     pub lights: Vec<LightEntry>,
 }
 
+/// A line of the list of objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectEntry {
+    /// The entity in the world.
     pub entity: Entity,
     /// Its name, or its kind and a number.
     pub label: String,
+    /// Kind of its shape, as in [`Shape::kind`], or `point light`.
     pub kind: &'static str,
 }
 
+/// A line of the list of materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialEntry {
+    /// The entity in the world.
     pub entity: Entity,
     /// Its name, or that of what uses it.
     pub label: String,
@@ -39,11 +45,14 @@ pub struct MaterialEntry {
     pub blends: Vec<Entity>,
 }
 
+/// A line of the list of lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightEntry {
     /// What stands in the scene and can be selected.
     pub entity: Entity,
+    /// Its name, or its kind and a number.
     pub label: String,
+    /// `point light`, or the kind of light that its shape makes it.
     pub kind: &'static str,
     /// The emissive material, which may be a part of a blend; none for a point light, which has an intensity of its own.
     pub material: Option<Entity>,
@@ -98,6 +107,7 @@ impl Inventory {
         Self { materials: materials.collect(), objects, lights }
     }
 
+    /// The line of a material; `None` for an entity that is none.
     pub fn material(&self, entity: Entity) -> Option<&MaterialEntry> {
         self.materials.iter().find(|entry| entry.entity == entity)
     }

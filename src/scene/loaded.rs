@@ -15,7 +15,9 @@ use std::sync::Arc;
 /// A scene with everything it needs, ready to be spawned into a world.
 #[derive(Clone, Debug)]
 pub struct LoadedScene {
+    /// What was opened.
     pub source: SceneSource,
+    /// The scene as its file says it; of a model, the scene that is made around it.
     pub file: SceneFile,
     /// What the paths in `file` count from.
     pub folder: PathBuf,
@@ -27,7 +29,9 @@ pub struct LoadedScene {
     pub(super) pictures: HashMap<String, Arc<ImageTexture>>,
     /// Where they lie, and what they were when they were read.
     pub(super) picture_files: HashMap<String, (PathBuf, Stamp)>,
+    /// Trees of its meshes and of its groups of spheres.
     pub trees: Trees,
+    /// What a person should know of it, one sentence each.
     pub warnings: Vec<String>,
     /// Which axis of a model was asked to point up.
     pub up: Option<UpAxis>,

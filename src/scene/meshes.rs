@@ -98,7 +98,7 @@ pub struct MeshBase {
 }
 
 impl MeshBase {
-    /// Reads or makes what [`load_mesh`] would begin with.
+    /// Reads or makes what `load_mesh` would begin with.
     pub fn read(
         source: &MeshSource,
         shading: MeshShading,
@@ -123,11 +123,12 @@ impl MeshBase {
         (&self.source, self.shading, self.simplified, &*self.folder) == (source, shading, simplify.is_some(), folder)
     }
 
-    /// Simplified and shaded, as [`load_mesh`] ends.
+    /// Simplified and shaded, as `load_mesh` ends.
     pub fn finish(&self, shading: MeshShading, simplify: Option<f64>) -> Result<Mesh, SceneError> {
         finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
     }
 
+    /// The mesh that [`Self::finish`] begins with.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }

@@ -42,6 +42,7 @@ mod up_axis;
 mod value;
 mod view;
 pub mod whole_file;
+mod write_error;
 
 pub use bad_value::BadValue;
 pub use bounds::{check_film_size, check_max_depth, check_stops};
@@ -78,3 +79,4 @@ pub use stamp::{Stamp, stamp};
 pub use trees::Trees;
 pub use value::{ColorValue, Rgb, ScalarValue};
 pub use view::{Lens, Projection, View, ViewError};
+pub use write_error::WriteError;

@@ -6,6 +6,7 @@
 
 use super::relative::absolute;
 use super::whole_file::{Replace, WholeFile, check_replaceable, check_writable};
+use super::write_error::WriteError;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -26,13 +27,14 @@ enum Use {
 }
 
 /// Why a file cannot be had.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum FilesError {
     /// One file stands for two things in the command.
     #[error("{0}")]
     Collision(String),
-    #[error("{0}")]
-    Unwritable(String),
+    /// The output may not be replaced, or cannot be written.
+    #[error(transparent)]
+    Unwritable(#[from] WriteError),
 }
 
 /// What makes two paths one file.
@@ -57,6 +59,7 @@ impl Identity {
 }
 
 impl Files {
+    /// No files yet; outputs may take the place of what `replace` says.
     pub fn new(replace: Replace) -> Self {
         Self { replace, ..Self::default() }
     }

@@ -9,6 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 pub struct Placement {
     /// Metres.
     pub translation: DVec3,
+    /// Rotation, scale and shear.
     pub linear: Linear,
 }
 
@@ -73,6 +74,7 @@ impl Placement {
         }
     }
 
+    /// The linear part as a matrix, from the object's own space to the world.
     pub fn linear(&self) -> DMat3 {
         match self.linear {
             Linear::Turned { rotation_deg, scale } => {
@@ -87,6 +89,7 @@ impl Placement {
         }
     }
 
+    /// The whole map from the object's own space to the world.
     pub fn affine(&self) -> DAffine3 {
         DAffine3 { matrix3: self.linear(), translation: self.translation }
     }

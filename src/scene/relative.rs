@@ -62,10 +62,12 @@ pub mod path_text {
     use serde::{Deserialize, Deserializer, Serializer};
     use std::path::{Path, PathBuf};
 
+    /// Writes a path as the text of [`path_to_text`].
     pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&path_to_text(path))
     }
 
+    /// Reads a path from the text of [`path_to_text`].
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
         String::deserialize(deserializer).map(|text| text_to_path(&text))
     }

@@ -8,6 +8,7 @@ use super::obj::{NewObj, ObjExtras, save_new_obj};
 use super::relative::{absolute, path_to_text, relative_path, text_to_path};
 use super::sources::{EnvironmentSource, MeshSource, TextureSource};
 use super::whole_file::write_whole;
+use super::write_error::WriteError;
 use bevy_ecs::prelude::World;
 use std::path::Path;
 
@@ -27,19 +28,19 @@ pub struct SavedScene {
 ///
 /// # Errors
 /// When the world holds what no scene file may say, or the file cannot be written.
-pub fn save_scene(world: &mut World, loaded: Option<&LoadedScene>, path: &Path) -> Result<SavedScene, String> {
+pub fn save_scene(world: &mut World, loaded: Option<&LoadedScene>, path: &Path) -> Result<SavedScene, WriteError> {
     Description::of(world, loaded).save(path)
 }
 
 impl Description {
     /// See [`save_scene`].
-    pub fn save(self, path: &Path) -> Result<SavedScene, String> {
+    pub fn save(self, path: &Path) -> Result<SavedScene, WriteError> {
         save(self, path)
     }
 }
 
-fn save(mut description: Description, path: &Path) -> Result<SavedScene, String> {
-    let failed = |reason: &dyn std::fmt::Display| format!("{}: cannot be saved: {reason}", path.display());
+fn save(mut description: Description, path: &Path) -> Result<SavedScene, WriteError> {
+    let failed = |source| WriteError::Scene { path: path.to_path_buf(), source };
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     move_paths(&mut description.file, &description.folder, &folder);
     let mut notes = std::mem::take(&mut description.losses);
@@ -52,7 +53,9 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
             number += 1;
             let name = format!("{stem}-mesh-{number}.obj");
             // A file that is there may be another mesh of this scene: it is replaced by nothing but itself.
-            match save_new_obj(&folder.join(text_to_path(&name)), mesh, &extras).map_err(|error| error.to_string())? {
+            match save_new_obj(&folder.join(text_to_path(&name)), mesh, &extras)
+                .map_err(|error| WriteError::Mesh(Box::new(error)))?
+            {
                 NewObj::Written => notes.push(format!("a mesh without a file was saved as {name}")),
                 NewObj::Same => {}
                 NewObj::Taken => continue,
@@ -63,11 +66,11 @@ fn save(mut description: Description, path: &Path) -> Result<SavedScene, String>
             *source = MeshSource::Obj(name);
         }
     }
-    description.file.check().map_err(|error| failed(&error))?;
+    description.file.check().map_err(failed)?;
     let text = description.file.to_ron();
-    let again = SceneFile::parse(&text, path).map_err(|error| failed(&error))?;
+    let again = SceneFile::parse(&text, path).map_err(failed)?;
     if again != description.file {
-        return Err(failed(&"the saved scene would differ; this is a bug in firstlight"));
+        return Err(WriteError::WouldDiffer(path.to_path_buf()));
     }
     if InputFile::open(path, FileKind::Scene).and_then(InputFile::text).is_ok_and(|old| has_comments(&old)) {
         notes.push("comments of the previous file were removed".to_owned());

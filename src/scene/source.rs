@@ -21,7 +21,9 @@ pub enum SceneSource {
 /// Which axis of a model points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UpAxis {
+    /// +Y, as in scenes.
     Y,
+    /// +Z, as in many CAD programs.
     Z,
 }
 

@@ -10,17 +10,25 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum EnvironmentSource {
+    /// No light from outside.
     #[default]
     Black,
+    /// The same radiance from every direction, W·m⁻²·sr⁻¹.
     Constant(Rgb),
+    /// A gradient of radiance between three directions, W·m⁻²·sr⁻¹.
     Gradient {
+        /// From straight above (+Y).
         zenith: Rgb,
+        /// From just above the horizon.
         horizon: Rgb,
+        /// From everywhere below the horizon.
         ground: Rgb,
     },
     /// Equirectangular, HDR, EXR, PNG or JPEG.
     Image {
+        /// Path of the image, relative to the scene file.
         file: String,
+        /// Radiance of a texel of 1, W·m⁻²·sr⁻¹.
         #[serde(default = "white")]
         scale: Rgb,
         /// Degrees about +Y.
@@ -29,31 +37,40 @@ pub enum EnvironmentSource {
     },
 }
 
+/// A texture as a scene file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum TextureSource {
     /// `squares` along u and v of the surface (0..1), or a metre on an infinite plane; (0, 0) lies in colour `a`.
     Checker {
+        /// Colour of squares whose whole coordinates have an even sum.
         a: Rgb,
+        /// Colour of the others.
         b: Rgb,
+        /// Number of squares along u and v.
         #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
         squares: DVec2,
+        /// Shift along u and v in squares, after rotation and scale.
         #[serde(default, skip_serializing_if = "is_default")]
         offset: DVec2,
         /// Degrees.
         #[serde(default, skip_serializing_if = "is_default")]
         rotate: f64,
     },
+    /// A picture from a file.
     Image {
+        /// Path of the picture, relative to the scene file.
         file: String,
         /// How often the picture fits along u and v.
         #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
         repeat: DVec2,
+        /// Shift along u and v in widths and heights of the picture, after rotation and scale.
         #[serde(default, skip_serializing_if = "is_default")]
         offset: DVec2,
         /// Degrees.
         #[serde(default, skip_serializing_if = "is_default")]
         rotate: f64,
+        /// What the texture shows beside the picture.
         #[serde(default, skip_serializing_if = "is_default")]
         wrap: Wrap,
         /// Bilinear between texels, or the nearest texel.
@@ -72,6 +89,7 @@ pub enum MeshSource {
     Builtin(String),
 }
 
+/// How the shading normals of a mesh are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshShading {
@@ -80,6 +98,7 @@ pub enum MeshShading {
     Auto,
     /// Area-weighted vertex normals, whatever the file says.
     Smooth,
+    /// No vertex normals: every triangle is shaded with its own.
     Flat,
 }
 

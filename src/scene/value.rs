@@ -10,14 +10,18 @@ use std::marker::PhantomData;
 /// A colour, linear Rec. 709: `0.5` for a grey, `(0.8, 0.2, 0.1)`, or the name of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ColorValue {
+    /// A colour, linear Rec. 709.
     Rgb(Vec3),
+    /// A texture, by name.
     Texture(String),
 }
 
 /// A number, or the name of a texture whose red channel is taken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ScalarValue {
+    /// The same number everywhere.
     Number(f32),
+    /// A texture, by name.
     Texture(String),
 }
 
@@ -26,10 +30,12 @@ pub enum ScalarValue {
 pub struct Rgb(pub Vec3);
 
 impl ColorValue {
+    /// The same value in all three channels.
     pub const fn grey(value: f32) -> Self {
         Self::Rgb(Vec3::splat(value))
     }
 
+    /// A colour from its channels, linear Rec. 709.
     pub const fn rgb(r: f32, g: f32, b: f32) -> Self {
         Self::Rgb(Vec3::new(r, g, b))
     }
@@ -194,18 +200,22 @@ impl Serialize for ScalarValue {
 pub struct Named<T>(pub Vec<(String, T)>);
 
 impl<T> Named<T> {
+    /// The thing of this name.
     pub fn get(&self, name: &str) -> Option<&T> {
         self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
+    /// All names, in the order of the file.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(|(name, _)| name.as_str())
     }
 
+    /// Whether there is nothing.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
+    /// All names and things, in the order of the file.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &T)> {
         self.0.iter().map(|(name, value)| (name.as_str(), value))
     }

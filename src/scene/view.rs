@@ -18,8 +18,11 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Component, Serialize, Deserialize)]
 #[require(Projection, Lens)]
 pub struct View {
+    /// Centre of the lens in the world, metres.
     pub eye: DVec3,
+    /// Direction of the view, unit.
     pub forward: DVec3,
+    /// What is up in the picture, unit and perpendicular to `forward`.
     pub up: DVec3,
     /// Metres along `forward` from the eye to the pivot; positive and finite.
     pub pivot_distance: f64,
@@ -28,18 +31,37 @@ pub struct View {
 /// Why there is no such view.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ViewError {
+    /// A vector has a NaN or infinite coordinate.
     #[error("camera: `{name}` is {value}, but all three numbers must be finite")]
-    NotFinite { name: &'static str, value: DVec3 },
+    NotFinite {
+        /// Name of the argument.
+        name: &'static str,
+        /// Its value.
+        value: DVec3,
+    },
+    /// The eye and the point that it looks at are the same.
     #[error(
         "camera: `eye` and `look_at` are the same point {eye}; move one of them so that there is a direction to look in"
     )]
-    NoDirection { eye: DVec3 },
+    NoDirection {
+        /// The point, metres.
+        eye: DVec3,
+    },
+    /// The up vector is zero.
     #[error("camera: `up` is zero; give the direction that is up in the picture, for example (0, 1, 0)")]
     NoUp,
+    /// The up vector lies along the direction of the view.
     #[error(
         "camera: `up` {up} lies along the view direction {forward}; choose an `up` that points elsewhere, for example {suggestion}"
     )]
-    UpAlongView { up: DVec3, forward: DVec3, suggestion: DVec3 },
+    UpAlongView {
+        /// The up vector.
+        up: DVec3,
+        /// Direction of the view, unit.
+        forward: DVec3,
+        /// An axis that would do.
+        suggestion: DVec3,
+    },
 }
 
 impl View {
@@ -90,6 +112,7 @@ impl View {
         Self { forward, up: right.cross(forward), ..self }
     }
 
+    /// Whether no number of it is NaN or infinite.
     pub fn is_finite(&self) -> bool {
         self.eye.is_finite() && self.forward.is_finite() && self.up.is_finite() && self.pivot_distance.is_finite()
     }

@@ -11,9 +11,9 @@ use super::Fingerprint;
 use super::image_metadata::FILM_KEY;
 use super::input_file::{FileKind, InputFile};
 use super::relative::absolute;
+use super::write_error::WriteError;
 use std::collections::BTreeSet;
 use std::error::Error;
-use std::fmt::Display;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
@@ -27,6 +27,7 @@ pub enum Replace {
     /// Of any file but a film: its samples took long and are nowhere else.
     #[default]
     AllButFilms,
+    /// Of any file, films included.
     Anything,
 }
 
@@ -82,20 +83,20 @@ pub fn give_up() {
 /// Finds out whether a file can be written here, without leaving anything behind.
 ///
 /// # Errors
-/// A sentence that names the path, and what is in the way.
-pub fn check_writable(path: &Path, replace: Replace) -> Result<(), String> {
+/// When the path names no file that may be written or replaced.
+pub fn check_writable(path: &Path, replace: Replace) -> Result<(), WriteError> {
     WholeFile::begin(path, replace).map(drop)
 }
 
 /// The same as far as the file itself is asked, if it is there; its folder is not tried.
-pub fn check_replaceable(path: &Path, replace: Replace) -> Result<(), String> {
+pub fn check_replaceable(path: &Path, replace: Replace) -> Result<(), WriteError> {
     check_target(path, &absolute(path), replace)
 }
 
 /// Writes a whole file; one that was there stays until the new one is complete. Films are not replaced.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
-    file.write_all(bytes).map_err(|error| unwritable(path, &error))?;
+    file.write_all(bytes).map_err(|error| unwritable(path, error))?;
     file.finish()
 }
 
@@ -125,7 +126,7 @@ fn is_named_as_folder(path: &Path) -> bool {
 impl WholeFile {
     /// # Errors
     /// As [`check_writable`].
-    pub fn begin(path: &Path, replace: Replace) -> Result<Self, String> {
+    pub fn begin(path: &Path, replace: Replace) -> Result<Self, WriteError> {
         let target = absolute(path);
         check_target(path, &target, replace)?;
         // Somebody may have claimed it.
@@ -146,7 +147,7 @@ impl WholeFile {
                 remove_left_over(&target, WRITERS - begun.len() as u32, WRITERS);
                 Ok(Self::new(part, path, target))
             }
-            Some(Err(error)) => Err(cannot_begin(path, &target, &error)),
+            Some(Err(error)) => Err(cannot_begin(path, &target, error)),
             _ => Err(busy(path)),
         }
     }
@@ -156,13 +157,13 @@ impl WholeFile {
     ///
     /// # Errors
     /// As [`check_writable`], and when another process has claimed the file.
-    pub fn claim(path: &Path, replace: Replace) -> Result<Self, String> {
+    pub fn claim(path: &Path, replace: Replace) -> Result<Self, WriteError> {
         let target = absolute(path);
         check_target(path, &target, replace)?;
         match open_part(&target, None) {
             Ok(Some(part)) => Ok(Self::new(part, path, target)),
             Ok(None) => Err(busy(path)),
-            Err(error) => Err(cannot_begin(path, &target, &error)),
+            Err(error) => Err(cannot_begin(path, &target, error)),
         }
     }
 
@@ -179,40 +180,40 @@ impl WholeFile {
     }
 
     /// Takes the place of whatever had the name.
-    pub fn finish(self) -> Result<(), String> {
+    pub fn finish(self) -> Result<(), WriteError> {
         self.finish_open().map(drop)
     }
 
     /// The same for what goes on being written; locked, so that no other process begins to write it.
-    pub fn finish_open(self) -> Result<File, String> {
+    pub fn finish_open(self) -> Result<File, WriteError> {
         let (path, target) = (self.path.clone(), self.target.clone());
         let (file, part) = self.complete()?;
         if let Ok(old) = std::fs::metadata(&target) {
             // Not all disks keep them, and the file is whole without.
             let _ = file.set_permissions(old.permissions());
         }
-        part.persist(&target).map_err(|error| unwritable(&path, &error.error))?;
+        part.persist(&target).map_err(|error| unwritable(&path, error.error))?;
         Ok(file)
     }
 
     /// Takes the first of `names` that is free: never over a file that is there, even one that another program makes
     /// at the same moment. Answers with the name; `None` when all are taken.
-    pub fn finish_new(self, names: impl Iterator<Item = PathBuf>) -> Result<Option<PathBuf>, String> {
+    pub fn finish_new(self, names: impl Iterator<Item = PathBuf>) -> Result<Option<PathBuf>, WriteError> {
         let (_file, mut part) = self.complete()?;
         for path in names {
             part = match part.persist_noclobber(&path) {
                 Ok(_) => return Ok(Some(path)),
                 Err(error) if error.error.kind() == ErrorKind::AlreadyExists => error.path,
-                Err(error) => return Err(unwritable(&path, &error.error)),
+                Err(error) => return Err(unwritable(&path, error.error)),
             };
         }
         Ok(None)
     }
 
-    fn complete(self) -> Result<(File, TempPath), String> {
+    fn complete(self) -> Result<(File, TempPath), WriteError> {
         let Self { out, part, path, in_progress, .. } = self;
-        let file = out.into_inner().map_err(|error| unwritable(&path, error.error()))?;
-        file.sync_all().and_then(|()| in_progress.check()).map_err(|error| unwritable(&path, &error))?;
+        let file = out.into_inner().map_err(|error| unwritable(&path, error.into_error()))?;
+        file.sync_all().and_then(|()| in_progress.check()).map_err(|error| unwritable(&path, error))?;
         Ok((file, part))
     }
 }
@@ -228,48 +229,32 @@ impl Write for WholeFile {
     }
 }
 
-/// What every failure to write a file says.
-pub fn unwritable(path: &Path, reason: &(dyn Error + 'static)) -> String {
-    // Libraries wrap what the system says in words of their own.
-    let mut cause = Some(reason);
-    let kind = std::iter::from_fn(|| {
-        let this = cause?;
-        cause = this.source();
-        Some(this.downcast_ref::<io::Error>().map(io::Error::kind))
-    });
-    match kind.flatten().next() {
-        Some(ErrorKind::StorageFull) => cannot_be_written(path, &"the disk is full"),
-        Some(ErrorKind::QuotaExceeded) => cannot_be_written(path, &"the disk quota is exceeded"),
-        Some(ErrorKind::FileTooLarge) => cannot_be_written(path, &"the file would exceed the size limit"),
-        _ => cannot_be_written(path, reason),
-    }
+/// A failure to write a file that was begun.
+pub fn unwritable(path: &Path, reason: impl Error + Send + Sync + 'static) -> WriteError {
+    WriteError::Failed { path: path.to_path_buf(), source: Box::new(reason) }
 }
 
-fn cannot_be_written(path: &Path, reason: &(impl Display + ?Sized)) -> String {
-    format!("{}: cannot be written: {reason}", path.display())
-}
-
-fn busy(path: &Path) -> String {
-    format!("{}: is being written by another process: wait for it to end, or choose another name", path.display())
+fn busy(path: &Path) -> WriteError {
+    WriteError::Busy(path.to_path_buf())
 }
 
 /// Whether what is there may be replaced.
-fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), String> {
+fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), WriteError> {
     if is_named_as_folder(path) {
-        return Err(format!("{}: is the name of a folder: expected a file name", path.display()));
+        return Err(WriteError::FolderName(path.to_path_buf()));
     }
     // All links have been followed.
     if target.is_symlink() {
-        return Err(cannot_be_written(path, &"the symbolic link is broken"));
+        return Err(WriteError::BrokenLink(path.to_path_buf()));
     }
     let Ok(info) = std::fs::metadata(target) else { return Ok(()) };
     if info.is_dir() {
-        return Err(format!("{}: is a folder: expected a file name", path.display()));
+        return Err(WriteError::Folder(path.to_path_buf()));
     }
     if !info.is_file() {
-        return Err(format!("{}: is not a regular file and is not replaced: choose another name", path.display()));
+        return Err(WriteError::NotRegular(path.to_path_buf()));
     }
-    let read_only = || format!("{}: is read-only and is not replaced: choose another name", path.display());
+    let read_only = || WriteError::ReadOnly(path.to_path_buf());
     if info.permissions().readonly() {
         return Err(read_only());
     }
@@ -280,10 +265,7 @@ fn check_target(path: &Path, target: &Path, replace: Replace) -> Result<(), Stri
         _ => {}
     }
     if replace == Replace::AllButFilms && is_film(target) {
-        return Err(format!(
-            "{}: is a film whose samples would be lost: choose another name, or use --overwrite",
-            path.display()
-        ));
+        return Err(WriteError::Film(path.to_path_buf()));
     }
     Ok(())
 }
@@ -377,7 +359,7 @@ fn is_at(file: &File, name: &Path) -> bool {
     }
 }
 
-fn cannot_begin(path: &Path, target: &Path, error: &io::Error) -> String {
+fn cannot_begin(path: &Path, target: &Path, error: io::Error) -> WriteError {
     // As it was asked for, not where links lead.
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -392,7 +374,7 @@ fn cannot_begin(path: &Path, target: &Path, error: &io::Error) -> String {
         // Some folders that the system makes up answer `not found` to whoever wants to write.
         _ => format!("no permission to create files in {}", folder.display()),
     };
-    cannot_be_written(path, &reason)
+    WriteError::Begin { path: path.to_path_buf(), reason, source: error }
 }
 
 #[cfg(test)]
@@ -451,14 +433,16 @@ mod tests {
         let mut claim = WholeFile::claim(&path, Replace::AllButFilms).unwrap();
         let beside = folder.path().join("../").join(folder.path().file_name().unwrap()).join("a.exr");
         for refused in [WholeFile::claim(&beside, Replace::Anything), WholeFile::begin(&beside, Replace::Anything)] {
-            assert!(refused.err().is_some_and(|error| error.contains("is being written by another process")));
+            assert!(
+                refused.err().is_some_and(|error| error.to_string().contains("is being written by another process"))
+            );
         }
         claim.write_all(b"mine").unwrap();
         claim.finish().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         // What goes on being written stays claimed under its own name.
         let open = WholeFile::claim(&path, Replace::Anything).unwrap().finish_open().unwrap();
-        assert!(write_whole(&path, b"yours").unwrap_err().contains("is being written"));
+        assert!(write_whole(&path, b"yours").unwrap_err().to_string().contains("is being written"));
         drop(open);
         write_whole(&path, b"yours").unwrap();
         assert_eq!(names(folder.path()), ["a.exr"]);
@@ -484,10 +468,10 @@ mod tests {
         write_whole(&root.join("a.txt"), b"three").unwrap();
         assert_eq!(std::fs::metadata(root.join("far/b.txt")).unwrap().permissions().mode() & 0o777, 0o640);
         mode(0o444);
-        assert!(write_whole(&root.join("a.txt"), b"four").unwrap_err().contains("a.txt: is read-only"));
+        assert!(write_whole(&root.join("a.txt"), b"four").unwrap_err().to_string().contains("a.txt: is read-only"));
         assert_eq!(std::fs::read(root.join("far/b.txt")).unwrap(), b"three");
         symlink("/dev/null", root.join("null")).unwrap();
-        assert!(write_whole(&root.join("null"), b"").unwrap_err().contains("is not a regular file"));
+        assert!(write_whole(&root.join("null"), b"").unwrap_err().to_string().contains("is not a regular file"));
         symlink("round", root.join("round")).unwrap();
         assert!(write_whole(&root.join("round"), b"").is_err());
     }
@@ -502,12 +486,12 @@ mod tests {
             (plain.join("a.txt"), "is not a folder"),
             (folder.path().to_path_buf(), "is a folder: expected a file name"),
         ] {
-            let error = check_writable(&path, Replace::AllButFilms).unwrap_err();
+            let error = check_writable(&path, Replace::AllButFilms).unwrap_err().to_string();
             assert!(error.contains(expected) && !error.contains(".firstlight"), "{error}");
         }
         #[cfg(target_os = "linux")]
         {
-            let error = check_writable(Path::new("/proc/a.txt"), Replace::AllButFilms).unwrap_err();
+            let error = check_writable(Path::new("/proc/a.txt"), Replace::AllButFilms).unwrap_err().to_string();
             assert!(error.contains("no permission to create files in /proc"), "{error}");
         }
         // However deep a library has wrapped it.
@@ -515,6 +499,6 @@ mod tests {
         #[error("wrapped")]
         struct Wrapped(#[source] io::Error);
         let full = Wrapped(io::Error::from(ErrorKind::StorageFull));
-        assert_eq!(unwritable(Path::new("a.png"), &full), "a.png: cannot be written: the disk is full");
+        assert_eq!(unwritable(Path::new("a.png"), full).to_string(), "a.png: cannot be written: the disk is full");
     }
 }

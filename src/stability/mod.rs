@@ -1,8 +1,8 @@
 //! The hard cases, counted: what other renderers are asked to mend, tried here by the million, with findings that can
 //! be replayed.
 //!
-//! Rays are held against an `f64` judge that knows no tree ([`reference`]), light against answers on paper ([`light`]), and the
-//! same scene elsewhere against itself ([`anywhere`]). Every ray is a function of case, stage and index alone: the
+//! Rays are held against an `f64` reference that knows no tree (`reference`), light against answers on paper (`light`), and the
+//! same scene elsewhere against itself (`anywhere`). Every ray is a function of case, stage and index alone: the
 //! counts do not depend on threads, and the worst ray can be had again ([`Case::replay`]). Start reading at [`CASES`].
 
 mod anywhere;

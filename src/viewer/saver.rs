@@ -142,7 +142,7 @@ fn print(
     // Paths in the note count from the folder, whatever the picture will be called.
     let note = draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into()));
     let print = Print { film, display, size, note: note.as_deref() };
-    print.write_new(folder, stem, format).map(|path| Kept { path, coarse })
+    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
 }
 
 /// A scene file in `folder` that is not there yet, for what is open: `NAME-0001.ron`.

@@ -8,11 +8,17 @@ use glam::Vec3;
 /// Many rays, one array per coordinate. The arrays may be longer than there are rays.
 #[derive(Clone, Debug, Default)]
 pub struct RayBatch {
+    /// x of each ray's origin, metres.
     pub origin_x: Vec<f32>,
+    /// y of each ray's origin, metres.
     pub origin_y: Vec<f32>,
+    /// z of each ray's origin, metres.
     pub origin_z: Vec<f32>,
+    /// x of each ray's direction.
     pub dir_x: Vec<f32>,
+    /// y of each ray's direction.
     pub dir_y: Vec<f32>,
+    /// z of each ray's direction.
     pub dir_z: Vec<f32>,
     /// Lengths of `dir`, excluded.
     pub t_max: Vec<f32>,
@@ -20,10 +26,12 @@ pub struct RayBatch {
 }
 
 impl RayBatch {
+    /// Number of rays.
     pub fn len(&self) -> usize {
         self.len
     }
 
+    /// Whether there are no rays.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -33,6 +41,7 @@ impl RayBatch {
         self.len = 0;
     }
 
+    /// Appends a ray.
     #[inline]
     pub fn push(&mut self, ray: &Ray) {
         if self.len == self.t_max.len() {
@@ -49,6 +58,7 @@ impl RayBatch {
         self.len += 1;
     }
 
+    /// Ray `i`, below [`Self::len`].
     #[inline(always)]
     pub fn get(&self, i: usize) -> Ray {
         Ray {
@@ -122,20 +132,26 @@ impl<'a> FromIterator<&'a Ray> for RayBatch {
 pub struct HitBatch {
     /// Lengths of `dir`; `f32::INFINITY` when the ray met nothing before its `t_max`.
     pub t: Vec<f32>,
+    /// First surface coordinate of each hit; see the table above.
     pub u: Vec<f32>,
+    /// Second surface coordinate of each hit; see the table above.
     pub v: Vec<f32>,
+    /// Index of the primitive within its object; see the table above.
     pub prim: Vec<u32>,
     /// Index of the object in the scene tree, [`HitBatch::MISS`] when there is none.
     pub object: Vec<u32>,
 }
 
 impl HitBatch {
+    /// Stands in `object` for a ray that hits nothing.
     pub const MISS: u32 = u32::MAX;
 
+    /// Number of answers, one per ray.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
+    /// Whether there are no answers.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }

@@ -116,6 +116,7 @@ impl MeshTree {
         self.tree.nodes.bounds
     }
 
+    /// Number of triangles of the mesh, those without area included.
     pub fn n_triangles(&self) -> usize {
         self.triangles.len()
     }

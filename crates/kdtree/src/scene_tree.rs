@@ -44,6 +44,7 @@ impl SceneTree {
         Self { objects: PlacedShapes { shapes, instances }, bounds, top }
     }
 
+    /// The shapes as given to [`Self::build`]; a hit's `object` is an index into them.
     pub fn shapes(&self) -> &[Shape] {
         &self.objects.shapes
     }

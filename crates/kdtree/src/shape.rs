@@ -10,31 +10,46 @@ use std::sync::Arc;
 /// The geometry of one object, in the space of the snapshot unless said otherwise.
 #[derive(Clone, Debug)]
 pub enum Shape {
+    /// A sphere, seen from outside and inside.
     Sphere {
+        /// Centre, metres.
         center: Vec3,
+        /// Radius in metres, positive.
         radius: f32,
     },
     /// Infinite; `normal` is unit.
     Plane {
+        /// A point of the plane, metres.
         point: Vec3,
+        /// Unit normal on its front.
         normal: Vec3,
     },
     /// A parallelogram; its front looks along `edge_u × edge_v`.
     Quad {
+        /// The corner at `u = v = 0`, metres.
         corner: Vec3,
+        /// From the corner to the one at `u = 1`, metres.
         edge_u: Vec3,
+        /// From the corner to the one at `v = 1`, metres.
         edge_v: Vec3,
     },
+    /// A single triangle; its front is where its vertices run counter-clockwise.
     Triangle {
+        /// The corners, metres.
         vertices: [Vec3; 3],
     },
+    /// A mesh with a tree of its own, seen through an invertible map.
     Mesh {
+        /// The tree over the triangles, in the mesh's own space.
         tree: Arc<MeshTree>,
+        /// Map from the mesh's own space to that of the snapshot.
         world_from_object: Affine3A,
     },
     /// `world_from_object` rotates, moves and scales evenly.
     Spheres {
+        /// The tree over the spheres, in the object's own space.
         tree: Arc<SphereTree>,
+        /// Map from the object's own space to that of the snapshot.
         world_from_object: Affine3A,
     },
 }
@@ -51,10 +66,15 @@ pub enum RayClass {
 /// One hit; fields as in [`super::batch::HitBatch`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
+    /// Distance along the ray, in lengths of `dir`.
     pub t: f32,
+    /// First surface coordinate.
     pub u: f32,
+    /// Second surface coordinate.
     pub v: f32,
+    /// Index of the primitive within the object.
     pub prim: u32,
+    /// Index of the object in the scene tree.
     pub object: u32,
 }
 

@@ -9,6 +9,7 @@ use super::reference::Primitives;
 use crate::geometry::{Aabb, Ray, Shear, intersect_sphere};
 use glam::{DVec3, Vec3};
 
+/// Kd-tree over many spheres in the space of their object, built once and shared by all objects that use it.
 #[derive(Debug, PartialEq)]
 pub struct SphereTree {
     pub(super) centers: Vec<Vec3>,
@@ -96,10 +97,12 @@ impl SphereTree {
         (self.centers[prim as usize], self.radii[prim as usize])
     }
 
+    /// Number of spheres.
     pub fn len(&self) -> usize {
         self.centers.len()
     }
 
+    /// Whether there are no spheres.
     pub fn is_empty(&self) -> bool {
         self.centers.is_empty()
     }

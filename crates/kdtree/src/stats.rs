@@ -10,24 +10,32 @@ use glam::Vec3;
 /// Counts over one tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct KdTreeStats {
+    /// Triangles of the mesh, those without area included.
     pub primitives: usize,
+    /// Nodes with two children.
     pub inner_nodes: usize,
     /// Leaves with something in them.
     pub leaves: usize,
+    /// Leaves with nothing in them.
     pub empty_leaves: usize,
     /// Of the deepest leaf; the root has 0.
     pub depth: usize,
     /// Entries in leaves; a primitive in several cells counts several times.
     pub references: usize,
+    /// Blocks of up to sixteen primitives, which are tested at once.
     pub blocks: usize,
+    /// Memory of nodes and blocks.
     pub bytes: usize,
-    /// Inner nodes, leaves and blocks that a line through the bounds crosses on average if nothing stops it.
+    /// Inner nodes that a line through the bounds crosses on average if nothing stops it.
     pub expected_inner_visits: f64,
+    /// Leaves with something in them that such a line crosses on average.
     pub expected_leaf_visits: f64,
+    /// Blocks in the leaves that such a line crosses on average.
     pub expected_block_tests: f64,
 }
 
 impl KdTreeStats {
+    /// Entries in leaves per primitive, on average.
     pub fn references_per_primitive(&self) -> f64 {
         self.references as f64 / self.primitives.max(1) as f64
     }
@@ -40,6 +48,7 @@ impl KdTreeStats {
 }
 
 impl MeshTree {
+    /// Counts over the tree and the costs that the surface area heuristic expects of it.
     pub fn stats(&self) -> KdTreeStats {
         let mut stats = KdTreeStats {
             primitives: self.n_triangles(),

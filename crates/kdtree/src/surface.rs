@@ -21,6 +21,7 @@ use glam::{Affine3A, Mat3A, Vec2, Vec3};
 /// Where a ray met a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
+    /// The point on the surface, metres, in the space of the snapshot.
     pub position: Vec3,
     /// Bound on the absolute error of `position`, metres per axis, including that of later ray tests from there.
     pub error: Vec3,
@@ -184,6 +185,7 @@ pub struct QuadRim {
     pub least: [f32; 2],
 }
 
+/// Normal, error bound and inset of a quad with this corner and these edges, metres; the edges must not be parallel.
 #[inline]
 pub fn quad_rim(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> QuadRim {
     // The corners that are tested are rounded themselves.

@@ -6,22 +6,59 @@ use glam::{DVec3, Vec3};
 /// Why numbers are not a mesh. Indices count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
+    /// The list of triangles is empty.
     #[error("the mesh has no triangles")]
     NoTriangles,
+    /// A triangle names a vertex that does not exist.
     #[error("triangle {triangle} uses vertex {index}, but there are {count}")]
-    IndexOutOfRange { triangle: usize, index: u32, count: usize },
+    IndexOutOfRange {
+        /// Index of the triangle.
+        triangle: usize,
+        /// Index of the vertex that it names.
+        index: u32,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// A vertex has a NaN coordinate, or an infinite one in [`Mesh::from_f64`]; or the centre is not finite.
     #[error("vertex {vertex} has a coordinate that is NaN or infinite")]
-    NotFinite { vertex: usize },
+    NotFinite {
+        /// Index of the vertex; 0 for the centre.
+        vertex: usize,
+    },
+    /// Squared lengths or areas of the mesh's box overflow `f32`.
     #[error("the mesh is {size:e} across, more than single precision can hold")]
-    TooLarge { size: f64 },
+    TooLarge {
+        /// Longest side of the box, metres.
+        size: f64,
+    },
+    /// There are more vertices than a `u32` can number.
     #[error("the mesh has {count} vertices, more than 32-bit indices can name")]
-    TooManyVertices { count: usize },
+    TooManyVertices {
+        /// Number of vertices.
+        count: usize,
+    },
+    /// A shading normal is not of unit length.
     #[error("the normal of vertex {vertex} is not of length 1")]
-    NormalNotUnit { vertex: usize },
+    NormalNotUnit {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// A texture coordinate is NaN or infinite.
     #[error("the texture coordinate of vertex {vertex} is NaN or infinite")]
-    UvNotFinite { vertex: usize },
+    UvNotFinite {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// A list that is not empty has another length than it must have.
     #[error("there are {found} {what}, but {expected} were expected")]
-    WrongCount { what: &'static str, found: usize, expected: usize },
+    WrongCount {
+        /// Name of the list: normals, texture coordinates or material slots.
+        what: &'static str,
+        /// Length of the list.
+        found: usize,
+        /// Number of vertices, or of triangles for slots.
+        expected: usize,
+    },
 }
 
 impl Mesh {
@@ -46,7 +83,7 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Checks all that the other rooms rely on: indices in range, finite positions whose box has a finite size
+    /// Checks all that the rest of the program relies on: indices in range, finite positions whose box has a finite size
     /// and area in `f32`, unit normals, finite texture coordinates, list lengths.
     pub fn validate(&self) -> Result<(), MeshError> {
         let count = self.positions.len();

@@ -13,8 +13,11 @@ use rayon::prelude::*;
 /// Distances from points of one surface to another, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distances {
+    /// Mean over the sample points.
     pub mean: f64,
+    /// Root mean square over the sample points.
     pub rms: f64,
+    /// Largest distance of a sample point or a used vertex.
     pub max: f64,
 }
 
@@ -23,6 +26,7 @@ pub struct Distances {
 pub struct Deviation {
     /// From the first surface to the second.
     pub forward: Distances,
+    /// From the second surface to the first.
     pub backward: Distances,
 }
 

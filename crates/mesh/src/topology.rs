@@ -10,7 +10,9 @@ pub struct Topology {
     pub vertices: usize,
     /// Vertices that no triangle uses.
     pub loose_vertices: usize,
+    /// Triangles, degenerate ones and duplicates included.
     pub triangles: usize,
+    /// Different pairs of places that a triangle with three different corners joins.
     pub edges: usize,
     /// Edges of exactly one triangle.
     pub boundary_edges: usize,
@@ -29,6 +31,7 @@ pub struct Topology {
 }
 
 impl Topology {
+    /// Counts over a mesh that passes [`Mesh::validate`].
     pub fn of(mesh: &Mesh) -> Self {
         let welding = Welding::of(&mesh.positions);
         let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|&t| welding.places(t)).collect();

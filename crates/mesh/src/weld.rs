@@ -46,6 +46,7 @@ impl Welding {
         self.first.len()
     }
 
+    /// Whether there are no places.
     pub fn is_empty(&self) -> bool {
         self.first.is_empty()
     }

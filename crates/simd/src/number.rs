@@ -7,14 +7,18 @@ use std::ops::{Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, Neg, Sub};
 /// Sixteen `f32`.
 #[derive(Clone, Copy)]
 pub struct Float<S: Simd> {
+    /// Instruction set that operates on the lanes.
     pub s: S,
+    /// The sixteen lanes, in a type of the instruction set.
     pub v: S::F,
 }
 
 /// Sixteen `u32`; sums and products are modulo 2³².
 #[derive(Clone, Copy)]
 pub struct Bits<S: Simd> {
+    /// Instruction set that operates on the lanes.
     pub s: S,
+    /// The sixteen lanes, in a type of the instruction set.
     pub v: S::U,
 }
 
@@ -25,21 +29,25 @@ pub fn padded<T: Copy + Default>(mut table: Vec<T>) -> Vec<T> {
 }
 
 impl<S: Simd> Float<S> {
+    /// `x` in all lanes.
     #[inline(always)]
     pub fn splat(s: S, x: f32) -> Self {
         Self { s, v: s.splat(x) }
     }
 
+    /// One lane per entry of the array, in order.
     #[inline(always)]
     pub fn load(s: S, from: &[f32; LANES]) -> Self {
         Self { s, v: s.load(from) }
     }
 
+    /// Writes the lanes to an array, in order.
     #[inline(always)]
     pub fn store(self, to: &mut [f32; LANES]) {
         self.s.store(self.v, to);
     }
 
+    /// The lanes as an array, in order.
     #[inline(always)]
     pub fn to_array(self) -> [f32; LANES] {
         let mut array = [0.0; LANES];
@@ -53,6 +61,7 @@ impl<S: Simd> Float<S> {
         Self { s: indices.s, v: indices.s.gather(from, indices.v) }
     }
 
+    /// The IEEE 754 bits of each lane.
     #[inline(always)]
     pub fn to_bits(self) -> Bits<S> {
         Bits { s: self.s, v: self.s.to_bits(self.v) }
@@ -64,6 +73,7 @@ impl<S: Simd> Float<S> {
         Bits { s: self.s, v: self.s.truncate(self.v) }
     }
 
+    /// Moves the lanes with their bit set to the front, in order; what follows them is unspecified.
     #[inline(always)]
     pub fn compress(self, mask: Mask) -> Self {
         Self { s: self.s, v: self.s.compress(mask, self.v) }
@@ -125,21 +135,25 @@ impl<S: Simd> Real for Float<S> {
 }
 
 impl<S: Simd> Bits<S> {
+    /// `x` in all lanes.
     #[inline(always)]
     pub fn splat(s: S, x: u32) -> Self {
         Self { s, v: s.splat_u(x) }
     }
 
+    /// One lane per entry of the array, in order.
     #[inline(always)]
     pub fn load(s: S, from: &[u32; LANES]) -> Self {
         Self { s, v: s.load_u(from) }
     }
 
+    /// Writes the lanes to an array, in order.
     #[inline(always)]
     pub fn store(self, to: &mut [u32; LANES]) {
         self.s.store_u(self.v, to);
     }
 
+    /// The lanes as an array, in order.
     #[inline(always)]
     pub fn to_array(self) -> [u32; LANES] {
         let mut array = [0; LANES];
@@ -153,6 +167,7 @@ impl<S: Simd> Bits<S> {
         Self { s: indices.s, v: indices.s.gather_u(from, indices.v) }
     }
 
+    /// Lanes that are equal to `x`.
     #[inline(always)]
     pub fn equals(self, x: u32) -> Mask {
         self.s.eq_u(self.v, self.s.splat_u(x))
@@ -176,6 +191,7 @@ impl<S: Simd> Bits<S> {
         Float { s: self.s, v: self.s.to_f(self.v) }
     }
 
+    /// Moves the lanes with their bit set to the front, in order; what follows them is unspecified.
     #[inline(always)]
     pub fn compress(self, mask: Mask) -> Self {
         Self { s: self.s, v: self.s.compress_u(mask, self.v) }

@@ -29,6 +29,7 @@ pub trait Real:
     + Mul<f32, Output = Self>
     + Div<f32, Output = Self>
 {
+    /// Result of a comparison: `bool` for one number, [`Mask`] for sixteen.
     type Mask: Truth;
 
     /// The same number in all lanes.
@@ -37,8 +38,10 @@ pub trait Real:
     /// `a` where the mask is true, else `b`; see [`select`].
     fn choose(mask: Self::Mask, a: Self, b: Self) -> Self;
 
+    /// Square root, rounded to nearest; NaN for numbers below zero.
     fn sqrt(self) -> Self;
 
+    /// Absolute value, with the sign bit cleared.
     fn abs(self) -> Self;
 
     /// The second where either is NaN.
@@ -47,13 +50,16 @@ pub trait Real:
     /// The second where either is NaN.
     fn max(self, other: Self) -> Self;
 
+    /// The magnitude of `self` with the sign bit of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
     /// False where either is NaN, as all comparisons are.
     fn lt(self, other: Self) -> Self::Mask;
 
+    /// Whether `self <= other`; false where either is NaN.
     fn le(self, other: Self) -> Self::Mask;
 
+    /// Whether `self == other`; false where either is NaN.
     fn equals(self, other: Self) -> Self::Mask;
 
     /// At least `least`, also where it is NaN.
@@ -68,21 +74,25 @@ pub trait Real:
         self.min(self.all(most))
     }
 
+    /// Whether the number is greater than zero; false for NaN.
     #[inline(always)]
     fn is_positive(self) -> Self::Mask {
         self.all(0.0).lt(self)
     }
 
+    /// Whether the number is less than zero; false for −0 and NaN.
     #[inline(always)]
     fn is_negative(self) -> Self::Mask {
         self.lt(self.all(0.0))
     }
 
+    /// Whether the number is 0 or −0.
     #[inline(always)]
     fn is_zero(self) -> Self::Mask {
         self.equals(self.all(0.0))
     }
 
+    /// Whether the number is NaN.
     #[inline(always)]
     fn is_nan(self) -> Self::Mask {
         !self.equals(self)

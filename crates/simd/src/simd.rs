@@ -28,15 +28,25 @@ pub trait Simd: Copy {
     /// Runs a kernel as a function of its own, compiled once for the instruction set however often it is called for.
     fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output;
 
+    /// `x` in all lanes.
     fn splat(self, x: f32) -> Self::F;
+    /// One lane per entry of the array, in order.
     fn load(self, from: &[f32; LANES]) -> Self::F;
+    /// Writes the lanes to an array, in order.
     fn store(self, a: Self::F, to: &mut [f32; LANES]);
+    /// `a + b`.
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    /// `a - b`.
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    /// `a · b`.
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    /// `a / b`.
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    /// The smaller of the two; `b` if either is NaN.
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// The larger of the two; `b` if either is NaN.
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Absolute value, with the sign bit cleared.
     fn abs(self, a: Self::F) -> Self::F;
     /// `a · b - c`, rounded once.
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
@@ -50,8 +60,11 @@ pub trait Simd: Copy {
     fn reciprocal_about(self, a: Self::F) -> Self::F;
     /// Lanes whose sign bit is set.
     fn negative(self, a: Self::F) -> Mask;
+    /// Lanes where `a < b`.
     fn lt(self, a: Self::F, b: Self::F) -> Mask;
+    /// Lanes where `a <= b`.
     fn le(self, a: Self::F, b: Self::F) -> Mask;
+    /// Lanes where `a == b`.
     fn eq(self, a: Self::F, b: Self::F) -> Mask;
     /// `a` where the bit is set, else `b`.
     fn select(self, mask: Mask, a: Self::F, b: Self::F) -> Self::F;
@@ -62,51 +75,80 @@ pub trait Simd: Copy {
     /// Entries of the table by the low four bits of the indices.
     fn lookup(self, table: Self::F, indices: Self::U) -> Self::F;
 
+    /// `x` in all lanes.
     fn splat_u(self, x: u32) -> Self::U;
+    /// One lane per entry of the array, in order.
     fn load_u(self, from: &[u32; LANES]) -> Self::U;
+    /// Writes the lanes to an array, in order.
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
+    /// Lanes where `a < b`, both unsigned.
     fn lt_u(self, a: Self::U, b: Self::U) -> Mask;
+    /// `a` where the bit is set, else `b`.
     fn select_u(self, mask: Mask, a: Self::U, b: Self::U) -> Self::U;
 
+    /// `x` in all lanes.
     fn splat_d(self, x: f64) -> Self::D;
+    /// Each `f32` as an `f64`, exactly.
     fn widen(self, a: Self::F) -> Self::D;
+    /// Each `f64` as an `f32`, rounded to nearest.
     fn narrow(self, a: Self::D) -> Self::F;
+    /// `a + b`.
     fn add_d(self, a: Self::D, b: Self::D) -> Self::D;
+    /// `a - b`.
     fn sub_d(self, a: Self::D, b: Self::D) -> Self::D;
+    /// `a · b`.
     fn mul_d(self, a: Self::D, b: Self::D) -> Self::D;
+    /// `a / b`.
     fn div_d(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Square root.
     fn sqrt_d(self, a: Self::D) -> Self::D;
+    /// Absolute value, with the sign bit cleared.
     fn abs_d(self, a: Self::D) -> Self::D;
+    /// The larger of the two; `b` if either is NaN.
     fn max_d(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanes where `a <= b`.
     fn le_d(self, a: Self::D, b: Self::D) -> Mask;
 
+    /// Square root.
     fn sqrt(self, a: Self::F) -> Self::F;
     /// Towards zero; anything from numbers that no `i32` can hold.
     fn truncate(self, a: Self::F) -> Self::U;
     /// Of two's complement.
     fn to_f(self, a: Self::U) -> Self::F;
+    /// The IEEE 754 bits of each lane.
     fn to_bits(self, a: Self::F) -> Self::U;
+    /// The `f32` that has these IEEE 754 bits; the inverse of [`Self::to_bits`].
     fn float_of(self, a: Self::U) -> Self::F;
     /// Modulo 2³², as is `mul_u`.
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// `a · b` modulo 2³².
     fn mul_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// Bitwise `a & b`.
     fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// Bitwise `a | b`.
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// Bitwise `a ^ b`.
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// `a << bits`, for `bits` below 32; zeros come in.
     fn shl_u(self, a: Self::U, bits: u32) -> Self::U;
+    /// `a >> bits`, for `bits` below 32; zeros come in.
     fn shr_u(self, a: Self::U, bits: u32) -> Self::U;
+    /// Lanes where `a == b`.
     fn eq_u(self, a: Self::U, b: Self::U) -> Mask;
     /// `from[i]` for each index; indices beyond the end read some number of it. `from` must not be empty. Fastest where
     /// it has exactly 16 or 32.
     fn gather(self, from: &[f32], indices: Self::U) -> Self::F;
+    /// [`Self::gather`] from a table of `u32`.
     fn gather_u(self, from: &[u32], indices: Self::U) -> Self::U;
     /// Moves the lanes with their bit set to the front, in order; what follows them is anything.
     fn compress(self, mask: Mask, a: Self::F) -> Self::F;
+    /// [`Self::compress`] of `u32`.
     fn compress_u(self, mask: Mask, a: Self::U) -> Self::U;
 }
 
 /// A function and its arguments, for [`Simd::call`].
 pub trait Kernel<S: Simd> {
+    /// What the kernel returns.
     type Output;
 
     /// To be `#[inline(always)]`.
@@ -116,8 +158,11 @@ pub trait Kernel<S: Simd> {
 /// What the processor can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
+    /// AVX-512 F, VL, DQ and BW, besides all of [`Self::Avx2`]: a register of 512 bits holds sixteen `f32`.
     Avx512,
+    /// AVX2 with FMA, BMI 1 and 2, LZCNT and POPCNT: two registers of 256 bits hold sixteen `f32`.
     Avx2,
+    /// Plain arrays, on any processor.
     Portable,
 }
 
@@ -141,6 +186,7 @@ impl InstructionSet {
         *WIDEST.get_or_init(|| Self::available()[0])
     }
 
+    /// Whether this processor can run code that is compiled for the set.
     #[inline]
     pub fn is_available(self) -> bool {
         self == Self::Portable || self as usize >= Self::widest() as usize

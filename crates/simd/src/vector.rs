@@ -9,8 +9,11 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// A [`Vec3`], or sixteen, one register a coordinate; every operation rounds as glam's does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vector3<R> {
+    /// Coordinate along x.
     pub x: R,
+    /// Coordinate along y.
     pub y: R,
+    /// Coordinate along z.
     pub z: R,
 }
 
@@ -66,11 +69,13 @@ impl<R: Real> Vector3<R> {
         Self { x, y: x, z: x }
     }
 
+    /// Scalar product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> R {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
+    /// Right-handed vector product.
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         Self {
@@ -80,21 +85,25 @@ impl<R: Real> Vector3<R> {
         }
     }
 
+    /// Euclidean length, squared.
     #[inline(always)]
     pub fn length_squared(self) -> R {
         self.dot(self)
     }
 
+    /// Euclidean length.
     #[inline(always)]
     pub fn length(self) -> R {
         self.dot(self).sqrt()
     }
 
+    /// The vector scaled to unit length; not finite for the zero vector.
     #[inline(always)]
     pub fn normalize(self) -> Self {
         self * (self.x.all(1.0) / self.length())
     }
 
+    /// Absolute values, coordinate by coordinate.
     #[inline(always)]
     pub fn abs(self) -> Self {
         Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
@@ -112,6 +121,7 @@ impl<R: Real> Vector3<R> {
         Self { x: self.x.max(other.x), y: self.y.max(other.y), z: self.z.max(other.z) }
     }
 
+    /// The largest coordinate.
     #[inline(always)]
     pub fn max_element(self) -> R {
         self.x.max(self.y).max(self.z)
@@ -135,6 +145,7 @@ impl<R: Real> Vector3<R> {
         Self { x: axes[0].dot(self), y: axes[1].dot(self), z: axes[2].dot(self) }
     }
 
+    /// The vector times a number that all lanes share.
     #[inline(always)]
     pub fn mul_all(self, x: f32) -> Self {
         Self { x: self.x * x, y: self.y * x, z: self.z * x }
@@ -142,11 +153,13 @@ impl<R: Real> Vector3<R> {
 }
 
 impl<S: Simd> Vector<S> {
+    /// `v` in all lanes.
     #[inline(always)]
     pub fn splat(s: S, v: Vec3) -> Self {
         Self { x: Float::splat(s, v.x), y: Float::splat(s, v.y), z: Float::splat(s, v.z) }
     }
 
+    /// One vector per index from a table of x, one of y and one of z; see [`Simd::gather`].
     #[inline(always)]
     pub fn gather(from: &[Vec<f32>; 3], indices: Bits<S>) -> Self {
         Self {
@@ -156,12 +169,13 @@ impl<S: Simd> Vector<S> {
         }
     }
 
-    /// The vector of one lane of stored coordinates.
+    /// The x, y and z of all lanes, one array each.
     #[inline(always)]
     pub fn to_arrays(self) -> [[f32; super::LANES]; 3] {
         [self.x.to_array(), self.y.to_array(), self.z.to_array()]
     }
 
+    /// The vectors whose x, y and z are the first, second and third array, one lane per entry.
     #[inline(always)]
     pub fn from_arrays(s: S, arrays: &[[f32; super::LANES]; 3]) -> Self {
         Self { x: Float::load(s, &arrays[0]), y: Float::load(s, &arrays[1]), z: Float::load(s, &arrays[2]) }

@@ -15,23 +15,30 @@ pub trait Word:
     + BitOr<u32, Output = Self>
     + BitXor<u32, Output = Self>
 {
+    /// Result of a comparison: `bool` for one number, [`Mask`] for sixteen.
     type Mask: Truth;
+    /// The numbers that these convert to: `f32`, or [`Float`].
     type Real: Real;
 
     /// The same number in all lanes.
     fn all(self, x: u32) -> Self;
 
+    /// `self + other` modulo 2³².
     fn plus(self, other: Self) -> Self;
 
+    /// `self · other` modulo 2³².
     fn times(self, other: Self) -> Self;
 
+    /// `self << bits`, for `bits` below 32; zeros come in.
     fn shift_left(self, bits: u32) -> Self;
 
+    /// `self >> bits`, for `bits` below 32; zeros come in.
     fn shift_right(self, bits: u32) -> Self;
 
     /// The bits back to front.
     fn reversed(self) -> Self;
 
+    /// Whether it is equal to `x`.
     fn equals(self, x: u32) -> Self::Mask;
 
     /// Entries of a table; the index must lie within.
@@ -40,6 +47,7 @@ pub trait Word:
     /// The number itself, below 2³¹ and rounded.
     fn to_real(self) -> Self::Real;
 
+    /// `self · x` modulo 2³², with the same `x` in all lanes.
     #[inline(always)]
     fn times_all(self, x: u32) -> Self {
         self.times(self.all(x))

@@ -15,14 +15,18 @@ use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// What can be added. It comes to stand where [`spot`] finds room for it.
+/// What can be added. It comes to stand where `spot` finds room for it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NewThing {
+    /// A diffuse sphere on the ground.
     Sphere,
+    /// A level, infinite plane.
     Plane,
     /// A glowing square above, that faces down.
     AreaLight,
+    /// A point light above.
     PointLight,
+    /// A diffuse cube on the ground.
     Cube,
     /// A built-in mesh or an OBJ file; read beside the picture.
     Mesh(MeshSource),

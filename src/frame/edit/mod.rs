@@ -48,82 +48,116 @@ pub enum Edit {
     /// Select what is at this place of the picture, fractions as in [`super::Command`]. With `add`, beside what is
     /// selected already, or no longer.
     PickAt {
+        /// Fraction of the width of the picture, from the left.
         x: f64,
+        /// Fraction of its height, from the top.
         y: f64,
+        /// Keep what else is selected.
         add: bool,
     },
+    /// Select an entity.
     Select {
+        /// The entity.
         id: Id,
+        /// Keep what else is selected; deselects the entity if it is the active one.
         add: bool,
     },
+    /// Select all objects and lights.
     SelectAll,
+    /// Select nothing.
     SelectNone,
     /// All objects that use this material, directly or in a blend.
     SelectUsers {
+        /// The material.
         material: Id,
     },
     /// From here to [`Edit::End`] everything is one step to undo, and [`Edit::Move`], [`Edit::Turn`] and
     /// [`Edit::Scale`] count from here.
     Begin,
+    /// The end of the step that [`Edit::Begin`] began.
     End,
+    /// Undo the last step.
     Undo,
+    /// Do the last undone step again.
     Redo,
     /// What is selected.
     Delete,
     /// Copies of what is selected, which then are selected.
     Duplicate,
+    /// Add an object or a light, which then is selected.
     Add(NewThing),
     /// What is selected, metres in the world.
     Move {
+        /// Along the axes of the world.
         by: DVec3,
     },
     /// What is selected, about the middle of the last one's place; `axis` in the world.
     Turn {
+        /// Any length but 0.
         axis: DVec3,
+        /// Counter-clockwise about the axis, degrees.
         angle_deg: f64,
     },
     /// What is selected, about the last one's place: along its own axes if it is one, evenly if they are several or
     /// a ball.
     Scale {
+        /// By axis, above 0; 1 keeps the size.
         factors: DVec3,
     },
     /// One number or one colour of an entity.
     Set {
+        /// The entity; any for what belongs to the environment.
         id: Id,
+        /// What is set.
         property: Property,
+        /// The value, in the unit of the property.
         value: DVec3,
     },
     /// Another kind of material, as near to the old one as it can be.
     SetKind {
+        /// The material.
         id: Id,
+        /// What it becomes.
         kind: MaterialKind,
     },
     /// A texture that the scene has, by name, in the place of a material's colour.
     SetTexture {
+        /// The material.
         id: Id,
+        /// Name of the texture.
         name: String,
     },
     /// Puts a texture of this description in the place of a material's colour; a picture is read beside the picture.
     Paint {
+        /// The material.
         id: Id,
+        /// What the texture shows.
         part: TextureSource,
     },
     /// Gives an object a material that the scene has.
     Assign {
+        /// The object.
         id: Id,
+        /// The material.
         material: Id,
     },
     /// Gives an object a copy of its material, for itself alone.
     OwnMaterial {
+        /// The object.
         id: Id,
     },
+    /// Give an entity another name.
     Rename {
+        /// The entity.
         id: Id,
+        /// The name.
         name: String,
     },
     /// Makes an object's mesh anew from where it came from, beside the picture.
     Remesh {
+        /// The object.
         id: Id,
+        /// How its normals are found.
         shading: MeshShading,
         /// Share of the faces to keep, (0, 1].
         ratio: f64,

@@ -9,6 +9,7 @@ pub enum Property {
     Translation,
     /// Degrees about X, then Y, then Z.
     Rotation,
+    /// Factors along the axes of the object, positive.
     Scale,
     /// Of a sphere or of a point light, metres.
     Radius,
@@ -20,19 +21,27 @@ pub enum Property {
     Alpha,
     /// 0: the same reflectance at every angle; else Schlick's.
     Schlick,
+    /// Index of refraction.
     Ior,
     /// Per metre.
     Absorption,
+    /// Of Phong: share of the ambient light that comes back, 0..1.
     Ambient,
+    /// Of Phong: share that is mirrored, 0..1.
     Specular,
+    /// Of Phong: exponent of the highlights.
     Shininess,
+    /// Of Phong: share that is glass, 0..1.
     Transparency,
     /// Of the second part of a blend.
     Weight,
     /// Radiance of an even sky.
     Sky,
+    /// Radiance of a gradient from straight above.
     Zenith,
+    /// Radiance of a gradient from just above the horizon.
     Horizon,
+    /// Radiance of a gradient from below the horizon.
     Ground,
     /// The brightest channel of the sky's colours, or the factor of its picture: all others keep their proportion to it.
     SkyStrength,

@@ -37,6 +37,9 @@ pub fn set_aperture(lens: &Lens, radius: f64) -> Lens {
     Lens { radius, enabled: radius > 0.0, ..*lens }
 }
 
+/// Switches depth of field off, or on with its last aperture.
+///
+/// A lens without an aperture gets a radius of 1 % of the focus distance, or 1 cm for a focus at infinity.
 pub fn toggle_depth_of_field(lens: &Lens) -> Lens {
     if lens.enabled { Lens { enabled: false, ..*lens } } else { with_aperture(lens) }
 }

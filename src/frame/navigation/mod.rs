@@ -4,7 +4,7 @@
 //! amounts that make no sense (not finite, a factor of zero) with the view it was given. All is f64 in the scene's
 //! own frame, so a camera a million metres from the origin moves as smoothly as one at it.
 //!
-//! Here is what commands mean; [`moves`] has the steps of a view, [`lens`] those of what is sharp. Start reading at
+//! Here is what commands mean; `moves` has the steps of a view, `lens` those of what is sharp. Start reading at
 //! [`steer`].
 
 mod lens;
@@ -22,13 +22,15 @@ use glam::DVec3;
 /// What the amounts of a command are measured by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
-    /// A sphere around everything finite in the scene; radius 0 when there is nothing.
+    /// Centre of a sphere around everything finite in the scene, metres.
     pub center: DVec3,
+    /// Radius of that sphere, metres; 0 when there is nothing finite.
     pub radius: f64,
     /// Where [`Command::Home`] leads.
     pub home: Rig,
     /// Width of the picture by its height.
     pub aspect: f64,
+    /// What a turn keeps level.
     pub turning: Turning,
     /// Metres to what a person flies towards, if that is known.
     pub pace: Option<f64>,

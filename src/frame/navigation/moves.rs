@@ -49,7 +49,7 @@ pub fn dolly(view: &View, factor: f64) -> View {
     finite_or(view, View { eye: view.pivot() - view.forward * pivot_distance, pivot_distance, ..*view })
 }
 
-/// Multiplies the height of what is seen at a given distance, within the limits of [`VFOV_RANGE_DEG`].
+/// Multiplies the height of what is seen at a given distance, within the limits of `VFOV_RANGE_DEG`.
 pub fn zoom(projection: &Projection, factor: f64) -> Projection {
     if !(factor.is_finite() && factor > 0.0) {
         return *projection;

@@ -46,6 +46,7 @@ pub struct Job {
 /// What is shown of it; no sample depends on this.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ViewOptions {
+    /// What is shown in place of the picture.
     pub inspection: Inspection,
     /// Tint what is sharp, and draw the focal plane.
     pub sharp_zone: bool,

@@ -10,34 +10,45 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
+    /// From where the scene is seen, and through which lens.
     pub camera: CameraPart,
+    /// Size and pixel filter.
     #[serde(default)]
     pub film: FilmPart,
+    /// The light model.
     #[serde(default)]
     pub integrator: Integrator,
     /// Longest path in segments; 1 shows emitters alone; unbounded when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
+    /// Exposure and tone curve.
     #[serde(default)]
     pub display: DisplayPart,
+    /// Light from infinitely far away.
     #[serde(default)]
     pub environment: EnvironmentSource,
     /// What the air absorbs, per metre. Light from the environment has passed it already.
     #[serde(default, skip_serializing_if = "is_default")]
     pub air: Rgb,
+    /// Textures that materials use, by name.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub textures: Named<TextureSource>,
+    /// Materials that objects use, by name.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub materials: Named<MaterialPart>,
+    /// Objects, in the order in which they come to be spawned.
     #[serde(default)]
     pub objects: Vec<ObjectPart>,
+    /// Point lights; everything else that emits is an object with an emissive material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightPart>,
 }
 
+/// A thin-lens camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraPart {
+    /// Centre of the lens, metres.
     pub eye: DVec3,
     /// What is in the middle of the picture, and what orbiting turns about.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -48,6 +59,7 @@ pub struct CameraPart {
     /// With `forward`: metres from the eye to what orbiting turns about; 1 when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pivot_distance: Option<f64>,
+    /// What is up in the picture; +Y when not given.
     #[serde(default = "default_up")]
     pub up: DVec3,
     /// Vertical field of view, degrees.
@@ -93,11 +105,15 @@ impl CameraPart {
     }
 }
 
+/// Size of the picture and the weights within a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilmPart {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
+    /// Weights of the light around the middle of a pixel.
     #[serde(default, skip_serializing_if = "is_default")]
     pub filter: PixelFilter,
 }
@@ -114,6 +130,7 @@ impl Default for FilmPart {
 pub struct DisplayPart {
     /// Factors of two.
     pub exposure: f32,
+    /// How bright light is brought into the range of the display.
     pub tone_curve: ToneCurve,
 }
 
@@ -143,54 +160,80 @@ impl Params for InFile {
 /// A material as a scene file writes it.
 pub type MaterialPart = Material<InFile>;
 
+/// An object and its place, metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ObjectPart {
+    /// A sphere.
     Sphere {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Centre; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         center: DVec3,
+        /// Radius, positive.
         radius: f64,
+        /// Its material, by name.
         material: String,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
     /// Infinite.
     Plane {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// A point of the plane; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         point: DVec3,
+        /// Direction of the front; +Y when not given.
         #[serde(default = "default_up")]
         normal: DVec3,
+        /// Its material, by name.
         material: String,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
     /// A parallelogram; its front looks along `edge_u` × `edge_v`.
     Quad {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// The corner at `u = v = 0`; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         corner: DVec3,
+        /// From the corner to the one at `u = 1`.
         edge_u: DVec3,
+        /// From the corner to the one at `v = 1`.
         edge_v: DVec3,
+        /// Its material, by name.
         material: String,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
+    /// A single triangle; its front is where its vertices run counter-clockwise.
     Triangle {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// The corners.
         vertices: [DVec3; 3],
+        /// Its material, by name.
         material: String,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
+    /// A triangle mesh.
     Mesh {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Where the triangles come from.
         source: MeshSource,
         /// How normals between vertices are found.
         #[serde(default, skip_serializing_if = "is_default")]
@@ -204,35 +247,47 @@ pub enum ObjectPart {
         /// One for each slot, in place of `material`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         materials: Option<Vec<String>>,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
     /// Balls of one material in rows, layers or blocks: one at `first`, then by each step in turn that many times.
     BallGrid {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Centre of the first sphere; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         first: DVec3,
         /// Up to three pairs: how many balls in a row, and the way from each to the next.
         steps: Vec<(u32, DVec3)>,
+        /// Radius of each sphere, positive.
         radius: f64,
+        /// Its material, by name.
         material: String,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
     /// Many balls, one material.
     Spheres {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Centre of each sphere.
         centers: Vec<DVec3>,
+        /// Radius of the spheres.
         radii: RadiiPart,
+        /// Its material, by name.
         material: String,
+        /// From these coordinates to the world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
 }
 
 impl ObjectPart {
+    /// Its name, if it has one.
     pub fn name(&self) -> Option<&str> {
         match self {
             Self::Sphere { name, .. }
@@ -245,6 +300,7 @@ impl ObjectPart {
         }
     }
 
+    /// The name of its material; `None` for a mesh without one for all slots.
     pub fn material(&self) -> Option<&str> {
         match self {
             Self::Sphere { material, .. }
@@ -265,6 +321,7 @@ impl ObjectPart {
         }
     }
 
+    /// From its coordinates to the world.
     pub fn transform(&self) -> &TransformPart {
         match self {
             Self::Sphere { transform, .. }
@@ -290,7 +347,9 @@ pub fn ball_grid(first: DVec3, steps: &[(u32, DVec3)]) -> Vec<DVec3> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RadiiPart {
+    /// The same radius for all, metres.
     All(f64),
+    /// The radius of each, metres, in the order of the centres.
     Each(Vec<f64>),
 }
 
@@ -298,11 +357,13 @@ pub enum RadiiPart {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TransformPart {
+    /// Metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub translate: Option<DVec3>,
     /// Degrees about X, then Y, then Z, the axes standing still.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<DVec3>,
+    /// Factors along the axes of the object; negative ones mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<ScalePart>,
     /// Three rows of four: the last column translates.
@@ -314,13 +375,16 @@ pub struct TransformPart {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScalePart(pub DVec3);
 
+/// A light that is no object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightPart {
     /// A small glowing ball that shines evenly into all directions.
     Point {
+        /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Centre of the light, metres.
         position: DVec3,
         /// Radiant intensity, W·sr⁻¹.
         intensity: Rgb,

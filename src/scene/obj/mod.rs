@@ -1,6 +1,6 @@
 //! Wavefront OBJ and MTL: any file in, one mesh with material slots out, or an error that names the line.
 //!
-//! The file is parsed in `f64` ([`parse`]; materials by tobj), and assembled: polygons are cut into triangles,
+//! The file is parsed in `f64` (`parse`; materials by tobj), and assembled: polygons are cut into triangles,
 //! corners that share position, texture coordinate and normal share a vertex (across groups too), and normals that
 //! the file lacks are computed. Start reading at [`load_obj`]; [`save_obj`] is
 //! the way back.
@@ -49,7 +49,10 @@ pub struct ImportedObj {
 pub enum ObjNormals {
     /// From the file; where it has none, computed with angle weights. Computed edges stay hard where triangles
     /// meet at more than `crease_angle` radians.
-    FileOrComputed { crease_angle: f32 },
+    FileOrComputed {
+        /// Largest angle between triangles across which normals are averaged, radians.
+        crease_angle: f32,
+    },
     /// Area-weighted at each position of the file, whatever normals it has and however texture coordinates split
     /// its vertices.
     OfPositions,
@@ -63,6 +66,7 @@ const MAX_LIBRARIES: usize = 256;
 /// How to read, and how much at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjOptions {
+    /// Where shading normals come from.
     pub normals: ObjNormals,
     /// Larger files are refused. Loading takes up to about 25 bytes of memory for each byte of the file.
     pub max_bytes: u64,

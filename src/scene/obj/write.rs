@@ -25,10 +25,10 @@ pub struct ObjExtras<'a> {
 /// Appears whole or not at all: it is written beside `path` under another name first, and a file that was there
 /// stays until the new one is complete.
 pub fn save_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<(), ObjError> {
-    let mut file = WholeFile::begin(path, Replace::AllButFilms).map_err(ObjError::Write)?;
+    let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    write(&mut file, mesh, extras, folder).map_err(|error| ObjError::Write(unwritable(path, &error)))?;
-    file.finish().map_err(ObjError::Write)
+    write(&mut file, mesh, extras, folder).map_err(|error| unwritable(path, error))?;
+    Ok(file.finish()?)
 }
 
 /// What has become of a mesh under a name.
@@ -48,7 +48,7 @@ pub(in crate::scene) fn save_new_obj(path: &Path, mesh: &Mesh, extras: &ObjExtra
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut bytes = Vec::new();
-    write(&mut bytes, mesh, extras, folder).map_err(|error| ObjError::Write(unwritable(path, &error)))?;
+    write(&mut bytes, mesh, extras, folder).map_err(|error| unwritable(path, error))?;
     let old = InputFile::open_within(path, FileKind::Model, u64::MAX).map_err(std::io::Error::other).and_then(|file| {
         let mut old = Vec::new();
         // A byte more tells a longer file.

@@ -60,7 +60,7 @@ impl Memory {
         {
             let views = (1..).zip(bookmarks.0).filter_map(|(slot, rig)| Some((slot, rig?))).collect();
             let kept = SceneBookmarks { views, ..SceneBookmarks::default() };
-            troubles.extend(self.store.keep_bookmarks(source, &kept).err());
+            troubles.extend(self.store.keep_bookmarks(source, &kept).err().map(String::from));
             self.bookmarks = bookmarks;
         }
         troubles
@@ -86,7 +86,7 @@ impl Memory {
         // The file anew: another window may have written to it.
         let (mut settings, unreadable) = self.store.settings();
         settings.remember(source);
-        let unkept = self.store.keep_settings(&settings).err();
+        let unkept = self.store.keep_settings(&settings).err().map(String::from);
         self.recent = settings.recent;
         unreadable.into_iter().chain(unkept).collect()
     }
@@ -100,14 +100,14 @@ impl Memory {
     pub fn keep_navigation(&self, navigation: Navigation) -> Option<String> {
         let mut settings = self.store.settings().0;
         settings.navigation = navigation;
-        self.store.keep_settings(&settings).err()
+        self.store.keep_settings(&settings).err().map(String::from)
     }
 
     /// For the next window, logical pixels.
     pub fn keep_window(&self, size: (u32, u32)) -> Option<String> {
         let mut settings = self.store.settings().0;
         settings.window = Some(size);
-        self.store.keep_settings(&settings).err()
+        self.store.keep_settings(&settings).err().map(String::from)
     }
 }
 

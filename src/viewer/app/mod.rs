@@ -260,9 +260,9 @@ impl App {
             up: options.up,
             waker: Some(waker.clone()),
         })
-        .map_err(ViewerError::Session)?;
+        .map_err(|error| ViewerError::Session(error.into()))?;
         if let Some(path) = &options.record {
-            session.record(path, &options.source, options.up).map_err(ViewerError::Session)?;
+            session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
         }
         session.open_lit_by(options.source.clone(), options.environment.clone());
         let memory = Memory::of_platform();

@@ -1,4 +1,4 @@
-//! Every key and mouse gesture, in one [`table`].
+//! Every key and mouse gesture, in one `table`.
 //!
 //! The window obeys [`BINDINGS`] and, before it, the preset that was chosen; the overlay on H shows both, and `docs/keys.md` is written from it, so these
 //! cannot disagree. Keys that move are physical (WASD is the same block of keys on every layout); all others are

@@ -3,7 +3,9 @@ use glam::Vec3;
 /// An axis-aligned box, closed on all sides. Empty when any `min` exceeds its `max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
+    /// Smallest coordinate along each axis.
     pub min: Vec3,
+    /// Largest coordinate along each axis.
     pub max: Vec3,
 }
 
@@ -15,32 +17,40 @@ impl Default for Aabb {
 }
 
 impl Aabb {
+    /// The box without any point.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
+    /// The smallest box around the points; empty if there are none.
     pub fn from_points(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, Self::grown_by)
     }
 
+    /// The smallest box around this one and the point.
     pub fn grown_by(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
+    /// The smallest box around both.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// The points that lie in both; empty if there are none.
     pub fn intersection(self, other: Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
+    /// Whether no point lies in it.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
+    /// Length of its sides along the axes; negative along an axis where it is empty.
     pub fn size(&self) -> Vec3 {
         self.max - self.min
     }
 
+    /// The point halfway between `min` and `max`.
     pub fn center(&self) -> Vec3 {
         0.5 * self.min + 0.5 * self.max
     }

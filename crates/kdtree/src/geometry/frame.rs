@@ -4,8 +4,11 @@ use glam::Vec3;
 /// A right-handed orthonormal frame around a unit normal, which is its z axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
+    /// First tangent, unit.
     pub x: Vec3,
+    /// Second tangent, unit.
     pub y: Vec3,
+    /// The normal, unit.
     pub z: Vec3,
 }
 
@@ -17,11 +20,13 @@ impl Frame {
         Self { x, y, z }
     }
 
+    /// A vector given by its coordinates in the frame, in the coordinates that the axes are given in.
     #[inline]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         local.x * self.x + local.y * self.y + local.z * self.z
     }
 
+    /// Coordinates of a vector in the frame.
     #[inline]
     pub fn to_local(&self, world: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(world), self.y.dot(world), self.z.dot(world))

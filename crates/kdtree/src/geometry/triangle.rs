@@ -18,13 +18,17 @@ use glam::Vec3;
 /// The part of the test that depends on the ray's direction only.
 #[derive(Clone, Copy, Debug)]
 pub struct Shear {
-    /// Axis along which the direction is longest, and the two others.
+    /// Axis along which the direction is longest: 0, 1 or 2.
     pub kz: usize,
+    /// The axis after `kz`, cyclically.
     pub kx: usize,
+    /// The axis after `kx`, cyclically.
     pub ky: usize,
-    /// `dir[kx] / dir[kz]`, `dir[ky] / dir[kz]` and `1 / dir[kz]`.
+    /// `dir[kx] / dir[kz]`.
     pub sx: f32,
+    /// `dir[ky] / dir[kz]`.
     pub sy: f32,
+    /// `1 / dir[kz]`.
     pub sz: f32,
 }
 
@@ -43,8 +47,11 @@ impl Shear {
 /// Where a ray meets a triangle: `t` in lengths of the direction, `u` and `v` the weights of vertices 1 and 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleHit {
+    /// Lengths of the direction from the origin, of either sign.
     pub t: f32,
+    /// Barycentric weight of vertex 1.
     pub u: f32,
+    /// Barycentric weight of vertex 2.
     pub v: f32,
 }
 

@@ -20,6 +20,7 @@ pub struct SerpentKnot {
     pub around: u32,
     /// 0: a smooth knot; 1: the full relief.
     pub relief: f64,
+    /// Seed of the noise in the relief.
     pub seed: u32,
 }
 

@@ -23,6 +23,7 @@ pub struct DisplacedSphere {
     pub hills: f64,
     /// 0: rounded hills; 1: sharp ridges.
     pub ridged: f64,
+    /// Seed of the noise that displaces the surface.
     pub seed: u32,
 }
 

@@ -16,6 +16,7 @@ pub struct Terrain {
     pub height: f64,
     /// Mountains along a side, about.
     pub mountains: f64,
+    /// Seed of the noise that shapes mountains and ground.
     pub seed: u32,
 }
 

@@ -57,12 +57,16 @@ pub enum Target {
 /// Why a mesh cannot be simplified as asked.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SimplifyError {
+    /// [`Target::Ratio`] is outside `(0, 1]` or NaN.
     #[error("the ratio of triangles to keep must be above 0 and at most 1, not {0}")]
     Ratio(f64),
+    /// [`Target::Faces`] is 0.
     #[error("at least one triangle must be kept")]
     NoFaces,
+    /// [`Target::Error`] is not above 0, or not finite.
     #[error("the largest error must be a length above 0, not {0}")]
     Error(f64),
+    /// No triangle has three corners at different places.
     #[error("the mesh has no triangle with three different corners")]
     Degenerate,
 }

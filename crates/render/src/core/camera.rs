@@ -9,10 +9,13 @@ use thiserror::Error;
 /// A thin-lens camera in the space of the snapshot. The focal *plane* is perpendicular to `forward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
+    /// Centre of the lens, metres.
     pub eye: Vec3,
-    /// Unit and mutually perpendicular; `right × up` points at the viewer, against `forward`.
+    /// To the right in the picture. The three axes are unit and mutually perpendicular; `right × up` points at the viewer.
     pub right: Vec3,
+    /// Upwards in the picture.
     pub up: Vec3,
+    /// Into the picture, along the optical axis.
     pub forward: Vec3,
     /// Tangent of half the vertical field of view.
     pub tan_half_vfov: f32,
@@ -30,8 +33,11 @@ pub struct Camera {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("camera: `{field}` is {value}, but must {allowed}")]
 pub struct CameraError {
+    /// Name of the field of [`Camera`].
     pub field: &'static str,
+    /// Its value, as text.
     pub value: String,
+    /// What it must be instead, as the end of a sentence that begins with "must".
     pub allowed: &'static str,
 }
 
@@ -127,6 +133,7 @@ impl Camera {
         if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
     }
 
+    /// The point of the lens at an offset from the eye along `right` and `up`, metres; see [`Self::lens_offset`].
     #[inline]
     pub fn lens_point(&self, offset: Vec2) -> Vec3 {
         self.lens_points(offset.to_array()).into()

@@ -11,18 +11,25 @@ use std::sync::Arc;
 /// Radiance that arrives from outside the scene, W·m⁻²·sr⁻¹.
 #[derive(Clone, Debug, Default)]
 pub enum Environment {
+    /// No light from outside.
     #[default]
     Black,
+    /// The same radiance from every direction.
     Constant(Vec3),
     /// A smooth sky: `horizon` to `zenith` above, `ground` below.
     Gradient {
+        /// Radiance from straight above (+Y).
         zenith: Vec3,
+        /// Radiance from just above the horizon.
         horizon: Vec3,
+        /// Radiance from everywhere below the horizon.
         ground: Vec3,
     },
     /// Equirectangular picture: its middle column looks along −Z, its top row along +Y.
     Image {
+        /// The picture, which the scale turns into radiance.
         image: Arc<ImageTexture>,
+        /// Radiance of a texel of 1, by channel.
         scale: Vec3,
         /// Radians about +Y.
         rotation: f32,

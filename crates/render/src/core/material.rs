@@ -45,14 +45,18 @@ impl Params for InSnapshot {
 /// A colour, linear Rec. 709, the same everywhere or looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorInput {
+    /// The same colour everywhere.
     Constant(Vec3),
+    /// The colour of a texture at the surface point.
     Texture(TextureId),
 }
 
 /// A number without unit, the same everywhere or the red channel of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ScalarInput {
+    /// The same number everywhere.
     Constant(f32),
+    /// The red channel of a texture at the surface point.
     Texture(TextureId),
 }
 
@@ -72,8 +76,10 @@ impl From<f32> for ScalarInput {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fresnel {
+    /// The reflectance is the same at every angle.
     #[default]
     Constant,
+    /// The reflectance rises to 1 at grazing angles by Schlick's approximation (Schlick 1994).
     Schlick,
 }
 
@@ -87,9 +93,13 @@ pub enum Fresnel {
 ))]
 pub enum Material<P: Params = InSnapshot> {
     /// Lambert: f = albedo / π.
-    Diffuse { albedo: P::Color },
+    Diffuse {
+        /// Share of light that is reflected, per channel, 0..1.
+        albedo: P::Color,
+    },
     /// Perfect mirror, the same reflectance at every angle.
     Mirror {
+        /// Share of light that is reflected, per channel, 0..1.
         #[serde(default = "white")]
         reflectance: P::Color,
     },
@@ -97,7 +107,9 @@ pub enum Material<P: Params = InSnapshot> {
     Metal {
         /// Width of the lobe, 0..1: the square of what other programs call roughness.
         alpha: P::Scalar,
+        /// Share of light that is reflected at normal incidence, per channel, 0..1.
         reflectance: P::Color,
+        /// How the reflectance depends on the angle.
         #[serde(default, skip_serializing_if = "is_default")]
         fresnel: Fresnel,
         /// Give back the energy that single scattering loses (Turquin 2019).
@@ -116,6 +128,7 @@ pub enum Material<P: Params = InSnapshot> {
     /// The classic local model. For paths it is diffuse, mirror and glass in shares that sum to 1: `transparency`, of
     /// the rest `specular`, of the rest `diffuse`.
     Phong {
+        /// Share of light that is reflected diffusely, of what is neither transparent nor specular; per channel, 0..1.
         diffuse: P::Color,
         /// Of the ambient light, the share of `diffuse` that comes back.
         #[serde(default = "one")]
@@ -138,7 +151,14 @@ pub enum Material<P: Params = InSnapshot> {
     },
     /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
     /// is constant: see [`Emission::of`].
-    Blend { weight: P::Scalar, a: P::Material, b: P::Material },
+    Blend {
+        /// Share of `b`, 0..1.
+        weight: P::Scalar,
+        /// The material at weight 0.
+        a: P::Material,
+        /// The material at weight 1.
+        b: P::Material,
+    },
     /// A black body: emits on its front (a sphere outwards, a face along its normal), reflects nothing.
     Emissive {
         /// W·sr⁻¹·m⁻².
@@ -149,12 +169,19 @@ pub enum Material<P: Params = InSnapshot> {
 /// The kinds of [`Material`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MaterialKind {
+    /// Emits light: [`Material::Emissive`].
     Emissive,
+    /// Lambertian reflection: [`Material::Diffuse`].
     Diffuse,
+    /// Perfect mirror: [`Material::Mirror`].
     Mirror,
+    /// Smooth dielectric: [`Material::Glass`].
     Glass,
+    /// GGX microfacets: [`Material::Metal`].
     Metal,
+    /// The classic local model: [`Material::Phong`].
     Phong,
+    /// Weighted sum of two materials: [`Material::Blend`].
     Blend,
 }
 
@@ -195,6 +222,7 @@ pub enum Param<Color, Scalar, Number, Rgb, Part> {
     Exponent(Number),
     /// Per metre.
     Absorption(Rgb),
+    /// Another material, of which a blend consists.
     Part(Part),
 }
 
@@ -261,8 +289,11 @@ macro_rules! color_of {
 
 /// What a material refers to, looked up for another place; see [`Material::map`].
 pub trait MapParams<From: Params, To: Params> {
+    /// Looks up a colour.
     fn color(&mut self, color: &From::Color) -> To::Color;
+    /// Looks up a number.
     fn scalar(&mut self, scalar: &From::Scalar) -> To::Scalar;
+    /// Looks up another material.
     fn material(&mut self, material: &From::Material) -> To::Material;
 }
 
@@ -301,10 +332,12 @@ impl<P: Params> Material<P> {
         params_of!(self)
     }
 
+    /// Its parameters to be changed, otherwise as in [`Self::params`].
     pub fn params_mut(&mut self) -> Vec<(&'static str, ParamMut<'_, P>)> {
         params_of!(self)
     }
 
+    /// Its kind.
     #[inline]
     pub fn kind(&self) -> MaterialKind {
         match self {
@@ -449,6 +482,7 @@ impl Material {
 /// The light that a material adds itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emission {
+    /// Radiance of the emissive material, W·m⁻²·sr⁻¹, before `scale`.
     pub radiance: ColorInput,
     /// Share of an emissive part in a blend.
     pub scale: f32,

@@ -22,11 +22,15 @@ pub enum Integrator {
 /// What decides the samples of a picture besides the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RenderSettings {
+    /// The light model.
     pub integrator: Integrator,
     /// Longest path in segments; 1 shows emitters alone. `u32::MAX` is unbounded.
     pub max_depth: u32,
+    /// Picks the random numbers of all samples: another seed gives independent noise.
     pub seed: u32,
+    /// Weights of the light around the middle of a pixel.
     pub filter: PixelFilter,
+    /// Techniques of variance reduction that are used.
     pub techniques: Techniques,
     /// With which instructions sixteen paths are shaded at a time; `None` shades one after the other, which is what
     /// tests compare with. All sets give the same bits.
@@ -37,6 +41,7 @@ pub struct RenderSettings {
 /// Settings that no picture comes of.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SettingsError {
+    /// [`RenderSettings::max_depth`] is 0.
     #[error("a path of 0 segments sees nothing: use at least 1 for `max_depth`, or leave it out for no limit")]
     NoDepth,
 }

@@ -13,14 +13,19 @@ use firstlight_mesh::Mesh;
 use glam::{Mat3, Vec3};
 use std::sync::Arc;
 
+/// Geometry, materials and camera of one picture, read-only and cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
+    /// Where everything is.
     pub geometry: Arc<Geometry>,
+    /// How everything looks.
     pub shading: Arc<Shading>,
+    /// From where it is seen.
     pub camera: Camera,
 }
 
 impl Snapshot {
+    /// Shares the parts, so that later snapshots can keep them.
     pub fn new(geometry: Geometry, shading: Shading, camera: Camera) -> Self {
         Self { geometry: Arc::new(geometry), shading: Arc::new(shading), camera }
     }
@@ -29,7 +34,9 @@ impl Snapshot {
 /// Where everything is. Object `i` here is object `i` of the tree.
 #[derive(Debug)]
 pub struct Geometry {
+    /// What each object needs beyond its shape, by object index.
     pub objects: Vec<Object>,
+    /// The tree over the shapes of the objects, by the same index.
     pub tree: SceneTree,
 }
 
@@ -71,8 +78,11 @@ impl Object {
 /// Material and texture ids lie within their lists, and a blend comes to no cycle and at most eight lobes.
 #[derive(Clone, Debug)]
 pub struct Shading {
+    /// Materials by [`MaterialId`].
     pub materials: Vec<Material>,
+    /// Textures by [`TextureId`](crate::core::texture::TextureId).
     pub textures: Vec<Texture>,
+    /// Light that arrives from outside the scene.
     pub environment: Environment,
     /// What the air outside of all glass absorbs, per metre; light from the environment has passed it already.
     pub air: Vec3,

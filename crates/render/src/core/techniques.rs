@@ -21,6 +21,7 @@ pub struct Techniques {
 }
 
 impl Techniques {
+    /// All techniques, which is the default.
     pub const ALL: Self = Self {
         light_sampling: true,
         mis: true,

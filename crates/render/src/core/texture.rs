@@ -12,9 +12,12 @@ pub type TextureId = u32;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
+    /// The pattern repeats.
     #[default]
     Repeat,
+    /// The pattern repeats, mirrored every other time.
     Mirror,
+    /// The texel at the edge continues.
     Clamp,
 }
 
@@ -24,6 +27,7 @@ pub enum Wrap {
 /// the object), metres along two axes of an infinite plane.
 #[derive(Clone, Debug)]
 pub struct Texture {
+    /// What the texture shows.
     pub pattern: TexturePattern,
     /// Applied to surface coordinates first: rotation and scale.
     pub uv_matrix: Mat2,
@@ -31,13 +35,21 @@ pub struct Texture {
     pub uv_offset: Vec2,
 }
 
+/// Colours over pattern coordinates.
 #[derive(Clone, Debug)]
 pub enum TexturePattern {
     /// Squares of side 1 in pattern coordinates; the one at (0, 0)..(1, 1) has colour `a`.
-    Checker { a: Vec3, b: Vec3 },
+    Checker {
+        /// Colour of squares whose whole coordinates have an even sum, linear Rec. 709.
+        a: Vec3,
+        /// Colour of the others, linear Rec. 709.
+        b: Vec3,
+    },
     /// The picture covers 0..1; its top row is at v = 1.
     Image {
+        /// The picture.
         image: Arc<ImageTexture>,
+        /// What the texture shows outside 0..1.
         wrap: Wrap,
         /// Bilinear when true, else the nearest texel.
         smooth: bool,
@@ -47,8 +59,11 @@ pub enum TexturePattern {
 /// A picture in linear Rec. 709, row by row from the top.
 #[derive(Debug, PartialEq)]
 pub struct ImageTexture {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
+    /// One texel per pixel, `width · height` of them.
     pub texels: Vec<Vec3>,
 }
 

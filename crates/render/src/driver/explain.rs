@@ -19,9 +19,11 @@ use std::ops::Range;
 /// A part of a pixel's light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contribution {
+    /// Where the light comes from.
     pub source: LightSource,
     /// Surfaces between the light and the eye; 0 is the light itself.
     pub bounces: u32,
+    /// Whether the path runs into the light or samples it.
     pub found_by: FoundBy,
     /// Of the mean, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
@@ -30,8 +32,11 @@ pub struct Contribution {
 /// See [`explain`].
 #[derive(Clone, Debug)]
 pub struct Explanation {
+    /// The pixel, x and y from the upper left corner.
     pub pixel: UVec2,
+    /// Width and height of the film in pixels.
     pub film_size: UVec2,
+    /// Numbers of the samples that are traced.
     pub samples: Range<u32>,
     /// One a sample, in order.
     pub paths: Vec<TracedPath>,

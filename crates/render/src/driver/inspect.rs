@@ -44,6 +44,7 @@ pub enum Inspection {
 }
 
 impl Inspection {
+    /// All views, in the order of menus.
     pub const ALL: [Self; 10] = [
         Self::Picture,
         Self::Normals,
@@ -57,6 +58,7 @@ impl Inspection {
         Self::Luminance,
     ];
 
+    /// Name for the user, lower case.
     pub fn label(self) -> &'static str {
         match self {
             Self::Picture => "picture",
@@ -85,13 +87,16 @@ pub struct Legend {
     pub low: f32,
     /// Red.
     pub high: f32,
+    /// Unit of both ends, as written beside the scale.
     pub unit: &'static str,
 }
 
 /// A view in bytes, as large as the film that it belongs to.
 #[derive(Clone, Debug, Default)]
 pub struct Inspected {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
     /// sRGB-encoded, row by row from the top.
     pub rgb: Vec<[u8; 3]>,

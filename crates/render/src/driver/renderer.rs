@@ -24,8 +24,11 @@ use std::ops::Range;
 /// A sample that cannot be right; replay it with the same scene, seed and settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BadSample {
+    /// Column of the pixel, from the left.
     pub x: u32,
+    /// Row of the pixel, from the top.
     pub y: u32,
+    /// Number of the sample within the pixel.
     pub sample: u32,
 }
 
@@ -34,6 +37,7 @@ pub struct BadSample {
 pub struct PassReport {
     /// False when it was stopped before every tile reached the target.
     pub completed: bool,
+    /// Rays that were traced, by class.
     pub rays: RayCounts,
     /// How many samples were left out because they were not finite.
     pub n_bad: u64,

@@ -16,26 +16,39 @@ pub enum MergeError {
         "both films have the samples {first} to {last}: render ranges that do not overlap, such as --samples 0..64 and \
          --samples 64..128"
     )]
-    SharedSamples { first: u32, last: u32 },
+    SharedSamples {
+        /// Number of the first shared sample.
+        first: u32,
+        /// Number of the last shared sample.
+        last: u32,
+    },
 }
 
 /// What is wrong with the numbers of a film that is read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum RecordError {
+    /// Width, height or tile size is 0.
     #[error("it has no pixels")]
     NoPixels,
+    /// A list does not have the length that width, height and tile size call for.
     #[error("its parts do not have the size that it names")]
     Size,
+    /// A tile has more samples per pixel than `u32` can count.
     #[error("it has more samples than can be counted")]
     TooManySamples,
+    /// A sample that was left out lies outside its tile, or a pixel has more of them than samples.
     #[error("its list of samples that were left out is wrong")]
     BadSamples,
+    /// The doublings on record do not fit the number of samples.
     #[error("what it knows of its error does not fit its samples")]
     Convergence,
+    /// The complete samples of light from light paths contradict its batches.
     #[error("its light from light paths has another number of samples")]
     LightPaths,
+    /// Ranges of samples are missing, overlap, touch or run backwards.
     #[error("its ranges of samples overlap or run backwards")]
     Ranges,
+    /// A sample has a higher number than a film can hold.
     #[error("its samples have higher numbers than can be counted")]
     Numbers,
 }

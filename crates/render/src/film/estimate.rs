@@ -20,6 +20,7 @@ pub struct ErrorEstimate {
     /// Bounds of an interval that holds the true value of this picture with a probability of about 95 %, and more where
     /// the slope is well known; it is wide as long as only few doublings tell how fast the error falls.
     pub low: f64,
+    /// Upper bound of that interval; see `low`.
     pub high: f64,
     /// relMSE is expected to fall as samples^−`exponent` from here on, from doubling to doubling; 1 for independent samples.
     pub exponent: f64,

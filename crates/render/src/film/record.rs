@@ -15,6 +15,7 @@ pub const N_PLANES: usize = 15;
 /// All that is in a film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmRecord {
+    /// Size, tiles and samples.
     pub layout: FilmLayout,
     /// Row by row from the top, [`N_PLANES`] of them.
     pub planes: Vec<Vec<f64>>,
@@ -23,7 +24,9 @@ pub struct FilmRecord {
 /// What is not a number for each pixel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FilmLayout {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
     /// Pixels.
     pub tile_size: u32,
@@ -42,6 +45,7 @@ pub struct LampRecord {
     pub spp: u32,
 }
 
+/// Which samples a tile has, and what is known of its error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TileRecord {
     /// First sample and the one after the last, of each range.
@@ -91,6 +95,7 @@ impl Film {
         }
     }
 
+    /// All numbers of the film; [`Self::from_record`] is the inverse.
     pub fn to_record(&self) -> FilmRecord {
         let n_pixels = self.width() as usize * self.height() as usize;
         let mut planes = vec![vec![0.0; n_pixels]; N_PLANES];
@@ -116,6 +121,8 @@ impl Film {
         FilmRecord { layout: self.layout(), planes }
     }
 
+    /// The film with these numbers; the inverse of [`Self::to_record`].
+    ///
     /// # Errors
     /// When the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, RecordError> {

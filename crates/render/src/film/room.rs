@@ -8,9 +8,11 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a picture of {width} x {height} would take {} of memory, and that much cannot be had: make it smaller", size(*.bytes))]
 pub struct NoRoom {
-    /// Pixels.
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
+    /// Memory that it would take, bytes.
     pub bytes: u64,
 }
 

@@ -34,14 +34,23 @@ pub enum FoundBy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {
     /// On an object, in the frame of the snapshot, metres.
-    Surface { position: Vec3, object: u32 },
+    Surface {
+        /// The point, metres.
+        position: Vec3,
+        /// Index of the object in the snapshot; `u32::MAX` at the rim of a light, where it is not known.
+        object: u32,
+    },
     /// Outside of the scene, in this direction (unit).
-    Sky { direction: Vec3 },
+    Sky {
+        /// Unit, from the scene outwards.
+        direction: Vec3,
+    },
 }
 
 /// Light that a vertex asked for and got.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked {
+    /// The light that was asked.
     pub source: LightSource,
     /// The point that was asked, or the direction.
     pub place: Place,
@@ -52,17 +61,20 @@ pub struct Asked {
 /// The end of one segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathVertex {
+    /// Where the segment ends.
     pub place: Place,
     /// Of light that arrives here, the share that reaches the pixel.
     pub throughput: Vec3,
     /// What the pixel got of the light that shines from here, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
+    /// What light sampling found from here; `None` where it was not used or found nothing.
     pub asked: Option<Asked>,
 }
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TracedPath {
+    /// Number of the sample within its pixel.
     pub sample: u32,
     /// On the lens.
     pub origin: Vec3,

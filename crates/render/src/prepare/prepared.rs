@@ -76,6 +76,7 @@ pub struct Features {
 }
 
 impl Prepared {
+    /// Builds all tables of a snapshot; the time grows with its objects, lights and textures.
     pub fn new(snapshot: Snapshot) -> Self {
         let surfaces = Arc::new(SurfaceTable::build(&snapshot.geometry.tree));
         let tables = Arc::new(Tables::build(&snapshot.geometry, &snapshot.shading));
@@ -121,6 +122,7 @@ impl Prepared {
         self.tables.features.environment || self.tables.emission.iter().any(Option::is_some)
     }
 
+    /// The lights that can be sampled.
     pub fn lights(&self) -> &LightTable {
         &self.tables.lights
     }

@@ -63,15 +63,18 @@ impl AliasTable {
         (index, self.bins[index as usize].pmf, fresh.clamp(0.0, 1.0f32.next_down()))
     }
 
+    /// Probability of an index, which must be below [`Self::len`].
     #[inline]
     pub fn pmf(&self, index: u32) -> f32 {
         self.bins[index as usize].pmf
     }
 
+    /// Number of indices to choose from.
     pub fn len(&self) -> usize {
         self.bins.len()
     }
 
+    /// Whether there is nothing to choose from.
     pub fn is_empty(&self) -> bool {
         self.bins.is_empty()
     }

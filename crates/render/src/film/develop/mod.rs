@@ -20,6 +20,7 @@ pub use crate::film::develop::srgb::{decode_srgb, encode_srgb};
 pub struct Display {
     /// Factors of two.
     pub exposure_stops: f32,
+    /// From exposed radiance to display light.
     pub tone_curve: ToneCurve,
 }
 

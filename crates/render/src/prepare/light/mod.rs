@@ -129,10 +129,12 @@ impl LightTable {
         Self { lights, by_object, selection, lanes }
     }
 
+    /// Number of lights that can be sampled; each triangle of a mesh and each of many spheres counts by itself.
     pub fn len(&self) -> usize {
         self.lights.len()
     }
 
+    /// Whether no light can be sampled.
     pub fn is_empty(&self) -> bool {
         self.lights.is_empty()
     }
