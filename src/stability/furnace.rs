@@ -338,7 +338,7 @@ fn random_camera(random: &mut Random, bodies: &[Body], materials: &[Material]) -
 /// Of the first transparent part of a material; `None` if it has none.
 fn first_ior(materials: &[Material], id: usize) -> Option<f32> {
     match &materials[id] {
-        Material::Glass { ior, .. } => Some(*ior),
+        Material::Glass { ior, .. } | Material::RoughGlass { ior, .. } => Some(*ior),
         Material::Phong { ior, transparency, .. } => (*transparency > 0.0).then_some(*ior),
         Material::Blend { a, b, .. } => first_ior(materials, *a as usize).or_else(|| first_ior(materials, *b as usize)),
         _ => None,
