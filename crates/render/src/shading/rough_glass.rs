@@ -346,6 +346,29 @@ mod tests {
     }
 
     #[test]
+    fn it_loses_what_the_page_of_materials_says() {
+        // Per cent of light from all around and of light along the normal, from outside and from inside.
+        for (alpha, lost) in [
+            (0.04, [0.2, 0.0, 0.7, 0.2]),
+            (0.1, [0.9, 0.1, 3.3, 1.0]),
+            (0.36, [5.6, 1.7, 21.9, 14.1]),
+            (0.64, [15.1, 4.9, 40.0, 35.6]),
+            (1.0, [29.6, 10.6, 56.4, 58.5]),
+        ] {
+            for (eta, lost) in [1.0 / 1.5, 1.5].into_iter().zip(lost.chunks(2)) {
+                let loss = |cos, n| 100.0 * (1.0 - sampled_albedo(alpha, cos, eta, n).iter().sum::<f64>());
+                // Even in the square of the cosine.
+                let n = 32;
+                let around =
+                    (0..n).map(|i| loss(((i as f32 + 0.5) / n as f32).sqrt(), 1 << 12)).sum::<f64>() / f64::from(n);
+                let along = loss(1.0, 1 << 14);
+                assert!((around - lost[0]).abs() < 0.4, "α {alpha}, η {eta}: {around:.2} for {}", lost[0]);
+                assert!((along - lost[1]).abs() < 0.6, "α {alpha}, η {eta}: {along:.2} for {}", lost[1]);
+            }
+        }
+    }
+
+    #[test]
     fn light_goes_both_ways_alike() {
         for case in 0..4000 {
             let sampler = Sampler::new(case, 1, 0, 0);
