@@ -64,8 +64,7 @@ struct Told<'a> {
     faults: BTreeMap<*const Mesh, Faults>,
 }
 
-const NOT_MODELLED: [&str; 6] =
-    ["spectra", "polarisation", "motion blur", "participating media", "rough glass", "lens aberrations"];
+const NOT_MODELLED: [&str; 5] = ["spectra", "polarisation", "motion blur", "participating media", "lens aberrations"];
 
 impl Told<'_> {
     /// For people.
@@ -230,10 +229,19 @@ fn environment(environment: &Environment) -> String {
     }
 }
 
-const FEATURES: [&str; 8] =
-    ["lens", "textures", "glass", "light sampling", "environment light", "caustics", "blends", "rough metal"];
+const FEATURES: [&str; 9] = [
+    "lens",
+    "textures",
+    "glass",
+    "light sampling",
+    "environment light",
+    "caustics",
+    "blends",
+    "rough metal",
+    "rough glass",
+];
 
-fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
+fn features(extraction: &Extraction, lens: &Lens) -> [bool; 9] {
     let (shading, features) = (&extraction.prepared.shading, extraction.prepared.features());
     let has = |kind: &str| shading.materials.iter().any(|material| material.kind().name() == kind);
     [
@@ -245,6 +253,7 @@ fn features(extraction: &Extraction, lens: &Lens) -> [bool; 8] {
         features.caustics,
         has("blend"),
         has("metal"),
+        has("rough_glass"),
     ]
 }
 

@@ -255,6 +255,18 @@ fn random_scene(seed: u64) -> LightCase {
             _ => classic(random.unit(), random.unit(), ior),
         });
     }
+    // Drawn by itself, so that scenes without it stay what they are.
+    let mut roughening = Random::new(0x20_0676, seed);
+    let mut is_lossy = false;
+    for material in &mut materials {
+        if let Material::Glass { ior, absorption } = *material
+            && roughening.below(6) == 0
+        {
+            let alpha = [0.0, 1e-4, 1e-3, 0.03, 0.2, 0.5, 1.0][roughening.below(7)];
+            *material = Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption };
+            is_lossy = true;
+        }
+    }
     for _ in 0..3 {
         let parts = materials.len();
         // A blend of blends comes to eight lobes at most, of which each classic material has three.
@@ -309,7 +321,8 @@ fn random_scene(seed: u64) -> LightCase {
     let mut picture = furnace(format!("scene {seed}"), things, materials, view, index, way);
     (picture.width, picture.height, picture.spp) = (12, 12, 8);
     // Dense glass of many corners holds some paths for longer than they live; seen from inside, some never get out.
-    picture.allowed_loss = if is_inside { 1.0 } else { 0.05 };
+    // What bounces more than once between microfacets is lost.
+    picture.allowed_loss = if is_inside || is_lossy { 1.0 } else { 0.05 };
     picture
 }
 
@@ -338,7 +351,7 @@ fn random_camera(random: &mut Random, bodies: &[Body], materials: &[Material]) -
 /// Of the first transparent part of a material; `None` if it has none.
 fn first_ior(materials: &[Material], id: usize) -> Option<f32> {
     match &materials[id] {
-        Material::Glass { ior, .. } => Some(*ior),
+        Material::Glass { ior, .. } | Material::RoughGlass { ior, .. } => Some(*ior),
         Material::Phong { ior, transparency, .. } => (*transparency > 0.0).then_some(*ior),
         Material::Blend { a, b, .. } => first_ior(materials, *a as usize).or_else(|| first_ior(materials, *b as usize)),
         _ => None,

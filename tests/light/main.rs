@@ -10,6 +10,7 @@ mod lanes;
 mod light_transport;
 mod phong;
 mod region;
+mod rough_glass;
 mod stability;
 mod terminator;
 mod textures;

@@ -30,7 +30,9 @@ fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
             [colors(world, *a, nesting + 1)[0], colors(world, *b, nesting + 1)[0]]
         }
         // What a metre of it lets through.
-        Material::Glass { absorption, .. } => [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2],
+        Material::Glass { absorption, .. } | Material::RoughGlass { absorption, .. } => {
+            [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2]
+        }
         material => match material.color() {
             // Of a light, the hue.
             Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],

@@ -125,6 +125,17 @@ pub enum Material<P: Params = InSnapshot> {
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
     },
+    /// Dielectric with GGX microfacets that reflect and refract, each with exact Fresnel (Walter et al. 2007).
+    RoughGlass {
+        /// Width of the distribution of normals, 0..1: the square of what other programs call roughness.
+        alpha: P::Scalar,
+        /// Index of refraction.
+        #[serde(default = "glass_ior")]
+        ior: f32,
+        /// Per metre inside (Beer–Lambert).
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: P::Rgb,
+    },
     /// The classic local model. For paths it is diffuse, mirror and glass in shares that sum to 1: `transparency`, of
     /// the rest `specular`, of the rest `diffuse`.
     Phong {
@@ -177,6 +188,8 @@ pub enum MaterialKind {
     Mirror,
     /// Smooth dielectric: [`Material::Glass`].
     Glass,
+    /// GGX microfacets that reflect and refract: [`Material::RoughGlass`].
+    RoughGlass,
     /// GGX microfacets: [`Material::Metal`].
     Metal,
     /// The classic local model: [`Material::Phong`].
@@ -187,7 +200,8 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The kinds that a material can be turned into; a blend needs two others.
-    pub const PLAIN: [Self; 6] = [Self::Diffuse, Self::Mirror, Self::Metal, Self::Glass, Self::Phong, Self::Emissive];
+    pub const PLAIN: [Self; 7] =
+        [Self::Diffuse, Self::Mirror, Self::Metal, Self::Glass, Self::RoughGlass, Self::Phong, Self::Emissive];
 
     pub(crate) const N: usize = Self::Blend as usize + 1;
 
@@ -198,6 +212,7 @@ impl MaterialKind {
             Self::Diffuse => "diffuse",
             Self::Mirror => "mirror",
             Self::Glass => "glass",
+            Self::RoughGlass => "rough_glass",
             Self::Metal => "metal",
             Self::Phong => "phong",
             Self::Blend => "blend",
@@ -256,6 +271,11 @@ macro_rules! params_of {
             Material::Glass { ior, absorption } => {
                 vec![("ior", Param::Ior(ior)), ("absorption", Param::Absorption(absorption))]
             }
+            Material::RoughGlass { alpha, ior, absorption } => vec![
+                ("alpha", Param::Share(alpha)),
+                ("ior", Param::Ior(ior)),
+                ("absorption", Param::Absorption(absorption)),
+            ],
             Material::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => vec![
                 ("specular", Param::Share(specular)),
                 ("diffuse", Param::Reflectance(diffuse)),
@@ -282,7 +302,7 @@ macro_rules! color_of {
             | Material::Metal { reflectance: color, .. }
             | Material::Phong { diffuse: color, .. }
             | Material::Emissive { radiance: color } => Some(color),
-            Material::Glass { .. } | Material::Blend { .. } => None,
+            Material::Glass { .. } | Material::RoughGlass { .. } | Material::Blend { .. } => None,
         }
     };
 }
@@ -311,6 +331,9 @@ impl<P: Params> Material<P> {
                 compensate: *compensate,
             },
             Self::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: rgb(absorption) },
+            Self::RoughGlass { alpha, ior, absorption } => {
+                Material::RoughGlass { alpha: to.scalar(alpha), ior: *ior, absorption: rgb(absorption) }
+            }
             Self::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => Material::Phong {
                 diffuse: to.color(diffuse),
                 ambient: *ambient,
@@ -345,6 +368,7 @@ impl<P: Params> Material<P> {
             Self::Diffuse { .. } => MaterialKind::Diffuse,
             Self::Mirror { .. } => MaterialKind::Mirror,
             Self::Glass { .. } => MaterialKind::Glass,
+            Self::RoughGlass { .. } => MaterialKind::RoughGlass,
             Self::Metal { .. } => MaterialKind::Metal,
             Self::Phong { .. } => MaterialKind::Phong,
             Self::Blend { .. } => MaterialKind::Blend,
@@ -373,6 +397,9 @@ impl<P: Params> Material<P> {
                 compensate: true,
             },
             MaterialKind::Glass => Self::Glass { ior: glass_ior(), absorption: P::Rgb::default() },
+            MaterialKind::RoughGlass => {
+                Self::RoughGlass { alpha: P::Scalar::from(0.04), ior: glass_ior(), absorption: P::Rgb::default() }
+            }
             MaterialKind::Phong => Self::Phong {
                 diffuse: color,
                 ambient: 1.0,
@@ -431,7 +458,7 @@ impl Material {
     /// Whether light can pass through the surface.
     pub(crate) fn is_clear(&self) -> bool {
         match self {
-            Self::Glass { .. } => true,
+            Self::Glass { .. } | Self::RoughGlass { .. } => true,
             Self::Phong { transparency, .. } => *transparency > 0.0,
             _ => false,
         }
@@ -448,7 +475,7 @@ impl Material {
     /// Whether the inside of it takes light away.
     pub(crate) fn absorbs(&self) -> bool {
         match self {
-            Self::Glass { absorption, .. } | Self::Phong { absorption, .. } => {
+            Self::Glass { absorption, .. } | Self::RoughGlass { absorption, .. } | Self::Phong { absorption, .. } => {
                 self.is_clear() && *absorption != Vec3::ZERO
             }
             _ => false,
@@ -459,7 +486,9 @@ impl Material {
     pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
         match self {
             Self::Mirror { .. } | Self::Glass { .. } => true,
-            Self::Metal { alpha, .. } => matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA),
+            Self::Metal { alpha, .. } | Self::RoughGlass { alpha, .. } => {
+                matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA)
+            }
             Self::Phong { specular, transparency, .. } => {
                 *transparency > 0.0 || !matches!(specular, ScalarInput::Constant(share) if *share <= 0.0)
             }

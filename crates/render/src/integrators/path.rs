@@ -286,26 +286,28 @@ impl PathWave {
         let &PathStep { scene, techniques, path, vertex, .. } = step;
         let (sampler, dimension) = (&path.sampler, step.dimension());
         let tables = &*scene.tables;
-        let found = choose_light_point(scene, techniques, vertex.position, vertex.normal, sampler, dimension);
+        let found = choose_light_point(scene, techniques, vertex.position, lit_side(vertex, bsdf), sampler, dimension);
         let Some((target, sample)) = found else { return };
         let (value, pdf) = bsdf.eval(vertex.wo, sample.wi, vertex.normal);
-        if pdf <= 0.0 || !vertex.is_reached_from(sample.wi) {
+        let through = bsdf.through().filter(|_| sample.wi.dot(vertex.normal) < 0.0);
+        if pdf <= 0.0 || !leads_on(vertex, sample.wi, through.is_some()) {
             return;
         }
+        let media = through.map_or(path.media, |interface| interface.beyond);
         let weight = light_weight(techniques, sample.pdf, pdf) / sample.pdf;
         let mut light = path.throughput * value * sample.radiance * weight;
         if light == Vec3::ZERO {
             return;
         }
         if tables.features.glass && target.is_none() {
-            light *= self.sets.environment_scale(path.media);
+            light *= self.sets.environment_scale(media);
         }
         if tables.features.media
             && let Some(target) = target
         {
-            light *= self.sets.transmittance(path.media, vertex.position.distance(target));
+            light *= self.sets.transmittance(media, vertex.position.distance(target));
         }
-        let origin = vertex.leaving(sample.wi);
+        let origin = if through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         let shadow_ray = match target {
             // The direction spans the way to the light's own bounded point, where the ray ends: t = 1, excluded.
             Some(target) => Ray { origin, dir: target - origin, t_max: 1.0 },
@@ -323,9 +325,7 @@ impl PathWave {
         let u = sampler.pair(dimension + DIM_DIRECTION);
         let u_lobe = || sampler.single(dimension + DIM_LOBE);
         let Some(sample) = bsdf.sample(vertex.wo, vertex.normal, u_lobe, u) else { return };
-        // The true surface decides which side a direction leads to.
-        let beyond = sample.wi.dot(vertex.geometric_normal) < 0.0;
-        if if sample.through.is_some() { !beyond } else { !vertex.is_reached_from(sample.wi) } {
+        if !leads_on(vertex, sample.wi, sample.through.is_some()) {
             return;
         }
         path.throughput *= sample.weight;
@@ -339,13 +339,17 @@ impl PathWave {
                 eye: (depth == 1).then_some(path.position),
                 wi: sample.wi,
                 pdf: sample.pdf,
-                transmitted: sample.through.is_some(),
+                through: sample.through,
                 blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
                 before: step.path.media,
                 after: path.media,
             };
             let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
-            path.track = pass.follow(track, &bounce, || bsdf.eval(sample.wi, vertex.wo, vertex.normal).1);
+            path.track = pass.follow(track, &bounce, || {
+                let normal =
+                    if sample.through.is_some() { vertex.normal_from_behind(sample.wi) } else { vertex.normal };
+                bsdf.eval(sample.wi, vertex.wo, normal).1
+            });
         }
         if let Some(most_kept) = Survival::at(depth, scene, techniques).share {
             // Inside glass throughput carries 1/n², which the way out gives back: it must not count as loss.
@@ -364,10 +368,22 @@ impl PathWave {
         }
         path.pdf = if techniques.light_sampling { sample.pdf } else { f32::INFINITY };
         path.position = vertex.position;
-        path.normal = vertex.normal;
+        path.normal = lit_side(vertex, bsdf);
         let origin = if sample.through.is_some() { vertex.passing(sample.wi) } else { vertex.leaving(sample.wi) };
         self.next.push(&Ray::new(origin, sample.wi), &path);
     }
+}
+
+/// The side that light is asked for on: the normal, or zero for both.
+#[inline]
+fn lit_side(vertex: &Vertex, bsdf: &impl Scatter) -> Vec3 {
+    if bsdf.through().is_some() { Vec3::ZERO } else { vertex.normal }
+}
+
+/// Whether a direction leads to the side that it is meant to: the true surface decides.
+#[inline]
+fn leads_on(vertex: &Vertex, wi: Vec3, passes: bool) -> bool {
+    if passes { wi.dot(vertex.geometric_normal) < 0.0 } else { vertex.is_reached_from(wi) }
 }
 
 /// One vertex of one path.

@@ -244,7 +244,9 @@ fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<(f32, Vec3)> {
     match &materials[id as usize] {
         Material::Blend { a, b, .. } => [leaves_of(materials, *a), leaves_of(materials, *b)].concat(),
         material if !material.is_clear() => Vec::new(),
-        Material::Glass { ior, absorption } | Material::Phong { ior, absorption, .. } => vec![(*ior, *absorption)],
+        Material::Glass { ior, absorption }
+        | Material::RoughGlass { ior, absorption, .. }
+        | Material::Phong { ior, absorption, .. } => vec![(*ior, *absorption)],
         _ => Vec::new(),
     }
 }

@@ -46,6 +46,8 @@ struct Other {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum ContactKind {
     Glass,
+    /// Before smooth glass: one rough wall scatters what goes through both.
+    RoughGlass,
     /// A blend with transparent parts.
     PartlyClear,
     Opaque,
@@ -106,7 +108,7 @@ impl Contacts {
         if !self.of_object.is_empty() && !self.of_object[hit.object as usize].is_empty() {
             let ray = ray();
             self.in_place_of(touched, &ray, hit, |other, at| {
-                if kind_of(touched, &other) == ContactKind::Glass {
+                if matches!(kind_of(touched, &other), ContactKind::Glass | ContactKind::RoughGlass) {
                     let front = ray.dir.dot(at.geometric_normal) <= 0.0;
                     found.push(touched.bodies.boundary(
                         other.object,
@@ -140,6 +142,7 @@ impl Contacts {
 fn kind_of(touched: &ContactScene, hit: &Hit) -> ContactKind {
     match &touched.materials[touched.geometry.material_of(hit) as usize] {
         Material::Glass { .. } => ContactKind::Glass,
+        Material::RoughGlass { .. } => ContactKind::RoughGlass,
         Material::Blend { .. } | Material::Phong { .. } if touched.bodies.is_transparent(hit.object) => {
             ContactKind::PartlyClear
         }

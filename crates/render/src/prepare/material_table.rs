@@ -36,6 +36,8 @@ pub(crate) struct MaterialTable {
     pub weights: [Vec<f32>; 2],
     /// Whether some emission has to be looked up.
     pub textured_emission: bool,
+    /// Whether some surface scatters light through itself, and so asks for light on both sides.
+    pub two_sided: bool,
     /// The material of each object; [`SEVERAL`] where its primitives differ.
     pub of_object: Vec<MaterialId>,
 }
@@ -99,6 +101,7 @@ impl MaterialTable {
             parts: table.parts.map(padded),
             weights: table.weights.map(padded),
             textured_emission: materials.iter().any(is_textured_emitter),
+            two_sided: materials.iter().any(|material| matches!(material, Material::RoughGlass { .. })),
             of_object: padded(of_object),
         }
     }

@@ -11,6 +11,7 @@ use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::metal::{Metal, schlick};
+use crate::shading::rough_glass::RoughGlass;
 use firstlight_kdtree::geometry::Frame;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
@@ -18,10 +19,24 @@ use glam::{Vec2, Vec3};
 /// One way of scattering, all inputs looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Lobe {
-    Diffuse { albedo: Vec3 },
-    Mirror { reflectance: Vec3 },
-    Metal { alpha: f32, reflectance: Vec3, fresnel: Fresnel, compensate: bool },
+    Diffuse {
+        albedo: Vec3,
+    },
+    Mirror {
+        reflectance: Vec3,
+    },
+    Metal {
+        alpha: f32,
+        reflectance: Vec3,
+        fresnel: Fresnel,
+        compensate: bool,
+    },
     Glass(Interface),
+    /// Not smooth as [`rough_glass::is_smooth`] tells.
+    RoughGlass {
+        interface: Interface,
+        alpha: f32,
+    },
 }
 
 impl Lobe {
@@ -34,9 +49,15 @@ pub(crate) trait Scatter {
     /// Whether light sampling can find anything: some lobe is not perfectly specular.
     fn has_non_specular(&self) -> bool;
 
-    /// f · cos of all lobes that are not specular, and the density of sampling `wi` through one of them; zero for `wi` behind
-    /// `normal`.
+    /// f · |cos| of all lobes that are not specular, and the density of sampling `wi` through one of them; zero for `wi`
+    /// behind `normal` but for what [`Self::through`] tells.
+    ///
+    /// Where light passes through, `wo` and `wi` may change sides: the surface is then seen from behind `normal`.
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
+
+    /// What light from behind `normal` passes through, where [`Self::eval`] knows of such light. In blends only sampling
+    /// finds it, as if it were specular: each part leads into a medium of its own.
+    fn through(&self) -> Option<Interface>;
 
     /// - `u_lobe`: chooses the lobe, and between reflection and refraction; asked for only where there is a choice;
     /// - `u`: the direction.
@@ -100,11 +121,18 @@ impl Scatter for Blend {
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
         let mut sum = (Vec3::ZERO, 0.0);
         for l in self.lobes().iter().filter(|l| l.lobe.has_non_specular()) {
+            if l.lobe.through().is_some() && (normal.dot(wi) <= 0.0 || normal.dot(wo) <= 0.0) {
+                continue;
+            }
             let (value, pdf) = l.lobe.eval(wo, wi, normal);
             sum.0 += l.weight * value;
             sum.1 += l.pmf * pdf;
         }
         sum
+    }
+
+    fn through(&self) -> Option<Interface> {
+        None
     }
 
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
@@ -123,13 +151,14 @@ impl Scatter for Blend {
         let l = &lobes[chosen];
         let fresh = (rest / l.pmf).clamp(0.0, 1.0f32.next_down());
         let mut sample = l.lobe.sample(wo, normal, || fresh, u)?;
-        if l.lobe.has_non_specular() {
+        if l.lobe.has_non_specular() && sample.through.is_none() {
             // All lobes that are not specular could have found this direction: the one-sample estimate over their mixture.
             let (value, pdf) = self.eval(wo, sample.wi, normal);
             sample.weight = value / pdf;
             sample.pdf = pdf;
         } else {
             sample.weight *= l.weight / l.pmf;
+            sample.pdf = f32::INFINITY;
         }
         Some(sample)
     }
@@ -140,7 +169,7 @@ impl Lobe {
         match self {
             Self::Diffuse { albedo } => luminance(*albedo),
             Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => luminance(*reflectance),
-            Self::Glass(_) => 1.0,
+            Self::Glass(_) | Self::RoughGlass { .. } => 1.0,
         }
     }
 }
@@ -149,7 +178,7 @@ impl Scatter for Lobe {
     #[inline]
     fn has_non_specular(&self) -> bool {
         match self {
-            Self::Diffuse { .. } => true,
+            Self::Diffuse { .. } | Self::RoughGlass { .. } => true,
             Self::Metal { alpha, .. } => *alpha >= SMALLEST_ALPHA,
             Self::Mirror { .. } | Self::Glass(_) => false,
         }
@@ -157,6 +186,12 @@ impl Scatter for Lobe {
 
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        if let Self::RoughGlass { interface, alpha } = *self {
+            let (normal, interface) =
+                if normal.dot(wo) < 0.0 { (-normal, interface.reversed()) } else { (normal, interface) };
+            let (value, pdf) = RoughGlass::new(normal, wo, alpha, interface).eval(wi);
+            return (Vec3::splat(value), pdf);
+        }
         let cos = normal.dot(wi);
         if cos <= 0.0 {
             return (Vec3::ZERO, 0.0);
@@ -175,6 +210,14 @@ impl Scatter for Lobe {
                 (Vec3::from(found.tint) * found.value, found.pdf)
             }
             _ => (Vec3::ZERO, 0.0),
+        }
+    }
+
+    #[inline]
+    fn through(&self) -> Option<Interface> {
+        match self {
+            Self::RoughGlass { interface, .. } => Some(*interface),
+            _ => None,
         }
     }
 
@@ -210,6 +253,9 @@ impl Scatter for Lobe {
                 let found = metal.eval_one(local);
                 let weight = Vec3::from(found.tint) * found.weight;
                 Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, through: None })
+            }
+            Self::RoughGlass { interface, alpha } => {
+                RoughGlass::new(normal, wo, alpha, interface).sample(u_choice(), u)
             }
             Self::Glass(interface) => {
                 let Interface { eta, squeeze, .. } = interface;

@@ -2,6 +2,7 @@
 
 use crate::prepare::guide::{Hints, SHARE};
 use crate::shading::bsdf::{BsdfSample, Scatter};
+use crate::shading::interface::Interface;
 use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
@@ -35,6 +36,10 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
         (value, mixed_pdf(pdf, self.hints.pdf(wi)))
     }
 
+    fn through(&self) -> Option<Interface> {
+        self.surface.through()
+    }
+
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
         let choice = u_lobe();
         let wi = if choice < SHARE {
@@ -48,6 +53,7 @@ impl<S: Scatter> Scatter for Guided<'_, S> {
             sample.wi
         };
         let (value, pdf) = self.eval(wo, wi, normal);
-        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample { wi, weight: value / pdf, pdf, through: None })
+        let through = self.through().filter(|_| normal.dot(wi) < 0.0);
+        (pdf > 0.0 && value != Vec3::ZERO).then(|| BsdfSample { wi, weight: value / pdf, pdf, through })
     }
 }

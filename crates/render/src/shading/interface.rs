@@ -19,3 +19,11 @@ pub(crate) struct Interface {
     /// What the path is inside of once it has passed.
     pub beyond: MediumId,
 }
+
+impl Interface {
+    /// Seen from its other side, but for what lies beyond.
+    #[inline]
+    pub fn reversed(self) -> Self {
+        Self { eta: 1.0 / self.eta, squeeze: 1.0 / self.squeeze, ..self }
+    }
+}

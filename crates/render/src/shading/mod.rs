@@ -11,5 +11,6 @@ pub(crate) mod medium;
 pub(crate) mod metal;
 pub(crate) mod mis_state;
 pub(crate) mod paths;
+pub(crate) mod rough_glass;
 pub(crate) mod simd;
 pub(crate) mod surface;

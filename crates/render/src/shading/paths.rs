@@ -17,6 +17,7 @@ pub(crate) struct Path {
     pub pdf: f32,
     /// The last vertex, for the density of light sampling there.
     pub position: Vec3,
+    /// Zero where light sampling asked on both sides.
     pub normal: Vec3,
     pub sampler: Sampler,
     pub slot: u32,

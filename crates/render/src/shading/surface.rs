@@ -8,6 +8,7 @@ use crate::shading::bsdf::{Blend, Lobe};
 use crate::shading::dielectric::reflect;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
+use crate::shading::rough_glass;
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
 use firstlight_kdtree::{Hit, Shape};
 use firstlight_simd::{Real, Vector3, three};
@@ -107,6 +108,22 @@ impl Vertex {
     pub fn seen_along(&self, wo: Vec3) -> Self {
         let faces_away = self.smooth_normal.dot(wo) <= 0.0;
         Self { wo, normal: if faces_away { self.geometric_normal } else { self.smooth_normal }, ..*self }
+    }
+
+    /// The same point as seen through the surface from its other side.
+    ///
+    /// - `wo`: unit, towards the viewer there.
+    #[inline]
+    pub fn from_behind(&self, wo: Vec3) -> Self {
+        let (geometric_normal, smooth_normal) = (-self.geometric_normal, -self.smooth_normal);
+        Self { geometric_normal, smooth_normal, front: !self.front, lift: Vec3::ZERO, ..*self }.seen_along(wo)
+    }
+
+    /// The shading normal that counts for a viewer at `wo`, on the other side; on this side. A surface that is asked with it how
+    /// it scatters between the two does so as seen from there.
+    #[inline]
+    pub fn normal_from_behind(&self, wo: Vec3) -> Vec3 {
+        -self.from_behind(wo).normal
     }
 
     /// `wo` mirrored by the shading normal, unit.
@@ -269,6 +286,9 @@ fn collect(
             }
         }
         Material::Glass { .. } => push(clear_lobe(scene, sides, leaf), weight),
+        Material::RoughGlass { alpha, .. } => {
+            push(rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.uv)), weight);
+        }
         _ => {
             if let Some(lobe) = lobe_at(scene, id, vertex, None) {
                 push(lobe, weight);
@@ -282,6 +302,17 @@ fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lo
     match sides {
         Some(sides) => Lobe::Glass(sides.interface(scene, leaf)),
         None => Lobe::CLEAR,
+    }
+}
+
+/// Glass as it is with microfacets of a width; smooth where these change no direction.
+#[inline]
+fn rough_lobe(smooth: Lobe, alpha: f32) -> Lobe {
+    match smooth {
+        Lobe::Glass(interface) if !rough_glass::is_smooth(alpha, interface.eta) => {
+            Lobe::RoughGlass { interface, alpha: alpha.min(1.0) }
+        }
+        _ => smooth,
     }
 }
 
@@ -312,6 +343,7 @@ pub(crate) fn lobe_at(
             compensate: *compensate,
         }),
         Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
+        Material::RoughGlass { alpha, .. } => Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv))),
         Material::Emissive { .. } | Material::Phong { .. } | Material::Blend { .. } => None,
     }
 }

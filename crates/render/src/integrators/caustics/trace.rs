@@ -13,7 +13,7 @@ use crate::integrators::caustics::lens_connections::{LensConnections, Splat};
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::simd;
 use crate::integrators::caustics::simd::LightHits;
-use crate::integrators::caustics::weight::{MisBounce, etendue_gain_at, is_reversible};
+use crate::integrators::caustics::weight::{MisBounce, etendue_gain_at, etendue_scale, is_reversible};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
@@ -247,8 +247,8 @@ impl LightWave {
             LightPathStep { pass, path: &path, vertex: &vertex, hit: &hit, material, n_vertices, is_scout: false };
         if n_vertices > 1
             && surface.has_non_specular()
-            && path.media == self.camera
-            && let Some((ray, film, light)) = step.join(&surface, &self.sets)
+            && (path.media == self.camera || surface.through().is_some())
+            && let Some((ray, film, light)) = step.join(&surface, &self.sets, self.camera)
         {
             self.arrivals.push(&ray, film, light);
         }
@@ -307,7 +307,9 @@ impl LightPathStep<'_> {
     }
 
     /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
-    fn join(&self, surface: &LightPathSurface, sets: &MediumSets) -> Option<(Ray, Vec2, Vec3)> {
+    ///
+    /// - `media`: what the camera is inside of.
+    fn join(&self, surface: &LightPathSurface, sets: &MediumSets, media: MediumId) -> Option<(Ray, Vec2, Vec3)> {
         let &Self { pass, path, .. } = self;
         let (scene, camera) = (pass.scene, &pass.scene.camera);
         let lens = if camera.lens_radius > 0.0 {
@@ -323,29 +325,38 @@ impl LightPathStep<'_> {
         let to_lamp = self.vertex.wo;
         let way = origin - self.vertex.position;
         let distance2 = way.length_squared();
-        let vertex = self.vertex.seen_along(way / distance2.sqrt());
-        // Lamp and eye on the same side of the true surface.
-        if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || !vertex.is_reached_from(to_lamp) {
+        let to_eye = way / distance2.sqrt();
+        let through = surface.through().filter(|_| to_eye.dot(self.vertex.geometric_normal) < 0.0);
+        let before = path.media;
+        let after = through.map_or(before, |interface| interface.beyond);
+        if after != media || through.is_some() && before == after {
             return None;
         }
-        let (value, pdf) = surface.eval(vertex.wo, to_lamp, vertex.normal);
+        let vertex = if through.is_some() { self.vertex.from_behind(to_eye) } else { self.vertex.seen_along(to_eye) };
+        // Lamp and eye on the same side of the true surface, unless light passes through it.
+        if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || through.is_none() && !vertex.is_reached_from(to_lamp) {
+            return None;
+        }
+        let normal = if through.is_some() { -vertex.normal } else { vertex.normal };
+        let (value, pdf) = surface.eval(vertex.wo, to_lamp, normal);
         if pdf <= 0.0 {
             return None;
         }
-        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), to_lamp.dot(vertex.geometric_normal));
+        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), to_lamp.dot(self.vertex.geometric_normal));
         if cos_o <= 0.0 || cos_i <= 0.0 {
             return None;
         }
-        let weight = pass.lamp_weight(path.ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
+        let ratio = path.ratio * etendue_scale(through);
+        let weight = pass.lamp_weight(ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
         let importance = cos_o / (distance2 * cos_lens.powi(3) * pass.pixel_area);
         let mut light = path.throughput * value * (weight * importance / cos_i);
         if light == Vec3::ZERO {
             return None;
         }
         if scene.tables.features.media {
-            light *= sets.transmittance(path.media, distance2.sqrt());
+            light *= sets.transmittance(after, distance2.sqrt());
         }
-        let start = vertex.leaving(vertex.wo);
+        let start = if through.is_some() { vertex.passing(vertex.wo) } else { vertex.leaving(vertex.wo) };
         Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
     }
 
@@ -383,7 +394,7 @@ impl LightPathStep<'_> {
             eye: None,
             wi: sample.wi,
             pdf: sample.pdf,
-            transmitted: sample.through.is_some(),
+            through: sample.through,
             blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
             before,
             after: path.media,
@@ -398,13 +409,15 @@ impl LightPathStep<'_> {
             let squeeze = sample.through.map_or(1.0, |Interface { squeeze, .. }| squeeze);
             sample.weight * (gain / (squeeze * squeeze))
         } else {
+            let passes = sample.through.is_some();
             let seen = vertex.seen_along(sample.wi);
-            let (value, pdf) = surface.eval(sample.wi, vertex.wo, seen.normal);
-            let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal), vertex.wo.dot(vertex.geometric_normal));
-            if pdf <= 0.0 || cos_i <= 0.0 || !seen.is_reached_from(vertex.wo) {
+            let normal = if passes { vertex.normal_from_behind(sample.wi) } else { seen.normal };
+            let (value, pdf) = surface.eval(sample.wi, vertex.wo, normal);
+            let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal).abs(), vertex.wo.dot(vertex.geometric_normal));
+            if pdf <= 0.0 || cos_i <= 0.0 || !passes && !seen.is_reached_from(vertex.wo) {
                 return None;
             }
-            path.ratio *= sample.pdf * cos_i / (cos_o * pdf);
+            path.ratio *= sample.pdf * cos_i / (cos_o * pdf) * etendue_scale(sample.through);
             value * (cos_o / (cos_i * sample.pdf))
         };
         let survival =
@@ -437,6 +450,13 @@ impl LightPathSurface {
         match self {
             Self::Lobe(lobe) => lobe.eval(wo, wi, normal),
             Self::Blend(blend) => blend.eval(wo, wi, normal),
+        }
+    }
+
+    fn through(&self) -> Option<Interface> {
+        match self {
+            Self::Lobe(lobe) => lobe.through(),
+            Self::Blend(blend) => blend.through(),
         }
     }
 

@@ -6,6 +6,8 @@
 //! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area);
 //! - another vertex that scatters: p_lamp · cos θᵢ / (cos θₒ · p_eye), p_lamp and p_eye being its densities towards
 //!   the eye's side (o) and the lamp's side (i);
+//! - the same for one that scatters through a rough interface, times nᵢ² / nₒ²: étendue is n² times area, solid angle
+//!   and cosine;
 //! - a specular one: 1, because étendue is kept by mirrors and lenses; or the ratio of the cosines with the true
 //!   and with the shading normal, where these differ, as étendue is kept about the shading normal (Veach 1997,
 //!   section 5.3);
@@ -16,7 +18,7 @@
 
 use crate::integrators::caustics::pass::CausticPass;
 use crate::prepare::casters::NO_CASTER;
-use crate::shading::interface::MediumId;
+use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lights::power_weight;
 use crate::shading::mis_state::MisState;
 use crate::shading::surface::Vertex;
@@ -33,7 +35,8 @@ pub(crate) struct MisBounce<'a> {
     pub wi: Vec3,
     /// Per steradian; infinite if specular.
     pub pdf: f32,
-    pub transmitted: bool,
+    /// What was passed through, if anything was.
+    pub through: Option<Interface>,
     /// The surface is a blend, of which the part is not known.
     pub blended: bool,
     pub before: MediumId,
@@ -55,10 +58,12 @@ impl CausticPass<'_> {
             (Some(eye), false) => {
                 let cos_lens = -vertex.wo.dot(self.scene.camera.forward);
                 let ratio = self.join_ratio(vertex.position.distance_squared(eye), cos_lens, cos_o, cos_i, bounce.pdf);
+                let ratio = ratio / etendue_scale(bounce.through);
                 MisState { ratio, caster: NO_CASTER, ..track }
             }
             (None, false) => {
                 let ratio = track.ratio * reverse_pdf() * cos_i / (cos_o * bounce.pdf);
+                let ratio = ratio / etendue_scale(bounce.through);
                 MisState { ratio, caster: NO_CASTER, ..track }
             }
             (None, true) => {
@@ -114,13 +119,20 @@ impl CausticPass<'_> {
     }
 }
 
+/// n² on the side that a path comes from over n² beyond what it passes through by scattering; 1 where it passes through
+/// nothing.
+#[inline]
+pub(crate) fn etendue_scale(through: Option<Interface>) -> f32 {
+    through.map_or(1.0, |Interface { squeeze, .. }| squeeze * squeeze)
+}
+
 /// Whether a path from the other end could do the same.
 ///
 /// Reflection must be seen from the front of the true surface on both ends, and glass that is left must have been
 /// entered: an eye or a lamp inside of glass does not know that it is.
 #[inline]
 pub(crate) fn is_reversible(bounce: &MisBounce) -> bool {
-    if bounce.transmitted {
+    if bounce.through.is_some() {
         !bounce.blended && bounce.before != bounce.after
     } else {
         bounce.wi.dot(bounce.vertex.geometric_normal) > 0.0

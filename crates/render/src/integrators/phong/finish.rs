@@ -87,7 +87,7 @@ impl Finish {
                     Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
                 });
             }
-            Material::Glass { .. } => {
+            Material::Glass { .. } | Material::RoughGlass { .. } => {
                 self.push(pane(weight));
             }
             Material::Phong { diffuse, ambient, specular, shininess, transparency, .. } => {
@@ -183,7 +183,7 @@ impl Passage {
                 return;
             }
             _ if weight == 0.0 => return,
-            Material::Glass { .. } => weight,
+            Material::Glass { .. } | Material::RoughGlass { .. } => weight,
             Material::Phong { transparency, .. } if *transparency > 0.0 => weight * transparency,
             _ => return,
         };

@@ -206,7 +206,7 @@ fn shadow_ray(origin: Vec3, wi: Vec3, target: Option<Vec3>) -> Ray {
 
 fn may_be_clear(scene: &Prepared, id: MaterialId) -> bool {
     match &scene.shading.materials[id as usize] {
-        Material::Glass { .. } | Material::Blend { .. } => true,
+        Material::Glass { .. } | Material::RoughGlass { .. } | Material::Blend { .. } => true,
         Material::Phong { transparency, .. } => *transparency > 0.0,
         _ => false,
     }
@@ -215,7 +215,9 @@ fn may_be_clear(scene: &Prepared, id: MaterialId) -> bool {
 /// What glass leaves of light on its way through (Beer–Lambert).
 fn inside(scene: &Prepared, id: MaterialId, distance: f32) -> Vec3 {
     match &scene.shading.materials[id as usize] {
-        Material::Glass { absorption, .. } | Material::Phong { absorption, .. } => (-*absorption * distance).exp(),
+        Material::Glass { absorption, .. }
+        | Material::RoughGlass { absorption, .. }
+        | Material::Phong { absorption, .. } => (-*absorption * distance).exp(),
         _ => Vec3::ONE,
     }
 }

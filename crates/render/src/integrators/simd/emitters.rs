@@ -19,7 +19,7 @@ pub(crate) fn shade_emitters(set: InstructionSet, group: KindHits, radiance: &mu
 
 #[inline(always)]
 fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
-    let KindHits { scene, techniques, caustics, paths, hits, materials, order, sets, .. } = group;
+    let KindHits { scene, techniques, caustics, paths, hits, materials, order, ref sets, .. } = group;
     let tables = &*scene.tables;
     for chunk in order.chunks(LANES) {
         let LaneGroup { indices, mask } = LaneGroup::of(chunk);
@@ -44,7 +44,10 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
             }
             let from = [Vector::gather(&paths.position, index), Vector::gather(&paths.normal, index)];
             let id = Bits::load(s, &id);
-            let other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
+            let mut other = tables.lights.pdf_lanes(techniques, known, id, from, -place.wo, distance);
+            if tables.materials.two_sided {
+                other = with_two_sided(other, &group, &indices, known);
+            }
             weight = select(known, bounce_weight(techniques, pdf, other), weight);
         }
         if let Some(pass) = caustics {
@@ -61,6 +64,23 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
             radiance[slot as usize] += Vec3::new(light[0][lane], light[1][lane], light[2][lane]);
         }
     }
+}
+
+/// Puts in the densities of light sampling from points that asked on both sides, one at a time.
+fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANES], mask: Mask) -> Float<S> {
+    let KindHits { scene, techniques, paths, hits, .. } = *group;
+    let mut pdfs = pdf.to_array();
+    for lane in lanes_of(mask) {
+        let i = indices[lane] as usize;
+        let path = paths.get(i);
+        if path.normal == Vec3::ZERO
+            && let Some(id) = scene.tables.lights.light_of(hits.object[i], hits.prim[i])
+        {
+            let (dir, distance) = (paths.rays.get(i).dir, hits.t[i]);
+            pdfs[lane] = scene.tables.lights.pdf(techniques, id, path.position, path.normal, dir, distance);
+        }
+    }
+    Float::load(pdf.s, &pdfs)
 }
 
 /// Puts in the weights of light that paths from the lamps could have found as well, one at a time.

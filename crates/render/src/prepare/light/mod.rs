@@ -156,7 +156,7 @@ impl LightTable {
 
     /// A point on some light, or `None` when the choice fell on one that cannot be seen from `position`.
     ///
-    /// - `normal`: unit; only light from its side matters.
+    /// - `normal`: unit; only light from its side matters. Zero where light from both does, here and in [`Self::pdf`].
     /// - `u_select`, `u`: independent uniform numbers in `[0, 1)`; `u_select` is asked for where there are many lights.
     #[inline]
     pub(crate) fn sample(

@@ -158,7 +158,8 @@ impl LightBounds {
     #[inline]
     fn estimate_one(&self, position: Vec3, normal: Vec3) -> f32 {
         let offset = Vector3::from(self.center - position);
-        self.estimate(offset.length_squared(), offset / offset.length(), normal.into())
+        let side = (normal != Vec3::ZERO).then(|| normal.into());
+        self.estimate(offset.length_squared(), offset / offset.length(), side)
     }
 
     /// The same from sixteen points.
@@ -166,18 +167,20 @@ impl LightBounds {
     pub fn estimate_lanes<S: Simd>(&self, position: Vector<S>, normal: Vector<S>) -> Float<S> {
         let offset = Vector::in_all(position.x, self.center) - position;
         let distance2 = offset.length_squared();
-        self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), normal)
+        self.estimate(distance2, offset * (distance2.all(1.0) / distance2.sqrt()), Some(normal))
     }
 
     /// An estimate of the irradiance that the light can cause, never zero where it can cause any.
     ///
-    /// - `distance2`: to the centre, squared; `wi`: unit, to the centre; `normal`: unit, of the surface.
+    /// - `distance2`: to the centre, squared; `wi`: unit, to the centre; `normal`: unit, of the surface, if it has one
+    ///   side.
     #[inline(always)]
-    fn estimate<R: Real>(&self, distance2: R, wi: Vector3<R>, normal: Vector3<R>) -> R {
+    fn estimate<R: Real>(&self, distance2: R, wi: Vector3<R>, normal: Option<Vector3<R>>) -> R {
         let (r2, one, distance) = (self.radius * self.radius, distance2.all(1.0), distance2.sqrt());
         let sin_u = one.all(self.radius) / distance;
         let cos_u = (one - sin_u * sin_u).at_least(0.0).sqrt();
-        let mut estimate = largest_cosine(wi.dot(normal), cos_u, sin_u) * self.intensity;
+        let receiver = normal.map_or(one, |normal| largest_cosine(wi.dot(normal), cos_u, sin_u));
+        let mut estimate = receiver * self.intensity;
         if self.normal != Vec3::ZERO {
             estimate = estimate * largest_cosine(-wi.dot(Vector3::in_all(one, self.normal)), cos_u, sin_u);
         }

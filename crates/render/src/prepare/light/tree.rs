@@ -150,7 +150,7 @@ impl LightNode {
     fn bound(&self, position: Vec3, normal: Vec3) -> f32 {
         let Self { center, radius, axis, widening, power, .. } = *self;
         let bound = NodeBound { offset: (center - position).into(), radius, axis: axis.into(), widening, power };
-        bound.irradiance(normal.into())
+        bound.irradiance((normal != Vec3::ZERO).then(|| normal.into()))
     }
 }
 
@@ -169,14 +169,19 @@ impl<R: Real> NodeBound<R> {
     ///
     /// It is asked for twice a level, so it is made of one root and no other angle: the cosine of the largest lean of a
     /// ball is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
+    ///
+    /// - `normal`: unit, of the surface, if it has one side.
     #[inline(always)]
-    pub fn irradiance(self, normal: Vector3<R>) -> R {
+    pub fn irradiance(self, normal: Option<Vector3<R>>) -> R {
         let Self { offset, radius, axis, widening, power } = self;
         let (distance2, r2) = (offset.length_squared(), radius * radius);
         let inv_distance = radius.all(1.0) / distance2.sqrt();
         // A little more, so that rounding hides nothing.
         let slack = 16.0 * f32::EPSILON;
-        let receiver = (offset.dot(normal) + radius) * inv_distance + slack;
+        let receiver = match normal {
+            Some(normal) => (offset.dot(normal) + radius) * inv_distance + slack,
+            None => radius.all(1.0),
+        };
         let emitter = (radius - offset.dot(axis)) * inv_distance + widening + slack;
         let receiver = receiver.at_least(0.0).at_most(1.0);
         let emitter = emitter.at_least(0.0).at_most(1.0);

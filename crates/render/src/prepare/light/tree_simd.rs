@@ -151,7 +151,7 @@ impl Rows {
             widening: Float::gather(&self.widening, node),
             power: Float::gather(&self.power, node),
         };
-        bound.irradiance(normal)
+        bound.irradiance(Some(normal))
     }
 
     /// Where open lanes go on.

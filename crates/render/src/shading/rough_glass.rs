@@ -1,0 +1,478 @@
+//! Rough dielectric surfaces: GGX microfacets that reflect and refract, as seen from one direction.
+//!
+//! Source: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces". Directions are in the frame of the
+//! shading normal (+z), and no formula here takes the microfacets for isotropic: widths along two axes would be a matter of
+//! [`ggx::lambda`], [`ggx::distribution`], [`ggx::sample_visible_normal`] and of a frame that is turned to the axes.
+
+use crate::core::material::SMALLEST_ALPHA;
+use crate::shading::bsdf::BsdfSample;
+use crate::shading::dielectric::{fresnel, reflect, refract};
+use crate::shading::ggx;
+use crate::shading::interface::Interface;
+use firstlight_simd::{Vector3, frame_around};
+use glam::{Vec2, Vec3};
+use std::f64::consts::TAU;
+
+/// Below this product of α and |η − 1| refracted directions are spread by less than directions in `f32` can tell apart.
+const SMALLEST_SPREAD: f32 = 3e-5;
+
+/// Cosines of rays with the normal are taken for at least this: the slope of none is larger than `f32` can square.
+const SMALLEST_COS: f32 = 1e-7;
+
+/// Whether microfacets change no direction by as much as counts, so that the surface is that of smooth glass.
+///
+/// - `alpha`: GGX width; `eta`: index on one side over that on the other.
+#[inline]
+pub(crate) fn is_smooth(alpha: f32, eta: f32) -> bool {
+    // Also where either is NaN.
+    !(alpha >= SMALLEST_ALPHA && alpha.min(1.0) * (eta - 1.0).abs() >= SMALLEST_SPREAD)
+}
+
+/// A surface as seen along `wo`.
+#[derive(Clone, Copy)]
+pub(crate) struct RoughGlass {
+    /// GGX width, no unit.
+    alpha: f32,
+    interface: Interface,
+    /// The last is the normal.
+    axes: [Vector3<f32>; 3],
+    /// Along `axes`, on the side of the normal.
+    wo: Vector3<f32>,
+    /// Smith's Λ.
+    lambda_o: f32,
+}
+
+impl RoughGlass {
+    /// - `normal`: unit, on the side of `wo`; `interface`: not smooth as [`is_smooth`] tells.
+    #[inline]
+    pub fn new(normal: Vec3, wo: Vec3, alpha: f32, interface: Interface) -> Self {
+        let axes = frame_around(normal.into());
+        let wo = Vector3::from(wo).to_local(&axes);
+        let wo = Vector3 { z: wo.z.max(SMALLEST_COS), ..wo };
+        Self { alpha, interface, axes, wo, lambda_o: ggx::lambda(wo, alpha) }
+    }
+
+    /// f · |cos| of single scattering, and density per steradian of [`Self::sample`].
+    ///
+    /// Of light from beyond, f has the factor by which an interface squeezes radiance: f(i, o) / nₒ² is the same both ways.
+    ///
+    /// - `wi`: unit, on either side.
+    pub fn eval(&self, wi: Vec3) -> (f32, f32) {
+        let wi = Vector3::from(wi).to_local(&self.axes);
+        if wi.z > 0.0 {
+            let half = (self.wo + wi).normalize();
+            self.reflected(half, wi)
+        } else if wi.z < 0.0 {
+            let Interface { eta, .. } = self.interface;
+            // Snell's law: tangential parts of η ωₒ and ωᵢ cancel.
+            let sum = wi + self.wo * eta;
+            let length = sum.length();
+            let half = sum * ((eta - 1.0).signum() / length);
+            if length > 0.0 && half.z > 0.0 && half.dot(wi) < 0.0 { self.refracted(half, wi) } else { (0.0, 0.0) }
+        } else {
+            (0.0, 0.0)
+        }
+    }
+
+    /// - `u_choice`: reflects or refracts at the microfacet that `u` chooses; uniform in `[0, 1)`.
+    ///
+    /// `None` for light that single scattering loses.
+    pub fn sample(&self, u_choice: f32, u: Vec2) -> Option<BsdfSample> {
+        let Interface { eta, squeeze, .. } = self.interface;
+        let half = ggx::sample_visible_normal(self.wo, self.alpha, u.to_array());
+        let (reflectance, cos_t) = fresnel(self.cos_o(half), eta);
+        let reflects = u_choice < reflectance;
+        let wi = if reflects { reflect(self.wo, half) } else { refract(self.wo, half, eta, cos_t) };
+        if !(if reflects { wi.z > 0.0 } else { wi.z < 0.0 }) {
+            return None;
+        }
+        // Of light at the microfacet the share that gets away: G2 / G1.
+        let seen = 1.0 + self.lambda_o;
+        let (both, scale, (_, pdf)) = if reflects {
+            (self.both_above(wi), 1.0, self.reflected(half, wi))
+        } else {
+            (self.above_and_below(wi), squeeze * squeeze, self.refracted(half, wi))
+        };
+        let weight = Vec3::splat((both * seen).min(1.0) * scale);
+        let through = (!reflects).then_some(self.interface);
+        (pdf > 0.0).then(|| BsdfSample { wi: wi.to_world(&self.axes).normalize().into(), weight, pdf, through })
+    }
+
+    /// [`Self::eval`] of a direction above the surface, `half` being the microfacet that mirrors it.
+    fn reflected(&self, half: Vector3<f32>, wi: Vector3<f32>) -> (f32, f32) {
+        let (reflectance, _) = fresnel(self.cos_o(half), self.interface.eta);
+        // D / 4 cos θₒ: the Jacobian 1 / (4 ωₒ·h) cancels the cosine of what is seen of the microfacet.
+        let per_angle = reflectance * ggx::distribution(half, self.alpha) / (4.0 * self.wo.z);
+        (per_angle * self.both_above(wi), per_angle / (1.0 + self.lambda_o))
+    }
+
+    /// [`Self::eval`] of a direction below the surface, `half` being the microfacet that refracts it.
+    fn refracted(&self, half: Vector3<f32>, wi: Vector3<f32>) -> (f32, f32) {
+        let Interface { eta, squeeze, .. } = self.interface;
+        let cos_o = self.cos_o(half);
+        let (reflectance, cos_t) = fresnel(cos_o, eta);
+        if reflectance >= 1.0 {
+            return (0.0, 0.0);
+        }
+        // |ωᵢ + η ωₒ| = |η cos θₒ − cos θₜ| without its cancellation near η = 1; the Jacobian of the half vector is cos θₜ over
+        // its square (Walter et al. 2007, equation 17).
+        let length = (eta - 1.0) * (eta + 1.0) / (eta * cos_o + cos_t);
+        let jacobian = cos_t / (length * length);
+        let visible = ggx::distribution(half, self.alpha) * cos_o / self.wo.z;
+        let per_angle = (1.0 - reflectance) * visible * jacobian;
+        (per_angle * self.above_and_below(wi) * (squeeze * squeeze), per_angle / (1.0 + self.lambda_o))
+    }
+
+    fn cos_o(&self, half: Vector3<f32>) -> f32 {
+        self.wo.dot(half).clamp(0.0, 1.0)
+    }
+
+    /// Height-correlated masking and shadowing of two directions above (Heitz 2014, equation 99).
+    fn both_above(&self, wi: Vector3<f32>) -> f32 {
+        1.0 / (1.0 + self.lambda_o + self.lambda_i(wi))
+    }
+
+    /// The same of one above and one below: at a height that a share u of the surface lies under they are seen with
+    /// probabilities u^Λₒ and (1 − u)^Λᵢ, and the mean over u is Euler's Β(1 + Λₒ, 1 + Λᵢ) (Heitz et al. 2016,
+    /// "Multiple-Scattering Microfacet BSDFs with the Smith Model").
+    fn above_and_below(&self, wi: Vector3<f32>) -> f32 {
+        beta_of_next(f64::from(self.lambda_o), f64::from(self.lambda_i(wi))) as f32
+    }
+
+    fn lambda_i(&self, wi: Vector3<f32>) -> f32 {
+        ggx::lambda(Vector3 { z: wi.z.abs().max(SMALLEST_COS), ..wi }, self.alpha)
+    }
+}
+
+/// Β(1 + a, 1 + b), for `a`, `b` from 0 on.
+fn beta_of_next(a: f64, b: f64) -> f64 {
+    (ln_factorial(a) + ln_factorial(b) - ln_factorial(a + b + 1.0)).exp()
+}
+
+/// ln Γ(1 + x) for `x` from 0 on, to 1e-11: Stirling's series from 8 on, the recurrence below.
+fn ln_factorial(x: f64) -> f64 {
+    let (mut z, mut product) = (x + 1.0, 1.0);
+    while z < 8.0 {
+        product *= z;
+        z += 1.0;
+    }
+    let r = 1.0 / (z * z);
+    let series = (1.0 / 12.0 - r * (1.0 / 360.0 - r * (1.0 / 1260.0 - r / 1680.0))) / z;
+    (z - 0.5) * z.ln() - z + 0.5 * TAU.ln() + series - product.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+    use crate::shading::bsdf::{Lobe, Scatter};
+    use crate::shading::interface::MediumId;
+    use crate::test_statistics::ChiSquared;
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    const ALPHAS: [f32; 10] = [1e-3, 3e-3, 0.01, 0.03, 0.06, 0.1, 0.2, 0.4, 0.7, 1.0];
+    /// Cosine of incidence, and index on its side over that beyond: from outside, from inside, nearly alike.
+    const VIEWS: [(f32, f32); 9] = [
+        (1.0, 1.0 / 1.5),
+        (0.6, 1.0 / 1.5),
+        (0.05, 1.0 / 1.5),
+        (0.01, 1.0 / 1.5),
+        (0.97, 1.5),
+        // Just within the critical angle, and beyond it.
+        (0.76, 1.5),
+        (0.1, 1.5),
+        (0.4, 1.0 / 2.4),
+        (0.5, 1.0 / 1.05),
+    ];
+
+    fn interface(eta: f32) -> Interface {
+        Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE }
+    }
+
+    fn lobe(alpha: f32, eta: f32) -> Lobe {
+        Lobe::RoughGlass { interface: interface(eta), alpha }
+    }
+
+    fn direction(cos: f32) -> Vec3 {
+        Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)
+    }
+
+    /// The sphere of directions that `wo` is scattered to, binned by the microfacet that does it: in rings that are even in
+    /// ln(1 + slope² / α²), and sectors, for each side. All in `f64`, apart from what it tests.
+    struct Grid {
+        wo: DVec3,
+        alpha: f64,
+        eta: f64,
+    }
+
+    const RINGS: usize = 24;
+    const SECTORS: usize = 16;
+    const BINS: usize = 2 * RINGS * SECTORS;
+
+    impl Grid {
+        fn new(wo: Vec3, alpha: f32, eta: f32) -> Self {
+            Self { wo: wo.as_dvec3().normalize(), alpha: f64::from(alpha), eta: f64::from(eta) }
+        }
+
+        fn bin(&self, wi: Vec3) -> usize {
+            let (side, wi) = (usize::from(wi.z < 0.0), wi.as_dvec3());
+            let half = if side == 0 { self.wo + wi } else { (wi + self.wo * self.eta) * (self.eta - 1.0).signum() };
+            let slope2 = (half.x * half.x + half.y * half.y) / (half.z * half.z * self.alpha * self.alpha);
+            let ring = (1.0 + slope2).ln() / self.last() * RINGS as f64;
+            let sector = (half.y.atan2(half.x) / TAU + 0.5) * SECTORS as f64;
+            (side * RINGS + (ring as usize).min(RINGS - 1)) * SECTORS + (sector as usize).min(SECTORS - 1)
+        }
+
+        /// ln(1 + slope² / α²) at the end of the last ring.
+        fn last(&self) -> f64 {
+            (1.0 + (1e3 / self.alpha).powi(2)).ln()
+        }
+
+        /// Where a microfacet sends light that goes to `wo`; `None` if it does not, or not to this side.
+        fn scattered(&self, side: usize, ring: f64, sector: f64) -> Option<DVec3> {
+            let slope = self.alpha * ((ring / RINGS as f64 * self.last()).exp() - 1.0).max(0.0).sqrt();
+            let (sin, cos) = ((sector / SECTORS as f64 - 0.5) * TAU).sin_cos();
+            let half = DVec3::new(slope * cos, slope * sin, 1.0).normalize();
+            let cos_o = self.wo.dot(half);
+            let cos2_t = 1.0 - self.eta * self.eta * (1.0 - cos_o * cos_o);
+            let wi = if side == 0 {
+                2.0 * cos_o * half - self.wo
+            } else {
+                -self.eta * self.wo + (self.eta * cos_o - cos2_t.max(0.0).sqrt()) * half
+            };
+            (cos_o > 0.0 && (side == 0 || cos2_t > 0.0) && (wi.z < 0.0) == (side == 1)).then_some(wi)
+        }
+
+        /// Integral over each bin per steradian, midpoint rule with `fine`² points, solid angles by differences; and whether
+        /// some microfacets of the bin send no light to this side.
+        fn integrals(&self, fine: usize, f: impl Fn(Vec3) -> f32) -> Vec<(f64, bool)> {
+            let mut sums = vec![(0.0, false); BINS];
+            for (bin, (sum, is_cut)) in sums.iter_mut().enumerate() {
+                let (side, ring, sector) = (bin / SECTORS / RINGS, bin / SECTORS % RINGS, bin % SECTORS);
+                for k in 0..fine * fine {
+                    let place = |at: usize, k: usize| at as f64 + (k as f64 + 0.5) / fine as f64;
+                    let (x, y, step) = (place(ring, k % fine), place(sector, k / fine), 1e-5);
+                    let at = |x, y| self.scattered(side, x, y);
+                    let (Some(wi), Some(a), Some(b), Some(c), Some(d)) =
+                        (at(x, y), at(x - step, y), at(x + step, y), at(x, y - step), at(x, y + step))
+                    else {
+                        *is_cut = true;
+                        continue;
+                    };
+                    let solid_angle = (b - a).cross(d - c).length() / (2.0 * step * fine as f64).powi(2);
+                    *sum += f64::from(f(wi.as_vec3())) * solid_angle;
+                }
+            }
+            sums
+        }
+    }
+
+    fn views() -> impl Iterator<Item = (u32, f32, f32, f32)> {
+        let all = ALPHAS.into_iter().flat_map(|alpha| VIEWS.map(|(cos, eta)| (alpha, cos, eta)));
+        (0..).zip(all).map(|(case, (alpha, cos, eta))| (case, alpha, cos, eta))
+    }
+
+    #[test]
+    fn sampled_directions_follow_their_pdf_on_the_whole_sphere() {
+        // 1 % over all ninety cases (Šidák: 3.7 σ).
+        for (case, alpha, cos, eta) in views() {
+            let (lobe, wo) = (lobe(alpha, eta), direction(cos));
+            let grid = Grid::new(wo, alpha, eta);
+            let n = 200_000u32;
+            let mut counts = vec![0.0; BINS + 1];
+            for i in 0..n {
+                let sampler = Sampler::new(i, case, 0, 0);
+                match lobe.sample(wo, Vec3::Z, || sampler.single(5), sampler.pair(3)) {
+                    Some(sample) => {
+                        assert_eq!(sample.through.is_some(), sample.wi.z < 0.0);
+                        counts[grid.bin(sample.wi)] += 1.0;
+                    }
+                    None => counts[BINS] += 1.0,
+                }
+            }
+            let integrals = grid.integrals(16, |wi| lobe.eval(wo, wi, Vec3::Z).1);
+            let mut expected: Vec<f64> = integrals.iter().map(|(share, _)| share * f64::from(n)).collect();
+            let found: f64 = expected.iter().sum();
+            assert!(
+                found <= 1.003 * f64::from(n),
+                "α {alpha}, cos {cos}, η {eta}: the pdf integrates to more than one"
+            );
+            expected.push((f64::from(n) - found).max(0.0));
+            // Bins at an edge are not known well one by one, nor are those of microfacets that stand upright, whose slopes
+            // `f32` tells apart badly.
+            let is_steep = |bin: usize| bin / SECTORS % RINGS >= 3 * RINGS / 4;
+            let (mut edge, mut of_edge) = (0.0, 0.0);
+            for bin in (0..BINS).filter(|&bin| integrals[bin].1 || is_steep(bin)) {
+                edge += std::mem::take(&mut counts[bin]);
+                of_edge += std::mem::take(&mut expected[bin]);
+            }
+            counts.push(edge);
+            expected.push(of_edge);
+            let name = format!("α {alpha}, cos {cos}, η {eta}");
+            ChiSquared::of(&counts, &expected, 0.01).assert_below(3.7, &name);
+        }
+    }
+
+    /// Share of light that single scattering returns, reflected and refracted, by sampling.
+    fn sampled_albedo(alpha: f32, cos: f32, eta: f32, n: u32) -> [f64; 2] {
+        let (lobe, wo, mut sums) = (lobe(alpha, eta), direction(cos), [0.0; 2]);
+        for i in 0..n {
+            let sampler = Sampler::new(7, 0, 0, i);
+            if let Some(sample) = lobe.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(0)) {
+                let passes = sample.through.is_some();
+                let scale = if passes { eta * eta } else { 1.0 };
+                assert!(sample.weight.x <= scale, "a sample outweighs its light: {}", sample.weight.x / scale);
+                sums[usize::from(passes)] += f64::from(sample.weight.x / scale);
+            }
+        }
+        sums.map(|sum| sum / f64::from(n))
+    }
+
+    #[test]
+    fn a_white_furnace_gains_nothing_and_sampling_agrees_with_the_integral() {
+        for (_, alpha, cos, eta) in views() {
+            let sampled = sampled_albedo(alpha, cos, eta, 1 << 16);
+            let wo = direction(cos);
+            let bins = Grid::new(wo, alpha, eta).integrals(16, |wi| lobe(alpha, eta).eval(wo, wi, Vec3::Z).0.x);
+            let (above, below) = bins.split_at(BINS / 2);
+            let sum = |bins: &[(f64, bool)]| bins.iter().map(|(sum, _)| sum).sum::<f64>();
+            let integral = [sum(above), sum(below) / f64::from(eta * eta)];
+            let name = format!("α {alpha}, cos {cos}, η {eta}: {sampled:?} for {integral:?}");
+            assert!(sampled[0] + sampled[1] <= 1.0, "{name}");
+            assert!(integral[0] + integral[1] <= 1.003, "{name}");
+            assert!((0..2).all(|k| (sampled[k] - integral[k]).abs() < 4e-3), "{name}");
+        }
+    }
+
+    #[test]
+    fn it_loses_what_the_page_of_materials_says() {
+        // Per cent of light from all around and of light along the normal, from outside and from inside.
+        for (alpha, lost) in [
+            (0.04, [0.2, 0.0, 0.7, 0.2]),
+            (0.1, [0.9, 0.1, 3.3, 1.0]),
+            (0.36, [5.6, 1.7, 21.9, 14.1]),
+            (0.64, [15.1, 4.9, 40.0, 35.6]),
+            (1.0, [29.6, 10.6, 56.4, 58.5]),
+        ] {
+            for (eta, lost) in [1.0 / 1.5, 1.5].into_iter().zip(lost.chunks(2)) {
+                let loss = |cos, n| 100.0 * (1.0 - sampled_albedo(alpha, cos, eta, n).iter().sum::<f64>());
+                // Even in the square of the cosine.
+                let n = 32;
+                let around =
+                    (0..n).map(|i| loss(((i as f32 + 0.5) / n as f32).sqrt(), 1 << 12)).sum::<f64>() / f64::from(n);
+                let along = loss(1.0, 1 << 14);
+                assert!((around - lost[0]).abs() < 0.4, "α {alpha}, η {eta}: {around:.2} for {}", lost[0]);
+                assert!((along - lost[1]).abs() < 0.6, "α {alpha}, η {eta}: {along:.2} for {}", lost[1]);
+            }
+        }
+    }
+
+    #[test]
+    fn light_goes_both_ways_alike() {
+        for case in 0..4000 {
+            let sampler = Sampler::new(case, 1, 0, 0);
+            let (a, b, c) = (sampler.pair(0), sampler.pair(1), sampler.pair(2));
+            let (alpha, eta) = (0.02 + 0.98 * c.x, [1.0 / 1.5, 1.5, 1.0 / 1.1, 2.0][case as usize % 4]);
+            let place = |u: Vec2| {
+                let z = 2.0 * u.x - 1.0;
+                let (sin, cos) = (TAU as f32 * u.y).sin_cos();
+                Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+            };
+            let (o, i) = (place(a), place(b));
+            if o.z.abs().min(i.z.abs()) < 1e-2 {
+                continue;
+            }
+            let lobe = lobe(alpha, eta);
+            let f = |o: Vec3, i: Vec3| lobe.eval(o, i, Vec3::Z).0.x / i.z.abs();
+            // Over n² on the side that light arrives at, which is 1 below.
+            let n2 = |w: Vec3| if w.z > 0.0 { eta * eta } else { 1.0 };
+            let (forth, back) = (f(o, i) / n2(o), f(i, o) / n2(i));
+            assert!((forth - back).abs() <= 2e-3 * forth.max(back) + 1e-5, "α {alpha}, η {eta}: {forth} and {back}");
+        }
+    }
+
+    #[test]
+    fn narrow_lobes_are_smooth_glass() {
+        for eta in [1.0 / 1.5, 1.5, 1.0 / 1.05] {
+            for cos in [1.0, 0.9, 0.5, 0.2] {
+                let (smooth, rough) = (Lobe::Glass(interface(eta)), lobe(2.0 * SMALLEST_ALPHA, eta));
+                assert!(!is_smooth(2.0 * SMALLEST_ALPHA, eta) || (eta - 1.0).abs() < 0.1);
+                let (mut n_split, n) = (0, 4000);
+                for i in 0..n {
+                    let sampler = Sampler::new(3, 0, 0, i);
+                    let sample =
+                        |lobe: &Lobe| lobe.sample(direction(cos), Vec3::Z, || sampler.single(2), sampler.pair(0));
+                    let (Some(a), Some(b)) = (sample(&smooth), sample(&rough)) else { panic!("light is lost") };
+                    if a.through.is_some() != b.through.is_some() {
+                        n_split += 1;
+                        continue;
+                    }
+                    assert!((a.weight - b.weight).length() < 1e-3, "{a:?} {b:?}");
+                    // Tails of the distribution are long: one in thousands leans by 100 α.
+                    assert!(a.wi.distance(b.wi) < 0.1, "η {eta}, cos {cos}: {a:?} {b:?}");
+                }
+                assert!(n_split < n / 200, "η {eta}, cos {cos}: {n_split} of {n} are split otherwise");
+            }
+        }
+        assert!([0.0, -1.0, f32::NAN, 0.5 * SMALLEST_ALPHA].into_iter().all(|alpha| is_smooth(alpha, 1.5)));
+        assert!(is_smooth(1.0, 1.0) && is_smooth(0.5, f32::NAN) && !is_smooth(SMALLEST_ALPHA, 1.5));
+    }
+
+    #[test]
+    fn betas_are_what_tables_say() {
+        for (a, b, expected) in
+            [(0.0, 0.0, 1.0), (1.0, 1.0, 1.0 / 6.0), (2.0, 3.0, 1.0 / 60.0), (0.5, 0.5, std::f64::consts::PI / 8.0)]
+        {
+            assert!((beta_of_next(a, b) / expected - 1.0).abs() < 1e-9, "{a}, {b}");
+        }
+        for a in [1e-9, 0.1, 5.0, 7.5, 1e3, 1e7] {
+            assert!((beta_of_next(a, 0.0) * (1.0 + a) - 1.0).abs() < 1e-6, "{a}");
+            assert!(beta_of_next(a, 1e7) < 1e-6);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_is_infinite_or_negative(
+            alpha in prop_oneof![Just(1.0), (0.0f32..1.0).prop_map(|x| x.max(1e-4)), (0.0f32..1.0).prop_map(|x| 1e-4 + 1e-3 * x)],
+            eta in prop_oneof![0.1f32..10.0, (-1.0f32..1.0).prop_map(|x| 1.0 + 0.1 * x), (-1.0f32..1.0).prop_map(|x| 1.0 + 1e-3 * x)],
+            cos in prop_oneof![0.0f32..1.0, (0.0f32..1.0).prop_map(|x| 1e-3 * x), Just(0.0), Just(1.0), Just(1e-30)],
+            wi in (-1.0f32..1.0, -1.0f32..1.0, prop_oneof![-1.0f32..1.0, (-1.0f32..1.0).prop_map(|x| 1e-5 * x), Just(0.0), Just(1e-38)]),
+            seed in any::<u32>(),
+        ) {
+            prop_assume!(!is_smooth(alpha, eta));
+            let (lobe, wo) = (lobe(alpha, eta), direction(cos));
+            let wi = Vec3::from(wi).normalize_or(Vec3::X);
+            for (o, i) in [(wo, wi), (wi, wo), (wo, -wo), (wo, wo)] {
+                let (value, pdf) = lobe.eval(o, i, Vec3::Z);
+                prop_assert!(value.is_finite() && value.x >= 0.0 && pdf.is_finite() && pdf >= 0.0, "{value} {pdf}");
+            }
+            let sampler = Sampler::new(seed, 0, 0, 0);
+            for u in [sampler.pair(0), Vec2::ZERO, Vec2::splat(1.0f32.next_down())] {
+                for choice in [sampler.single(1), 0.0, 1.0f32.next_down()] {
+                    let Some(s) = lobe.sample(wo, Vec3::Z, || choice, u) else { continue };
+                    prop_assert!(s.wi.is_finite() && (s.wi.length() - 1.0).abs() < 1e-5, "{s:?}");
+                    prop_assert!(s.pdf > 0.0 && s.pdf.is_finite(), "{s:?}");
+                    let most = if s.through.is_some() { eta * eta } else { 1.0 };
+                    prop_assert!(s.weight.x >= 0.0 && s.weight.x <= most, "{s:?}");
+                }
+            }
+        }
+
+        #[test]
+        fn what_is_sampled_is_what_is_evaluated(
+            alpha in 0.01f32..1.0, eta in prop_oneof![0.4f32..0.95, 1.05f32..2.5], cos in 0.05f32..1.0, seed in any::<u32>(),
+        ) {
+            let (lobe, wo) = (lobe(alpha, eta), direction(cos));
+            let sampler = Sampler::new(seed, 0, 0, 0);
+            if let Some(s) = lobe.sample(wo, Vec3::Z, || sampler.single(1), sampler.pair(0)) {
+                let (value, pdf) = lobe.eval(wo, s.wi, Vec3::Z);
+                // Where light grazes a microfacet its angle is known to fewer digits.
+                let slack = 1e-2 + 1e-4 / s.wi.z.abs();
+                prop_assert!((pdf / s.pdf - 1.0).abs() < slack, "{pdf} for {s:?}");
+                prop_assert!((value.x / pdf / s.weight.x - 1.0).abs() < slack, "{value} / {pdf} for {s:?}");
+            }
+        }
+    }
+}
