@@ -11,7 +11,7 @@ use firstlight::report::cpu_seconds;
 use firstlight::scene::{Extraction, FilmSize, SceneInputs};
 use std::time::Instant;
 
-/// Two mirrors across a corner and balls before them, on a matte checkered floor.
+/// Two mirrors across a corner and spheres before them, on a diffuse checkered floor.
 const MIRRORS: &str = r#"(
     camera: (eye: (-7, 5, 12), look_at: (2, 2, 0), vfov: 45),
     film: (width: 600, height: 600),

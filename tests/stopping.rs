@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 const CAMERA: &str = "camera: (eye: (0, 0, 300), look_at: (0, 0, 0)), film: (width: 32, height: 32)";
 
-/// Balls that each stand for themselves, so many along a side.
+/// Spheres that each stand for themselves, so many along a side.
 #[cfg(unix)]
 fn many_objects(side: u32) -> String {
     let mut text =

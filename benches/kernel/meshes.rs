@@ -73,7 +73,7 @@ fn grid(mesh: &mut Mesh, n: u32, point: impl Fn(f32, f32) -> Vec3) {
     }
 }
 
-/// A ball with bumps of several sizes.
+/// A sphere with bumps of several sizes.
 fn blob(mesh: &mut Mesh, n: u32, center: Vec3, radius: f32) {
     grid(mesh, n, |u, v| {
         let (theta, phi) = (u * std::f32::consts::PI, v * std::f32::consts::TAU);

@@ -1,4 +1,4 @@
-//! Small scenes: a box of ten quads and balls without any mesh, and what a ray costs there.
+//! Small scenes: a box of ten quads and spheres without any mesh, and what a ray costs there.
 
 use crate::WAVE;
 use crate::clock::{cpu_seconds, median};

@@ -7,7 +7,7 @@ use super::number::parse_size;
 use clap::Args;
 use firstlight::frame::{End, PixelStory, SnapshotNames, brightness};
 use firstlight::printable;
-use firstlight::render::{Integrator, RenderSettings, explain, light_from_lamps};
+use firstlight::render::{Integrator, RenderSettings, explain, light_traced};
 use firstlight::scene::{Extraction, Files, FilmSize, Rendering, SceneInputs};
 use glam::{DVec3, UVec2};
 
@@ -64,8 +64,8 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         RenderSettings { integrator: Integrator::Path, seed: args.seed.unwrap_or(of_scene.seed), ..of_scene };
     let prepared = &extraction.prepared;
     let explanation = explain(prepared, &settings, size, args.pixel, 0..args.spp).expect("path tracing has paths");
-    let from_lamps = light_from_lamps(prepared, &settings, size, args.pixel, 0..args.spp, &|| false);
-    let story = PixelStory::new(&explanation, from_lamps, &SnapshotNames::of(&extraction, &inputs));
+    let light_traced = light_traced(prepared, &settings, size, args.pixel, 0..args.spp, &|| false);
+    let story = PixelStory::new(&explanation, light_traced, &SnapshotNames::of(&extraction, &inputs));
     if args.json { print(json(&scene.source.title(), &story)) } else { print(text(&scene.source.title(), &story)) }
 }
 
@@ -93,7 +93,7 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     if story.n_bad > 0 {
         line(format!("{} of them are not finite and were discarded", story.n_bad));
     }
-    let from_lamps = story.from_lamps.unwrap_or_default();
+    let light_traced = story.light_traced.unwrap_or_default();
     let all = brightness(story.total());
     let share = |part: f64| if all > 0.0 { format!("{:.1} %", 100.0 * part / all) } else { "–".to_owned() };
     let width =
@@ -113,8 +113,8 @@ fn text(title: &str, story: &PixelStory) -> Vec<String> {
     for light in &story.lights {
         line(row(&printable::name(&light.name), light.parts()));
     }
-    if from_lamps != DVec3::ZERO {
-        let total = brightness(from_lamps);
+    if light_traced != DVec3::ZERO {
+        let total = brightness(light_traced);
         let empty = String::new;
         let cells = [empty(), empty(), empty(), format!("{total:.5}"), share(total)];
         line(columns("by light tracing", cells));
@@ -180,7 +180,7 @@ fn json(title: &str, story: &PixelStory) -> serde_json::Value {
         "by_bounces": all(&story.by_bounces),
         "by_running_into_it": rgb(&story.by_itself),
         "by_asking": rgb(&story.by_asking),
-        "by_paths_from_the_lamps": story.from_lamps.as_ref().map(rgb),
+        "by_paths_from_the_lamps": story.light_traced.as_ref().map(rgb),
         "paths": paths,
     })
 }

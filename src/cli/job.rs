@@ -107,10 +107,10 @@ impl RenderJob {
     fn new_film(&self, purposes: &[Purpose]) -> Result<Film, Failure> {
         let (width, height) = self.size;
         let no_room = |error: NoRoom| Failure::Failed(error.to_string());
-        let from_lamps = self.extraction.prepared.features().caustics;
-        drop(Room::for_film(width, height, from_lamps, purposes).map_err(no_room)?);
+        let light_traced = self.extraction.prepared.features().caustics;
+        drop(Room::for_film(width, height, light_traced, purposes).map_err(no_room)?);
         let mut film = Film::try_new(width, height).map_err(no_room)?;
-        if from_lamps {
+        if light_traced {
             film.reserve_light().map_err(no_room)?;
         }
         Ok(film)

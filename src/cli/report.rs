@@ -223,8 +223,8 @@ impl ReportScene {
             (_, Some(size)) | (Some(size), None) => size,
             (None, None) => modest(width, height),
         };
-        let from_lamps = extraction.prepared.features().caustics;
-        let room = Room::for_film(size.0, size.1, from_lamps, &[Purpose::Exr]);
+        let light_traced = extraction.prepared.features().caustics;
+        let room = Room::for_film(size.0, size.1, light_traced, &[Purpose::Exr]);
         drop(room.map_err(|error| Failure::Failed(error.to_string()))?);
         let settings = RenderSettings { seed: args.seed, ..world.resource::<Rendering>().0 };
         Ok(Self {

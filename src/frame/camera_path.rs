@@ -15,7 +15,7 @@ pub fn turntable(start: &Rig, n: u32) -> Vec<Rig> {
 
 /// `n` views from the first stop through all others to the last; the same time from each to the next.
 ///
-/// The eye follows a Catmull-Rom spline, directions the shortest arc (slerp), distances and the angle of view change by
+/// The camera follows a Catmull-Rom spline, directions the shortest arc (slerp), distances and the angle of view change by
 /// equal factors, the focal distance evenly in its reciprocal, so that it may be infinite.
 pub fn along(stops: &[Rig], n: u32) -> Vec<Rig> {
     let Some(last) = stops.len().checked_sub(1) else { return Vec::new() };
@@ -88,7 +88,7 @@ mod tests {
             assert!((view.pivot() - start.view.pivot()).length() < 1e-12);
             assert!((view.eye.y - 2.0).abs() < 1e-12 && view.right().y.abs() < 1e-12, "{view:?}");
         }
-        // Half way round, the eye is on the other side.
+        // Half way round, the camera is on the other side.
         let opposite = 2.0 * start.view.pivot() - start.view.eye;
         assert!((views[4].view.eye - DVec3::new(opposite.x, 2.0, opposite.z)).length() < 1e-12);
     }

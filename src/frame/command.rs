@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// that they mean the same at any resolution.
 #[derive(Clone, Debug, PartialEq, Message, Serialize, Deserialize)]
 pub enum Command {
-    /// Look about from where the eye is, degrees; positive yaw looks to the right, positive pitch upwards.
+    /// Look about from where the camera is, degrees; positive yaw looks to the right, positive pitch upwards.
     Turn {
         /// Degrees to the right.
         yaw_deg: f64,
@@ -41,7 +41,7 @@ pub enum Command {
         /// Fraction of its height, from the top.
         y: f64,
     },
-    /// Move the eye around the pivot, degrees; positive yaw moves it to the right, positive pitch upwards.
+    /// Move the camera around the pivot, degrees; positive yaw moves it to the right, positive pitch upwards.
     Orbit {
         /// Degrees to the right.
         yaw_deg: f64,
@@ -76,7 +76,7 @@ pub enum Command {
     ToggleTurntable,
     /// The camera as it was when the scene was opened.
     Home,
-    /// Keep the direction, place the eye so that what is selected just fits into the picture, or else the whole scene
+    /// Keep the direction, place the camera so that what is selected just fits into the picture, or else the whole scene
     /// but for what lies far off, and focus on its middle.
     FrameAll,
     /// Set the pose of the camera.

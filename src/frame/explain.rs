@@ -37,8 +37,8 @@ pub struct PixelStory {
     pub mean: DVec3,
     /// Standard deviation of `mean`.
     pub deviation: DVec3,
-    /// What paths from the lamps brought beside that, as far as it is known.
-    pub from_lamps: Option<DVec3>,
+    /// What light paths brought beside that, as far as it is known.
+    pub light_traced: Option<DVec3>,
     /// The path of each sample.
     pub ways: Vec<PathRecord>,
 }
@@ -157,7 +157,7 @@ impl SnapshotNames {
 
 impl PixelStory {
     /// The story of an explanation, in the world and with the names of its objects.
-    pub fn new(explanation: &Explanation, from_lamps: Option<DVec3>, names: &SnapshotNames) -> Self {
+    pub fn new(explanation: &Explanation, light_traced: Option<DVec3>, names: &SnapshotNames) -> Self {
         let contributions = explanation.contributions();
         let mut by_light: BTreeMap<LightSource, Vec<DVec3>> = BTreeMap::new();
         let (mut by_bounces, mut by_itself, mut by_asking) = (Vec::new(), DVec3::ZERO, DVec3::ZERO);
@@ -202,14 +202,14 @@ impl PixelStory {
             by_asking,
             mean: explanation.mean(),
             deviation: explanation.deviation(),
-            from_lamps,
+            light_traced,
             ways: ways.collect(),
         }
     }
 
-    /// With what paths from the lamps brought.
+    /// With what light paths brought.
     pub fn total(&self) -> DVec3 {
-        self.mean + self.from_lamps.unwrap_or_default()
+        self.mean + self.light_traced.unwrap_or_default()
     }
 
     /// Seen directly, after one bounce, after more.
@@ -272,8 +272,8 @@ pub fn explain_pixel(
     if let Some(waiting) = &explaining.waiting {
         let answer = waiting.answer.lock().map_or(Err(TryRecvError::Disconnected), |answer| answer.try_recv());
         match answer {
-            Ok(Answer { explanation, from_lamps }) => {
-                explaining.story = Some(PixelStory::new(&explanation, from_lamps, &waiting.names));
+            Ok(Answer { explanation, light_traced }) => {
+                explaining.story = Some(PixelStory::new(&explanation, light_traced, &waiting.names));
                 explaining.waiting = None;
             }
             Err(TryRecvError::Empty) => {}

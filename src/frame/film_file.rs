@@ -275,7 +275,7 @@ mod tests {
     use crate::render::RenderSettings;
     use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
-    /// A film of a scene with paths from the lights, and its note.
+    /// A film of a scene with light paths, and its note.
     fn tiny(spp: u32) -> (Film, String) {
         let loaded = load(&SceneSource::Builtin("cornell-balls".to_owned()), &LoadOptions::default()).unwrap();
         let mut world = bevy_ecs::world::World::new();

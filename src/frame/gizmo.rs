@@ -95,7 +95,7 @@ const RING_STEPS: usize = 48;
 const SNAP_DEG: f64 = 15.0;
 
 impl Gizmo {
-    /// As large in the window wherever it is; `None` for a place that is not in front of the eye.
+    /// As large in the window wherever it is; `None` for a place that is not in front of the camera.
     pub fn at(center: DVec3, mode: Mode, axes: [DVec3; 3], projector: &Projector) -> Option<Self> {
         let size = LENGTH * projector.metres_at(center)?;
         size.is_normal().then_some(Self { mode, center, axes, size })
@@ -162,12 +162,12 @@ impl Gizmo {
         let on_plane = |normal: DVec3, place: DVec2| {
             let dir = projector.direction(place);
             let t = (self.center - projector.eye()).dot(normal) / dir.dot(normal);
-            // Behind the eye, or so flat that a pixel is a mile.
+            // Behind the camera, or so flat that a pixel is a mile.
             let flat = dir.dot(normal).abs() < 0.02 * dir.length();
             (t > 0.0 && t.is_finite() && !flat).then(|| projector.eye() + t * dir)
         };
         let along = |axis: DVec3, place: DVec2| {
-            // The plane through the axis that faces the eye most.
+            // The plane through the axis that faces the camera most.
             let normal = (view - view.dot(axis) * axis).try_normalize()?;
             Some((on_plane(normal, place)? - self.center).dot(axis))
         };

@@ -7,7 +7,7 @@
 //! | camera, lens, light model, depth, seed | [`Level::Restart`] | trees, lights, textures |
 //! | material, texture, environment, light power | [`Level::Shading`] | all trees |
 //! | object or light moved, added, removed, given another material | [`Level::TopTree`] | every mesh's own tree |
-//! | a mesh or a cloud of balls | [`Level::MeshTree`] | other trees |
+//! | a mesh or a cloud of spheres | [`Level::MeshTree`] | other trees |
 //! | picture size | [`Level::Resize`] | the scene side |
 
 use crate::render::{Display, RenderSettings};

@@ -125,7 +125,7 @@ pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
     Some(OwnBox { min, max, world_from_box: object.placement.affine() })
 }
 
-/// From the world to the window: a pinhole at the eye of a camera.
+/// From the world to the window: a pinhole at the camera of a camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Projector {
     eye: DVec3,
@@ -151,7 +151,7 @@ impl Projector {
         }
     }
 
-    /// `None` for what is not in front of the eye.
+    /// `None` for what is not in front of the camera.
     pub fn place(&self, point: DVec3) -> Option<DVec2> {
         let offset = point - self.eye;
         let depth = offset.dot(self.forward);
@@ -159,9 +159,9 @@ impl Projector {
         (depth > 0.0 && place.is_finite()).then_some(place)
     }
 
-    /// The part of a line between two points that is in front of the eye.
+    /// The part of a line between two points that is in front of the camera.
     pub fn segment(&self, a: DVec3, b: DVec3) -> Option<[DVec2; 2]> {
-        /// A line that passes the eye is cut so far in front of it, as a part of the depth of its farther end: well
+        /// A line that passes the camera is cut so far in front of it, as a part of the depth of its farther end: well
         /// outside of any window.
         const NEAR: f64 = 1.0 / 1024.0;
         let depth = |point: DVec3| (point - self.eye).dot(self.forward);
@@ -193,7 +193,7 @@ impl Projector {
         self.eye
     }
 
-    /// How many metres a unit of the window spans where `point` is; `None` for what is not in front of the eye.
+    /// How many metres a unit of the window spans where `point` is; `None` for what is not in front of the camera.
     pub fn metres_at(&self, point: DVec3) -> Option<f64> {
         let depth = (point - self.eye).dot(self.forward);
         (depth > 0.0).then(|| depth / self.scale)
@@ -230,7 +230,7 @@ mod tests {
             assert!((projector.place(point).unwrap() - place).length() < 1e-6);
         }
         assert_eq!(projector.place(view.eye - view.forward), None);
-        // Behind the eye and to its right is to the right.
+        // Behind the camera and to its right is to the right.
         let behind = view.eye - 3.0 * view.forward + view.right();
         assert!((projector.way_to(behind).unwrap() - DVec2::X).length() < 1e-6);
         assert_eq!(projector.way_to(view.eye), None);
@@ -243,7 +243,7 @@ mod tests {
         let at = |right: f64, ahead: f64| view.eye + right * view.right() + ahead * view.forward;
         let [a, b] = projector.segment(at(-1.0, 4.0), at(1.0, 4.0)).unwrap();
         assert_eq!([a, b], [projector.place(at(-1.0, 4.0)).unwrap(), projector.place(at(1.0, 4.0)).unwrap()]);
-        // Straight past the eye, to the right of it: the near end is far outside, on the same line of the window.
+        // Straight past the camera, to the right of it: the near end is far outside, on the same line of the window.
         let [a, b] = projector.segment(at(1.0, 4.0), at(1.0, -4.0)).unwrap();
         assert!(a.x < 800.0 && b.x > 10_000.0 && (a.y - b.y).abs() < 1e-6, "{a} {b}");
         assert_eq!(projector.segment(at(0.0, -1.0), at(1.0, -2.0)), None);

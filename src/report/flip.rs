@@ -1,7 +1,7 @@
 //! LDR-FLIP: how much of a difference a person sees who flips between two pictures.
 //!
 //! Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images". Two pipelines: colours are blurred as
-//! the eye blurs them and compared in a perceptual space; edges and points are compared where they stand; where
+//! the camera blurs them and compared in a perceptual space; edges and points are compared where they stand; where
 //! features differ, the colour difference weighs more. All filters are sums of products of a row and a column.
 
 use glam::{Mat3, Vec3};
@@ -67,7 +67,7 @@ fn hyab(a: Vec3, b: Vec3) -> f32 {
     d.x.abs() + d.y.hypot(d.z)
 }
 
-/// Difference of the colours that the eye makes out, 0..1.
+/// Difference of the colours that the camera makes out, 0..1.
 fn color_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
     // Most of the visible differences take most of the range; the rest is squeezed into what is left (section 4.1.2).
     const EXPONENT: f32 = 0.7;
@@ -87,7 +87,7 @@ fn color_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32>
     reference.par_iter().zip(&test).map(mapped).collect()
 }
 
-/// Blurred as the eye blurs each opponent channel (Johnson and Fairchild 2003), then to perceptual colours.
+/// Blurred as the camera blurs each opponent channel (Johnson and Fairchild 2003), then to perceptual colours.
 fn as_seen(opponent: &[Vec3], width: usize) -> Vec<Vec3> {
     // Amplitude and width of one or two Gaussians a channel, in degrees.
     const ACHROMATIC: &[(f32, f32)] = &[(1.0, 0.0047)];
@@ -121,7 +121,7 @@ fn as_seen(opponent: &[Vec3], width: usize) -> Vec<Vec3> {
 
 /// Difference of edges or of points, whichever is larger, 0..1.
 fn feature_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
-    /// Width of the filters in degrees: how far apart peaks of the eye's sensitivity to edges are.
+    /// Width of the filters in degrees: how far apart peaks of the camera's sensitivity to edges are.
     const FEATURE_WIDTH: f32 = 0.082;
     let sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * sigma).ceil() as i32;

@@ -66,7 +66,7 @@ pub struct MeanVisits {
 pub struct CountedVisits {
     /// Lines in all directions, which nothing stops: what the expected figures speak of.
     pub lines: MeanVisits,
-    /// From the eye of view 1 to the first hit.
+    /// From the camera of view 1 to the first hit.
     pub camera: MeanVisits,
     /// From these hits into the hemisphere above, by the cosine, to the next.
     pub bounce: MeanVisits,
@@ -223,7 +223,7 @@ impl ModelScene {
         let floor = Shape::Plane { point: Vec3::new(center.x, bounds.min.y, center.z), normal: Vec3::Y };
         let n_slots = mesh.slots.iter().max().map_or(1, |&last| usize::from(last) + 1);
         let model = Object { mesh: Some(mesh.clone()), ..Object::plain(MODEL) };
-        let lamp = Object { is_point_light: true, ..Object::plain(LIGHT) };
+        let emitter = Object { is_point_light: true, ..Object::plain(LIGHT) };
         let shapes = vec![
             placed(tree, world_from_mesh),
             floor,
@@ -231,7 +231,7 @@ impl ModelScene {
             light(Vec3::new(0.0, 1.2, -2.0)),
         ];
         let objects =
-            vec![Object { materials: vec![MODEL; n_slots], ..model }, Object::plain(FLOOR), lamp.clone(), lamp];
+            vec![Object { materials: vec![MODEL; n_slots], ..model }, Object::plain(FLOOR), emitter.clone(), emitter];
         let geometry = Geometry::build(shapes, objects);
         // Five squares along the model. At two sizes away the lights bring an irradiance of about 3.
         let squares = Texture {
@@ -333,7 +333,7 @@ impl SampleRays {
     }
 }
 
-/// A line of the uniform density through a ball: all directions alike, all places across them alike.
+/// A line of the uniform density through a sphere: all directions alike, all places across them alike.
 fn line(middle: Vec3, radius: f32, sampler: &Sampler) -> Ray {
     let (u, v) = (sampler.pair(0), sampler.pair(1));
     let z = 1.0 - 2.0 * u.x;

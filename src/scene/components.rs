@@ -45,7 +45,7 @@ pub enum Shape {
     },
     /// Shared by all objects that use it, together with its tree.
     Mesh(Arc<Mesh>),
-    /// Many balls of one material. Its placement must scale evenly.
+    /// Many spheres of one material. Its placement must scale evenly.
     Spheres(Arc<Balls>),
 }
 
@@ -78,7 +78,7 @@ impl PartialEq for Shape {
     }
 }
 
-/// Many balls, stored about their centre so that `f32` suffices.
+/// Many spheres, stored about their centre so that `f32` suffices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Balls {
     /// Metres, relative to `center`.

@@ -2,7 +2,7 @@
 //!
 //! What comes out says what the world holds, to the last bit: spawning it gives equal components in the same order.
 //! Three things have no words in a scene file and get some: meshes that came from no file are listed, to be written
-//! beside it; many balls that were made by a program are listed one by one; surfaces without a material get a grey
+//! beside it; many spheres that were made by a program are listed one by one; surfaces without a material get a grey
 //! one. Comments and the spelling of a file that was read are not kept.
 
 use super::camera::camera;
@@ -125,7 +125,7 @@ struct Item {
 #[derive(Default)]
 struct Writer<'a> {
     loaded: Option<&'a LoadedScene>,
-    /// What was loaded, by the address of the mesh and of the balls, and by the name of the texture.
+    /// What was loaded, by the address of the mesh and of the spheres, and by the name of the texture.
     loaded_meshes: HashMap<usize, &'a LoadedMesh>,
     loaded_balls: HashMap<usize, &'a ObjectPart>,
     loaded_textures: HashMap<&'a str, &'a TextureSource>,

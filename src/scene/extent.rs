@@ -19,7 +19,7 @@ pub struct Extent {
 pub struct ExtentCache(HashMap<usize, (Shape, (DVec3, DVec3))>);
 
 impl ExtentCache {
-    /// The extent of what can be seen, but for what lies far off; lamps count only when there is nothing else, since
+    /// The extent of what can be seen, but for what lies far off; lights count only when there is nothing else, since
     /// nobody goes to look at one.
     pub fn extent(&mut self, inputs: &SceneInputs) -> Extent {
         let boxes = self.near_boxes(inputs);
@@ -48,15 +48,15 @@ impl ExtentCache {
             .filter(|material| matches!(material.material, Material::Emissive { .. }))
             .map(|material| material.entity)
             .collect();
-        let is_lamp =
+        let is_light =
             |object: &&ObjectInput| !object.slots.is_empty() && object.slots.iter().all(|slot| glowing.contains(slot));
-        let (lamps, things): (Vec<_>, Vec<_>) = inputs.objects.iter().partition(is_lamp);
+        let (lights, things): (Vec<_>, Vec<_>) = inputs.objects.iter().partition(is_light);
         let mut boxes = |objects: Vec<&ObjectInput>| -> Vec<(DVec3, DVec3)> {
             objects.into_iter().filter_map(|object| self.world_box(object)).collect()
         };
         let mut near = boxes(things);
         if near.is_empty() {
-            near = boxes(lamps);
+            near = boxes(lights);
         }
         leave_out_far(&mut near);
         near

@@ -296,7 +296,7 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds) -> Shading {
             MaterialKey::Light(entity) => render::Material::Emissive {
                 radiance: ColorInput::Constant(lights.get(&entity).map_or(
                     Vec3::ZERO,
-                    // A ball of radiance L and radius r has the radiant intensity π r² L in every direction.
+                    // A sphere of radiance L and radius r has the radiant intensity π r² L in every direction.
                     |light| light.intensity * (1.0 / (PI * light.radius.powi(2))) as f32,
                 )),
             },

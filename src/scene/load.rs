@@ -377,7 +377,7 @@ impl<'a> Known<'a> {
         ((is_builtin || self.scene.folder == folder) && mesh.is_fresh()).then(|| mesh.clone())
     }
 
-    /// The balls of an object that has the same.
+    /// The spheres of an object that has the same.
     fn same_balls(&self, wanted: &ObjectPart) -> Option<Arc<Balls>> {
         self.scene.balls[*self.balls.get(&Self::balls_key(wanted)?)?].clone()
     }

@@ -223,7 +223,7 @@ impl LoadedMesh {
     }
 
     /// What an MTL material means here: illumination models 3 and 5 are mirrors, 4, 6, 7 and 9 are glass, 0 and 1 are
-    /// matte, and all others have a highlight if the file gives it a strength.
+    /// diffuse, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
         let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
         let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);

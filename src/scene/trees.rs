@@ -96,7 +96,7 @@ impl Trees {
         reason.map_or("its kd-tree is not built yet".to_owned(), |(_, reason)| reason.clone())
     }
 
-    /// Memory of all trees; of clouds, that of the balls in them.
+    /// Memory of all trees; of clouds, that of the spheres in them.
     pub fn bytes(&self) -> usize {
         self.meshes.values().map(|(_, tree)| tree.stats().bytes).sum::<usize>()
             + self.balls.values().map(|(_, tree)| tree.len() * size_of::<[f32; 4]>()).sum::<usize>()

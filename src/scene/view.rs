@@ -24,7 +24,7 @@ pub struct View {
     pub forward: DVec3,
     /// What is up in the picture, unit and perpendicular to `forward`.
     pub up: DVec3,
-    /// Metres along `forward` from the eye to the pivot; positive and finite.
+    /// Metres along `forward` from the camera to the pivot; positive and finite.
     pub pivot_distance: f64,
 }
 
@@ -39,7 +39,7 @@ pub enum ViewError {
         /// Its value.
         value: DVec3,
     },
-    /// The eye and the point that it looks at are the same.
+    /// The camera and the point that it looks at are the same.
     #[error(
         "camera: `eye` and `look_at` are the same point {eye}; move one of them so that there is a direction to look in"
     )]
@@ -65,7 +65,7 @@ pub enum ViewError {
 }
 
 impl View {
-    /// A view from `eye` with `look_at` in the middle of the picture and as the pivot.
+    /// A view from `camera` with `look_at` in the middle of the picture and as the pivot.
     ///
     /// `up` need not be unit, nor perpendicular to the view direction, but must not lie along it.
     pub fn look_at(eye: DVec3, look_at: DVec3, up: DVec3) -> Result<Self, ViewError> {

@@ -11,7 +11,7 @@ use bevy_ecs::world::World;
 use glam::{DVec3, dvec3};
 use std::fmt::Write;
 
-/// A room with matte, rough, clear and shining things, some of them meshes; all lengths times `scale`, all places
+/// A room with diffuse, rough, clear and shining things, some of them meshes; all lengths times `scale`, all places
 /// moved by `shift`.
 fn scene_text(scale: f64, shift: DVec3) -> String {
     let at = |x: f64, y: f64, z: f64| {
@@ -29,7 +29,7 @@ fn scene_text(scale: f64, shift: DVec3) -> String {
         plane(point: {floor}, material: "matte"),
         quad(corner: {wall}, edge_u: {wall_u}, edge_v: {wall_v}, material: "matte"),
         sphere(center: {ball}, radius: {ball_radius:?}, material: "glass"),
-        sphere(center: {lamp}, radius: {lamp_radius:?}, material: "light"),
+        sphere(center: {light_center}, radius: {light_radius:?}, material: "light"),
         mesh(source: builtin("cube"), material: "rough", transform: (translate: {cube}, rotate: (20, 30, 0), scale: {cube_size:?})),
         mesh(source: builtin("torus"), material: "matte", transform: (translate: {ring}, rotate: (60, 0, 0), scale: {ring_size:?})),
         spheres(centers: [{small_a}, {small_b}], radii: all({small:?}), material: "rough"),
@@ -46,8 +46,8 @@ fn scene_text(scale: f64, shift: DVec3) -> String {
         wall_v = way(0.0, 3.0, 0.0),
         ball = at(-0.9, 0.7, 0.6),
         ball_radius = 0.7 * scale,
-        lamp = at(1.0, 2.6, 1.0),
-        lamp_radius = 0.3 * scale,
+        light_center = at(1.0, 2.6, 1.0),
+        light_radius = 0.3 * scale,
         cube = at(1.2, 0.6, 0.0),
         cube_size = 0.7 * scale,
         ring = at(0.0, 1.2, -1.0),
@@ -204,7 +204,7 @@ pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     let mut tally = Tally { rays: 2 * n, ..Tally::default() };
     for i in 0..n {
         let mut random = Random::new(0x6E0, i);
-        // Relative to the eye, which the origin of a snapshot may be a little away from.
+        // Relative to the camera, which the origin of a snapshot may be a little away from.
         let center = glam::vec3(0.0, 0.0, -90.0);
         let (from, to) = (center + random.point() * 10.0, center + random.direction() * 100.0);
         let trace = |scene: &Prepared| -> (crate::geometry::Ray, Option<Hit>) {

@@ -179,7 +179,7 @@ pub fn glass() -> Vec<LightCase> {
     let mut dense = furnace("index 1000", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1e3)], 5e-3);
     dense.every_pixel = false;
     pictures.push(dense);
-    // From inside a ball, at the radius where the flattest rays all but reach the angle of total reflection. What comes from
+    // From inside a sphere, at the radius where the flattest rays all but reach the angle of total reflection. What comes from
     // outside is n² as bright there.
     let mut inside = furnace("inside a sphere of glass", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1.5)], 1e-3);
     // Total reflection keeps some paths for longer than roulette lets them live.
@@ -208,8 +208,8 @@ pub fn metal() -> Vec<LightCase> {
     pictures
 }
 
-/// Ball lights over a floor: tiny and bright, huge, and touching it. A floor point at distance d from the centre of a ball of
-/// radius r sees albedo · L · (r/d)² · cos θ while all of the ball is above its horizon.
+/// Sphere lights over a floor: tiny and bright, huge, and touching it. A floor point at distance d from the centre of a sphere of
+/// radius r sees albedo · L · (r/d)² · cos θ while all of the sphere is above its horizon.
 pub fn lights() -> Vec<LightCase> {
     let cases: [(&str, f32, f32, f32); 9] = [
         ("a sphere of 1 µm", 1e-6, 1.0, 0.3),
@@ -229,7 +229,7 @@ pub fn lights() -> Vec<LightCase> {
             let share = f64::from(radius).powi(2) / d2 * f64::from(height) / d2.sqrt();
             // As bright as it takes for the floor to have a radiance of about 1.
             let radiance = (2.0 / share) as f32;
-            // Grazing, so that the ball is not in the way; a small view, so that all pixels see the same.
+            // Grazing, so that the sphere is not in the way; a small view, so that all pixels see the same.
             let eye_height = (1e-3 * x).min(0.1);
             let eye = vec3(x, eye_height, eye_height);
             let materials = vec![diffuse(0.5), emissive(radiance)];
@@ -277,7 +277,7 @@ pub fn cameras() -> Vec<LightCase> {
             }
         }
     }
-    // The back of a ball that shines is dark: a lens that reaches into it would see that.
+    // The back of a sphere that shines is dark: a lens that reaches into it would see that.
     pictures.iter_mut().filter(|p| p.scene.camera.lens_radius >= 1e3).for_each(|p| p.every_pixel = false);
     pictures
 }

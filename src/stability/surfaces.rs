@@ -343,7 +343,7 @@ pub fn leaving() -> Vec<Plan> {
     SurfaceCase::all().flat_map(|place| (0..n).map(move |index| (place, index))).map(plan).collect()
 }
 
-/// Balls that touch: the floor, each other, and a floor that is a ball of 10 km; seen from all around the contact.
+/// Spheres that touch: the floor, each other, and a floor that is a sphere of 10 km; seen from all around the contact.
 pub fn tangent() -> Vec<Plan> {
     let kinds: [(&str, fn(SurfaceCase) -> Vec<Shape>); 4] = [
         ("sphere on a plane", |place| {

@@ -76,7 +76,7 @@ impl TestScene {
                 }
                 _ => self.judge_ray(&mut tally, stage, index, ray, &hit),
             }
-            // Rays that leave do not meet the same flat primitive again, nor a ball from outside.
+            // Rays that leave do not meet the same flat primitive again, nor a sphere from outside.
             if let Some(hit) = hit {
                 let next = self.leaving(ray, &hit, &mut randoms[k]);
                 second.push(&next);

@@ -192,7 +192,7 @@ fn is_seen(own: &OwnBox, projector: &Projector, size: DVec2) -> bool {
         return true;
     }
     let corners = own.corners();
-    // A box around the eye is seen, or what is in it; one that reaches behind the eye may be.
+    // A box around the camera is seen, or what is in it; one that reaches behind the camera may be.
     let places: Vec<Option<DVec2>> = corners.iter().map(|&corner| projector.place(corner)).collect();
     let in_front: Vec<DVec2> = places.iter().copied().flatten().collect();
     if in_front.is_empty() {

@@ -9,7 +9,7 @@ use crate::frame::{End, PathRecord, PixelStory, Projector, brightness};
 use egui::{Color32, Context, Pos2, Stroke};
 use glam::{DVec2, DVec3};
 
-/// By segment, from the eye on; the last one is that of all further ones.
+/// By segment, from the camera on; the last one is that of all further ones.
 const SEGMENTS: [Color32; 6] = [
     Color32::from_rgb(240, 240, 240),
     Color32::from_rgb(255, 214, 92),
@@ -18,7 +18,7 @@ const SEGMENTS: [Color32; 6] = [
     Color32::from_rgb(190, 100, 230),
     Color32::from_rgb(96, 140, 255),
 ];
-/// From a vertex to the lamp that it asked.
+/// From a vertex to the light that it asked.
 const ASKED: Color32 = Color32::from_rgb(140, 230, 150);
 
 /// Which paths are drawn.
@@ -62,7 +62,7 @@ impl WaysShown {
         };
         let parts = way.stops.iter().enumerate().flat_map(|(i, stop)| {
             let itself = (&stop.end, i, stop.radiance);
-            let asked = stop.asked.as_ref().map(|(lamp, radiance)| (lamp, i + 1, *radiance));
+            let asked = stop.asked.as_ref().map(|(light, radiance)| (light, i + 1, *radiance));
             [Some(itself), asked].into_iter().flatten()
         });
         parts.filter(|(end, bounces, _)| is_asked_for(end, *bounces)).map(|(.., radiance)| brightness(radiance)).sum()
@@ -89,13 +89,13 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown, projec
         for (segment, stop) in way.stops.iter().enumerate() {
             let to = point_of(&stop.end, from, reach);
             let color = SEGMENTS[segment.min(SEGMENTS.len() - 1)];
-            // What brings no light is there, but does not catch the eye.
+            // What brings no light is there, but is faint.
             let is_dark = way.radiance == DVec3::ZERO;
             line(&painter, projector, from, to, color.gamma_multiply(if is_dark { 0.25 } else { 0.75 }));
-            if let Some((lamp, radiance)) = &stop.asked
+            if let Some((light, radiance)) = &stop.asked
                 && brightness(*radiance) > 0.0
             {
-                line(&painter, projector, to, point_of(lamp, to, reach), ASKED.gamma_multiply(0.45));
+                line(&painter, projector, to, point_of(light, to, reach), ASKED.gamma_multiply(0.45));
             }
             if let (End::At { .. }, Some(place)) = (&stop.end, projector.place(to)) {
                 painter.circle_filled(pos(place), 2.0, color);
@@ -133,8 +133,8 @@ mod tests {
     use super::*;
     use crate::frame::Stop;
 
-    /// A path that runs into `lamp` after its bounces, with this radiance.
-    fn way(lamp: &str, bounces: usize, radiance: f64) -> PathRecord {
+    /// A path that runs into `light` after its bounces, with this radiance.
+    fn way(light: &str, bounces: usize, radiance: f64) -> PathRecord {
         let stop = |what: &str, radiance: f64| Stop {
             end: End::At { point: DVec3::ZERO, what: what.to_owned() },
             throughput: DVec3::ONE,
@@ -142,7 +142,7 @@ mod tests {
             asked: None,
         };
         let mut stops: Vec<Stop> = (0..bounces).map(|_| stop("wall", 0.0)).collect();
-        stops.push(stop(lamp, radiance));
+        stops.push(stop(light, radiance));
         PathRecord { sample: 0, radiance: DVec3::splat(radiance), origin: DVec3::ZERO, stops }
     }
 
@@ -151,7 +151,7 @@ mod tests {
         let mut asked = way("sky", 1, 0.0);
         asked.stops[0].asked = Some((End::Sky { direction: DVec3::Y }, DVec3::splat(7.0)));
         let story = PixelStory {
-            ways: vec![way("lamp", 1, 2.0), way("lamp", 2, 5.0), way("bulb", 1, 9.0), way("bulb", 1, 0.0), asked],
+            ways: vec![way("light", 1, 2.0), way("light", 2, 5.0), way("bulb", 1, 9.0), way("bulb", 1, 0.0), asked],
             ..PixelStory::default()
         };
         let strengths = |shown: &WaysShown| -> Vec<f64> {
@@ -160,9 +160,9 @@ mod tests {
         let all = WaysShown { strongest: None, light: None, bounces: None };
         assert_eq!(strengths(&all), [0.0, 2.0, 5.0, 7.0, 9.0]);
         assert_eq!(strengths(&WaysShown { strongest: Some(2), ..all.clone() }), [7.0, 9.0]);
-        let of_lamp = WaysShown { light: Some("lamp".to_owned()), ..all.clone() };
-        assert_eq!(strengths(&of_lamp), [2.0, 5.0]);
-        assert_eq!(strengths(&WaysShown { bounces: Some(1), ..of_lamp }), [2.0]);
+        let of_light = WaysShown { light: Some("light".to_owned()), ..all.clone() };
+        assert_eq!(strengths(&of_light), [2.0, 5.0]);
+        assert_eq!(strengths(&WaysShown { bounces: Some(1), ..of_light }), [2.0]);
         assert_eq!(strengths(&WaysShown { light: Some("sky".to_owned()), ..all }), [7.0], "what was asked counts");
     }
 }

@@ -24,7 +24,7 @@ fn report(folder: &Path, args: &[&str]) -> serde_json::Value {
     serde_json::from_str(outcome.out.lines().last().unwrap()).unwrap()
 }
 
-/// A closed ball of 8 · 4ⁿ triangles: an octahedron, split and rounded.
+/// A closed sphere of 8 · 4ⁿ triangles: an octahedron, split and rounded.
 fn write_ball(path: &Path, splits: u32) {
     let mut triangles: Vec<[[f64; 3]; 3]> = Vec::new();
     for (x, y, z) in (0..8).map(|i| (f64::from(1 - (i & 2)), f64::from(1 - 2 * (i & 1)), f64::from(1 - (i & 4) / 2))) {

@@ -5,7 +5,7 @@ use assert_cmd::Command;
 use firstlight::frame::{Command as Ask, Explaining, Session, SessionOptions, Target};
 use firstlight::render::{
     Environment, Film, FoundBy, Integrator, LightSource, Place, Prepared, RenderSettings, advance, explain,
-    light_from_lamps, replay_sample,
+    light_traced, replay_sample,
 };
 use firstlight::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::{DVec3, UVec2, Vec3};
@@ -26,7 +26,7 @@ fn builtin(name: &str) -> (Prepared, RenderSettings) {
 fn an_explanation_has_the_samples_of_the_film_and_its_parts_add_up() {
     let size = UVec2::new(40, 32);
     let mut n_asked = 0;
-    // A lamp alone; with caustics; through a lens; under a sky, with metals and blends; several lamps.
+    // A light alone; with caustics; through a lens; under a sky, with metals and blends; several lights.
     for name in ["cornell", "cornell-balls", "dof-balls", "gallery", "veach-mis"] {
         let (scene, of_scene) = builtin(name);
         for lanes in [of_scene.lanes, None] {
@@ -48,8 +48,8 @@ fn an_explanation_has_the_samples_of_the_film_and_its_parts_add_up() {
                     let rim = |asked: firstlight::render::Asked| asked.source == LightSource::Rim;
                     assert!(!path.vertices.iter().any(|vertex| vertex.asked.is_some_and(rim)), "{at}: {path:?}");
                 }
-                let from_lamps = film.light_from_lamps(pixel.x, pixel.y);
-                let whole = (told.mean() + from_lamps).as_vec3();
+                let light_traced = film.light_traced(pixel.x, pixel.y);
+                let whole = (told.mean() + light_traced).as_vec3();
                 assert_eq!(
                     whole.to_array().map(f32::to_bits),
                     film.mean(pixel.x, pixel.y).to_array().map(f32::to_bits)
@@ -59,8 +59,8 @@ fn an_explanation_has_the_samples_of_the_film_and_its_parts_add_up() {
             }
             if lanes.is_some() {
                 let pixel = UVec2::new(20, 25);
-                let alone = light_from_lamps(&scene, &settings, size, pixel, 0..n, &NEVER).unwrap();
-                assert_eq!(alone, film.light_from_lamps(pixel.x, pixel.y), "{name}");
+                let alone = light_traced(&scene, &settings, size, pixel, 0..n, &NEVER).unwrap();
+                assert_eq!(alone, film.light_traced(pixel.x, pixel.y), "{name}");
             }
         }
     }
@@ -93,13 +93,13 @@ fn a_white_ball_under_a_sky_gets_all_of_its_light_from_one_bounce() {
 }
 
 #[test]
-fn lamps_are_told_apart_and_one_behind_a_wall_brings_nothing() {
+fn lights_are_told_apart_and_one_behind_a_wall_brings_nothing() {
     let camera = camera(Vec3::new(0.0, 1.0, 5.0), Vec3::new(0.0, 0.0, 0.0), 30.0);
     let shapes = vec![
         (plane(Vec3::ZERO, Vec3::Y), 0),
         (quad(Vec3::new(-2.0, 3.0, -1.0), Vec3::X, Vec3::Z), 1),
         (sphere(Vec3::new(1.5, 3.0, 0.0), 0.3), 1),
-        // The lamp in the box of the wall is the third light.
+        // The light in the box of the wall is the third light.
         (sphere(Vec3::new(0.0, 3.0, 0.0), 0.2), 1),
         (sphere(Vec3::new(0.0, 3.0, 0.0), 0.5), 2),
     ];

@@ -10,7 +10,7 @@ use firstlight::report::{ConvergenceCurve, CurveLimits, Key, LinearPicture, Refe
 use firstlight::scene::{Extraction, Fingerprint, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 use glam::Vec3;
 
-/// A room with lights of every shape, one much brighter than the others, matte, glossy and mirroring things.
+/// A room with lights of every shape, one much brighter than the others, diffuse, glossy and mirroring things.
 fn room() -> Prepared {
     let metal = Material::Metal {
         alpha: ScalarInput::Constant(0.2),
@@ -233,7 +233,7 @@ fn ctrl_c_writes_what_was_measured_and_leaves_no_empty_folder() {
     }
 }
 
-/// Where no rare, bright samples carry the error (no glint of a small lamp, no caustic), the estimate agrees with the true
+/// Where no rare, bright samples carry the error (no glint of a small light, no caustic), the estimate agrees with the true
 /// error within ×1.25 from 16 samples a pixel on: as root of the mean of squares over several renders. Elsewhere, what
 /// was not drawn yet cannot be told from the picture, and at this size the ratio is anything between 0.7 and 26.
 #[test]

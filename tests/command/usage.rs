@@ -128,7 +128,7 @@ fn an_environment_image_lights_any_scene_and_the_picture_knows_it() {
         assert!(!said.contains("warning"), "{said}");
         assert!(image::open(path.join(to)).unwrap().into_rgb8() == picture, "{to}");
     }
-    // A model loses its lamp: all light is that of the image.
+    // A model loses its light: all light is that of the image.
     let (told, _) = does(path, "info tent.obj --env sky.exr --json");
     let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
     assert_eq!((told["emissive_objects"].as_u64(), told["environment"].as_str()), (Some(0), Some("image, 8 x 4")));

@@ -28,7 +28,7 @@ pub fn quad(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Shape {
     Shape::Quad { corner, edge_u, edge_v }
 }
 
-/// A pinhole at `eye`; `vfov` in degrees.
+/// A pinhole at `camera`; `vfov` in degrees.
 pub fn camera(eye: Vec3, look_at: Vec3, vfov: f32) -> Camera {
     let forward = (look_at - eye).normalize();
     let right = forward.cross(if forward.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y }).normalize();

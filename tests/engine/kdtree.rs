@@ -287,7 +287,7 @@ fn copies_are_tested_once_and_hit_as_if_all_were_there() {
 
 #[test]
 fn no_ray_leaves_a_closed_mesh() {
-    // A ball of triangles around the origin, subdivided from an octahedron: seams on the axes, where splits lie.
+    // A sphere of triangles around the origin, subdivided from an octahedron: seams on the axes, where splits lie.
     let mut faces: Vec<[Vec3; 3]> = (0..8)
         .map(|i| {
             let s = |bit: usize| if i >> bit & 1 == 0 { 1.0 } else { -1.0 };

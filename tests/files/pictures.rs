@@ -125,7 +125,7 @@ fn parts_add_up_to_the_whole_bit_for_bit_in_any_order() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let render = |name: &str, samples: &str| {
-        // Sums of a lamp in the picture and of dark corners are those that rounding would tell apart.
+        // Sums of a light in the picture and of dark corners are those that rounding would tell apart.
         does(path, &format!("render cornell-balls -o {name}.png --film {name}.exr --size 40x33 --samples {samples}"));
     };
     render("whole", "0..128");

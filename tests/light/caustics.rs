@@ -1,4 +1,4 @@
-//! Light that smooth surfaces gather, found by paths from the lamps and from the eye together.
+//! Light that smooth surfaces gather, found by light paths and from the camera together.
 
 use crate::common::*;
 use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
@@ -40,7 +40,7 @@ fn mean_of_renders(scene: &Prepared, settings: RenderSettings, size: (u32, u32),
     (mean, (variance / n).sqrt())
 }
 
-/// A room with a lamp, a floor and something smooth.
+/// A room with a light, a floor and something smooth.
 fn room(smooth: Vec<(Shape, u32)>, lamp: Shape, camera: Camera) -> Prepared {
     let mut shapes = vec![
         (plane(Vec3::ZERO, Vec3::Y), 0),
@@ -56,7 +56,7 @@ fn eye() -> Camera {
     camera(Vec3::new(0.3, 1.6, 4.0), Vec3::new(0.0, 0.4, 0.0), 40.0)
 }
 
-fn quad_lamp() -> Shape {
+fn quad_light() -> Shape {
     quad(Vec3::new(-0.3, 2.6, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6)
 }
 
@@ -66,8 +66,8 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
     (lens.lens_radius, lens.focus_distance, lens.blades) = (0.2, 4.0, 5);
     let mirror_quad = quad(Vec3::new(-1.8, 0.0, 1.0), Vec3::new(0.2, 0.0, -2.0), Vec3::new(-0.3, 1.5, 0.0));
     let cases = [
-        ("a glass ball", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), eye())),
-        ("through a lens", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), lens)),
+        ("a glass ball", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_light(), eye())),
+        ("through a lens", room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_light(), lens)),
         (
             "a mirror ball under a ball lamp",
             room(vec![(sphere(Vec3::new(0.4, 0.5, 0.0), 0.5), 3)], sphere(Vec3::new(-1.0, 2.0, 0.5), 0.3), eye()),
@@ -81,7 +81,7 @@ fn the_mean_is_that_of_paths_from_the_eye_alone() {
                     (sphere(Vec3::new(0.7, 0.5, 0.0), 0.5), 2),
                     (sphere(Vec3::new(0.7, 0.5, 0.0), 0.2), 2),
                 ],
-                quad_lamp(),
+                quad_light(),
                 eye(),
             ),
         ),
@@ -120,7 +120,7 @@ fn a_camera_under_water_sees_the_same_with_and_without_them() {
 
 #[test]
 fn every_filter_sees_the_same_light() {
-    let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), eye());
+    let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_light(), eye());
     for filter in [PixelFilter::Tent, PixelFilter::BlackmanHarris, PixelFilter::Mitchell] {
         let mean = |settings: RenderSettings, spp| {
             mean_of_renders(&scene, RenderSettings { filter, ..settings }, (12, 9), spp, 12)
@@ -144,7 +144,7 @@ fn error(film: &Film, truth: &Film) -> f64 {
 
 #[test]
 fn a_caustic_comes_many_times_sooner() {
-    // The floor behind the ball, where the light of the lamp is gathered; the ball itself is out of sight.
+    // The floor behind the sphere, where the light of the emitter is gathered; the sphere itself is out of sight.
     let view = camera(Vec3::new(0.0, 0.4, -1.95), Vec3::new(0.0, 0.0, -1.0), 30.0);
     let lamp = quad(Vec3::new(-0.15, 1.5, 2.0), Vec3::new(0.0, 0.2, 0.2), Vec3::X * 0.3);
     let ball = (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2);
@@ -159,8 +159,8 @@ fn a_caustic_comes_many_times_sooner() {
 }
 
 #[test]
-fn scenes_without_smooth_surfaces_or_lamps_take_no_notice() {
-    let matte = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 0)], quad_lamp(), eye());
+fn scenes_without_smooth_surfaces_or_lights_take_no_notice() {
+    let matte = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 0)], quad_light(), eye());
     // Light from everywhere: bounces find it as well as anything could.
     let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::Y * 0.5, 0.5), 1)];
     let dark = scene(shapes, vec![diffuse(0.6), GLASS], Environment::Constant(Vec3::ONE), eye());
@@ -176,7 +176,7 @@ fn scenes_without_smooth_surfaces_or_lamps_take_no_notice() {
 fn any_number_of_threads_and_any_portions_give_the_same_bits() {
     let mut lens = eye();
     (lens.lens_radius, lens.focus_distance) = (0.2, 4.0);
-    let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_lamp(), lens);
+    let scene = room(vec![(sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)], quad_light(), lens);
     let settings = RenderSettings { filter: PixelFilter::Gaussian, ..settings(3, true) };
     let picture = |threads, tile_size, portions: &[u32]| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -211,7 +211,7 @@ fn block(center: Vec3, size: Vec3, material: u32) -> (Shape, Object) {
     (Shape::Mesh { tree, world_from_object }, Object { mesh: Some(mesh), ..Object::plain(material) })
 }
 
-/// A lamp above a floor, and bodies between them.
+/// A light above a floor, and bodies between them.
 fn bench(bodies: Vec<(Shape, Object)>, ior: f32) -> Prepared {
     let mut parts = bodies;
     parts.push((plane(Vec3::new(0.0, -1.1, 0.0), Vec3::Y), Object::plain(0)));

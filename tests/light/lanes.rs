@@ -27,7 +27,7 @@ fn scaled(scale: Vec3, to: Vec3) -> Affine3A {
     Affine3A::from_translation(to) * Affine3A::from_scale(scale)
 }
 
-/// A small cloud of balls.
+/// A small cloud of spheres.
 fn cloud(to: Vec3) -> Shape {
     let centers: Vec<Vec3> = (0..30).map(|i| Vec3::new((i % 6) as f32, (i / 6 % 2) as f32, (i / 12) as f32)).collect();
     let radii: Vec<f32> = (0..30).map(|i| 0.2 + 0.01 * i as f32).collect();
@@ -40,7 +40,7 @@ fn room(lights: Vec<(Shape, Option<Arc<Mesh>>)>, environment: Environment, air: 
     room_with(lights, false, environment, air)
 }
 
-/// - `as_points`: the balls among the lights stand for point lights.
+/// - `as_points`: the spheres among the lights stand for point lights.
 fn room_with(
     lights: Vec<(Shape, Option<Arc<Mesh>>)>,
     as_points: bool,
@@ -83,7 +83,7 @@ fn room_with(
         Material::Glass { ior: 1.2, absorption: Vec3::ZERO },
         emissive(7.0),
         Material::Diffuse { albedo: ColorInput::Texture(1) },
-        // Matte under metal, metal that is matte in places, and the classic kind.
+        // Diffuse under metal, metal that is diffuse in places, and the classic kind.
         Material::Blend { weight: ScalarInput::Constant(0.3), a: 6, b: 5 },
         Material::Blend { weight: ScalarInput::Constant(0.6), a: 4, b: 10 },
         Material::Phong {
@@ -188,7 +188,7 @@ fn compare_with_one_at_a_time(integrator: Integrator) {
     }
 }
 
-/// Paths from the lamps are in films alone: whole pictures, with the same numbers for both.
+/// Light paths are in films alone: whole pictures, with the same numbers for both.
 #[test]
 fn lanes_light_what_one_path_at_a_time_lights() {
     let mut n_lit = 0;

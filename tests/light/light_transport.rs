@@ -8,7 +8,7 @@ fn settings(seed: u32) -> RenderSettings {
     RenderSettings { seed, ..RenderSettings::default() }
 }
 
-/// Irradiance at a floor point from a ball overhead is π L (r/d)² cos θ while all of it is above the horizon, so the
+/// Irradiance at a floor point from a sphere overhead is π L (r/d)² cos θ while all of it is above the horizon, so the
 /// floor shows albedo · L · (r/d)² cos θ. The values of the 2013 system's check: 0.444, 0.318, 0.0605.
 #[test]
 fn floor_under_a_ball_light_has_its_closed_form() {
@@ -140,7 +140,7 @@ fn a_corridor_of_mirrors_dims_by_the_reflectance_each_time() {
 
 #[test]
 fn absorption_follows_beer_and_lambert() {
-    // Straight through the middle of a ball of index 1: only absorption is left.
+    // Straight through the middle of a sphere of index 1: only absorption is left.
     let scene = scene(
         vec![(sphere(Vec3::ZERO, 1.0), 0)],
         vec![Material::Glass { ior: 1.0, absorption: Vec3::new(0.2, 0.5, 0.0) }],
@@ -208,13 +208,13 @@ fn one_sample_can_be_replayed_alone() {
                 replay_sample(&scene, &settings(9), UVec2::new(16, 12), at).as_dvec3()
             })
             .sum();
-        assert_eq!((sum / 4.0 + film.light_from_lamps(x, y)).as_vec3(), film.mean(x, y), "pixel {x}, {y}");
+        assert_eq!((sum / 4.0 + film.light_traced(x, y)).as_vec3(), film.mean(x, y), "pixel {x}, {y}");
     }
 }
 
-/// Many small lamps side by side are one large lamp, whichever of them is asked.
+/// Many small lights side by side are one large light, whichever of them is asked.
 #[test]
-fn a_lamp_in_pieces_shines_like_the_whole() {
+fn a_light_in_pieces_shines_like_the_whole() {
     let room = |side: u32| {
         let (corner, edge) = (Vec3::new(-1.0, 2.0, -0.5), Vec3::new(2.0, 0.4, 0.0));
         let (u, v) = (edge / side as f32, Vec3::Z / side as f32);

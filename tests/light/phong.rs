@@ -47,7 +47,7 @@ fn point_lit(shapes: Vec<(Shape, u32)>, materials: Vec<Material>, eye: Vec3, loo
     Prepared::new(Snapshot::new(geometry, shading, camera(eye, look_at, 1e-3)))
 }
 
-/// A ball of radiant intensity 1 in every direction.
+/// A sphere of radiant intensity 1 in every direction.
 const POINT: f32 = 0.01;
 
 fn unit_point() -> Material {
@@ -84,7 +84,7 @@ fn point_lights_within_the_scene_cast_hard_shadows() {
         (sphere(Vec3::Y * 2.0, POINT), 1),
         (sphere(Vec3::Y * 9.0, 0.1), 0),
     ];
-    // The ball of radius 1/2 seen from one metre above it covers the floor up to 2 · tan(asin(1/2)) = 1.1547 m.
+    // The sphere of radius 1/2 seen from one metre above it covers the floor up to 2 · tan(asin(1/2)) = 1.1547 m.
     for (x, lit) in [(0.3, false), (1.15, false), (1.16, true), (3.0, true)] {
         let target = Vec3::new(x, 0.0, 0.0);
         let scene =
@@ -157,7 +157,7 @@ fn a_white_furnace_stays_white() {
         let scene = scene(vec![(sphere(Vec3::ZERO, 0.9), 0)], vec![material], even.clone(), view);
         let (film, _) = render(&scene, &PHONG, 16, 16, 64);
         let (mean, _) = picture_mean(&film);
-        // The matte part of the last one gives back no ambient light: it may only lose.
+        // The diffuse part of the last one gives back no ambient light: it may only lose.
         assert!(mean < 1.0 + 2e-3 && mean > 1.0 - bound, "{name}: {mean}");
     }
     // Surroundings that are sampled: all of a metal's light comes by its highlight.
@@ -171,7 +171,7 @@ fn a_white_furnace_stays_white() {
     assert!((mean - 1.0).abs() < 0.01 + 4.0 * error, "highlight: {mean} ± {error}");
 }
 
-/// A highlight narrower than the lamp in it was found by chance alone: most samples were black, and a few very bright.
+/// A highlight narrower than the light in it was found by chance alone: most samples were black, and a few very bright.
 /// Each surface splits a ray in two; the rays of a sample stay a number that does not grow with the surfaces.
 #[test]
 fn fifty_shells_of_glass_do_not_multiply_the_rays() {
@@ -189,14 +189,14 @@ fn fifty_shells_of_glass_do_not_multiply_the_rays() {
 }
 
 #[test]
-fn polished_metal_shows_a_large_lamp_without_speckles() {
+fn polished_metal_shows_a_large_light_without_speckles() {
     let metal = |alpha: f32| Material::Metal {
         alpha: ScalarInput::Constant(alpha),
         reflectance: ColorInput::Constant(Vec3::ONE),
         fresnel: Fresnel::Constant,
         compensate: false,
     };
-    // The mirror image of the lamp is far wider than the view and the lobe.
+    // The mirror image of the light is far wider than the view and the lobe.
     let shapes = vec![
         (quad(Vec3::new(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::Z * -2.0), 0),
         (sphere(Vec3::new(0.0, 6.0, -6.0), 4.0), 1),
@@ -205,23 +205,23 @@ fn polished_metal_shows_a_large_lamp_without_speckles() {
     for alpha in [0.005, 0.02, 0.05] {
         let scene = scene(shapes.clone(), vec![metal(alpha), emissive(3.0)], Environment::Black, view);
         let (film, _) = render(&scene, &PHONG, 12, 12, 4);
-        // What one way brings where the other is as good is half of the lamp at most.
+        // What one way brings where the other is as good is half of the light at most.
         let off: Vec<f32> = film.means().iter().map(|found| (found.x / 3.0 - 1.0).abs()).collect();
         let rms = (off.iter().map(|off| off * off).sum::<f32>() / off.len() as f32).sqrt();
         let most = off.iter().copied().fold(0.0, f32::max);
         assert!(rms < 0.1 && most <= 0.5, "alpha {alpha}: rms {rms}, most {most}");
     }
-    // Dull metal reaches beyond the lamp's rim: both ways of finding it agree with much of one of them.
+    // Dull metal reaches beyond the light's rim: both ways of finding it agree with much of one of them.
     let dull = |lamps: usize| {
         let mut shapes = shapes.clone();
-        // So many lamps that one of them is asked at a time.
+        // So many lights that one of them is asked at a time.
         shapes.extend((1..lamps).map(|i| (sphere(Vec3::new(40.0 + i as f32, 0.2, 0.0), 0.1), 1)));
         let scene = scene(shapes, vec![metal(0.3), emissive(3.0)], Environment::Black, view);
         picture_mean(&render(&scene, &PHONG, 8, 8, 1024).0)
     };
     let ((one, error), (many, error_many)) = (dull(1), dull(20));
     assert!((one - many).abs() < 4.0 * error.hypot(error_many) + 1e-3, "{one} ± {error}, {many} ± {error_many}");
-    // ∫ over the lamp of (n + 1) / 2π · cosⁿ, with n = (1 / 0.09 − 1) / 2, about its centre's direction.
+    // ∫ over the light of (n + 1) / 2π · cosⁿ, with n = (1 / 0.09 − 1) / 2, about its centre's direction.
     let n = 0.5 / 0.09 - 0.5;
     let cos_rim = (1.0 - 16.0 / 72.0_f64).sqrt();
     let expected = 3.0 * (1.0 - cos_rim.powf(n + 1.0));

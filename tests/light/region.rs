@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 const NEVER: fn() -> bool = || false;
 
-/// A lamp over a floor; with `glass`, caustics on it.
+/// A light over a floor; with `glass`, caustics on it.
 fn room(glass: bool) -> Prepared {
     let lamp: Shape = quad(Vec3::new(-0.3, 2.6, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
     let ball = (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), if glass { 2 } else { 0 });
@@ -27,9 +27,9 @@ fn film() -> Film {
     Film::with_tile_size(SIZE.x, SIZE.y, 8)
 }
 
-/// What paths from the eye have found; light from the lamps falls anywhere.
+/// What camera paths have found; traced light falls anywhere.
 fn from_the_eye(film: &Film, x: u32, y: u32) -> [u32; 3] {
-    (film.mean(x, y).as_dvec3() - film.light_from_lamps(x, y)).as_vec3().to_array().map(f32::to_bits)
+    (film.mean(x, y).as_dvec3() - film.light_traced(x, y)).as_vec3().to_array().map(f32::to_bits)
 }
 
 fn same_picture(a: &Film, b: &Film) -> bool {
@@ -71,7 +71,7 @@ fn only_the_region_gets_samples_and_they_are_those_of_a_whole_picture() {
             let like = if region.contains(x, y) { &many } else { &few };
             assert_eq!(film.samples(x, y), like.samples(x, y));
             if glass {
-                let [a, b] = [&film, like].map(|film| film.mean(x, y).as_dvec3() - film.light_from_lamps(x, y));
+                let [a, b] = [&film, like].map(|film| film.mean(x, y).as_dvec3() - film.light_traced(x, y));
                 assert!((a - b).abs().max_element() <= 1e-6 * (1.0 + b.max_element()), "{x},{y}: {a} {b}");
             } else {
                 assert_eq!(from_the_eye(&film, x, y), from_the_eye(like, x, y), "{x},{y}");

@@ -57,7 +57,7 @@ fn assert_same_mean(name: &str, scene: &Prepared, [a, b]: [(Techniques, u32); 2]
     assert!(deviation < precision * expected, "{name}: too noisy to tell: {deviation} of {expected}");
 }
 
-/// A frosted pane before lamps and a floor, a frosted ball, and what else is told.
+/// A frosted pane before lights and a floor, a frosted sphere, and what else is told.
 fn room(sky: f32, lamps: Vec<Shape>, alpha: f32, others: Vec<(Shape, u32)>) -> Prepared {
     let mut shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0)];
     shapes.extend(lamps.into_iter().map(|lamp| (lamp, 1)));
@@ -85,7 +85,7 @@ fn room(sky: f32, lamps: Vec<Shape>, alpha: f32, others: Vec<(Shape, u32)>) -> P
     )
 }
 
-fn large_lamp() -> Vec<Shape> {
+fn large_light() -> Vec<Shape> {
     vec![sphere(Vec3::new(-0.5, 1.6, -1.6), 0.7)]
 }
 
@@ -99,9 +99,9 @@ fn light_is_the_same_by_bounces_and_by_asking_for_it() {
     };
     let in_glass = vec![(sphere(Vec3::new(0.7, 0.5, 0.2), 0.3), 7), (sphere(Vec3::new(0.1, 0.25, 1.0), 0.25), 4)];
     for (name, lamps, alpha) in [
-        ("one lamp", large_lamp(), 0.3),
-        ("one lamp, narrow lobes", large_lamp(), 0.02),
-        ("one lamp, wide lobes", large_lamp(), 1.0),
+        ("one lamp", large_light(), 0.3),
+        ("one lamp, narrow lobes", large_light(), 0.02),
+        ("one lamp, wide lobes", large_light(), 1.0),
         ("three lamps", several(3), 0.3),
         ("twenty lamps", several(20), 0.2),
     ] {
@@ -110,10 +110,10 @@ fn light_is_the_same_by_bounces_and_by_asking_for_it() {
     }
 }
 
-/// A lamp that only a mirror and a smooth ball send light of, through rough surfaces on the way to the eye: its light is found
+/// A light that only a mirror and a smooth sphere send light of, through rough surfaces on the way to the camera: its light is found
 /// from both ends.
 #[test]
-fn paths_from_lamps_and_from_the_eye_agree() {
+fn paths_from_lights_and_from_the_eye_agree() {
     let mirror_quad = quad(Vec3::new(-1.8, 0.0, -1.0), Vec3::new(2.4, 0.0, -0.4), Vec3::new(0.0, 1.6, 0.3));
     let lamp = || vec![quad(Vec3::new(-0.4, 2.4, 1.2), Vec3::X * 0.8, Vec3::Z * 0.8)];
     let off = Techniques { caustics: false, ..Techniques::ALL };
@@ -161,7 +161,7 @@ fn a_little_roughness_looks_like_none() {
         let mut shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::new(-0.5, 1.6, -1.6), 0.7), 1)];
         shapes.push((sphere(Vec3::new(0.0, 0.6, 0.6), 0.6), 2));
         let scene = scene(shapes, vec![diffuse(0.6), emissive(6.0), material], Environment::Constant(Vec3::ONE), eye());
-        // Without paths from lamps: they know of smooth glass alone.
+        // Without light paths: they know of smooth glass alone.
         let techniques = Techniques { caustics: false, ..Techniques::ALL };
         let settings = RenderSettings { techniques, ..RenderSettings::default() };
         render(&scene, &settings, 32, 24, 256).0.means()
@@ -187,7 +187,7 @@ fn a_little_roughness_looks_like_none() {
 fn in_an_even_world_it_takes_light_away_and_adds_none() {
     for (alpha, ior) in [(0.01, 1.5), (0.1, 1.5), (0.3, 1.5), (0.3, 0.7), (0.3, 1.01), (1.0, 1.5), (1.0, 2.4)] {
         let mut last = f64::INFINITY;
-        // A ball, in glass, and seen from inside: there the world is n² as bright.
+        // A sphere, in glass, and seen from inside: there the world is n² as bright.
         for (inside, lanes) in [(false, true), (false, false), (true, true)] {
             let shapes = vec![(sphere(Vec3::ZERO, 1.0), 0), (sphere(Vec3::new(0.1, 0.0, 0.0), 0.5), 1)];
             let eye = if inside {

@@ -1,7 +1,7 @@
 //! Smooth normals on a coarse mesh: how far its shading is from that of the smooth surface which they tell of.
 //!
-//! A ball of flat triangles with the normals of a true one, lit from the side, so that the line between light and
-//! shadow runs across the picture. Where a shadow ray starts on the flat triangle, those in the way are the ball's own
+//! A sphere of flat triangles with the normals of a true one, lit from the side, so that the line between light and
+//! shadow runs across the picture. Where a shadow ray starts on the flat triangle, those in the way are the sphere's own
 //! and the line comes out as saw teeth. `cargo test --test light terminator:: -- --nocapture` prints the table of
 //! `docs/scenes.md`.
 
@@ -31,7 +31,7 @@ fn tree(mesh: &Mesh) -> Arc<MeshTree> {
     Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best))
 }
 
-/// The renderer's picture of a shape of matte paint under one point light, one sample a pixel.
+/// The renderer's picture of a shape of diffuse paint under one point light, one sample a pixel.
 fn rendered(shape: Shape, mesh: Option<Arc<Mesh>>) -> Vec<f32> {
     let light = Shape::Sphere { center: LIGHT, radius: LIGHT_RADIUS };
     let objects = vec![Object { mesh, ..Object::plain(0) }, Object { is_point_light: true, ..Object::plain(1) }];
@@ -82,7 +82,7 @@ fn plain(mesh: &Mesh) -> Vec<f32> {
     (0..SIDE * SIDE).map(|i| shade(i).unwrap_or(0.0)).collect()
 }
 
-/// The true ball on paper, through the middles of the pixels as [`plain`] looks.
+/// The true sphere on paper, through the middles of the pixels as [`plain`] looks.
 fn true_at_centers() -> Vec<f32> {
     let shade = |i: u32| {
         let film = Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5);
@@ -99,9 +99,9 @@ fn true_at_centers() -> Vec<f32> {
 }
 
 /// RMS and largest difference, percent of the brightest pixel, over the inner part of the disc, where rays meet
-/// ball and mesh alike.
+/// sphere and mesh alike.
 fn difference(picture: &[f32], truth: &[f32]) -> (f64, f64) {
-    // Half of the picture is 60 m · tan 1° = 1.047 balls.
+    // Half of the picture is 60 m · tan 1° = 1.047 spheres.
     let inner = |i: u32| {
         let at = Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32 * 2.0 - 1.0;
         at.length() * 1.047 < 0.9
@@ -128,7 +128,7 @@ fn coarse_balls_are_shaded_like_true_ones() {
             "| {} | {plain_rms:.2} % | {plain_largest:.1} % | {rms:.2} % | {largest:.1} % |",
             mesh.triangles.len()
         );
-        // What is left in the mean is what flat places and blended normals cost anywhere on the ball, teeth or not.
+        // What is left in the mean is what flat places and blended normals cost anywhere on the sphere, teeth or not.
         assert!(rms < plain_rms, "{frequency}: {rms} against {plain_rms}");
         // Nothing left of the teeth: no pixel is wrong by more than a grazing facet may turn.
         assert!(largest < 0.5 * plain_largest, "{frequency}: {largest} against {plain_largest}");

@@ -6,7 +6,7 @@ use firstlight::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load}
 use glam::Vec3;
 use std::path::Path;
 
-/// Renders a scene file of `objects` seen from `eye` towards `look_at`; returns the colour in the middle.
+/// Renders a scene file of `objects` seen from `camera` towards `look_at`; returns the colour in the middle.
 fn middle(dir: &Path, objects: &str, eye: &str, look_at: &str, integrator: Integrator) -> Vec3 {
     let settings = RenderSettings { integrator, ..RenderSettings::default() };
     middle_with(dir, objects, eye, look_at, &settings, 64)
@@ -157,7 +157,7 @@ fn textures_drive_albedo_and_roughness() {
              sphere(center: (0.5, 0.5, 2), radius: 0.2, material: \"photo\")"
         )
     };
-    // Matte under surroundings of one: the colour itself, but for what the small green lamp adds or covers.
+    // Diffuse under surroundings of one: the colour itself, but for what the small green light adds or covers.
     let seen = |material: &str, x: f64, y: f64| {
         let (eye, target) = (format!("({x}, {y}, 3)"), format!("({x}, {y}, 0)"));
         middle(dir.path(), &quad(material), &eye, &target, Integrator::Path)
@@ -195,10 +195,10 @@ fn a_checker_to_the_horizon_converges_to_its_mean() {
     assert!((found.x - 0.5).abs() < 0.2 && (found.z - 0.5).abs() < 0.2, "{found}");
 }
 
-/// A lamp that is a mesh with a picture, mirrored or not, over a matte quad in the dark corner beside it: those that ask the
-/// lamp find the light of those that run into it.
+/// A light that is a mesh with a picture, mirrored or not, over a diffuse quad in the dark corner beside it: those that ask the
+/// light find the light of those that run into it.
 #[test]
-fn textured_lamps_of_meshes_send_what_is_seen_of_them() {
+fn textured_lights_of_meshes_send_what_is_seen_of_them() {
     let dir = folder();
     for placed in
         ["rotate: (90, 0, 0), translate: (0, 1, -1)", "rotate: (90, 0, 0), scale: (-1, 1, 1), translate: (2, 1, -1)"]

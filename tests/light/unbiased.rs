@@ -3,7 +3,7 @@
 //! Each scene is rendered many times with seeds of their own: with all techniques, and with as few as find its light at
 //! all. Student's t for unequal variances (Welch 1947) compares the two, pixel by pixel and over the whole picture.
 //!
-//! Point lights are made larger first: plain paths that a mirror sends their way would hit the small balls that they are
+//! Point lights are made larger first: plain paths that a mirror sends their way would hit the small spheres that they are
 //! so seldom that a mean of thousands of samples lacks their light, a hundredth of some of the scenes.
 
 use firstlight::render::{Film, Integrator, Prepared, RenderSettings, Techniques, advance};
@@ -15,7 +15,7 @@ const WIDTH: u32 = 24;
 const HEIGHT: u32 = 18;
 const RENDERS: u32 = 24;
 
-/// As few techniques as find the light of small lamps.
+/// As few techniques as find the light of small lights.
 const PLAIN: Techniques = Techniques {
     light_sampling: true,
     mis: true,
@@ -96,7 +96,7 @@ fn all_techniques_together_have_the_mean_of_the_plain_ones() {
         let all = estimates(&renders(&scene, all, 1000, n_all));
         let plain = estimates(&renders(&scene, RenderSettings { techniques: PLAIN, ..settings }, 2000, n_plain));
         let (whole, pixels) = (all.len() - 1, 0..all.len() - 1);
-        // What shows the same in every render, such as a lamp that is seen alone, is equal to the last bits.
+        // What shows the same in every render, such as a light that is seen alone, is equal to the last bits.
         let (t, error) = (
             all[whole].differs_by(plain[whole]),
             (all[whole].variance + plain[whole].variance).sqrt() / all[whole].mean,

@@ -147,7 +147,7 @@ fn a_drag_is_one_step_and_counts_from_where_it_began() {
     assert_eq!(after.translation, before.translation + 2.5 * DVec3::X);
     driver.edit([Edit::Undo]);
     assert_eq!(driver.get::<Placement>("red ball"), before);
-    // A ball that is scaled along one axis stays one, or it could not be drawn.
+    // A sphere that is scaled along one axis stays one, or it could not be drawn.
     driver.edit([Edit::Scale { factors: DVec3::new(1.5, 1.0, 1.0) }]);
     assert_eq!(driver.get::<Placement>("red ball").even_scale(), Some(1.5));
     driver.edit([Edit::Undo]);

@@ -75,7 +75,7 @@ fn the_mouse_looks_orbits_or_is_captured_and_flies_as_fast_as_what_is_under_it_i
         program.key("Home");
         camera_when(&program, "the view home", |now| *now == home)
     };
-    // First person: the eye stays. In orbit: what is looked at stays.
+    // First person: the camera stays. In orbit: what is looked at stays.
     program.drag(1, (300, 200), (50, 0));
     let looked = camera_when(&program, "the view to turn", |now| target(now) != target(&home));
     assert_eq!(looked.eye, home.eye);
@@ -167,7 +167,7 @@ fn focus_goes_where_it_is_clicked_dragged_or_pointed() {
 #[test]
 fn a_pixel_is_explained_and_a_rectangle_gets_all_samples() {
     let Some(desktop) = Desktop::start() else { return };
-    // Without glass, no light from the lamps falls outside of a rectangle.
+    // Without glass, no traced light falls outside of a rectangle.
     let program = open(&desktop, "cornell");
     program.key("p");
     program.point_at(330, 300);

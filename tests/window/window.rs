@@ -79,7 +79,7 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     assert!(has_content(&first), "{:?}", content(&first));
     let home = camera(&program);
 
-    // Fly: the eye goes where it looks, and looks where it looked.
+    // Fly: the camera goes where it looks, and looks where it looked.
     program.hold("w", 300);
     let flown = camera_when(&program, "the eye to move", |now| now.eye != home.eye);
     let (step, ahead) = (flown.eye - home.eye, (target(&home) - home.eye).normalize());
@@ -87,7 +87,7 @@ fn a_person_flies_focuses_keeps_pictures_and_leaves() {
     assert!(step.normalize().dot(ahead) > 1.0 - 1e-9, "{step}");
     assert!((target(&flown) - flown.eye).normalize().dot(ahead) > 1.0 - 1e-9);
 
-    // Look about: the eye stays.
+    // Look about: the camera stays.
     program.drag(1, (300, 200), (60, 0));
     let looked = camera_when(&program, "the view to turn", |now| target(now) != target(&flown));
     assert_eq!(looked.eye, flown.eye);
@@ -265,7 +265,7 @@ fn a_person_edits_inspects_and_takes_it_back() {
     assert!(program.ended().success());
 }
 
-/// Deletes the ball in front, and waits until the title says that there are changes.
+/// Deletes the sphere in front, and waits until the title says that there are changes.
 fn delete_something(program: &Program, title: &str) {
     until("the box to be seen", || has_content(&program.pixels()).then_some(()));
     until("a clean title", || (program.title() == format!("firstlight — {title}")).then_some(()));

@@ -103,7 +103,7 @@ impl LeafBlock for QuadBlock {
     }
 }
 
-/// Balls by centre and radius.
+/// Spheres by centre and radius.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct SphereBlock {

@@ -129,7 +129,7 @@ fn choose<S: KernelSimd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sh
     [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
 }
 
-/// Where rays meet balls in front of them (`geometry::intersect_sphere`): the near side, from inside the far one.
+/// Where rays meet spheres in front of them (`geometry::intersect_sphere`): the near side, from inside the far one.
 ///
 /// - `to_center`: from the origin of the ray.
 /// - `inv_dir_squared`: `1 / (dir · dir)`.

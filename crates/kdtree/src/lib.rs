@@ -1,6 +1,6 @@
 //! Which surface does a ray meet first, and is anything in its way? Asked in batches.
 //!
-//! [`SceneTree`] stands above the objects of a scene; a mesh brings a [`MeshTree`] and a cloud of balls a
+//! [`SceneTree`] stands above the objects of a scene; a mesh brings a [`MeshTree`] and a cloud of spheres a
 //! [`SphereTree`], each built once in the space of its own and shared by all objects that use it.
 //! Knows nothing of materials or entities: positions go in, hits come out.
 

@@ -1,4 +1,4 @@
-//! Sixteen rays side by side through one mesh or one cloud of balls: for rays that go the same way.
+//! Sixteen rays side by side through one mesh or one cloud of spheres: for rays that go the same way.
 //!
 //! All rays of a packet visit a node together, as long as one of them has business there. Rays of different octants
 //! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
@@ -37,7 +37,7 @@ pub(super) struct NearestLanes {
 
 /// What packets test in leaves.
 pub(super) trait PacketBlock: LeafBlock {
-    /// What the test of balls wants to know of the rays.
+    /// What the test of spheres wants to know of the rays.
     type Frame<S: KernelSimd>: Copy;
 
     /// Whether a [`Footprint`] is of any use.
@@ -396,7 +396,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         }
     }
 
-    /// Whichever are fewer, balls or rays, one after the other.
+    /// Whichever are fewer, spheres or rays, one after the other.
     #[inline(always)]
     fn test_balls(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, mut mask: Mask) {
         let n_balls = block.prims().len();
@@ -416,7 +416,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         }
     }
 
-    /// One ball against all rays.
+    /// One sphere against all rays.
     #[inline(always)]
     fn test_ball(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, lane: usize, mask: Mask) {
         let (center, radius) = block.sphere(lane % BLOCK);

@@ -1,6 +1,6 @@
 //! The simple objects of a scene as flat records, and the packet of sixteen rays that is tested against them.
 //!
-//! Most scenes have a handful of walls and balls. Testing sixteen rays against each of them without any
+//! Most scenes have a handful of walls and spheres. Testing sixteen rays against each of them without any
 //! branch costs less than finding out which ones to leave away, however little the rays have in common.
 
 use super::batch::{HitBatch, RayBatch};
@@ -232,7 +232,7 @@ impl<S: KernelSimd> Packet<S> {
         }
     }
 
-    /// Tests every ball of a cloud.
+    /// Tests every sphere of a cloud.
     ///
     /// - `origin`, `dir`: in its space.
     #[inline(always)]
@@ -253,7 +253,7 @@ impl<S: KernelSimd> Packet<S> {
             let radius_squared = s.splat_d(f64::from(*radius).powi(2));
             let hits = sphere_hits(s, self.lanes, &to_center, radius_squared, &wide.dir, wide.inv_dir_squared);
             if hits.mask != 0 {
-                // The first of balls at equal distance is there already.
+                // The first of spheres at equal distance is there already.
                 let take = self.offer(s, hits, object);
                 self.prim = s.select_u(take, s.splat_u(prim), self.prim);
             }

@@ -1,4 +1,4 @@
-//! Kd-tree over many balls that share one material, in the space of their object.
+//! Kd-tree over many spheres that share one material, in the space of their object.
 
 use super::block_tree::BlockTree;
 use super::blocks::SphereBlock;
@@ -22,14 +22,14 @@ struct BallPrimitives<'a> {
     radii: &'a [f32],
 }
 
-/// The box around a ball, rounded outwards.
+/// The box around a sphere, rounded outwards.
 pub(super) fn ball_bounds(center: Vec3, radius: f32) -> Aabb {
     let (min, max) = (center - radius, center + radius);
     let slack = super::ray::WIDEN * (center.abs() + radius);
     Aabb { min: min - slack, max: max + slack }
 }
 
-/// The box around the part of a ball on one side of a plane: the rim of the cap may be narrower than the ball.
+/// The box around the part of a sphere on one side of a plane: the rim of the cap may be narrower than the ball.
 /// Arguments as in [`Primitives::clipped`].
 pub(super) fn clip_ball(center: Vec3, radius: f32, axis: usize, limit: f32, below: bool, padding: f32) -> Aabb {
     let mut bounds = ball_bounds(center, radius);
@@ -86,12 +86,12 @@ impl SphereTree {
         Self { centers, radii, tree }
     }
 
-    /// The box around all balls; empty if there are none.
+    /// The box around all spheres; empty if there are none.
     pub fn bounds(&self) -> Aabb {
         self.tree.nodes.bounds
     }
 
-    /// Centre and radius of one ball, in the space of the object.
+    /// Centre and radius of one sphere, in the space of the object.
     #[inline]
     pub fn sphere(&self, prim: u32) -> (Vec3, f32) {
         (self.centers[prim as usize], self.radii[prim as usize])
@@ -107,7 +107,7 @@ impl SphereTree {
         self.centers.is_empty()
     }
 
-    /// Offers the balls along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
+    /// Offers the spheres along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
         let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.tree.extent);
         let wide = RayF64::new(ray);

@@ -198,7 +198,7 @@ pub fn quad_rim(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> QuadRim {
     QuadRim { normal: cross.normalize(), error, least }
 }
 
-/// Error of a point of a ball along each axis, without the rounding of the point itself: next to the origin, where `f32` has
+/// Error of a point of a sphere along each axis, without the rounding of the point itself: next to the origin, where `f32` has
 /// more digits than the centre has in `f64`, those of `f64` count.
 #[inline]
 pub fn sphere_error(center: Vec3, radius: f32) -> f32 {

@@ -1,6 +1,6 @@
 //! Batches of rays through a scene: which objects are tested by which traversal.
 //!
-//! A handful of simple objects, and of balls in a cloud, is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
+//! A handful of simple objects, and of spheres in a cloud, is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
 //! box of an instance go on through its own tree, as a packet when the caller says that they belong together, otherwise
 //! in a stream. Of many instances each ray asks for the nearest first, and rays that ask for the same one go together, round
 //! after round. None of this changes what is found.
@@ -54,7 +54,7 @@ impl Default for Instances {
     }
 }
 
-/// Clouds of at most so many balls are tested by sixteen rays at once, ball by ball.
+/// Clouds of at most so many spheres are tested by sixteen rays at once, sphere by ball.
 const MAX_BALLS: usize = 16;
 
 /// With more instances than this a tree above them pays.
@@ -263,7 +263,7 @@ fn tree_of(scene: &PlacedShapes, object: u32) -> Option<StreamTree<'_>> {
 /// What rays are taken through sixteen at a time.
 struct Packets<'a> {
     simple: &'a SimpleObjects,
-    /// Meshes and small clouds of balls.
+    /// Meshes and small clouds of spheres.
     instances: &'a [u32],
     scene: &'a PlacedShapes,
     rays: &'a RayBatch,
@@ -308,7 +308,7 @@ fn trace_packets<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(s: S, pack
     }
 }
 
-/// Takes a packet through one mesh or cloud of balls.
+/// Takes a packet through one mesh or cloud of spheres.
 #[inline(always)]
 fn trace_packet<S: KernelSimd, B: PacketBlock, const ANY: bool>(
     s: S,

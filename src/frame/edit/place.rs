@@ -27,7 +27,7 @@ pub enum Change {
 /// Changes the placements of all that is selected; `change` is told the middle of the last one.
 pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let selected = world.resource::<Selection>().0.clone();
-    // Several would be sheared along the axes of one, and balls stay balls.
+    // Several would be sheared along the axes of one, and spheres stay spheres.
     let round = |entity: &Entity| matches!(world.get(*entity), Some(Shape::Sphere { .. } | Shape::Spheres(_)));
     let evenly = selected.len() > 1 || selected.iter().any(round);
     let before: Vec<_> = selected

@@ -89,7 +89,7 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
     let mut params = material.params_mut().into_iter();
     let (_, param) = params.find(|(name, _)| Property::of_param(name) == Some(property))?;
     match param {
-        // A narrower lobe is a mirror to the eye.
+        // A narrower lobe is a mirror to the camera.
         Param::Share(width) if property == Property::Alpha => *width = number.clamp(1e-3, 1.0).into(),
         Param::Share(scalar) => *scalar = share.into(),
         Param::ConstantShare(old) => *old = share,

@@ -1,7 +1,7 @@
 //! Where new things go: on what the middle of the picture shows, as large as suits its distance, and inside of nothing.
 //!
-//! What the eye sees is free up to the first surface. So places are tried along the line of sight, from that surface
-//! towards the eye; from each, the thing falls onto what is below it, and stays where it touches nothing else. What is
+//! What the camera sees is free up to the first surface. So places are tried along the line of sight, from that surface
+//! towards the camera; from each, the thing falls onto what is below it, and stays where it touches nothing else. What is
 //! in its way is found by rays, which know what a box does not: that a room is empty inside.
 
 use crate::frame::resources::{PictureSize, RenderState};
@@ -22,7 +22,7 @@ pub struct Spot {
 
 /// A tenth of the distance is large enough to see and to grab, and leaves most of the picture as it is.
 const SHARE: f64 = 0.1;
-/// Steps towards the eye, of half a size, before something smaller is tried.
+/// Steps towards the camera, of half a size, before something smaller is tried.
 const STEPS: u32 = 24;
 /// What has no room is made smaller so many times.
 const SHRINKS: u32 = 5;

@@ -17,14 +17,14 @@ const MAX_ELEVATION: f64 = 89.0 * (FRAC_PI_2 / 90.0);
 /// The field of view that zooming stays within, degrees: a strong telescope, and the widest flat picture of any use.
 const VFOV_RANGE_DEG: (f64, f64) = (0.1, 150.0);
 
-/// Looks about from the eye; radians to the right and upwards in the picture.
+/// Looks about from the camera; radians to the right and upwards in the picture.
 pub fn turn(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
     finite_or(view, rotated(view, yaw, pitch, turning))
 }
 
-/// Moves the eye around the pivot, at the same distance; radians to the right and upwards in the picture.
+/// Moves the camera around the pivot, at the same distance; radians to the right and upwards in the picture.
 pub fn orbit(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
-    // The eye moving right means that the direction turns left.
+    // The camera moving right means that the direction turns left.
     let turned = rotated(view, -yaw, -pitch, turning);
     finite_or(view, View { eye: view.pivot() - turned.forward * view.pivot_distance, ..turned })
 }
@@ -79,7 +79,7 @@ pub fn level(view: &View) -> View {
     View { up: VERTICAL, ..*view }.orthonormalized()
 }
 
-/// Keeps the direction and places the eye as near as all points still are in a picture of this `aspect` (width by
+/// Keeps the direction and places the camera as near as all points still are in a picture of this `aspect` (width by
 /// height), with a little room around them; the middle of their box becomes the pivot's depth. One point alone keeps
 /// its distance; without any, the view stays.
 pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &[DVec3]) -> View {
@@ -92,7 +92,7 @@ pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &
         return finite_or(view, View { eye: middle - view.forward * view.pivot_distance, ..*view });
     }
     let tan_v = projection.tan_half_vfov() * (1.0 - ROOM);
-    // In each direction, lines at the edge of the picture through the outermost points meet at the nearest eye.
+    // In each direction, lines at the edge of the picture through the outermost points meet at the nearest camera.
     let fit = |axis: DVec3, tan: f64| {
         let most = |sign: f64| {
             let edge = |point: &DVec3| {
@@ -206,7 +206,7 @@ mod tests {
             assert!((view.up.length() - 1.0).abs() < 1e-15, "{view:?}");
             assert!(view.forward.dot(view.up).abs() < 1e-15, "{view:?}");
             assert_eq!(view.pivot_distance, first.pivot_distance);
-            // Each step rounds the eye once or twice: a random walk of a thousand times that, here with room to spare.
+            // Each step rounds the camera once or twice: a random walk of a thousand times that, here with room to spare.
             let rounding = f64::EPSILON * first.eye.length().max(1.0);
             assert!(
                 close(view.pivot(), first.pivot(), 20_000.0 * rounding),

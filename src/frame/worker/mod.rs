@@ -67,8 +67,8 @@ pub struct Question {
 #[derive(Clone, Debug)]
 pub struct Answer {
     pub explanation: Explanation,
-    /// What paths from the lamps have brought there so far; `None` where the film is not at full resolution.
-    pub from_lamps: Option<DVec3>,
+    /// What light paths have brought there so far; `None` where the film is not at full resolution.
+    pub light_traced: Option<DVec3>,
 }
 
 /// How far the current job is.

@@ -196,7 +196,7 @@ impl<'a> Loop<'a> {
         let size = UVec2::new(job.width, job.height);
         let place = DVec2::new(question.x, question.y).clamp(DVec2::ZERO, DVec2::ONE) * size.as_dvec2();
         let pixel = place.as_uvec2().min(size - 1);
-        let from_lamps = film.map(|(_, film)| film.light_from_lamps(pixel.x, pixel.y));
+        let light_traced = film.map(|(_, film)| film.light_traced(pixel.x, pixel.y));
         let first = film.map_or(0, |(_, film)| film.first_sample());
         let samples = first..first.saturating_add(question.n_samples);
         let pool = lock(&self.shared.pool).clone();
@@ -207,7 +207,7 @@ impl<'a> Loop<'a> {
         match (result, sender) {
             (Ok(Some(explanation)), Some(sender)) => {
                 // Whoever asked may have gone.
-                let _ = sender.send(Answer { explanation, from_lamps });
+                let _ = sender.send(Answer { explanation, light_traced });
             }
             (Err(panic), _) => self.fail(panic.as_ref()),
             _ => {}

@@ -23,7 +23,7 @@ use ron::extensions::Extensions;
 use std::path::Path;
 
 impl SceneFile {
-    /// Balls of one grid at most.
+    /// Spheres of one grid at most.
     pub const MAX_GRID_BALLS: u64 = 4_000_000;
     /// Pixels along one side of a film at most.
     pub const MAX_FILM_SIDE: u32 = 65_536;

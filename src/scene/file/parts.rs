@@ -56,7 +56,7 @@ pub struct CameraPart {
     /// In place of `look_at`: the direction of the view. A unit vector is taken as it is, to the last bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forward: Option<DVec3>,
-    /// With `forward`: metres from the eye to what orbiting turns about; 1 when not given.
+    /// With `forward`: metres from the camera to what orbiting turns about; 1 when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pivot_distance: Option<f64>,
     /// What is up in the picture; +Y when not given.
@@ -71,7 +71,7 @@ pub struct CameraPart {
     /// Focal length over aperture diameter, for a film 24 mm high.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f_stop: Option<f64>,
-    /// Metres from the eye to the focal plane along the view axis; the distance of `look_at` when not given.
+    /// Metres from the camera to the focal plane along the view axis; the distance of `look_at` when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_distance: Option<f64>,
     /// Whether the lens blurs; when not given, it does if it has a radius.
@@ -251,7 +251,7 @@ pub enum ObjectPart {
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// Balls of one material in rows, layers or blocks: one at `first`, then by each step in turn that many times.
+    /// Spheres of one material in rows, layers or blocks: one at `first`, then by each step in turn that many times.
     BallGrid {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -259,7 +259,7 @@ pub enum ObjectPart {
         /// Centre of the first sphere; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         first: DVec3,
-        /// Up to three pairs: how many balls in a row, and the way from each to the next.
+        /// Up to three pairs: how many spheres in a row, and the way from each to the next.
         steps: Vec<(u32, DVec3)>,
         /// Radius of each sphere, positive.
         radius: f64,
@@ -269,7 +269,7 @@ pub enum ObjectPart {
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// Many balls, one material.
+    /// Many spheres, one material.
     Spheres {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -343,7 +343,7 @@ pub fn ball_grid(first: DVec3, steps: &[(u32, DVec3)]) -> Vec<DVec3> {
     })
 }
 
-/// One radius for all balls or one for each.
+/// One radius for all spheres or one for each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RadiiPart {
@@ -379,7 +379,7 @@ pub struct ScalePart(pub DVec3);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightPart {
-    /// A small glowing ball that shines evenly into all directions.
+    /// A small glowing sphere that shines evenly into all directions.
     Point {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -388,7 +388,7 @@ pub enum LightPart {
         position: DVec3,
         /// Radiant intensity, W·sr⁻¹.
         intensity: Rgb,
-        /// Metres; shadows are as soft as the ball is large.
+        /// Metres; shadows are as soft as the sphere is large.
         #[serde(default = "default_light_radius")]
         radius: f64,
     },

@@ -56,7 +56,7 @@ pub struct Input {
     speed: f64,
     /// Since when the camera goes around by itself and has not been counted.
     spin: Option<Instant>,
-    /// A drag with the left button moves around the pivot, not the eye's direction.
+    /// A drag with the left button moves around the pivot, not the camera's direction.
     orbits: bool,
     /// The mouse moves the view without a button.
     captured: bool,

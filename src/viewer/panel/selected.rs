@@ -92,7 +92,7 @@ fn place(ui: &mut Ui, id: u64, placement: &Placement, asked: &mut Asked) {
                 });
                 row(ui, "scale", |ui| {
                     let even = scale.x == scale.y && scale.y == scale.z;
-                    // What was even stays even: balls must be, and most else is meant to be.
+                    // What was even stays even: spheres must be, and most else is meant to be.
                     let value = if even {
                         number(ui, scale.x, 0.005 * scale.x.abs(), 1e-6..=1e6, "").map(DVec3::splat)
                     } else {

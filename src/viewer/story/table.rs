@@ -41,8 +41,8 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
                         let sum = |part: usize| others.iter().map(|light| light.parts()[part]).sum();
                         row(ui, &format!("{} others", others.len()), [sum(0), sum(1), sum(2)], all, None);
                     }
-                    if let Some(from_lamps) = story.from_lamps.filter(|light| *light != DVec3::ZERO) {
-                        let total = brightness(from_lamps);
+                    if let Some(light_traced) = story.light_traced.filter(|light| *light != DVec3::ZERO) {
+                        let total = brightness(light_traced);
                         cell(ui, "by light tracing".to_owned(), false, Color32::from_gray(228));
                         (0..3).for_each(|_| drop(ui.label("")));
                         cell(ui, figure(total), true, Color32::from_gray(228));
@@ -113,7 +113,7 @@ fn ways(ui: &mut Ui, shown: &mut WaysShown) {
     }
 }
 
-/// What came after how many bounces, as a bar in the colours of the paths: light that the eye sees directly has the
+/// What came after how many bounces, as a bar in the colours of the paths: light that the camera sees directly has the
 /// colour of the first segment.
 fn bounces(ui: &mut Ui, story: &PixelStory, shown: &mut WaysShown) {
     let parts: Vec<f64> = story.by_bounces.iter().map(|part| brightness(*part).max(0.0)).collect();

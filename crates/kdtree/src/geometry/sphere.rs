@@ -1,13 +1,13 @@
 //! Ray tests of spheres and planes.
 //!
 //! Both run in `f64`: the inputs are `f32`, so differences and products of coordinates are exact or nearly so, and
-//! neither a ball of 10 km seen from 1 m nor a ball of 1 mm seen from 10 km loses its digits.
+//! neither a sphere of 10 km seen from 1 m nor a sphere of 1 mm seen from 10 km loses its digits.
 
 use glam::{DVec3, Vec3};
 
 /// The two crossings of the line with the sphere, nearer first, rounded once; `None` if it passes by.
 ///
-/// The square of the half chord comes from the perpendicular, not from `b² - 4ac`, which cancels for small balls
+/// The square of the half chord comes from the perpendicular, not from `b² - 4ac`, which cancels for small spheres
 /// far away (Haines, Günther and Akenine-Möller 2019, "Precision Improvements for Ray/Sphere Intersection").
 ///
 /// - `inv_dir_squared`: `1 / (dir · dir)`.
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn huge_sphere_from_close_by() {
-        // A planet of 10 km under an eye 1 m above it: f32 arithmetic would be off by millimetres to metres.
+        // A planet of 10 km under an camera 1 m above it: f32 arithmetic would be off by millimetres to metres.
         let (near, far) = hits(vec3(0.0, 1.0, 0.0), -Vec3::Y, vec3(0.0, -1e4, 0.0), 1e4).unwrap();
         assert_eq!((near, far), (1.0, 20001.0));
     }

@@ -21,7 +21,7 @@ pub struct Camera {
     pub tan_half_vfov: f32,
     /// Metres; 0 is a pinhole, which samples no lens.
     pub lens_radius: f32,
-    /// Metres along `forward` from the eye to the focal plane, positive; may be infinite.
+    /// Metres along `forward` from the camera to the focal plane, positive; may be infinite.
     pub focus_distance: f32,
     /// Straight edges of the aperture; below 3 it is round.
     pub blades: u32,
@@ -96,7 +96,7 @@ impl Camera {
         let offset =
             (Vector3::in_all(one, self.right) * x + Vector3::in_all(one, self.up) * y).mul_all(self.lens_radius);
         let origin = Vector3::in_all(one, self.eye) + offset;
-        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the eye.
+        // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the camera.
         if focus >= 1.0 {
             return (origin, (direction - offset * (one / one.all(focus))).normalize());
         }
@@ -119,7 +119,7 @@ impl Camera {
         ((focus + slack).recip(), far)
     }
 
-    /// A point of the lens by its distance from the eye along `right` and `up`, metres.
+    /// A point of the lens by its distance from the camera along `right` and `up`, metres.
     ///
     /// - `u`: two numbers in `[0, 1)`.
     #[inline]
@@ -133,7 +133,7 @@ impl Camera {
         if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
     }
 
-    /// The point of the lens at an offset from the eye along `right` and `up`, metres; see [`Self::lens_offset`].
+    /// The point of the lens at an offset from the camera along `right` and `up`, metres; see [`Self::lens_offset`].
     #[inline]
     pub fn lens_point(&self, offset: Vec2) -> Vec3 {
         self.lens_points(offset.to_array()).into()
@@ -166,7 +166,7 @@ impl Camera {
         ([(across * scale + size.x) * 0.5, (above * -scale + size.y) * 0.5], depth)
     }
 
-    /// From the eye through a point of the film to the plane one metre ahead; not unit.
+    /// From the camera through a point of the film to the plane one metre ahead; not unit.
     #[inline]
     pub fn film_direction(&self, film: Vec2, size: Vec2) -> Vec3 {
         self.film_directions(film.to_array(), size).into()

@@ -4,7 +4,7 @@
 /// same noise takes longer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Techniques {
-    /// Each matte or rough vertex asks a light for its share; off: paths run into lights by themselves or not at all.
+    /// Each diffuse or rough vertex asks a light for its share; off: paths run into lights by themselves or not at all.
     pub light_sampling: bool,
     /// Light that both light sampling and bounces find is weighted between them; off: light sampling takes all of it.
     pub mis: bool,
@@ -14,7 +14,7 @@ pub struct Techniques {
     pub solid_angle: bool,
     /// Lights are asked by what they could send or by their power; off: all alike.
     pub light_selection: bool,
-    /// Where specular surfaces gather the light of lamps, paths are traced from the lamps as well; off: from the eye alone.
+    /// Where specular surfaces gather light, paths are traced from the lights as well; off: from the camera alone.
     pub caustics: bool,
     /// Dim paths are ended early; off: only very long ones.
     pub roulette: bool,

@@ -21,7 +21,7 @@ use std::ops::Range;
 pub struct Contribution {
     /// Where the light comes from.
     pub source: LightSource,
-    /// Surfaces between the light and the eye; 0 is the light itself.
+    /// Surfaces between the light and the camera; 0 is the light itself.
     pub bounces: u32,
     /// Whether the path runs into the light or samples it.
     pub found_by: FoundBy,
@@ -44,7 +44,7 @@ pub struct Explanation {
 
 /// Traces samples of a pixel as the picture does. `None` for the classic model, which has no paths.
 ///
-/// Light that paths from the lamps bring ([`light_from_lamps`]) is not among it: those belong to no pixel.
+/// Light that light paths bring ([`light_traced`]) is not among it: those belong to no pixel.
 pub fn explain(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -70,7 +70,7 @@ impl Explanation {
         self.paths.iter().filter(|path| path.radiance.is_finite())
     }
 
-    /// What a film has of these samples, paths from the lamps aside; W·m⁻²·sr⁻¹.
+    /// What a film has of these samples, light paths aside; W·m⁻²·sr⁻¹.
     pub fn mean(&self) -> DVec3 {
         let mut sum = ExactSum::default();
         self.good().for_each(|path| sum.add(path.radiance));
@@ -107,10 +107,10 @@ impl Explanation {
     }
 }
 
-/// What paths from the lamps bring into a pixel, the mean over these samples of the whole picture; W·m⁻²·sr⁻¹.
+/// What light paths bring into a pixel, the mean over these samples of the whole picture; W·m⁻²·sr⁻¹.
 ///
 /// They may fall anywhere, so all of them are traced. `None` when `stop` said so.
-pub fn light_from_lamps(
+pub fn light_traced(
     snapshot: &Prepared,
     settings: &RenderSettings,
     film_size: UVec2,

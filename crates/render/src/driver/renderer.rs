@@ -67,7 +67,7 @@ pub fn advance(
     advance_region(snapshot, settings, film, None, target_spp, stop)
 }
 
-/// The same for the tiles of a region alone. Light from the lamps falls where it falls, so the others may get more of it.
+/// The same for the tiles of a region alone. Traced light falls where it falls, so the others may get more of it.
 pub fn advance_region(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -88,7 +88,7 @@ pub fn advance_region(
     }
     film.want_light();
     let mut total = PassReport { completed: true, ..PassReport::default() };
-    // Light from the lamps goes with all tiles, so their error is told when all of them have come as far.
+    // Traced light goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp_in(region) < target_spp {
         let next = (film.spp_in(region) + 1).checked_next_power_of_two();
         let goal = next.unwrap_or(u32::MAX).min(target_spp);
@@ -295,7 +295,7 @@ fn advance_tile(
 }
 
 /// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film, but for that of paths from
-/// the lamps, which belong to no pixel.
+/// the lights, which belong to no pixel.
 pub fn replay_sample(snapshot: &Prepared, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
     let pass = Pass::new(snapshot, settings, film_size);
     if let Some(caustics) = &pass.caustics {
@@ -340,7 +340,7 @@ pub(crate) fn mean_bounces(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Vec<f32>> {
     const SIDE: u32 = 4;
-    // Paths from the eye alone; light from the lamps has no pixel to begin with.
+    // Camera paths alone; traced light has no pixel to begin with.
     let pass = Pass { caustics: None, ..Pass::new(snapshot, settings, size) };
     let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
     let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)

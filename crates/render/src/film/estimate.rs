@@ -210,7 +210,7 @@ impl TileConvergence {
 /// What the error of pixel `i` is relative to: its own mean, but no more than its neighbours' mean and its own darker
 /// half.
 ///
-/// A bright sample that came once raises one half alone, and few of the neighbours. A lamp of a single pixel, which
+/// A bright sample that came once raises one half alone, and few of the neighbours. A light of a single pixel, which
 /// its neighbours know nothing of, is bright in both halves.
 fn local_level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
     let (x, y, height) = (i % width, i / width, means.len() / width);
@@ -278,14 +278,14 @@ mod tests {
     }
 
     #[test]
-    fn lamps_keep_their_level_and_fireflies_lose_it() {
+    fn lights_keep_their_level_and_fireflies_lose_it() {
         let (dark, width) = (DVec3::splat(0.1), 3);
         let around = |middle: f64| {
             let mut means = vec![dark; 9];
             means[4] = DVec3::splat(middle);
             means
         };
-        // A lamp of one pixel: 19 in the first half, 21 in the second.
+        // A light of one pixel: 19 in the first half, 21 in the second.
         assert_eq!(local_level(&around(20.0), DVec3::splat(19.0), width, 4), DVec3::splat(19.0));
         // A firefly in the second half, or in the first.
         assert!((local_level(&around(10.05), dark, width, 4) - dark).length() < 1e-12);

@@ -1,4 +1,4 @@
-//! Where light from the lamps is summed up: over the whole picture, because it may fall into any pixel.
+//! Where traced light is summed up: over the whole picture, because it may fall into any pixel.
 //!
 //! Each sample of the picture has its own paths, in batches that are traced by any worker. Sums do not depend on their order, so neither
 //! threads nor portions change them, and layers of different samples add up like films do.
@@ -13,7 +13,7 @@ use glam::{DVec3, UVec2};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Sums over all paths from lamps so far.
+/// Sums over all light paths so far.
 #[derive(Clone, Debug)]
 pub(crate) struct LightLayer {
     /// Row by row from the top.

@@ -9,7 +9,7 @@ use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
 /// Numbers for each pixel: three channels of the sum, of its rest, of the mean at the last power of two, and of sum and
-/// rest of the light from the lamps.
+/// rest of the traced light.
 pub const N_PLANES: usize = 15;
 
 /// All that is in a film.
@@ -32,13 +32,14 @@ pub struct FilmLayout {
     pub tile_size: u32,
     /// Row by row from the top.
     pub tiles: Vec<TileRecord>,
-    /// What is known of the light from the lamps, where there is such light.
-    pub lamps: Option<LampRecord>,
+    /// What is known of the traced light, where there is such light.
+    #[serde(rename = "lamps")]
+    pub light_traced: Option<LightTracingRecord>,
 }
 
-/// Paths from the lamps that are in the film.
+/// Light paths that are in the film.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LampRecord {
+pub struct LightTracingRecord {
     /// First batch and the one after the last, of each range.
     pub batches: Vec<(u64, u64)>,
     /// Samples of the whole picture that are complete.
@@ -66,7 +67,8 @@ impl FilmLayout {
             let is_covered = |(start, end): &(T, T)| start >= end || ranges.iter().any(|(s, e)| s <= start && end <= e);
             others.iter().all(is_covered)
         }
-        let batches = |layout: &Self| layout.lamps.as_ref().map_or_else(Vec::new, |lamps| lamps.batches.clone());
+        let batches =
+            |layout: &Self| layout.light_traced.as_ref().map_or_else(Vec::new, |traced| traced.batches.clone());
         (self.width, self.height, self.tile_size) == (other.width, other.height, other.tile_size)
             && self.tiles.iter().zip(&other.tiles).all(|(tile, other)| covers(&tile.samples, &other.samples))
             && covers(&batches(self), &batches(other))
@@ -82,7 +84,7 @@ impl Film {
             mean_of: tile.convergence.checkpoint_spp,
             steps: tile.convergence.steps.iter().map(|step| step.to_bits()).collect(),
         };
-        let of_light = |light: &LightLayer| LampRecord {
+        let of_light = |light: &LightLayer| LightTracingRecord {
             batches: light.done.iter().map(|range| (range.start, range.end)).collect(),
             spp: light.spp,
         };
@@ -91,7 +93,7 @@ impl Film {
             height: self.height(),
             tile_size: self.tile_size(),
             tiles: self.tiles.iter().map(record).collect(),
-            lamps: self.light.as_ref().map(of_light),
+            light_traced: self.light.as_ref().map(of_light),
         }
     }
 
@@ -126,7 +128,7 @@ impl Film {
     /// # Errors
     /// When the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, RecordError> {
-        let FilmLayout { width, height, tile_size, tiles, lamps } = &record.layout;
+        let FilmLayout { width, height, tile_size, tiles, light_traced } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
         let n_pixels = u64::from(width) * u64::from(height);
         if n_pixels == 0 || tile_size == 0 {
@@ -178,18 +180,18 @@ impl Film {
                 return Err(RecordError::Convergence);
             }
         }
-        if let Some(lamps) = lamps {
+        if let Some(traced) = light_traced {
             let mut light = LightLayer::new(UVec2::new(width, height), 0);
-            check_ranges(&lamps.batches, light.batches_before(Self::MAX_SAMPLES))?;
+            check_ranges(&traced.batches, light.batches_before(Self::MAX_SAMPLES))?;
             for (at, sum) in light.sums.iter_mut().enumerate() {
                 let vector = |first: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));
                 *sum = ExactSum { sum: vector(9), rest: vector(12) };
             }
-            light.done = lamps.batches.iter().map(|&(start, end)| start..end).collect();
-            if light.complete() != lamps.spp {
+            light.done = traced.batches.iter().map(|&(start, end)| start..end).collect();
+            if light.complete() != traced.spp {
                 return Err(RecordError::LightPaths);
             }
-            light.spp = lamps.spp;
+            light.spp = traced.spp;
             film.light = Some(light);
         }
         Ok(film)

@@ -47,7 +47,7 @@ impl Purpose {
 /// Memory that a pixel of a film takes: its sums, and its mean at the last power of two.
 pub(crate) const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
 
-/// And for light from the lamps, where there is such light.
+/// And for traced light, where there is such light.
 pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>();
 
 /// For what a large picture takes besides, such as the workers' memory: an eighth, and no more than this.
@@ -61,9 +61,9 @@ impl Room {
 
     /// Keeps as much memory free as a film takes, and then for what it is wanted for.
     ///
-    /// - `from_lamps`: there will be light from the lamps on it.
-    pub fn for_film(width: u32, height: u32, from_lamps: bool, purposes: &[Purpose]) -> Result<Self, NoRoom> {
-        let film = BYTES_A_PIXEL + size_of::<f32>() + if from_lamps { LIGHT_BYTES_A_PIXEL } else { 0 };
+    /// - `light_traced`: there will be traced light on it.
+    pub fn for_film(width: u32, height: u32, light_traced: bool, purposes: &[Purpose]) -> Result<Self, NoRoom> {
+        let film = BYTES_A_PIXEL + size_of::<f32>() + if light_traced { LIGHT_BYTES_A_PIXEL } else { 0 };
         Self::of(width, height, film as u64 + most(purposes))
     }
 

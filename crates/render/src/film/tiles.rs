@@ -25,7 +25,7 @@ pub struct Film {
     pub(crate) tiles: Vec<FilmTile>,
     tiles_x: u32,
     tile_size: u32,
-    /// From paths that began at the lamps; `None` until there is some.
+    /// From paths that began at the lights; `None` until there is some.
     pub(crate) light: Option<LightLayer>,
     /// Memory of such a layer that is not in use.
     idle_light: Vec<ExactSum>,
@@ -79,7 +79,7 @@ impl Film {
     /// Memory that a pixel takes: its sums, and its mean at the last power of two.
     pub const BYTES_A_PIXEL: usize = room::BYTES_A_PIXEL;
 
-    /// Memory that a pixel takes for light from the lamps, where there is such light.
+    /// Memory that a pixel takes for traced light, where there is such light.
     pub const LIGHT_BYTES_A_PIXEL: usize = room::LIGHT_BYTES_A_PIXEL;
 
     /// Width and height in pixels, at least 1 each. Panics where there is no memory for it.
@@ -97,7 +97,7 @@ impl Film {
         Self::try_with_tile_size(width, height, tile_size).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// All that a render will need for it is there then, but for light from the lamps ([`Self::reserve_light`]).
+    /// All that a render will need for it is there then, but for traced light ([`Self::reserve_light`]).
     pub fn try_with_tile_size(width: u32, height: u32, tile_size: u32) -> Result<Self, NoRoom> {
         assert!(width > 0 && height > 0 && tile_size > 0, "a film of {width} × {height} has no pixels");
         // In one piece first: a system that promises small pieces beyond what it has refuses such a large one.
@@ -115,7 +115,7 @@ impl Film {
         Ok(Self { width, height, tiles, tiles_x, tile_size, light: None, idle_light: Vec::new() })
     }
 
-    /// Has memory ready for light from the lamps.
+    /// Has memory ready for traced light.
     pub fn reserve_light(&mut self) -> Result<(), NoRoom> {
         if self.light.is_some() {
             return Ok(());
@@ -158,8 +158,8 @@ impl Film {
 
     /// Samples that every pixel of a region has at least, or of the whole film.
     pub fn spp_in(&self, region: Option<&Region>) -> u32 {
-        let from_lamps = self.light.as_ref().map(|light| light.spp);
-        self.tiles_in(region).map(|tile| tile.spp).chain(from_lamps).min().unwrap_or(0)
+        let light_traced = self.light.as_ref().map(|light| light.spp);
+        self.tiles_in(region).map(|tile| tile.spp).chain(light_traced).min().unwrap_or(0)
     }
 
     fn tiles_in<'a>(&'a self, region: Option<&'a Region>) -> impl Iterator<Item = &'a FilmTile> + Clone {
@@ -168,8 +168,8 @@ impl Film {
 
     /// Samples that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
     pub fn max_spp(&self) -> u32 {
-        let from_lamps = self.light.as_ref().map(LightLayer::begun);
-        self.tiles.iter().map(|tile| tile.spp).chain(from_lamps).max().unwrap_or(0)
+        let light_traced = self.light.as_ref().map(LightLayer::begun);
+        self.tiles.iter().map(|tile| tile.spp).chain(light_traced).max().unwrap_or(0)
     }
 
     /// A film like a new one, in the memory of this one: for a large film, memory is what takes time.
@@ -191,7 +191,7 @@ impl Film {
         })
     }
 
-    /// Makes room for light from the lamps, if there is none.
+    /// Makes room for traced light, if there is none.
     pub(crate) fn want_light(&mut self) {
         if self.light.is_none() {
             let size = UVec2::new(self.width, self.height);
@@ -242,11 +242,11 @@ impl Film {
     /// Mean radiance of a pixel, row 0 at the top; black where there is no sample yet.
     pub fn mean(&self, x: u32, y: u32) -> Vec3 {
         let (tile, local) = self.locate(x, y);
-        (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3()
+        (tile.mean(local) + self.light_traced(x, y)).as_vec3()
     }
 
-    /// The part of [`Self::mean`] that paths from the lamps have found.
-    pub fn light_from_lamps(&self, x: u32, y: u32) -> DVec3 {
+    /// The part of [`Self::mean`] that light paths have found.
+    pub fn light_traced(&self, x: u32, y: u32) -> DVec3 {
         self.light.as_ref().map_or(DVec3::ZERO, |layer| layer.mean((y * self.width + x) as usize))
     }
 
@@ -257,7 +257,7 @@ impl Film {
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
             (first..first + tile.size.x as usize)
                 .zip(tile.origin.x..)
-                .map(move |(local, x)| (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3())
+                .map(move |(local, x)| (tile.mean(local) + self.light_traced(x, y)).as_vec3())
         })
     }
 
@@ -269,7 +269,7 @@ impl Film {
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
             if self.light.is_some() || !tile.bad.is_empty() || tile.spp == 0 {
                 for (local, x) in (first..).zip(columns) {
-                    take(x as usize, (tile.mean(local) + self.light_from_lamps(x, y)).as_vec3());
+                    take(x as usize, (tile.mean(local) + self.light_traced(x, y)).as_vec3());
                 }
             } else {
                 let n = f64::from(tile.spp);
@@ -379,18 +379,18 @@ impl FilmTile {
         }
     }
 
-    /// At powers of two, tells the error estimate of the picture so far; `light`: from the lamps, and the width of the film.
+    /// At powers of two, tells the error estimate of the picture so far; `light`: from the lights, and the width of the film.
     pub fn record_convergence(&mut self, light: Option<(&LightLayer, u32)>) {
         if !self.spp.is_power_of_two() {
             return;
         }
         let mut convergence = std::mem::take(&mut self.convergence);
         let mean = |local: usize| {
-            let from_lamps = light.map_or(DVec3::ZERO, |(layer, width)| {
+            let light_traced = light.map_or(DVec3::ZERO, |(layer, width)| {
                 let pixel = self.origin + UVec2::new(local as u32 % self.size.x, local as u32 / self.size.x);
                 layer.mean((pixel.y * width + pixel.x) as usize)
             });
-            self.mean(local) + from_lamps
+            self.mean(local) + light_traced
         };
         convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(mean));
         self.convergence = convergence;

@@ -231,8 +231,8 @@ impl PathWave {
         if let Some(emission) = scene.tables.emission[material as usize]
             && vertex.front
         {
-            let from_lamp = caustics.and_then(|pass| pass.eye_weight(&path.track, path.media, &hit, &vertex));
-            let weight = from_lamp.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+            let with_light_paths = caustics.and_then(|pass| pass.camera_weight(&path.track, path.media, &hit, &vertex));
+            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
             let weight = emission.scale * weight;
             radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
         }
@@ -347,7 +347,7 @@ impl PathWave {
             let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
             path.track = pass.follow(track, &bounce, || {
                 let normal =
-                    if sample.through.is_some() { vertex.normal_from_behind(sample.wi) } else { vertex.normal };
+                    if sample.through.is_some() { vertex.normal_seen_from_behind(sample.wi) } else { vertex.normal };
                 bsdf.eval(sample.wi, vertex.wo, normal).1
             });
         }

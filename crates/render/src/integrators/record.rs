@@ -1,7 +1,7 @@
 //! What happens in a wave of paths, written down from outside: nothing that is traced knows of it.
 //!
 //! A wave adds light to a slot at three moments of each depth: where a path leaves the scene, where it runs into a
-//! lamp, and where a shadow ray gets through. With one path a slot, what a slot gained between two looks is the light
+//! emitter, and where a shadow ray gets through. With one path a slot, what a slot gained between two looks is the light
 //! of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
 
 use crate::prepare::prepared::Prepared;
@@ -17,7 +17,7 @@ pub enum LightSource {
     Object(u32),
     /// What is around the scene.
     Sky,
-    /// A point on the very rim of a lamp, where a ray towards it passes by: whose it is cannot be told.
+    /// A point on the very rim of an emitter, where a ray towards it passes by: whose it is cannot be told.
     Rim,
 }
 
@@ -139,11 +139,11 @@ impl Record {
             let (source, place) = if ray.t_max == f32::INFINITY {
                 (LightSource::Sky, Place::Sky { direction: ray.dir.normalize() })
             } else {
-                // It ends a hair in front of the lamp and met nothing, so whatever comes next is the lamp.
-                let lamp = scene.geometry.tree.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
-                let lamp = lamp.filter(|hit| scene.tables.lights.light_of(hit.object, hit.prim).is_some());
-                let object = lamp.map_or(HitBatch::MISS, |hit| hit.object);
-                let source = lamp.map_or(LightSource::Rim, |hit| LightSource::Object(hit.object));
+                // It ends a hair in front of the emitter and met nothing, so whatever comes next is the emitter.
+                let emitter = scene.geometry.tree.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
+                let emitter = emitter.filter(|hit| scene.tables.lights.light_of(hit.object, hit.prim).is_some());
+                let object = emitter.map_or(HitBatch::MISS, |hit| hit.object);
+                let source = emitter.map_or(LightSource::Rim, |hit| LightSource::Object(hit.object));
                 (source, Place::Surface { position: ray.at(ray.t_max), object })
             };
             let vertex = self.paths[slot].vertices.last_mut().expect("its hit has been seen");

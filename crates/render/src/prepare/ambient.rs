@@ -9,7 +9,7 @@ use firstlight_simd::{Real, Vector3};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 
-/// Irradiance over π: the radiance of a white matte surface that sees nothing but the surroundings.
+/// Irradiance over π: the radiance of a white diffuse surface that sees nothing but the surroundings.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AmbientLight {
     /// By spherical harmonics up to degree 2, the cosine lobe folded in.

@@ -1,9 +1,9 @@
-//! Which lamp to start from, and where to aim: at what is specular and makes caustics.
+//! Which light to start from, and where to aim: at what is specular and makes caustics.
 //!
-//! A line from a lamp is chosen in three steps: a pair of lamp and caster by the flux between them, a point on the lamp
-//! evenly over its area (on a ball over the cap that the caster can see), a direction evenly over the cone of the ball
+//! A line from a light is chosen in three steps: a pair of light and caster by the flux between them, a point on the light
+//! evenly over its area (on a sphere over the cap that the caster can see), a direction evenly over the cone of the sphere
 //! around the caster. A line counts only where the caster it was aimed at is what it hits first, so its density follows
-//! from lamp, point and that caster alone, without a sum over all cones it may lie in.
+//! from light, point and that caster alone, without a sum over all cones it may lie in.
 //!
 //! Densities are per unit of étendue, cos θ · area · solid angle, which is the same at both ends of a line.
 
@@ -23,7 +23,7 @@ use std::sync::OnceLock;
 /// No caster.
 pub(crate) const NO_CASTER: u32 = u32::MAX;
 
-/// Up to this many pairs of lamp and caster are weighed one by one; of more, both are chosen apart.
+/// Up to this many pairs of light and caster are weighed one by one; of more, both are chosen apart.
 const MAX_PAIRS: usize = 1 << 16;
 
 /// Sample dimensions of a line.
@@ -32,7 +32,7 @@ const DIM_DIRECTION: u32 = 1;
 const DIM_PAIR: u32 = 2;
 pub(crate) const LINE_DIMENSIONS: u32 = 3;
 
-/// All specular objects, and with which lamp each goes how well.
+/// All specular objects, and with which light each goes how well.
 #[derive(Debug)]
 pub(crate) struct CasterTable {
     casters: Vec<Caster>,
@@ -43,7 +43,7 @@ pub(crate) struct CasterTable {
     pub(crate) guide: OnceLock<Guide>,
 }
 
-/// A ball around something specular; without end for a plane.
+/// A sphere around something specular; without end for a plane.
 #[derive(Clone, Copy, Debug)]
 struct Caster {
     center: Vec3,
@@ -60,7 +60,7 @@ enum Pairs {
     },
 }
 
-/// A line from a lamp.
+/// A line from a light.
 pub(crate) struct LightLine {
     pub ray: Ray,
     /// What it has to hit first.
@@ -72,7 +72,7 @@ pub(crate) struct LightLine {
 }
 
 impl CasterTable {
-    /// `None` where no light can come to a specular surface from a finite lamp.
+    /// `None` where no light can come to a specular surface from a finite light.
     pub fn build(geometry: &Geometry, materials: &[Material], lights: &LightTable) -> Option<Self> {
         let mut casters = Vec::new();
         let is_specular: Vec<bool> = materials.iter().map(|material| material.is_specular(materials)).collect();
@@ -117,18 +117,18 @@ impl CasterTable {
         }
     }
 
-    /// A line from some lamp towards some caster; `None` if it points into the lamp.
+    /// A line from some light towards some caster; `None` if it points into the light.
     pub(crate) fn sample(&self, lights: &LightTable, textures: &[Texture], sampler: &Sampler) -> Option<LightLine> {
         let (light_id, caster, _) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
         let light = lights.light(light_id);
         let Caster { center, radius } = self.casters[caster as usize];
         let u = sampler.pair(DIM_POINT);
         let point = match light.shape {
-            LightShape::Sphere { center: lamp, radius: lamp_radius } => {
-                let cap = cap_height(lamp, lamp_radius, center, radius);
+            LightShape::Sphere { center: light_center, radius: light_radius } => {
+                let cap = cap_height(light_center, light_radius, center, radius);
                 // The cap is a cone of normals.
                 let (local, _) = uniform_cap(u, cap);
-                light.shape.at_normal(Frame::around((center - lamp).normalize_or(Vec3::Y)).to_world(local))
+                light.shape.at_normal(Frame::around((center - light_center).normalize_or(Vec3::Y)).to_world(local))
             }
             _ => light.shape.at_area(u),
         };
@@ -152,14 +152,14 @@ impl CasterTable {
         Some(LightLine { ray: Ray::new(origin, dir), caster, density, radiance })
     }
 
-    /// Density of [`Self::sample`] to start at `position` of a lamp in a direction of cosine `cos` with its normal, on
+    /// Density of [`Self::sample`] to start at `position` of a light in a direction of cosine `cos` with its normal, on
     /// which `caster` lies first; per unit of étendue.
     pub(crate) fn density(&self, lights: &LightTable, light_id: u32, caster: u32, position: Vec3, cos: f32) -> f32 {
         let pmf = self.pairs.pmf(self.casters.len(), light_id, caster);
         let Caster { center, radius } = self.casters[caster as usize];
         let area = match &lights.light(light_id).shape {
-            LightShape::Sphere { center: lamp, radius: lamp_radius } => {
-                TAU * lamp_radius * lamp_radius * cap_height(*lamp, *lamp_radius, center, radius)
+            LightShape::Sphere { center: light_center, radius: light_radius } => {
+                TAU * light_radius * light_radius * cap_height(*light_center, *light_radius, center, radius)
             }
             flat => flat.area(),
         };
@@ -203,27 +203,27 @@ impl Caster {
         }
     }
 
-    /// An estimate of the étendue between a lamp and the ball, zero only where none of the lamp can see any of it.
-    fn coupling(&self, lamp: &LightShape) -> f64 {
-        let lamp_area = lamp.area();
-        if let LightShape::Sphere { center, radius } = lamp {
+    /// An estimate of the étendue between a light and the sphere, zero only where none of the light can see any of it.
+    fn coupling(&self, light: &LightShape) -> f64 {
+        let light_area = light.area();
+        if let LightShape::Sphere { center, radius } = light {
             let sin2 = (self.radius * self.radius / center.distance_squared(self.center)).min(1.0);
             return f64::from(PI * radius * radius * PI * sin2);
         }
         const SIDE: u32 = 4;
         let at = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_points = (0..SIDE * SIDE).map(|i| {
-            let point = lamp.at_area(at(i));
+            let point = light.at_area(at(i));
             let offset = self.center - point.position;
             let distance = offset.length();
             if distance <= self.radius {
                 return 1.0;
             }
             let (cos, sin) = (offset.dot(point.normal) / distance, self.radius / distance);
-            // The form factor of a ball, and a parabola where the horizon cuts it.
+            // The form factor of a sphere, and a parabola where the horizon cuts it.
             f64::from(sin * sin * if cos >= sin { cos } else { (cos + sin).max(0.0).powi(2) / (4.0 * sin) })
         });
-        f64::from(PI * lamp_area) * over_points.sum::<f64>() / f64::from(SIDE * SIDE)
+        f64::from(PI * light_area) * over_points.sum::<f64>() / f64::from(SIDE * SIDE)
     }
 }
 
@@ -281,14 +281,14 @@ impl Pairs {
     }
 }
 
-/// Height, over the radius, of the cap of a lamp from which some of a ball can be seen; 0..2.
-fn cap_height(lamp: Vec3, lamp_radius: f32, center: Vec3, radius: f32) -> f32 {
-    let distance = lamp.distance(center);
-    if radius.is_infinite() || distance <= (lamp_radius - radius).abs() {
+/// Height, over the radius, of the cap of a light from which some of a sphere can be seen; 0..2.
+fn cap_height(light_center: Vec3, light_radius: f32, center: Vec3, radius: f32) -> f32 {
+    let distance = light_center.distance(center);
+    if radius.is_infinite() || distance <= (light_radius - radius).abs() {
         return 2.0;
     }
     // A little more, so that rounding leaves nothing out.
-    (1.0 - (lamp_radius - radius) / distance + 8.0 * f32::EPSILON).clamp(0.0, 2.0)
+    (1.0 - (light_radius - radius) / distance + 8.0 * f32::EPSILON).clamp(0.0, 2.0)
 }
 
 /// Even over the cap of the unit sphere around +z, up to the whole of it.

@@ -8,9 +8,9 @@ use glam::Vec3;
 
 /// Materials that are shaded one at a time: all that shines, is clear, has several parts that send rays, or looks up a number.
 pub(crate) const ONE_BY_ONE: u32 = 0;
-/// Nothing but matte.
+/// Nothing but diffuse.
 pub(crate) const MATTE: u32 = 1;
-/// The others may be matte beside this: highlights and a sharp mirror,
+/// The others may be diffuse beside this: highlights and a sharp mirror,
 pub(crate) const GLOSS: u32 = 2;
 /// rough ones,
 pub(crate) const ROUGH: u32 = 3;
@@ -22,7 +22,7 @@ pub(crate) const PLAIN_MIRROR: u32 = 4;
 pub(crate) struct ClassicTable {
     pub kinds: Kinds,
     pub matte: Inputs,
-    /// Of the ambient light, the share of the matte part that comes back.
+    /// Of the ambient light, the share of the diffuse part that comes back.
     pub ambient: Vec<f32>,
     pub shiny: Inputs,
     /// Of the highlights.

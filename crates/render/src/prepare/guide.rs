@@ -1,8 +1,8 @@
 //! Where does gathered light come from? For vertices that are seen in mirrors and through glass.
 //!
-//! Paths from the lamps cannot be joined to the lens through something specular, so a caustic that is seen in a mirror is
-//! left to paths from the eye, and these hardly ever find the way on to the lamp by themselves. They are told the way: a
-//! first wave of paths from the lamps leaves, at each matte or rough point that it reaches, the point of the specular
+//! Light paths cannot be joined to the lens through something specular, so a caustic that is seen in a mirror is
+//! left to camera paths, and these hardly ever find the way on to the light by themselves. They are told the way: a
+//! first wave of light paths leaves, at each diffuse or rough point that it reaches, the point of the specular
 //! surface that it came from (Jensen 1995, "Importance Driven Path Tracing Using the Photon Map"). A tree over the
 //! points reached gives each place a small list of such exits; part of the directions there are chosen towards them,
 //! the density of the mixture being known exactly, so the mean stays as it is whatever the list holds.
@@ -16,7 +16,7 @@ use std::ops::Range;
 /// Most exits in one list. Each costs a few multiplications an evaluation.
 const LIST: usize = 32;
 
-/// The neighbour of an exit that its ball reaches: wide enough to overlap, narrow enough to tell one side of a lens from the
+/// The neighbour of an exit that its sphere reaches: wide enough to overlap, narrow enough to tell one side of a lens from the
 /// other.
 const NEIGHBOR: usize = 3;
 
@@ -52,7 +52,7 @@ struct GuideLeaf {
     n_exits: u32,
 }
 
-/// Balls around exits, side by side; those that there are not have no inside.
+/// Spheres around exits, side by side; those that there are not have no inside.
 #[derive(Debug)]
 #[repr(C, align(64))]
 struct ExitBlock {
@@ -69,7 +69,7 @@ impl ExitBlock {
     }
 }
 
-/// A ball around the exit.
+/// A sphere around the exit.
 #[derive(Clone, Copy, Debug)]
 struct Exit {
     center: Vec3,
@@ -180,12 +180,12 @@ impl Guide {
     }
 }
 
-/// A ball around each exit of a list.
+/// A sphere around each exit of a list.
 ///
 /// - `extent`: of the places reached, metres.
 ///
-/// It reaches to a neighbour, so that the balls of one mirror image of a lamp overlap. A faint image of few exits has its
-/// next neighbours in another one: its balls are no larger than those of most exits, or than what exits move by from one
+/// It reaches to a neighbour, so that the spheres of one mirror image of a light overlap. A faint image of few exits has its
+/// next neighbours in another one: its spheres are no larger than those of most exits, or than what exits move by from one
 /// end of the places to the other.
 fn exits_of(list: &[Trace], extent: f32) -> Vec<Exit> {
     let reach = |trace: &Trace| {

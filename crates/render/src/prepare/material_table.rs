@@ -44,7 +44,7 @@ pub(crate) struct MaterialTable {
 
 pub(crate) const SEVERAL: MaterialId = MaterialId::MAX;
 
-/// Two parts of different kinds, each matte, rough metal or mirror.
+/// Two parts of different kinds, each diffuse, rough metal or mirror.
 pub(crate) const COATED: usize = MaterialKind::N;
 
 impl MaterialTable {

@@ -71,7 +71,7 @@ pub struct Features {
     pub environment: bool,
     /// Some material looks up a texture.
     pub textures: bool,
-    /// Something specular gathers the light of some lamp, so paths are traced from lamps as well.
+    /// Something specular gathers the light of some emitter, so paths are traced from lights as well.
     pub caustics: bool,
 }
 

@@ -20,16 +20,16 @@ pub(crate) const CLOUD: u32 = 5;
 #[derive(Debug, Default)]
 pub(crate) struct SurfaceTable {
     pub kind: Vec<u32>,
-    /// Corner of a quad, centre of a ball, point of a plane.
+    /// Corner of a quad, centre of a sphere, point of a plane.
     pub a: [Vec<f32>; 3],
     /// The edges of a quad, the axes of a plane.
     pub b: [Vec<f32>; 3],
     pub c: [Vec<f32>; 3],
-    /// How far points of a quad stay away from its rim, in its coordinates; of a ball the first is the error of a point along each
+    /// How far points of a quad stay away from its rim, in its coordinates; of a sphere the first is the error of a point along each
     /// axis beside the rounding, metres.
     pub least: [Vec<f32>; 2],
     pub normal: [Vec<f32>; 3],
-    /// How far from a quad the next ray must start, metres along the normal; of a ball the radius.
+    /// How far from a quad the next ray must start, metres along the normal; of a sphere the radius.
     pub offset: Vec<f32>,
     /// Of what has a space of its own, the row in `instances`.
     pub row: Vec<u32>,

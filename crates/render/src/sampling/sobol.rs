@@ -35,7 +35,7 @@ pub type Sampler = SamplerOf<u32>;
 pub(crate) type SamplerLanes<S> = SamplerOf<Bits<S>>;
 
 /// How many dimensions of a pixel's samples are spread over the screen: the camera's and those of the first vertex of a
-/// path, whose noise is what the eye sees first.
+/// path, whose noise is what the camera sees first.
 pub(super) const SCREEN_DIMENSIONS: u32 = 7;
 
 impl Sampler {

@@ -1,12 +1,12 @@
-//! What a path from the eye remembers, so that light found by it can be weighed against a path from a lamp.
+//! What a camera path remembers, so that light found by it can be weighed against a light path.
 
 use crate::prepare::casters::NO_CASTER;
 use glam::Vec3;
 
-/// Of a path from the eye.
+/// Of a camera path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MisState {
-    /// Density of finding it from the lamp over that from the eye, without the lamp's factor; NaN if no path from a lamp
+    /// Density of finding it from the light over that from the camera, without the light's factor; NaN if no light path
     /// can be it.
     pub ratio: f32,
     /// That the last vertex lies on, if it was specular.
@@ -23,25 +23,25 @@ impl Default for MisState {
 }
 
 impl MisState {
-    /// - `ratio`: NaN if no path from a lamp can be the path so far.
+    /// - `ratio`: NaN if no light path can be the path so far.
     /// - `caster`: that the last vertex lies on, if it was specular; [`NO_CASTER`] otherwise.
     #[inline(always)]
     pub fn new(ratio: f32, caster: u32, gain: f32) -> Self {
         Self { ratio, caster, gain }
     }
 
-    /// See [`crate::integrators::caustics::pass::CausticPass::follow`]; NaN if no path from a lamp can be the path so far.
+    /// See [`crate::integrators::caustics::pass::CausticPass::follow`]; NaN if no light path can be the path so far.
     #[inline(always)]
     pub fn ratio(&self) -> f32 {
         self.ratio
     }
 
-    /// Whether no path from a lamp can be the path so far and what follows.
+    /// Whether no light path can be the path so far and what follows.
     pub fn is_lost(&self) -> bool {
         self.ratio.is_nan()
     }
 
-    /// Whether the last vertex was specular, and a path from a lamp can be the path so far.
+    /// Whether the last vertex was specular, and a light path can be the path so far.
     pub fn is_gathered(&self) -> bool {
         self.caster != NO_CASTER && !self.is_lost()
     }

@@ -22,7 +22,7 @@ pub(crate) struct Path {
     pub sampler: Sampler,
     pub slot: u32,
     pub media: MediumId,
-    /// Against paths from the lamps.
+    /// Against light paths.
     pub track: MisState,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct PathBatch {
     pub slot: Vec<u32>,
     /// Kept only where some surface lets light through.
     pub media: Option<Vec<MediumId>>,
-    /// Kept only where paths are traced from the lamps as well.
+    /// Kept only where paths are traced from the lights as well.
     pub tracks: Option<Vec<MisState>>,
 }
 

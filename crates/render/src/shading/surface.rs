@@ -89,7 +89,7 @@ impl Vertex {
                 });
             }
             Shape::Spheres { world_from_object, .. } => {
-                // Balls scale evenly, so the transpose is the inverse but for that factor.
+                // Spheres scale evenly, so the transpose is the inverse but for that factor.
                 let m = world_from_object.matrix3;
                 uv = sphere_uv((m.transpose() * point.geometric_normal).normalize());
             }
@@ -114,7 +114,7 @@ impl Vertex {
     ///
     /// - `wo`: unit, towards the viewer there.
     #[inline]
-    pub fn from_behind(&self, wo: Vec3) -> Self {
+    pub fn seen_from_behind(&self, wo: Vec3) -> Self {
         let (geometric_normal, smooth_normal) = (-self.geometric_normal, -self.smooth_normal);
         Self { geometric_normal, smooth_normal, front: !self.front, lift: Vec3::ZERO, ..*self }.seen_along(wo)
     }
@@ -122,8 +122,8 @@ impl Vertex {
     /// The shading normal that counts for a viewer at `wo`, on the other side; on this side. A surface that is asked with it how
     /// it scatters between the two does so as seen from there.
     #[inline]
-    pub fn normal_from_behind(&self, wo: Vec3) -> Vec3 {
-        -self.from_behind(wo).normal
+    pub fn normal_seen_from_behind(&self, wo: Vec3) -> Vec3 {
+        -self.seen_from_behind(wo).normal
     }
 
     /// `wo` mirrored by the shading normal, unit.
@@ -366,7 +366,7 @@ mod tests {
         prepared(vec![Shape::Mesh { tree, world_from_object }], vec![object], vec![grey], Environment::Black)
     }
 
-    /// Rays from outside towards a unit ball, side by side.
+    /// Rays from outside towards a unit sphere, side by side.
     fn rays() -> impl Iterator<Item = Ray> {
         let n = 160;
         (0..n * n).map(move |i| {
@@ -375,8 +375,8 @@ mod tests {
         })
     }
 
-    /// Root mean square error of the light that a coarse ball of radius `size` gets from one side, against the true
-    /// ball: by the lifted origin, and by the plain one.
+    /// Root mean square error of the light that a coarse sphere of radius `size` gets from one side, against the true
+    /// sphere: by the lifted origin, and by the plain one.
     fn light_errors(frequency: u32, map: Affine3A) -> (f64, f64) {
         let light = Vec3::new(0.96, 0.28, 0.0);
         let scene = scene_of(procedural::icosphere(frequency).with_vertex_normals(), map);
@@ -410,7 +410,7 @@ mod tests {
         ((lifted / f64::from(n)).sqrt(), (plain / f64::from(n)).sqrt())
     }
 
-    /// The true normal, in the ball's own space, where the ray meets it.
+    /// The true normal, in the sphere's own space, where the ray meets it.
     fn ray_point(ray: &Ray, map: &Affine3A, dir: Vec3, b: f32, disc: f32) -> Vec3 {
         let origin = map.inverse().transform_point3(ray.origin);
         (origin + (-b - disc.sqrt()) * dir).normalize()

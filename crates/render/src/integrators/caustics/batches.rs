@@ -1,6 +1,6 @@
-//! How many paths from the lamps a picture gets, and how they are divided.
+//! How many light paths a picture gets, and how they are divided.
 
-/// Paths from the lamps for each path from the eye: they cost less, and all of them carry light that the others hardly
+/// Light paths for each camera path: they cost less, and all of them carry light that the others hardly
 /// find.
 const LIGHT_PATHS_PER_PIXEL: f64 = 0.25;
 

@@ -1,4 +1,4 @@
-//! Which sample dimension decides what on a path from a lamp, and when such paths end by chance.
+//! Which sample dimension decides what on a light path, and when such paths end by chance.
 
 use crate::integrators::survival::{ENDLESS_SURVIVAL, endless_depth};
 use crate::prepare::prepared::Prepared;
@@ -8,7 +8,7 @@ use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 pub(crate) const VERTEX_DIMENSIONS: u32 = 4;
 pub(crate) const DIM_LENS: u32 = 0;
 pub(crate) const DIM_ROULETTE: u32 = 2;
-// Those of directions and lobes are where paths from the eye have them: surfaces are sampled alike.
+// Those of directions and lobes are where camera paths have them: surfaces are sampled alike.
 const _: () = assert!(DIM_DIRECTION == 1 && DIM_LOBE == 3);
 
 /// What a surface that scatters keeps of a path, at most: most of what can be seen of a caustic is its first light.

@@ -1,4 +1,4 @@
-//! What of a picture paths from the lamps, and paths that are weighed against them, need to know.
+//! What of a picture light paths, and paths that are weighed against them, need to know.
 
 use crate::core::camera::Camera;
 use crate::core::filter::PixelFilter;
@@ -12,7 +12,7 @@ use crate::shading::mis_state::MisState;
 use firstlight_simd::InstructionSet;
 use glam::{UVec2, Vec2, Vec3};
 
-/// What tracing from the lamps and weighting against it need to know of a picture.
+/// What tracing from the lights and weighting against it need to know of a picture.
 pub(crate) struct CausticPass<'a> {
     pub scene: &'a Prepared,
     pub casters: &'a CasterTable,
@@ -25,9 +25,9 @@ pub(crate) struct CausticPass<'a> {
     pub filter: PixelFilter,
     /// The integral of the filter along one axis.
     pub filter_norm: f64,
-    /// Paths from the lamps a sample of the whole picture.
+    /// Light paths a sample of the whole picture.
     pub paths_per_sample: f64,
-    /// Of a pixel, on the plane one metre ahead of the eye; square metres.
+    /// Of a pixel, on the plane one metre ahead of the camera; square metres.
     pub pixel_area: f32,
     /// See [`crate::prepare::bodies::Bodies::around`].
     pub camera_media: Vec<u32>,
@@ -37,7 +37,7 @@ impl<'a> CausticPass<'a> {
     /// `None` where there is nothing to gain.
     pub fn of(scene: &'a Prepared, settings: &RenderSettings, size: UVec2, camera_media: &[u32]) -> Option<Self> {
         let casters = scene.tables.casters.as_ref()?;
-        // Lamp, mirror, matte, eye: three segments.
+        // Light, mirror, diffuse, camera: three segments.
         let traces_paths = settings.integrator == Integrator::Path;
         if !traces_paths || !settings.techniques.caustics || settings.max_depth < 3 {
             return None;
@@ -68,7 +68,7 @@ impl CausticPass<'_> {
         self.casters.guide.get().filter(|guide| !guide.is_empty())
     }
 
-    /// Hints for a vertex, where paths from lamps are of no use to the path so far.
+    /// Hints for a vertex, where light paths are of no use to the path so far.
     ///
     /// - `n_vertices`: up to and with this one.
     #[inline]

@@ -1,4 +1,4 @@
-//! Pilot paths from the lamps, which show paths from the eye the way.
+//! Pilot light paths, which show camera paths the way.
 
 use crate::core::techniques::Techniques;
 use crate::integrators::caustics::pass::CausticPass;
@@ -6,7 +6,7 @@ use crate::integrators::caustics::trace::LightWave;
 use crate::prepare::guide::Guide;
 use rayon::prelude::*;
 
-/// Paths from the lamps that show the others the way.
+/// Light paths that show the others the way.
 const PILOT_PATHS: u32 = 1 << 15;
 
 /// Scouts that one worker sends at once.
@@ -14,7 +14,7 @@ const PILOT_BATCH: u32 = 2048;
 
 /// Sees to it that hints are there; false if `stop` said so before they were.
 ///
-/// They belong to the lamps and surfaces of the scene, so they outlive cameras, seeds and settings.
+/// They belong to the lights and surfaces of the scene, so they outlive cameras, seeds and settings.
 pub(crate) fn prepare_guide(pass: &CausticPass, stop: &(dyn Fn() -> bool + Sync)) -> bool {
     if pass.casters.guide.get().is_some() {
         return true;

@@ -1,6 +1,6 @@
-//! Paths from the lamps, sixteen at a time; [`crate::integrators::caustics::trace`] has the same for one.
+//! Light paths, sixteen at a time; [`crate::integrators::caustics::trace`] has the same for one.
 //!
-//! Matte and rough surfaces are known where the true normal shades, for there the eye and the lamp see the same surface;
+//! Diffuse and rough surfaces are known where the true normal shades, for there the camera and the light see the same surface;
 //! mirrors and glass are known everywhere.
 
 use crate::core::camera::Camera;
@@ -119,7 +119,7 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
 struct LightPathLanes<'a, S: Simd> {
     pass: &'a CausticPass<'a>,
     at: &'a HitGroup<'a, S>,
-    /// As seen from the lamp's side.
+    /// As seen from the light's side.
     place: &'a SurfaceLanes<S>,
     media: &'a [MediumId; LANES],
     throughput: Vector<S>,
@@ -161,7 +161,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let importance = distance2 * (cos_lens * cos_lens * cos_lens);
         // `CausticPass::join_ratio`, rounded in an order of its own.
         let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
-        let weight = pass.lamp_weight(ratio);
+        let weight = pass.light_path_weight(ratio);
         let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
         open &= !light.is_zero();
         if open == 0 {
@@ -207,7 +207,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let reached = along.is_positive() & wi.dot(place.reach_normal).is_positive();
         let mut go_on = at.mask & bounce.go_on;
         go_on &= (bounce.transmitted & along.is_negative()) | (!bounce.transmitted & reached);
-        // A path that scatters before anything specular is left to the eye's side.
+        // A path that scatters before anything specular is left to the camera's side.
         if n_vertices == 1 {
             go_on &= specular;
         }

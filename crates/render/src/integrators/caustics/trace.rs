@@ -1,8 +1,8 @@
-//! Paths from the lamps, a wave at a time, joined to the lens wherever they meet something that scatters.
+//! Light paths, a wave at a time, joined to the lens wherever they meet something that scatters.
 //!
-//! The twin of [`crate::integrators::path`], with light and eye in each other's place. Where shading normals differ from true
-//! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the eye's view is the
-//! one that counts, so surfaces are always looked at from the eye's side here. Hits on what has no shading normals of its
+//! The twin of [`crate::integrators::path`], with light and camera in each other's place. Where shading normals differ from true
+//! ones, what a surface does depends on which end the path started from (Veach 1997, section 5.3); the camera's view is the
+//! one that counts, so surfaces are always looked at from the camera's side here. Hits on what has no shading normals of its
 //! own are taken sixteen at a time ([`crate::integrators::caustics::simd`]).
 
 use crate::core::counts::RayCounts;
@@ -38,7 +38,7 @@ const PILOT_REFLECTION: f32 = 0.25;
 struct LightPath {
     /// Flux over density.
     throughput: Vec3,
-    /// Density over that of the same path from the eye, up to the vertex to come; see [`crate::integrators::caustics::weight`].
+    /// Density over that of the same camera path, up to the vertex to come; see [`crate::integrators::caustics::weight`].
     ratio: f32,
     sampler: Sampler,
     /// To be hit first; no caster any more after that.
@@ -46,7 +46,7 @@ struct LightPath {
     media: MediumId,
 }
 
-/// Paths from the lamps are kept like those from the eye, of which they need less: the density is the ratio, and the
+/// Light paths are kept like those from the camera, of which they need less: the density is the ratio, and the
 /// slot is what they are aimed at.
 impl From<LightPath> for Path {
     fn from(LightPath { throughput, ratio, sampler, aimed_at, media }: LightPath) -> Self {
@@ -292,7 +292,7 @@ fn surface_at(
 struct LightPathStep<'a> {
     pass: &'a CausticPass<'a>,
     path: &'a LightPath,
-    /// As seen from the lamp's side.
+    /// As seen from the light's side.
     vertex: &'a Vertex,
     hit: &'a Hit,
     material: MaterialId,
@@ -322,32 +322,33 @@ impl LightPathStep<'_> {
         if !pass.reaches_film(film) {
             return None;
         }
-        let to_lamp = self.vertex.wo;
+        let to_light = self.vertex.wo;
         let way = origin - self.vertex.position;
         let distance2 = way.length_squared();
-        let to_eye = way / distance2.sqrt();
-        let through = surface.through().filter(|_| to_eye.dot(self.vertex.geometric_normal) < 0.0);
+        let to_camera = way / distance2.sqrt();
+        let through = surface.through().filter(|_| to_camera.dot(self.vertex.geometric_normal) < 0.0);
         let before = path.media;
         let after = through.map_or(before, |interface| interface.beyond);
         if after != media || through.is_some() && before == after {
             return None;
         }
-        let vertex = if through.is_some() { self.vertex.from_behind(to_eye) } else { self.vertex.seen_along(to_eye) };
-        // Lamp and eye on the same side of the true surface, unless light passes through it.
-        if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || through.is_none() && !vertex.is_reached_from(to_lamp) {
+        let vertex =
+            if through.is_some() { self.vertex.seen_from_behind(to_camera) } else { self.vertex.seen_along(to_camera) };
+        // Light and camera on the same side of the true surface, unless light passes through it.
+        if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || through.is_none() && !vertex.is_reached_from(to_light) {
             return None;
         }
         let normal = if through.is_some() { -vertex.normal } else { vertex.normal };
-        let (value, pdf) = surface.eval(vertex.wo, to_lamp, normal);
+        let (value, pdf) = surface.eval(vertex.wo, to_light, normal);
         if pdf <= 0.0 {
             return None;
         }
-        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), to_lamp.dot(self.vertex.geometric_normal));
+        let (cos_o, cos_i) = (vertex.wo.dot(vertex.geometric_normal), to_light.dot(self.vertex.geometric_normal));
         if cos_o <= 0.0 || cos_i <= 0.0 {
             return None;
         }
         let ratio = path.ratio * etendue_scale(through);
-        let weight = pass.lamp_weight(ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
+        let weight = pass.light_path_weight(ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
         let importance = cos_o / (distance2 * cos_lens.powi(3) * pass.pixel_area);
         let mut light = path.throughput * value * (weight * importance / cos_i);
         if light == Vec3::ZERO {
@@ -376,7 +377,7 @@ impl LightPathStep<'_> {
         };
         let sample = surface.sample(vertex.wo, vertex.normal, u_lobe, sampler.pair(dimension + DIM_DIRECTION))?;
         let is_specular = sample.pdf.is_infinite();
-        // A path that scatters before anything specular is left to the eye's side.
+        // A path that scatters before anything specular is left to the camera's side.
         if n_vertices == 1 && !is_specular {
             return None;
         }
@@ -411,7 +412,7 @@ impl LightPathStep<'_> {
         } else {
             let passes = sample.through.is_some();
             let seen = vertex.seen_along(sample.wi);
-            let normal = if passes { vertex.normal_from_behind(sample.wi) } else { seen.normal };
+            let normal = if passes { vertex.normal_seen_from_behind(sample.wi) } else { seen.normal };
             let (value, pdf) = surface.eval(sample.wi, vertex.wo, normal);
             let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal).abs(), vertex.wo.dot(vertex.geometric_normal));
             if pdf <= 0.0 || cos_i <= 0.0 || !passes && !seen.is_reached_from(vertex.wo) {
@@ -469,7 +470,7 @@ impl LightPathSurface {
 }
 
 impl CausticPass<'_> {
-    /// Whether paths may have more than these vertices: one more, and the way to the eye, are two more segments.
+    /// Whether paths may have more than these vertices: one more, and the way to the camera, are two more segments.
     pub(crate) fn goes_on(&self, n_vertices: u32) -> bool {
         n_vertices + 2 <= self.max_depth
     }

@@ -1,17 +1,17 @@
-//! What a path from the eye must remember so that light found by it can be weighed against a path from a lamp.
+//! What a camera path must remember so that light found by it can be weighed against a light path.
 //!
-//! Let a path have vertices x₁ … xₖ from the eye to the lamp point y. Per unit of film, solid angle and étendue, the
+//! Let a path have vertices x₁ … xₖ from the camera to the light point y. Per unit of film, solid angle and étendue, the
 //! ratio of the densities of the two ways to find it is a product of one factor a vertex:
 //!
 //! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area);
 //! - another vertex that scatters: p_lamp · cos θᵢ / (cos θₒ · p_eye), p_lamp and p_eye being its densities towards
-//!   the eye's side (o) and the lamp's side (i);
+//!   the camera's side (o) and the light's side (i);
 //! - the same for one that scatters through a rough interface, times nᵢ² / nₒ²: étendue is n² times area, solid angle
 //!   and cosine;
 //! - a specular one: 1, because étendue is kept by mirrors and lenses; or the ratio of the cosines with the true
 //!   and with the shading normal, where these differ, as étendue is kept about the shading normal (Veach 1997,
 //!   section 5.3);
-//! - the lamp: the density per étendue with which the line from y was chosen, times paths from the lamps.
+//! - the light: the density per étendue with which the line from y was chosen, times light paths.
 //!
 //! All cosines but those inside of densities are with the true normal. The factor n² of the medium that the camera is in
 //! is left out: the light of a path that counts lies outside of all glass. Roulette is left out on both sides, which makes the weights no less valid.
@@ -26,7 +26,7 @@ use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
 
-/// How a path from the eye goes on at a vertex.
+/// How a camera path goes on at a vertex.
 pub(crate) struct MisBounce<'a> {
     pub vertex: &'a Vertex,
     pub hit: &'a Hit,
@@ -85,15 +85,15 @@ impl CausticPass<'_> {
         distance2 * self.density_scale() * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * pdf)
     }
 
-    /// Of paths from the lamps that are joined to a pixel.
+    /// Of light paths that are joined to a pixel.
     #[inline]
     pub fn density_scale(&self) -> f32 {
         self.paths_per_sample as f32 * self.pixel_area
     }
 
-    /// Weight of light that a path from the eye finds on a lamp; `None` if paths from lamps do not matter here.
+    /// Weight of light that a camera path finds on a light; `None` if light paths do not matter here.
     #[inline]
-    pub fn eye_weight(&self, track: &MisState, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
+    pub fn camera_weight(&self, track: &MisState, media: MediumId, hit: &Hit, vertex: &Vertex) -> Option<f32> {
         if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
             return None;
         }
@@ -112,9 +112,9 @@ impl CausticPass<'_> {
         select(ratio.is_positive(), ratio.all(0.0), ratio.all(1.0))
     }
 
-    /// Weight of a path from the lamp that has `ratio` times the density of the one from the eye.
+    /// Weight of a light path that has `ratio` times the density of the one from the camera.
     #[inline(always)]
-    pub fn lamp_weight<R: Real>(&self, ratio: R) -> R {
+    pub fn light_path_weight<R: Real>(&self, ratio: R) -> R {
         ratio.all(1.0) - self.weight_against(ratio)
     }
 }
@@ -129,7 +129,7 @@ pub(crate) fn etendue_scale(through: Option<Interface>) -> f32 {
 /// Whether a path from the other end could do the same.
 ///
 /// Reflection must be seen from the front of the true surface on both ends, and glass that is left must have been
-/// entered: an eye or a lamp inside of glass does not know that it is.
+/// entered: an camera or a light inside of glass does not know that it is.
 #[inline]
 pub(crate) fn is_reversible(bounce: &MisBounce) -> bool {
     if bounce.through.is_some() {

@@ -1,4 +1,4 @@
-//! What the classic model makes of a material: a matte part, highlights, mirrors and panes.
+//! What the classic model makes of a material: a diffuse part, highlights, mirrors and panes.
 
 use crate::core::material::{MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA};
 use crate::integrators::phong::lobe::lobe_pdf;

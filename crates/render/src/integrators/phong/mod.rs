@@ -1,15 +1,15 @@
 //! The classic local model, a wave of rays at a time: Phong 1975 for light, Whitted 1980 for mirrors and glass.
 //!
-//! Each light adds a matte part, a highlight, and a small share to surfaces that it cannot reach (ambient). Lights
+//! Each light adds a diffuse part, a highlight, and a small share to surfaces that it cannot reach (ambient). Lights
 //! with an area are asked at one new point a sample, so that soft shadows get smooth as samples come in; point lights
 //! cast hard ones. Smooth surroundings add ambient light without shadows. Mirrors and glass send rays of their own,
 //! both reflected and refracted, until their weight is small; then chance decides, which costs no accuracy (Arvo and
 //! Kirk 1990). All rays of a wave that are at the same depth go to the kernel in one batch.
 //!
-//! Hits on matte surfaces, and on those with one part that sends a ray, are shaded sixteen at a time (`simd/classic.rs`). What
+//! Hits on diffuse surfaces, and on those with one part that sends a ray, are shaded sixteen at a time (`simd/classic.rs`). What
 //! is here shades all others, and whatever is asked of it as the reference.
 //!
-//! What it leaves out, and [`crate::integrators::path`] does not: light from one matte surface to another, and caustics.
+//! What it leaves out, and [`crate::integrators::path`] does not: light from one diffuse surface to another, and caustics.
 //! Start reading at [`PhongWave::trace`].
 
 mod finish;
@@ -187,7 +187,7 @@ impl PhongWave {
         {
             let share = match tables.lights.light_of(hit.object, hit.prim) {
                 None => 1.0,
-                // A point shows to the eye alone: in a mirror its ball would be a speck that few samples meet.
+                // A point shows to the camera alone: in a mirror its sphere would be a speck that few samples meet.
                 Some(id) if depth > 1 && tables.lights.is_point(id) => 0.0,
                 Some(id) => share_of_light(&path, |from| {
                     tables.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))

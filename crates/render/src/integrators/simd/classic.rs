@@ -1,6 +1,6 @@
 //! The classic model for sixteen hits at a time; see `phong/` for one, and for what it is.
 //!
-//! Knows matte surfaces and those with one part that sends a ray. Each hit sends at most one ray and asks each light
+//! Knows diffuse surfaces and those with one part that sends a ray. Each hit sends at most one ray and asks each light
 //! once, and what belongs to one light is kept together: so the order in which light is added up at a pixel does not
 //! depend on which hits share a register.
 

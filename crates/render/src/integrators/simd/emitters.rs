@@ -51,7 +51,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
             weight = select(known, bounce_weight(techniques, pdf, other), weight);
         }
         if let Some(pass) = caustics {
-            weight = lamp_weights(s, pass, &at, &place, weight);
+            weight = light_path_weights(s, pass, &at, &place, weight);
         }
         light = light * weight;
         if scene.tables.features.media {
@@ -83,9 +83,9 @@ fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANE
     Float::load(pdf.s, &pdfs)
 }
 
-/// Puts in the weights of light that paths from the lamps could have found as well, one at a time.
+/// Puts in the weights of light that light paths could have found as well, one at a time.
 #[inline(always)]
-fn lamp_weights<S: Simd>(
+fn light_path_weights<S: Simd>(
     s: S,
     pass: &CausticPass,
     at: &HitGroup<S>,
@@ -104,7 +104,7 @@ fn lamp_weights<S: Simd>(
     for lane in lanes_of(gathered) {
         let i = at.indices[lane] as usize;
         let hit = at.hits.get(i).expect("a hit is being shaded");
-        let found = pass.eye_weight(&at.paths.track_of(i), at.paths.media_of(i), &hit, &vertices.vertex(lane));
+        let found = pass.camera_weight(&at.paths.track_of(i), at.paths.media_of(i), &hit, &vertices.vertex(lane));
         weights[lane] = found.unwrap_or(weights[lane]);
     }
     Float::load(s, &weights)

@@ -1,4 +1,4 @@
-//! Shading of sixteen paths at a time, for matte, mirror, glass, metal, and two of them in one surface.
+//! Shading of sixteen paths at a time, for diffuse, mirror, glass, metal, and two of them in one surface.
 //!
 //! A wave's hits come sorted by kind of material, so the lanes of a chunk do the same. What is rare is done lane by
 //! lane with the scalar code: textures, the glasses that a path is inside of, many lights, and pictures of the

@@ -1,4 +1,4 @@
-//! What sixteen paths must remember against paths from the lamps; see [`crate::integrators::caustics::pass::CausticPass::follow`].
+//! What sixteen paths must remember against light paths; see [`crate::integrators::caustics::pass::CausticPass::follow`].
 
 use crate::core::camera::Camera;
 use crate::core::material::Material;

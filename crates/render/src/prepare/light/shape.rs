@@ -405,7 +405,7 @@ mod tests {
                 let position = Vec3::new(0.1 * (i % 16) as f32 - 0.8, 0.0, 0.1 * (i / 16) as f32 - 0.8);
                 let Some(point) = shape.sample(position, by_angle, Sampler::new(1, 0, 0, i).pair(0)) else { continue };
                 let pdf = shape.pdf(position, by_angle, point.wi, (point.target - position).length());
-                // By area the normal is found again from the point: a far, small ball leaves it few digits.
+                // By area the normal is found again from the point: a far, small sphere leaves it few digits.
                 let bound = if by_angle { 1e-3 } else { 1e-2 };
                 assert!((pdf / point.pdf - 1.0).abs() < bound, "light {case}: {pdf} for {}", point.pdf);
             }

@@ -1,6 +1,6 @@
 //! A tree over many lights, so that one of them is chosen by what it could send to a point without asking them all.
 //!
-//! Every node knows a ball around its lights, a cone around the directions in which they face, and their power. From
+//! Every node knows a sphere around its lights, a cone around the directions in which they face, and their power. From
 //! the root down, one of two children is chosen in proportion to a bound on the light that it can send: power over
 //! distance squared, times the largest cosines at both ends (Conty Estevez and Kulla 2018, "Importance Sampling of Many
 //! Lights with Adaptive Tree Splitting", without the splitting). The tree is built by their cost, surface area times
@@ -168,7 +168,7 @@ impl<R: Real> NodeBound<R> {
     /// About the largest irradiance that the lights can cause, never zero where they can cause any.
     ///
     /// It is asked for twice a level, so it is made of one root and no other angle: the cosine of the largest lean of a
-    /// ball is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
+    /// sphere is taken for that of its middle plus radius over distance, and the cone of normals widens it once more.
     ///
     /// - `normal`: unit, of the surface, if it has one side.
     #[inline(always)]
@@ -186,7 +186,7 @@ impl<R: Real> NodeBound<R> {
         let receiver = receiver.at_least(0.0).at_most(1.0);
         let emitter = emitter.at_least(0.0).at_most(1.0);
         let outside = power * receiver * emitter * (inv_distance * inv_distance);
-        // Within the ball anything can happen; on average the lights are about a radius away.
+        // Within the sphere anything can happen; on average the lights are about a radius away.
         select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
     }
 }

@@ -1,4 +1,4 @@
-//! Two parts in one surface, sixteen at a time: matte under a rough or mirroring coat, as blends and classic materials have it.
+//! Two parts in one surface, sixteen at a time: diffuse under a rough or mirroring coat, as blends and classic materials have it.
 //!
 //! The formulas are those of [`crate::shading::bsdf::Blend`]: light sampling asks both parts, a bounce is chosen from one
 //! and weighted over both.

@@ -1,8 +1,8 @@
-//! Hits on meshes and clouds of balls, which have spaces of their own, sixteen at a time.
+//! Hits on meshes and clouds of spheres, which have spaces of their own, sixteen at a time.
 //!
 //! The formulas are those of `kdtree/surface.rs` and [`crate::shading::surface::Vertex`], operation by operation; there is where
 //! they are explained. What is looked up by object comes from an [`InstanceTable`], what is looked up by triangle or
-//! ball is loaded lane by lane.
+//! sphere is loaded lane by lane.
 
 use crate::prepare::instance_table::{Columns, InstanceTable};
 use crate::shading::simd::lanes::lanes_of;
@@ -139,7 +139,7 @@ impl<S: Simd> SurfaceLanes<S> {
         self.lifted = select_vector(lifted, self.position + lift, self.lifted);
     }
 
-    /// Points on clouds of balls, with the normals of their outsides.
+    /// Points on clouds of spheres, with the normals of their outsides.
     #[inline(always)]
     pub(crate) fn set_clouds(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, dir: Vector<S>, mask: Mask) {
         let geometry = &*at.scene.geometry;

@@ -199,7 +199,7 @@ impl<S: Simd> SurfaceLanes<S> {
         self.uv = two!(|k| select(mask, local.dot(Vector::gather(axes[k], object)), self.uv[k]));
     }
 
-    /// Lone triangles, textured balls and what is near the rim of a triangle, one at a time.
+    /// Lone triangles, textured spheres and what is near the rim of a triangle, one at a time.
     #[inline(always)]
     fn set_others(&mut self, s: S, at: &HitGroup<S>, mask: Mask) {
         let mut vectors = [
