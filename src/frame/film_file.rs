@@ -120,6 +120,9 @@ pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), Write
 }
 
 /// The same into a file that was claimed before, whatever it replaces.
+///
+/// # Errors
+/// When it cannot be written.
 pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<(), WriteError> {
     let path = &out.path().to_path_buf();
     drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, error))?);
@@ -210,6 +213,9 @@ pub fn read_film_file(path: &Path) -> Result<FilmFile, FilmError> {
 }
 
 /// The same with limits of one's own.
+///
+/// # Errors
+/// As [`read_film_file`].
 pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, FilmError> {
     read(path, limits).map_err(|problem| FilmError { path: path.to_path_buf(), problem })
 }

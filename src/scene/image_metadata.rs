@@ -145,6 +145,9 @@ impl ImageMetadata {
     }
 
     /// The same with limits of one's own.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
     pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, MetadataError> {
         Self::from_note(&note_of(path, limits)?)
     }

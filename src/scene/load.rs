@@ -47,6 +47,9 @@ impl LoadOptions<'_> {
 }
 
 /// Reads a scene and all it points at, and builds its trees.
+///
+/// # Errors
+/// When the scene, or a file that it cannot be without, is missing or wrong; see [`SceneError`].
 pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     if let SceneSource::Picture(path) = source {
         return load_picture(path, options);

@@ -46,11 +46,17 @@ impl From<PictureError> for String {
 
 /// Reads PNG, JPEG, HDR or EXR; 8- and 16-bit pictures are taken as sRGB. Returns a warning beside the picture when
 /// some of its numbers had to be left out.
+///
+/// # Errors
+/// As [`read_picture_within`].
 pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), PictureError> {
     read_picture_within(path, &Limits::of_this_process())
 }
 
 /// The same within limits of the caller's choice.
+///
+/// # Errors
+/// When the file cannot be read, is none of these formats, is too large or cannot be decoded.
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), PictureError> {
     let reader = picture_reader(path, limits)?;
     if reader.format().is_none() {
