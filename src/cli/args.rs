@@ -110,7 +110,7 @@ impl SceneArgs {
         let source = self.source()?;
         if let Some(path) = source.path() {
             files.read(path)?;
-            check_film_source(&source).map_err(Failure::Failed)?;
+            check_film_source(&source)?;
         }
         let environment = self.how.env.as_deref();
         let options =

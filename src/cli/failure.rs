@@ -1,5 +1,6 @@
 //! Why a command did not do its work.
 
+use firstlight::frame::FilmError;
 use firstlight::scene::{FilesError, SceneError, WriteError};
 
 /// Why a command did not do its work; a message of one line, but for [`Failure::Problems`].
@@ -30,6 +31,12 @@ impl From<FilesError> for Failure {
 
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<FilmError> for Failure {
+    fn from(error: FilmError) -> Self {
         Self::Failed(error.into())
     }
 }

@@ -139,7 +139,7 @@ impl RenderJob {
         let Some((FilmFile { film, shot, .. }, path)) = kept else {
             return Ok(self.new_film(&purposes(args))?.starting_at(first.unwrap_or(0)));
         };
-        let ours = ImageMetadata::from_note(&self.note(&film, path)).map_err(Failure::Failed)?;
+        let ours = ImageMetadata::from_note(&self.note(&film, path)).map_err(|error| Failure::Failed(error.into()))?;
         match ours.differs_from(&shot) {
             None => Ok(film),
             Some(what) => Err(Failure::Failed(format!(

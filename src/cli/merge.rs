@@ -45,11 +45,11 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let mut films: Vec<&PathBuf> = args.films.iter().collect();
     films.sort_by_cached_key(|path| ImageMetadata::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
     let (first, others) = films.split_first().expect("two films at least");
-    let FilmFile { mut film, shot, warning } = read_film_file(first).map_err(Failure::Failed)?;
+    let FilmFile { mut film, shot, warning } = read_film_file(first)?;
     let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
     warn(warning);
     for path in others {
-        let mut other = read_film_file(path).map_err(Failure::Failed)?;
+        let mut other = read_film_file(path)?;
         warn(other.warning.take());
         let failed = |reason: String| {
             Failure::Failed(format!("{} and {} cannot be merged: {reason}", first.display(), path.display()))

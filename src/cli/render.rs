@@ -122,7 +122,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let film_path = film_file.as_ref().map(|file| file.path().to_path_buf());
     let film_path = film_path.as_deref();
     let kept = match film_path.filter(|_| args.resume) {
-        Some(path) => Some((read_film_file(path).map_err(Failure::Failed)?, path)),
+        Some(path) => Some((read_film_file(path)?, path)),
         None => None,
     };
     if let Some(warning) = kept.as_ref().and_then(|(kept, _)| kept.warning.as_ref()) {

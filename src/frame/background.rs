@@ -209,7 +209,7 @@ impl BackgroundTasks {
         self.with(|board| board.reading += 1);
         let this = self.clone();
         let work = move || {
-            let result = guarded(|| read_picture(&path)).and_then(|read| read);
+            let result = guarded(|| read_picture(&path)).and_then(|read| read.map_err(String::from));
             let result = result.map(|(picture, _)| picture).map_err(|reason| format!("{}: {reason}", path.display()));
             this.with(|board| {
                 board.reading -= 1;

@@ -7,11 +7,14 @@
 //! every byte of the file but its own digits, so that a change of anything is noticed.
 
 use super::picture_file::mean_channels;
-use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, Purpose, Room};
+use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, NoRoom, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
-use crate::scene::{FileKind, Fingerprint, ImageMetadata, InputFile, Limits, ReadError, SceneSource, WriteError};
+use crate::scene::{
+    BadValue, FileKind, Fingerprint, ImageMetadata, InputFile, Limits, MetadataError, ReadError, SceneSource,
+    WriteError,
+};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
     ReadLayers, Text, WritableImage,
@@ -19,7 +22,7 @@ use exr::prelude::{
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Seek, Write};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A film and what it is a film of.
 #[derive(Clone, Debug)]
@@ -30,6 +33,58 @@ pub struct FilmFile {
     pub shot: ImageMetadata,
     /// What cannot be known of it; for people, with its name.
     pub warning: Option<String>,
+}
+
+/// Why a file is not read as a film.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", path.display())]
+pub struct FilmError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    #[source]
+    pub problem: FilmProblem,
+}
+
+/// What is wrong with the file of a film; the words follow its path.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FilmProblem {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file is something else.
+    #[error("is not a firstlight film: films are written by render --film FILE.exr")]
+    NoFilm,
+    /// The film is of a format that this version does not know.
+    #[error("was written by a newer version of firstlight")]
+    Newer,
+    /// The file is not as it was written.
+    #[error("is truncated or damaged: {0}")]
+    Damaged(String),
+    /// No film may have that size.
+    #[error(transparent)]
+    Size(#[from] BadValue),
+    /// The film has more pixels than the limits allow.
+    #[error("has {pixels} pixels, above the limit of {limit}: {}", Limits::advice())]
+    TooLarge {
+        /// Pixels of the film.
+        pixels: u64,
+        /// Pixels that a film may have.
+        limit: u64,
+    },
+    /// There is no memory for the film.
+    #[error(transparent)]
+    Memory(#[from] NoRoom),
+    /// The metadata of the film is not what this program writes.
+    #[error(transparent)]
+    Metadata(#[from] MetadataError),
+}
+
+impl From<FilmError> for String {
+    fn from(error: FilmError) -> Self {
+        error.to_string()
+    }
 }
 
 /// What stands in the attribute.
@@ -65,6 +120,9 @@ pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), Write
 }
 
 /// The same into a file that was claimed before, whatever it replaces.
+///
+/// # Errors
+/// When it cannot be written.
 pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<(), WriteError> {
     let path = &out.path().to_path_buf();
     drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, error))?);
@@ -128,7 +186,7 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), W
     }
     let refused = |film: String| WriteError::OtherFilm { path: path.to_path_buf(), film };
     let old = read(path, &Limits::of_this_process()).map_err(|reason| refused(format!("that {reason}")))?;
-    if let Some(what) = ImageMetadata::from_note(note).map_err(WriteError::Metadata)?.differs_from(&old.shot) {
+    if let Some(what) = ImageMetadata::from_note(note)?.differs_from(&old.shot) {
         return Err(refused(format!("with a different {what}")));
     }
     if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
@@ -139,7 +197,7 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), W
 ///
 /// # Errors
 /// As [`read_film_file`].
-pub fn check_film_source(source: &SceneSource) -> Result<(), String> {
+pub fn check_film_source(source: &SceneSource) -> Result<(), FilmError> {
     match source {
         SceneSource::Picture(path) if is_film(path) => read_film_file(path).map(|_| ()),
         _ => Ok(()),
@@ -150,45 +208,45 @@ pub fn check_film_source(source: &SceneSource) -> Result<(), String> {
 ///
 /// # Errors
 /// A sentence that names the file: when it is not there, no film, cut short or damaged.
-pub fn read_film_file(path: &Path) -> Result<FilmFile, String> {
+pub fn read_film_file(path: &Path) -> Result<FilmFile, FilmError> {
     read_film_file_within(path, &Limits::of_this_process())
 }
 
 /// The same with limits of one's own.
-pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
-    read(path, limits).map_err(|reason| format!("{}: {reason}", path.display()))
+///
+/// # Errors
+/// As [`read_film_file`].
+pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, FilmError> {
+    read(path, limits).map_err(|problem| FilmError { path: path.to_path_buf(), problem })
 }
 
-const NO_FILM: &str = "is not a firstlight film: films are written by render --film FILE.exr";
-
-fn read(path: &Path, limits: &Limits) -> Result<FilmFile, String> {
+fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
     let limit = FileKind::Film.limit(limits);
-    let mut file = InputFile::open_within(path, FileKind::Film, limit).map_err(|error| error.to_string())?;
-    let unreadable = |error: std::io::Error| ReadError::from(error).to_string();
+    let mut file = InputFile::open_within(path, FileKind::Film, limit)?;
     // Before gigabytes of something else are read.
     let mut start = [0; 4];
-    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(unreadable)?;
+    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
     if start[..n] != [0x76, 0x2f, 0x31, 0x01] {
-        return Err(NO_FILM.to_owned());
+        return Err(FilmProblem::NoFilm);
     }
-    let bytes = file.bytes().map_err(|error| error.to_string())?;
+    let bytes = file.bytes()?;
     decode(&bytes, path, limits)
 }
 
 /// A film from the bytes of its file.
-fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String> {
+fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
     if bytes.get(..4) != Some(&[0x76, 0x2f, 0x31, 0x01]) {
-        return Err(NO_FILM.to_owned());
+        return Err(FilmProblem::NoFilm);
     }
-    let damaged = |error: &dyn std::fmt::Display| format!("is truncated or damaged: {error}");
+    let damaged = |error: &dyn std::fmt::Display| FilmProblem::Damaged(error.to_string());
     let meta = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(|error| damaged(&error))?;
-    let header = meta.headers.first().ok_or(NO_FILM)?;
+    let header = meta.headers.first().ok_or(FilmProblem::NoFilm)?;
     let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
-        return Err(NO_FILM.to_owned());
+        return Err(FilmProblem::NoFilm);
     };
     let film: Header = ron::from_str(&string_of(text)).map_err(|error| damaged(&error))?;
     if film.format > FORMAT {
-        return Err("was written by a newer version of firstlight".to_owned());
+        return Err(FilmProblem::Newer);
     }
     const WRONG: &str = "checksum mismatch";
     if film.format >= FORMAT {
@@ -204,15 +262,14 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, String
     }
     let n_pixels = u64::from(width) * u64::from(height);
     if n_pixels > limits.film_pixels {
-        let most = limits.film_pixels;
-        return Err(format!("has {n_pixels} pixels, above the limit of {most}: {}", Limits::advice()));
+        return Err(FilmProblem::TooLarge { pixels: n_pixels, limit: limits.film_pixels });
     }
     // What claims to be larger than its bytes could unpack to is refused before any memory is asked for it.
     const MOST_UNPACKED: u64 = 1100;
     if n_pixels * BYTES_A_PIXEL > MOST_UNPACKED * bytes.len() as u64 {
         return Err(damaged(&"the file is too short for its size"));
     }
-    drop(Room::for_files(width, height, &[Purpose::FilmFile]).map_err(|error| error.to_string())?);
+    drop(Room::for_files(width, height, &[Purpose::FilmFile])?);
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -290,7 +347,7 @@ mod tests {
         (film, note)
     }
 
-    fn read_bytes(bytes: &[u8]) -> Result<FilmFile, String> {
+    fn read_bytes(bytes: &[u8]) -> Result<FilmFile, FilmProblem> {
         decode(bytes, Path::new("a.exr"), &Limits::USUAL)
     }
 

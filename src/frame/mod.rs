@@ -52,8 +52,8 @@ pub use command::Command;
 pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use film_file::{
-    FilmFile, check_film_source, check_replaced_film, read_film_file, read_film_file_within, write_film_file,
-    write_film_into,
+    FilmError, FilmFile, FilmProblem, check_film_source, check_replaced_film, read_film_file, read_film_file_within,
+    write_film_file, write_film_into,
 };
 pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;

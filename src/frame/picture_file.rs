@@ -23,6 +23,9 @@ pub enum PictureFormat {
 
 impl PictureFormat {
     /// The kind that a file name asks for.
+    ///
+    /// # Errors
+    /// When it asks for none, or for one that is not written.
     pub fn of(path: &Path) -> Result<Self, WriteError> {
         match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
             Some("png") => Ok(Self::Png),
@@ -55,6 +58,9 @@ pub struct Print<'a> {
 }
 
 /// Writes a film as its name asks, without a note.
+///
+/// # Errors
+/// As [`Print::write`].
 pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), WriteError> {
     Print { film, display, size: (film.width(), film.height()), note: None }.write(path, Replace::AllButFilms)
 }
@@ -75,12 +81,18 @@ pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), Wr
 
 impl Print<'_> {
     /// Writes the picture as its name asks: to a temporary name first, which then takes the place of `path`.
+    ///
+    /// # Errors
+    /// When the name asks for no kind of picture, or the file cannot be written.
     pub fn write(&self, path: &Path, replace: Replace) -> Result<(), WriteError> {
         self.encode_beside(PictureFormat::of(path)?, path, replace)?.finish()
     }
 
     /// Writes the picture into `folder` as `STEM-0001`, or with the first higher number that is free: never over a
     /// file that is there, even one that another program makes at the same moment. Answers with the path.
+    ///
+    /// # Errors
+    /// When no number is free, or the file cannot be written.
     pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, WriteError> {
         let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
         let file = self.encode_beside(format, &name(0), Replace::AllButFilms)?;

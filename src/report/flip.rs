@@ -121,7 +121,7 @@ fn as_seen(opponent: &[Vec3], width: usize) -> Vec<Vec3> {
 
 /// Difference of edges or of points, whichever is larger, 0..1.
 fn feature_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
-    /// Width of the filters in degrees: how far apart peaks of the camera's sensitivity to edges are.
+    /// Width of the filters in degrees: how far apart peaks of the eye's sensitivity to edges are.
     const FEATURE_WIDTH: f32 = 0.082;
     let sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * sigma).ceil() as i32;

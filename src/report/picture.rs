@@ -25,12 +25,12 @@ impl LinearPicture {
     pub fn read_exr(path: &Path) -> Result<Self, String> {
         let fail = |reason: String| format!("{}: {reason}", path.display());
         let limits = Limits::of_this_process();
-        let reader = picture_reader(path, &limits).map_err(fail)?;
+        let reader = picture_reader(path, &limits).map_err(|error| fail(error.into()))?;
         if reader.format() != Some(image::ImageFormat::OpenExr) {
             let reason = "is not an OpenEXR image: a reference must be .exr (linear light)";
             return Err(fail(reason.to_owned()));
         }
-        let picture = decode_picture(reader, &limits).map_err(fail)?.into_rgb32f();
+        let picture = decode_picture(reader, &limits).map_err(|error| fail(error.into()))?.into_rgb32f();
         let (width, height) = picture.dimensions();
         let pixels: Vec<Vec3> = picture.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
         if let Some(at) = pixels.iter().position(|pixel| !pixel.is_finite()) {

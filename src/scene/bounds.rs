@@ -230,6 +230,9 @@ impl DisplayPart {
 }
 
 /// Whether there is such an exposure, factors of two.
+///
+/// # Errors
+/// When it is out of range.
 pub fn check_stops(stops: f32) -> Result<(), BadValue> {
     if stops.abs() <= MOST_STOPS {
         return Ok(());
@@ -239,6 +242,9 @@ pub fn check_stops(stops: f32) -> Result<(), BadValue> {
 }
 
 /// Whether there are such paths, segments; `None` is without a limit.
+///
+/// # Errors
+/// When it is 0.
 pub fn check_max_depth(max_depth: Option<u32>) -> Result<(), BadValue> {
     let settings = RenderSettings { max_depth: max_depth.unwrap_or(u32::MAX), ..RenderSettings::default() };
     settings.check().map_err(|error| BadValue::unfit("max_depth", error.to_string()))
@@ -267,6 +273,9 @@ impl FilmSize {
 }
 
 /// Whether a film may have this size.
+///
+/// # Errors
+/// When it is out of range.
 pub fn check_film_size(width: u32, height: u32) -> Result<(), BadValue> {
     FilmSize::try_new(width, height).map(drop)
 }

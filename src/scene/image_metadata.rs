@@ -16,8 +16,9 @@ use crate::render::{Film, Integrator};
 use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
+use std::error::Error;
 use std::io::{BufReader, Read, Seek};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The name of the note in a picture: of the text chunk in a PNG, of the attribute in an EXR.
 pub const NOTE_KEY: &str = "firstlight";
@@ -27,6 +28,45 @@ pub const FILM_KEY: &str = "firstlight.film";
 
 /// A newer program that writes something else counts this up.
 pub(super) const FORMAT: u32 = 1;
+
+/// Why a picture has no metadata to open it by, or leads to no scene; the words follow its path.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MetadataError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// What stands before the pixels of the PNG or EXR is truncated, damaged or too long.
+    #[error("cannot be read: {0}")]
+    Damaged(#[source] Box<dyn Error + Send + Sync>),
+    /// The file begins as neither format does.
+    #[error("is neither a PNG nor an OpenEXR image")]
+    Format,
+    /// The picture was not made by this program, or has lost its metadata.
+    #[error("it has no embedded firstlight scene: only pictures rendered by firstlight can be opened")]
+    Missing,
+    /// The metadata is not what this program writes.
+    #[error("its firstlight metadata cannot be parsed: {0}")]
+    Syntax(#[source] Box<dyn Error + Send + Sync>),
+    /// The metadata is of a format that this version does not know.
+    #[error("it was made by {program}, whose metadata format is not supported by this version")]
+    Newer {
+        /// Name and version of the program that wrote it.
+        program: String,
+    },
+    /// The metadata holds values that nothing is rendered from.
+    #[error("its firstlight metadata is invalid: {0}")]
+    Invalid(String),
+    /// The file of the scene is neither where it was nor beside the picture.
+    #[error("its scene {} was not found: put it next to the picture", .0.display())]
+    NoScene(PathBuf),
+}
+
+impl From<MetadataError> for String {
+    fn from(error: MetadataError) -> Self {
+        error.to_string()
+    }
+}
 
 /// What is in a picture's note.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,12 +140,15 @@ impl ImageMetadata {
     ///
     /// # Errors
     /// When the picture cannot be read or has no note.
-    pub fn read(path: &Path) -> Result<Self, String> {
+    pub fn read(path: &Path) -> Result<Self, MetadataError> {
         Self::read_within(path, &Limits::of_this_process())
     }
 
     /// The same with limits of one's own.
-    pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, MetadataError> {
         Self::from_note(&note_of(path, limits)?)
     }
 
@@ -127,18 +170,16 @@ impl ImageMetadata {
         self
     }
 
+    /// The metadata that is written as this text; the inverse of [`Self::to_note`].
+    ///
     /// # Errors
     /// When the text is no note that this program knows.
-    pub fn from_note(text: &str) -> Result<Self, String> {
-        let shot: Self =
-            options().from_str(text).map_err(|error| format!("its firstlight metadata cannot be parsed: {error}"))?;
+    pub fn from_note(text: &str) -> Result<Self, MetadataError> {
+        let shot: Self = options().from_str(text).map_err(|error| MetadataError::Syntax(Box::new(error)))?;
         if shot.format > FORMAT {
-            return Err(format!(
-                "it was made by {}, whose metadata format is not supported by this version",
-                shot.program
-            ));
+            return Err(MetadataError::Newer { program: shot.program });
         }
-        shot.check().map_err(|bad| format!("its firstlight metadata is invalid: {bad}"))?;
+        shot.check().map_err(MetadataError::Invalid)?;
         Ok(shot)
     }
 
@@ -166,7 +207,7 @@ impl ImageMetadata {
     ///
     /// # Errors
     /// When its file is not there.
-    pub fn source(&self, path: &Path) -> Result<Option<SceneSource>, String> {
+    pub fn source(&self, path: &Path) -> Result<Option<SceneSource>, MetadataError> {
         // Its paths count from where it lies, not from a link that leads there.
         let lies_at = if path.is_symlink() { absolute(path) } else { path.to_path_buf() };
         let folder = lies_at.parent().unwrap_or(Path::new(""));
@@ -174,8 +215,7 @@ impl ImageMetadata {
             let from_picture = text_to_path(relative);
             let beside = from_picture.file_name().map(|name| folder.join(name));
             let found = [Some(folder.join(&from_picture)), beside].into_iter().flatten().find(|path| path.is_file());
-            let name = from_picture.display();
-            found.ok_or_else(|| format!("its scene {name} was not found: put it next to the picture"))
+            found.ok_or(MetadataError::NoScene(from_picture))
         };
         Ok(match &self.scene {
             ImageScene::Builtin(name) => Some(SceneSource::Builtin(name.clone())),
@@ -257,23 +297,22 @@ pub(crate) fn string_of(text: &Text) -> String {
 }
 
 /// The text of the note, within the limits.
-fn note_of(path: &Path, limits: &Limits) -> Result<String, String> {
-    let unreadable = |error: std::io::Error| ReadError::from(error).to_string();
+fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
     // A film carries a note too, and is the longest of all pictures.
     let longest = FileKind::Film.limit(limits).max(FileKind::Image.limit(limits));
-    let mut file = InputFile::open_within(path, FileKind::Image, longest).map_err(|error| error.to_string())?;
+    let mut file = InputFile::open_within(path, FileKind::Image, longest)?;
     let mut start = [0; 8];
-    let n = file.read(&mut start).map_err(unreadable)?;
-    file.rewind().map_err(unreadable)?;
-    let none = "it has no embedded firstlight scene: only pictures rendered by firstlight can be opened";
+    let n = file.read(&mut start).map_err(ReadError::from)?;
+    file.rewind().map_err(ReadError::from)?;
     if start[..n] == *b"\x89PNG\r\n\x1a\n" {
-        let unreadable = |error: png::DecodingError| format!("cannot be read: {error}");
+        let unreadable = |error: png::DecodingError| MetadataError::Damaged(Box::new(error));
         let most = usize::try_from(limits.note_bytes).unwrap_or(usize::MAX);
         let reader = BufReader::new(file);
         let decoder =
             png::Decoder::new_with_limits(reader, png::Limits { bytes: most }).read_info().map_err(unreadable)?;
         let info = decoder.info();
-        let mut chunk = info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(none)?.clone();
+        let mut chunk =
+            info.utf8_text.iter().find(|chunk| chunk.keyword == NOTE_KEY).ok_or(MetadataError::Missing)?.clone();
         // A few kilobytes may claim to unpack to gigabytes.
         chunk.decompress_text_with_limit(most).map_err(unreadable)?;
         return chunk.get_text().map_err(unreadable);
@@ -283,8 +322,8 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, String> {
         const HEADER_BYTES: u64 = 1 << 20;
         let header = BufReader::new(file).take(limits.note_bytes.saturating_add(HEADER_BYTES));
         let meta = exr::meta::MetaData::read_from_buffered(header, false)
-            .map_err(|error| format!("cannot be read: {error}"))?;
-        return note_in(&meta).ok_or_else(|| none.to_owned());
+            .map_err(|error| MetadataError::Damaged(Box::new(error)))?;
+        return note_in(&meta).ok_or(MetadataError::Missing);
     }
-    Err("is neither a PNG nor an OpenEXR image".to_owned())
+    Err(MetadataError::Format)
 }

@@ -118,6 +118,9 @@ impl InputFile<'static> {
     }
 
     /// The same with a limit of the caller's own, bytes.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
     pub fn open_within(path: &Path, kind: FileKind, limit: u64) -> Result<Self, ReadError> {
         // Asked by name first, for opening some devices already does something; and again of what was opened, which
         // may be another by then.
@@ -154,6 +157,9 @@ impl<'a> InputFile<'a> {
     }
 
     /// All of it.
+    ///
+    /// # Errors
+    /// When it cannot be read to its end, is too long, or reading is stopped.
     pub fn bytes(mut self) -> Result<Vec<u8>, ReadError> {
         // A file may claim any length; what it has is found by reading.
         let mut bytes = Vec::with_capacity(self.length.min(64 << 20) as usize);
@@ -162,6 +168,9 @@ impl<'a> InputFile<'a> {
     }
 
     /// All of it as text, without a byte order mark.
+    ///
+    /// # Errors
+    /// As [`Self::bytes`], and when it is not UTF-8.
     pub fn text(self) -> Result<String, ReadError> {
         let text = String::from_utf8(self.bytes()?).map_err(|error| {
             let good = error.utf8_error().valid_up_to();

@@ -5,7 +5,7 @@ use super::components::{Balls, Shape};
 use super::default_scene;
 use super::error::{Problem, SceneError, suggestion};
 use super::file::{ObjectPart, RadiiPart, SceneFile, ball_grid, locate};
-use super::image_metadata::ImageMetadata;
+use super::image_metadata::{ImageMetadata, MetadataError};
 use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
@@ -47,6 +47,9 @@ impl LoadOptions<'_> {
 }
 
 /// Reads a scene and all it points at, and builds its trees.
+///
+/// # Errors
+/// When the scene, or a file that it cannot be without, is missing or wrong; see [`SceneError`].
 pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     if let SceneSource::Picture(path) = source {
         return load_picture(path, options);
@@ -101,7 +104,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
 
 /// The scene that a picture shows, seen as the picture shows it.
 fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
-    let failed = |reason: String| SceneError::in_file(path, reason);
+    let failed = |error: MetadataError| SceneError::in_file(path, error);
     let shot = ImageMetadata::read(path).map_err(failed)?;
     let source = shot.source(path).map_err(failed)?;
     let options = LoadOptions { up: options.up.or(shot.up()), ..*options };
@@ -124,7 +127,7 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
             scene
         }
         (None, Some(source)) => load(&source, &options)?,
-        (None, None) => return Err(failed("its metadata names no scene".to_owned())),
+        (None, None) => return Err(SceneError::in_file(path, "its metadata names no scene")),
     };
     if scene.content_fingerprint().to_string() != shot.fingerprint {
         let (picture, title) = (path.display(), scene.source.title());

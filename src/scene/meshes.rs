@@ -99,6 +99,9 @@ pub struct MeshBase {
 
 impl MeshBase {
     /// Reads or makes what `load_mesh` would begin with.
+    ///
+    /// # Errors
+    /// When there is no such mesh, or its file cannot be read.
     pub fn read(
         source: &MeshSource,
         shading: MeshShading,
@@ -124,6 +127,9 @@ impl MeshBase {
     }
 
     /// Simplified and shaded, as `load_mesh` ends.
+    ///
+    /// # Errors
+    /// When it cannot be simplified as asked.
     pub fn finish(&self, shading: MeshShading, simplify: Option<f64>) -> Result<Mesh, SceneError> {
         finish(self.mesh.clone(), &self.source, shading, simplify, self.crease)
     }

@@ -86,6 +86,9 @@ impl Files {
     }
 
     /// The same of many.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
     pub fn read_all(&mut self, paths: impl IntoIterator<Item = PathBuf>) -> Result<(), FilesError> {
         paths.into_iter().try_for_each(|path| self.read(&path))
     }

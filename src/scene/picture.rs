@@ -13,17 +13,54 @@ const MAX_SIDE: u32 = 32_768;
 /// Bytes that the decoder may take for each pixel of the largest picture.
 const BYTES_A_PIXEL: u64 = 16;
 
+/// Why a picture cannot be read; the words follow its path.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PictureError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file begins as no picture that can be read does.
+    #[error("unsupported image format: use PNG, JPEG, HDR or EXR")]
+    Format,
+    /// The picture has more pixels than the limits allow.
+    #[error("has {width} x {height} pixels, above the limit of {limit} pixels for images: {}", Limits::advice())]
+    TooLarge {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// Pixels that a picture may have.
+        limit: u64,
+    },
+    /// The picture is truncated or damaged, or of a kind that its format has and the decoder has not.
+    #[error("cannot be decoded: {0}")]
+    Decode(#[from] image::ImageError),
+}
+
+impl From<PictureError> for String {
+    fn from(error: PictureError) -> Self {
+        error.to_string()
+    }
+}
+
 /// Reads PNG, JPEG, HDR or EXR; 8- and 16-bit pictures are taken as sRGB. Returns a warning beside the picture when
 /// some of its numbers had to be left out.
-pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), String> {
+///
+/// # Errors
+/// As [`read_picture_within`].
+pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), PictureError> {
     read_picture_within(path, &Limits::of_this_process())
 }
 
 /// The same within limits of the caller's choice.
-pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), String> {
+///
+/// # Errors
+/// When the file cannot be read, is none of these formats, is too large or cannot be decoded.
+pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), PictureError> {
     let reader = picture_reader(path, limits)?;
     if reader.format().is_none() {
-        return Err("unsupported image format: use PNG, JPEG, HDR or EXR".to_owned());
+        return Err(PictureError::Format);
     }
     let picture = decode_picture(reader, limits)?;
     let (width, height) = (picture.width(), picture.height());
@@ -46,11 +83,10 @@ pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture
 pub(crate) fn picture_reader(
     path: &Path,
     limits: &Limits,
-) -> Result<ImageReader<BufReader<InputFile<'static>>>, String> {
+) -> Result<ImageReader<BufReader<InputFile<'static>>>, PictureError> {
     let file = InputFile::open_within(path, FileKind::Image, FileKind::Image.limit(limits));
-    let mut reader = file
-        .and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(ReadError::from))
-        .map_err(|error| error.to_string())?;
+    let mut reader =
+        file.and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(ReadError::from))?;
     let mut of_decoder = image::Limits::default();
     of_decoder.max_image_width = Some(MAX_SIDE);
     of_decoder.max_image_height = Some(MAX_SIDE);
@@ -63,17 +99,15 @@ pub(crate) fn picture_reader(
 pub(crate) fn decode_picture<R: BufRead + Seek>(
     reader: ImageReader<R>,
     limits: &Limits,
-) -> Result<DynamicImage, String> {
-    let undecodable = |error: image::ImageError| format!("cannot be decoded: {error}");
+) -> Result<DynamicImage, PictureError> {
     // A few bytes can claim any size, so it is asked for before anything is decoded.
-    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
     if pixels > limits.picture_pixels {
-        let (limit, advice) = (limits.picture_pixels, Limits::advice());
-        return Err(format!("has {width} x {height} pixels, above the limit of {limit} pixels for images: {advice}"));
+        return Err(PictureError::TooLarge { width, height, limit: limits.picture_pixels });
     }
-    DynamicImage::from_decoder(decoder).map_err(undecodable)
+    Ok(DynamicImage::from_decoder(decoder)?)
 }
 
 /// The sRGB transfer function backwards (IEC 61966-2-1).
@@ -104,11 +138,11 @@ mod tests {
         let path = dir.path().join("wide.png");
         image::GrayImage::new(100, 40).save(&path).unwrap();
         let limits = Limits { picture_pixels: 3999, ..Limits::USUAL };
-        let error = read_picture_within(&path, &limits).unwrap_err();
+        let error = read_picture_within(&path, &limits).unwrap_err().to_string();
         assert!(error.contains("100 x 40") && error.contains("3999") && error.contains(Limits::VARIABLE), "{error}");
         assert!(read_picture_within(&path, &Limits { picture_pixels: 4000, ..limits }).is_ok());
         #[cfg(unix)]
-        assert!(read_picture(Path::new("/dev/zero")).unwrap_err().contains("not a regular file"));
+        assert!(read_picture(Path::new("/dev/zero")).unwrap_err().to_string().contains("not a regular file"));
     }
 
     #[test]
@@ -116,9 +150,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("broken.png");
         std::fs::write(&path, b"\x89PNG\r\n\x1a\nnothing").unwrap();
-        assert!(read_picture(&path).unwrap_err().contains("decoded"));
+        assert!(read_picture(&path).unwrap_err().to_string().contains("decoded"));
         std::fs::write(&path, b"just text").unwrap();
         assert!(read_picture(&path).is_err());
-        assert!(read_picture(&dir.path().join("none.png")).unwrap_err().contains("no such file"));
+        assert!(read_picture(&dir.path().join("none.png")).unwrap_err().to_string().contains("no such file"));
     }
 }

@@ -34,6 +34,9 @@ pub fn save_scene(world: &mut World, loaded: Option<&LoadedScene>, path: &Path) 
 
 impl Description {
     /// See [`save_scene`].
+    ///
+    /// # Errors
+    /// As [`save_scene`].
     pub fn save(self, path: &Path) -> Result<SavedScene, WriteError> {
         save(self, path)
     }

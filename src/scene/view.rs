@@ -68,6 +68,9 @@ impl View {
     /// A view from `camera` with `look_at` in the middle of the picture and as the pivot.
     ///
     /// `up` need not be unit, nor perpendicular to the view direction, but must not lie along it.
+    ///
+    /// # Errors
+    /// When a number is not finite, the two points are the same, or `up` is zero or along the view direction.
     pub fn look_at(eye: DVec3, look_at: DVec3, up: DVec3) -> Result<Self, ViewError> {
         for (name, value) in [("eye", eye), ("look_at", look_at), ("up", up)] {
             if !value.is_finite() {

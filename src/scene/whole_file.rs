@@ -89,11 +89,17 @@ pub fn check_writable(path: &Path, replace: Replace) -> Result<(), WriteError> {
 }
 
 /// The same as far as the file itself is asked, if it is there; its folder is not tried.
+///
+/// # Errors
+/// When it may not be replaced.
 pub fn check_replaceable(path: &Path, replace: Replace) -> Result<(), WriteError> {
     check_target(path, &absolute(path), replace)
 }
 
 /// Writes a whole file; one that was there stays until the new one is complete. Films are not replaced.
+///
+/// # Errors
+/// When it cannot be written or replaced.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     file.write_all(bytes).map_err(|error| unwritable(path, error))?;
@@ -180,11 +186,17 @@ impl WholeFile {
     }
 
     /// Takes the place of whatever had the name.
+    ///
+    /// # Errors
+    /// When it cannot be completed.
     pub fn finish(self) -> Result<(), WriteError> {
         self.finish_open().map(drop)
     }
 
     /// The same for what goes on being written; locked, so that no other process begins to write it.
+    ///
+    /// # Errors
+    /// When it cannot be completed.
     pub fn finish_open(self) -> Result<File, WriteError> {
         let (path, target) = (self.path.clone(), self.target.clone());
         let (file, part) = self.complete()?;
@@ -198,6 +210,9 @@ impl WholeFile {
 
     /// Takes the first of `names` that is free: never over a file that is there, even one that another program makes
     /// at the same moment. Answers with the name; `None` when all are taken.
+    ///
+    /// # Errors
+    /// When it cannot be completed.
     pub fn finish_new(self, names: impl Iterator<Item = PathBuf>) -> Result<Option<PathBuf>, WriteError> {
         let (_file, mut part) = self.complete()?;
         for path in names {

@@ -1,6 +1,7 @@
 //! Why a file is not written. Every message names the file, and what to do about it where something can be done.
 
 use super::error::SceneError;
+use super::image_metadata::MetadataError;
 use crate::render::NoRoom;
 use std::error::Error;
 use std::io::{self, ErrorKind};
@@ -92,8 +93,8 @@ pub enum WriteError {
     #[error("{0}")]
     Encode(#[source] Box<dyn Error + Send + Sync>),
     /// The metadata of a film is not what this program writes.
-    #[error("{0}")]
-    Metadata(String),
+    #[error(transparent)]
+    Metadata(#[from] MetadataError),
     /// The scene holds what no scene file may say.
     #[error("{}: cannot be saved: {source}", path.display())]
     Scene {

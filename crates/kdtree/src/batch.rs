@@ -101,12 +101,18 @@ impl RayBatch {
 }
 
 /// Writes the lanes in `mask` to `to[at..]`, and anything to the rest of the sixteen numbers there.
+///
+/// # Panics
+/// When `to` has fewer than sixteen numbers from `at` on.
 #[inline(always)]
 pub fn append<S: Simd>(to: &mut [f32], at: usize, mask: Mask, lanes: Float<S>) {
     lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
 }
 
 /// The same of integers.
+///
+/// # Panics
+/// When `to` has fewer than sixteen numbers from `at` on.
 #[inline(always)]
 pub fn append_bits<S: Simd>(to: &mut [u32], at: usize, mask: Mask, lanes: Bits<S>) {
     lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));

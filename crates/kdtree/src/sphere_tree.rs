@@ -76,6 +76,9 @@ impl Primitives for BallPrimitives<'_> {
 
 impl SphereTree {
     /// One radius per centre; radii positive, all numbers finite.
+    ///
+    /// # Panics
+    /// When the two lists differ in length, or have more entries than a tree can number.
     pub fn build(centers: &[Vec3], radii: &[f32]) -> Self {
         assert_eq!(centers.len(), radii.len(), "each sphere needs a centre and a radius");
         let (centers, radii) = (centers.to_vec(), radii.to_vec());

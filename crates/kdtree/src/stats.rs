@@ -77,7 +77,10 @@ impl MeshTree {
         stats
     }
 
-    /// Panics unless every triangle with an area, or an earlier copy of it, is in every leaf whose cell it passes through.
+    /// Checks that every triangle with an area, or an earlier copy of it, is in every leaf whose cell it passes through.
+    ///
+    /// # Panics
+    /// When it is not.
     pub fn check_invariants(&self) {
         let mut seen = vec![false; self.n_triangles()];
         self.tree.nodes.visit_cells(&mut |node, cell, _| {

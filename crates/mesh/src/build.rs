@@ -65,6 +65,9 @@ impl Mesh {
     /// Stores positions given in file coordinates about the centre of their box, and checks everything.
     ///
     /// A position is off by at most 2⁻²⁴ of the box's half size, wherever the box lies.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
     pub fn from_f64(positions: &[DVec3], triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
             return Err(MeshError::NotFinite { vertex });
@@ -85,6 +88,9 @@ impl Mesh {
 
     /// Checks all that the rest of the program relies on: indices in range, finite positions whose box has a finite size
     /// and area in `f32`, unit normals, finite texture coordinates, list lengths.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
     pub fn validate(&self) -> Result<(), MeshError> {
         let count = self.positions.len();
         if u32::try_from(count).is_err() {

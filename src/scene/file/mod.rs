@@ -35,6 +35,9 @@ impl SceneFile {
     pub const MIN_SIZE: f64 = 1e-12;
 
     /// Reads and checks the text of a scene file; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// What is wrong with the text, by line and column where that is known.
     pub fn parse(text: &str, name: impl AsRef<Path>) -> Result<Self, SceneError> {
         let name = name.as_ref();
         let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
@@ -58,6 +61,9 @@ impl SceneFile {
     }
 
     /// What is wrong with the values, without places.
+    ///
+    /// # Errors
+    /// What is wrong.
     pub fn check(&self) -> Result<(), SceneError> {
         let found = check::check(self, SceneError::MAX_TOLD);
         let problem = |(path, message)| Problem { file: None, at: None, message: format!("{path}: {message}") };

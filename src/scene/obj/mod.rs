@@ -85,6 +85,9 @@ impl Default for ObjOptions {
 }
 
 /// [`load_obj_with`] and the default options.
+///
+/// # Errors
+/// As [`load_obj_with`].
 pub fn load_obj(path: &Path) -> Result<ImportedObj, ObjError> {
     load_obj_with(path, &ObjOptions::default())
 }
@@ -93,6 +96,9 @@ pub fn load_obj(path: &Path) -> Result<ImportedObj, ObjError> {
 ///
 /// The fourth number of a vertex and vertex colours are ignored, as are lines and points. Normals of length zero
 /// count as missing. A missing library or material is a warning.
+///
+/// # Errors
+/// When the file cannot be read, a line of it has the wrong form, or it holds no mesh.
 pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, ObjError> {
     let bytes = read(path, options.max_bytes)?;
     let mut parsed =

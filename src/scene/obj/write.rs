@@ -24,6 +24,9 @@ pub struct ObjExtras<'a> {
 ///
 /// Appears whole or not at all: it is written beside `path` under another name first, and a file that was there
 /// stays until the new one is complete.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn save_obj(path: &Path, mesh: &Mesh, extras: &ObjExtras) -> Result<(), ObjError> {
     let mut file = WholeFile::begin(path, Replace::AllButFilms)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

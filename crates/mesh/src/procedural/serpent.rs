@@ -42,6 +42,9 @@ const SCALES_AROUND: f64 = 20.0;
 const BELLY_PLATES: f64 = 100.0;
 
 /// A knot about 3.4 metres wide and 1.5 high about the origin, lying flat, y up. Closed, manifold, genus 1.
+///
+/// # Panics
+/// With fewer than 64 segments along or 8 around.
 pub fn serpent_knot(shape: &SerpentKnot) -> Mesh {
     let SerpentKnot { along, around, .. } = *shape;
     assert!(along >= 64 && around >= 8, "the knot needs at least 64 × 8 segments, not {along} × {around}");

@@ -19,6 +19,9 @@ pub fn cuboid(size: DVec3) -> Mesh {
 /// A ring about the y axis of `nu` segments around the axis and `nv` around the tube, each at least 3.
 ///
 /// Texture coordinates run 0..1 around both; the seams are doubled vertices.
+///
+/// # Panics
+/// With fewer than 3 segments around either.
 pub fn torus(radius: f64, tube_radius: f64, nu: u32, nv: u32) -> Mesh {
     assert!(nu >= 3 && nv >= 3, "a torus needs 3 segments each way, not {nu} and {nv}");
     let mut positions = Vec::new();
@@ -39,6 +42,9 @@ pub fn torus(radius: f64, tube_radius: f64, nu: u32, nv: u32) -> Mesh {
 /// long needles along the bore, fans of thin triangles on the faces.
 ///
 /// - `segments`: of the hole, a multiple of 4.
+///
+/// # Panics
+/// When `segments` is 0 or no multiple of 4.
 pub fn bored_block(segments: u32) -> Mesh {
     assert!(segments >= 4 && segments.is_multiple_of(4), "segments must be a multiple of 4, not {segments}");
     let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];

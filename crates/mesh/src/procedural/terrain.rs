@@ -28,6 +28,9 @@ impl Default for Terrain {
 }
 
 /// Ridged mountains over rolling ground, with texture coordinates 0..1 along x and −z.
+///
+/// # Panics
+/// Without cells.
 pub fn terrain(shape: &Terrain) -> Mesh {
     assert!(shape.cells >= 1, "a terrain needs at least one cell");
     let n = f64::from(shape.cells);

@@ -78,6 +78,9 @@ const ERROR_SAMPLES: usize = 100_000;
 ///
 /// The result has normals and texture coordinates if the mesh has them. Without either, vertices at one place are
 /// welded. The same mesh and options give the same bytes with any number of threads.
+///
+/// # Errors
+/// As [`check_target`], and when no triangle has three different corners.
 pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, SimplifyError> {
     check_target(target)?;
     let total = mesh.triangles.len();
@@ -92,6 +95,9 @@ pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, Sim
 }
 
 /// Whether the target means anything, whatever the mesh.
+///
+/// # Errors
+/// When the target is outside of its range.
 pub fn check_target(target: Target) -> Result<(), SimplifyError> {
     match target {
         Target::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => Err(SimplifyError::Ratio(ratio)),
@@ -102,6 +108,9 @@ pub fn check_target(target: Target) -> Result<(), SimplifyError> {
 }
 
 /// Records all collapses down to as few triangles as `faces`, for a slider: see [`CollapseOrder::mesh_with`].
+///
+/// # Errors
+/// When no triangle has three different corners.
 pub fn collapse_order(mesh: &Mesh, method: Method, faces: usize) -> Result<CollapseOrder, SimplifyError> {
     let start = prepare(mesh, method)?;
     let mut work = start.clone();

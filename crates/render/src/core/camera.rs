@@ -43,6 +43,9 @@ pub struct CameraError {
 
 impl Camera {
     /// Whether rays through every point of the film and the lens have an origin and a direction.
+    ///
+    /// # Errors
+    /// The first field that is out of range.
     pub fn check(&self) -> Result<(), CameraError> {
         let wrong = |field, value: &dyn std::fmt::Display, allowed| {
             let value = value.to_string();

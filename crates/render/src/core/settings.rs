@@ -48,6 +48,9 @@ pub enum SettingsError {
 
 impl RenderSettings {
     /// Whether a picture comes of them.
+    ///
+    /// # Errors
+    /// When `max_depth` is 0.
     pub fn check(&self) -> Result<(), SettingsError> {
         if self.max_depth == 0 { Err(SettingsError::NoDepth) } else { Ok(()) }
     }

@@ -90,6 +90,9 @@ pub struct Shading {
 
 impl Geometry {
     /// Builds the tree over the objects. The two lists run in parallel.
+    ///
+    /// # Panics
+    /// When the lists differ in length.
     pub fn build(shapes: Vec<Shape>, objects: Vec<Object>) -> Self {
         assert_eq!(shapes.len(), objects.len(), "each shape needs its object");
         Self { objects, tree: SceneTree::build(shapes) }

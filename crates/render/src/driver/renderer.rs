@@ -68,6 +68,9 @@ pub fn advance(
 }
 
 /// The same for the tiles of a region alone. Traced light falls where it falls, so the others may get more of it.
+///
+/// # Panics
+/// As [`advance`].
 pub fn advance_region(
     snapshot: &Prepared,
     settings: &RenderSettings,

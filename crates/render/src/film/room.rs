@@ -55,6 +55,9 @@ const MOST_BESIDES: u64 = 32 << 20;
 
 impl Room {
     /// Keeps memory free for writing or reading files, one after the other.
+    ///
+    /// # Errors
+    /// When there is not so much.
     pub fn for_files(width: u32, height: u32, purposes: &[Purpose]) -> Result<Self, NoRoom> {
         Self::of(width, height, most(purposes))
     }
@@ -62,6 +65,9 @@ impl Room {
     /// Keeps as much memory free as a film takes, and then for what it is wanted for.
     ///
     /// - `light_traced`: there will be traced light on it.
+    ///
+    /// # Errors
+    /// When there is not so much.
     pub fn for_film(width: u32, height: u32, light_traced: bool, purposes: &[Purpose]) -> Result<Self, NoRoom> {
         let film = BYTES_A_PIXEL + size_of::<f32>() + if light_traced { LIGHT_BYTES_A_PIXEL } else { 0 };
         Self::of(width, height, film as u64 + most(purposes))

@@ -88,16 +88,28 @@ impl Film {
     }
 
     /// The same, or how much memory it would have taken.
+    ///
+    /// # Errors
+    /// When the memory cannot be had.
     pub fn try_new(width: u32, height: u32) -> Result<Self, NoRoom> {
         Self::try_with_tile_size(width, height, Self::TILE_SIZE)
     }
 
     /// The picture does not depend on `tile_size`, bit for bit.
+    ///
+    /// # Panics
+    /// When a size is 0, or the memory cannot be had.
     pub fn with_tile_size(width: u32, height: u32, tile_size: u32) -> Self {
         Self::try_with_tile_size(width, height, tile_size).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// All that a render will need for it is there then, but for traced light ([`Self::reserve_light`]).
+    ///
+    /// # Errors
+    /// When the memory cannot be had.
+    ///
+    /// # Panics
+    /// When a size is 0.
     pub fn try_with_tile_size(width: u32, height: u32, tile_size: u32) -> Result<Self, NoRoom> {
         assert!(width > 0 && height > 0 && tile_size > 0, "a film of {width} × {height} has no pixels");
         // In one piece first: a system that promises small pieces beyond what it has refuses such a large one.
@@ -116,6 +128,9 @@ impl Film {
     }
 
     /// Has memory ready for traced light.
+    ///
+    /// # Errors
+    /// When the memory cannot be had.
     pub fn reserve_light(&mut self) -> Result<(), NoRoom> {
         if self.light.is_some() {
             return Ok(());
