@@ -332,7 +332,7 @@ impl LightPathStep<'_> {
         if after != media || through.is_some() && before == after {
             return None;
         }
-        let vertex = if through.is_some() { self.vertex.from_behind(to_eye) } else { self.vertex.seen_along(to_eye) };
+        let vertex = if through.is_some() { self.vertex.seen_through(to_eye) } else { self.vertex.seen_along(to_eye) };
         // Lamp and eye on the same side of the true surface, unless light passes through it.
         if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || through.is_none() && !vertex.is_reached_from(to_lamp) {
             return None;
