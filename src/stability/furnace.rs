@@ -263,7 +263,8 @@ fn random_scene(seed: u64) -> LightCase {
             && roughening.below(6) == 0
         {
             let alpha = [0.0, 1e-4, 1e-3, 0.03, 0.2, 0.5, 1.0][roughening.below(7)];
-            *material = Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption };
+            *material =
+                Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption, compensate: false };
             is_lossy = true;
         }
     }

@@ -8,7 +8,7 @@ use firstlight::render::{
 use glam::Vec3;
 
 fn rough(alpha: f32, ior: f32) -> Material {
-    Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption: Vec3::ZERO }
+    Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption: Vec3::ZERO, compensate: false }
 }
 
 fn smooth(ior: f32) -> Material {
@@ -65,8 +65,12 @@ fn room(sky: f32, lamps: Vec<Shape>, alpha: f32, others: Vec<(Shape, u32)>) -> P
     shapes.push((sphere(Vec3::new(0.7, 0.5, 0.2), 0.5), 3));
     shapes.extend(others);
     let blend = Material::Blend { weight: ScalarInput::Constant(0.6), a: 0, b: 2 };
-    let absorbing =
-        Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior: 1.33, absorption: Vec3::new(0.8, 0.3, 0.1) };
+    let absorbing = Material::RoughGlass {
+        alpha: ScalarInput::Constant(alpha),
+        ior: 1.33,
+        absorption: Vec3::new(0.8, 0.3, 0.1),
+        compensate: true,
+    };
     let materials = vec![
         diffuse(0.6),
         emissive(6.0),
@@ -212,6 +216,20 @@ fn in_an_even_world_it_takes_light_away_and_adds_none() {
             }
             println!("α {alpha}, index {ior}, inside {inside}: {mean:.4}");
         }
+    }
+}
+
+#[test]
+fn compensated_it_can_hardly_be_seen_in_an_even_world() {
+    for (alpha, ior) in [(0.05, 1.5), (0.3, 1.5), (0.3, 0.7), (1.0, 1.5), (0.6, 2.0)] {
+        let material =
+            Material::RoughGlass { alpha: ScalarInput::Constant(alpha), ior, absorption: Vec3::ZERO, compensate: true };
+        let eye = camera(Vec3::new(0.0, 0.4, 4.0), Vec3::ZERO, 20.0);
+        let scene = scene(vec![(sphere(Vec3::ZERO, 1.0), 0)], vec![material], Environment::Constant(Vec3::ONE), eye);
+        let (mean, error) = picture_mean(&render(&scene, &RenderSettings::default(), 16, 16, 256).0);
+        println!("α {alpha}, index {ior}: {mean:.4} ± {error:.4}");
+        // Several surfaces on the way, each with the error of the table.
+        assert!((mean - 1.0).abs() < 0.03 + 4.0 * error, "α {alpha}, index {ior}: {mean} ± {error}");
     }
 }
 

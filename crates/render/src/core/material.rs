@@ -135,6 +135,9 @@ pub enum Material<P: Params = InSnapshot> {
         /// Per metre inside (Beer–Lambert).
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
+        /// Give back the energy that single scattering loses, after Kulla and Conty 2017.
+        #[serde(default, skip_serializing_if = "is_default")]
+        compensate: bool,
     },
     /// The classic local model. For paths it is diffuse, mirror and glass in shares that sum to 1: `transparency`, of
     /// the rest `specular`, of the rest `diffuse`.
@@ -271,7 +274,7 @@ macro_rules! params_of {
             Material::Glass { ior, absorption } => {
                 vec![("ior", Param::Ior(ior)), ("absorption", Param::Absorption(absorption))]
             }
-            Material::RoughGlass { alpha, ior, absorption } => vec![
+            Material::RoughGlass { alpha, ior, absorption, compensate: _ } => vec![
                 ("alpha", Param::Share(alpha)),
                 ("ior", Param::Ior(ior)),
                 ("absorption", Param::Absorption(absorption)),
@@ -331,9 +334,12 @@ impl<P: Params> Material<P> {
                 compensate: *compensate,
             },
             Self::Glass { ior, absorption } => Material::Glass { ior: *ior, absorption: rgb(absorption) },
-            Self::RoughGlass { alpha, ior, absorption } => {
-                Material::RoughGlass { alpha: to.scalar(alpha), ior: *ior, absorption: rgb(absorption) }
-            }
+            Self::RoughGlass { alpha, ior, absorption, compensate } => Material::RoughGlass {
+                alpha: to.scalar(alpha),
+                ior: *ior,
+                absorption: rgb(absorption),
+                compensate: *compensate,
+            },
             Self::Phong { diffuse, ambient, specular, shininess, transparency, ior, absorption } => Material::Phong {
                 diffuse: to.color(diffuse),
                 ambient: *ambient,
@@ -397,9 +403,12 @@ impl<P: Params> Material<P> {
                 compensate: true,
             },
             MaterialKind::Glass => Self::Glass { ior: glass_ior(), absorption: P::Rgb::default() },
-            MaterialKind::RoughGlass => {
-                Self::RoughGlass { alpha: P::Scalar::from(0.04), ior: glass_ior(), absorption: P::Rgb::default() }
-            }
+            MaterialKind::RoughGlass => Self::RoughGlass {
+                alpha: P::Scalar::from(0.04),
+                ior: glass_ior(),
+                absorption: P::Rgb::default(),
+                compensate: true,
+            },
             MaterialKind::Phong => Self::Phong {
                 diffuse: color,
                 ambient: 1.0,

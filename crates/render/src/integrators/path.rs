@@ -347,7 +347,7 @@ impl PathWave {
             let track = if step.is_told { path.track.guided(sample.weight) } else { path.track };
             path.track = pass.follow(track, &bounce, || {
                 let normal =
-                    if sample.through.is_some() { vertex.normal_seen_from_behind(sample.wi) } else { vertex.normal };
+                    if sample.through.is_some() { vertex.normal_from_behind(sample.wi) } else { vertex.normal };
                 bsdf.eval(sample.wi, vertex.wo, normal).1
             });
         }

@@ -31,7 +31,7 @@ fn returns_at_most_all(materials: &[Material], id: MaterialId) -> bool {
     match &materials[id as usize] {
         Material::Diffuse { albedo: color } | Material::Mirror { reflectance: color } => at_most_one(color),
         Material::Metal { reflectance, compensate: false, .. } => at_most_one(reflectance),
-        Material::Glass { .. } | Material::RoughGlass { .. } => true,
+        Material::Glass { .. } | Material::RoughGlass { compensate: false, .. } => true,
         Material::Emissive { .. } => true,
         Material::Phong { diffuse, specular, .. } => {
             at_most_one(diffuse) && matches!(specular, ScalarInput::Constant(_)) && is_even(diffuse)

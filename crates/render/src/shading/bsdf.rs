@@ -32,10 +32,11 @@ pub(crate) enum Lobe {
         compensate: bool,
     },
     Glass(Interface),
-    /// Not smooth as [`rough_glass::is_smooth`] tells.
+    /// Not smooth as [`crate::shading::rough_glass::is_smooth`] tells.
     RoughGlass {
         interface: Interface,
         alpha: f32,
+        compensate: bool,
     },
 }
 
@@ -186,10 +187,10 @@ impl Scatter for Lobe {
 
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
-        if let Self::RoughGlass { interface, alpha } = *self {
+        if let Self::RoughGlass { interface, alpha, compensate } = *self {
             let (normal, interface) =
                 if normal.dot(wo) < 0.0 { (-normal, interface.reversed()) } else { (normal, interface) };
-            let (value, pdf) = RoughGlass::new(normal, wo, alpha, interface).eval(wi);
+            let (value, pdf) = RoughGlass::new(normal, wo, alpha, interface, compensate).eval(wi);
             return (Vec3::splat(value), pdf);
         }
         let cos = normal.dot(wi);
@@ -254,8 +255,8 @@ impl Scatter for Lobe {
                 let weight = Vec3::from(found.tint) * found.weight;
                 Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, through: None })
             }
-            Self::RoughGlass { interface, alpha } => {
-                RoughGlass::new(normal, wo, alpha, interface).sample(u_choice(), u)
+            Self::RoughGlass { interface, alpha, compensate } => {
+                RoughGlass::new(normal, wo, alpha, interface, compensate).sample(u_choice(), u)
             }
             Self::Glass(interface) => {
                 let Interface { eta, squeeze, .. } = interface;

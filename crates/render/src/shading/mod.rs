@@ -4,6 +4,7 @@ pub(crate) mod bsdf;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
 pub(crate) mod ggx;
+pub(crate) mod glass_loss;
 pub(crate) mod guided;
 pub(crate) mod interface;
 pub(crate) mod lights;

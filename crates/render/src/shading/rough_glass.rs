@@ -5,9 +5,11 @@
 //! [`ggx::lambda`], [`ggx::distribution`], [`ggx::sample_visible_normal`] and of a frame that is turned to the axes.
 
 use crate::core::material::SMALLEST_ALPHA;
+use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::bsdf::BsdfSample;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
+use crate::shading::glass_loss;
 use crate::shading::interface::Interface;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
@@ -28,6 +30,37 @@ pub(crate) fn is_smooth(alpha: f32, eta: f32) -> bool {
     !(alpha >= SMALLEST_ALPHA && alpha.min(1.0) * (eta - 1.0).abs() >= SMALLEST_SPREAD)
 }
 
+/// The light that single scattering loses, given back: it has forgotten where it came from.
+///
+/// After many bounces between microfacets light leaves on either side as light from there would have been lost: with the
+/// density of (1 − E(θ)) cos θ, E being the albedo of single scattering for that side, and on the two sides in proportion to
+/// n² (1 − Ē), as much as each side loses of light from all around. So what it gives is the same both ways, and a white
+/// furnace is whole again (after Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks").
+#[derive(Clone, Copy)]
+struct Multiple {
+    /// 1 − E of the direction that is seen along.
+    lost: f32,
+    /// On this side and beyond: share of the light, and 1 − Ē.
+    sides: [(f32, f32); 2],
+}
+
+impl Multiple {
+    /// `None` where nothing is lost.
+    fn new(cos_o: f32, alpha: f32, eta: f32) -> Option<Self> {
+        let lost = glass_loss::lost(cos_o, alpha, eta);
+        let means = [glass_loss::mean_lost(alpha, eta), glass_loss::mean_lost(alpha, 1.0 / eta)];
+        if lost.min(means[0]).min(means[1]) < SMALLEST_LOSS {
+            return None;
+        }
+        let strength = [means[0] * eta * eta, means[1]];
+        let share = strength.map(|one| one / (strength[0] + strength[1]));
+        Some(Self { lost, sides: [(share[0], means[0]), (share[1], means[1])] })
+    }
+}
+
+/// Less is not worth giving back.
+const SMALLEST_LOSS: f32 = 1e-5;
+
 /// A surface as seen along `wo`.
 #[derive(Clone, Copy)]
 pub(crate) struct RoughGlass {
@@ -40,25 +73,33 @@ pub(crate) struct RoughGlass {
     wo: Vector3<f32>,
     /// Smith's Λ.
     lambda_o: f32,
+    multiple: Option<Multiple>,
 }
 
 impl RoughGlass {
-    /// - `normal`: unit, on the side of `wo`; `interface`: not smooth as [`is_smooth`] tells.
+    /// - `normal`: unit, on the side of `wo`; `interface`: not smooth as [`is_smooth`] tells; `compensate`: give back what single
+    ///   scattering loses.
     #[inline]
-    pub fn new(normal: Vec3, wo: Vec3, alpha: f32, interface: Interface) -> Self {
+    pub fn new(normal: Vec3, wo: Vec3, alpha: f32, interface: Interface, compensate: bool) -> Self {
         let axes = frame_around(normal.into());
         let wo = Vector3::from(wo).to_local(&axes);
         let wo = Vector3 { z: wo.z.max(SMALLEST_COS), ..wo };
-        Self { alpha, interface, axes, wo, lambda_o: ggx::lambda(wo, alpha) }
+        let multiple = if compensate { Multiple::new(wo.z, alpha, interface.eta) } else { None };
+        Self { alpha, interface, axes, wo, lambda_o: ggx::lambda(wo, alpha), multiple }
     }
 
-    /// f · |cos| of single scattering, and density per steradian of [`Self::sample`].
+    /// f · |cos|, and density per steradian of [`Self::sample`].
     ///
     /// Of light from beyond, f has the factor by which an interface squeezes radiance: f(i, o) / nₒ² is the same both ways.
     ///
     /// - `wi`: unit, on either side.
     pub fn eval(&self, wi: Vec3) -> (f32, f32) {
         let wi = Vector3::from(wi).to_local(&self.axes);
+        self.with_multiple(wi, self.scattered_once(wi))
+    }
+
+    /// - `wi`: along the axes.
+    fn scattered_once(&self, wi: Vector3<f32>) -> (f32, f32) {
         if wi.z > 0.0 {
             let half = (self.wo + wi).normalize();
             self.reflected(half, wi)
@@ -74,11 +115,43 @@ impl RoughGlass {
         }
     }
 
+    /// [`Self::eval`], given that of light that was scattered once.
+    fn with_multiple(&self, wi: Vector3<f32>, (value, pdf): (f32, f32)) -> (f32, f32) {
+        let Interface { eta, squeeze, .. } = self.interface;
+        let Some(Multiple { lost, sides }) = self.multiple else { return (value, pdf) };
+        let beyond = wi.z < 0.0;
+        let (share, mean) = sides[usize::from(beyond)];
+        let (cos, eta, scale) = if beyond { (-wi.z, 1.0 / eta, squeeze * squeeze) } else { (wi.z, eta, 1.0) };
+        let per_angle = lost * share * cosine_hemisphere_pdf(cos);
+        let back = per_angle * glass_loss::lost(cos, self.alpha, eta) / mean;
+        (value + back * scale, pdf * (1.0 - lost) + per_angle)
+    }
+
+    /// A direction of [`Multiple`].
+    fn sample_multiple(&self, Multiple { sides, .. }: Multiple, u_side: f32, u: Vec2) -> Option<BsdfSample> {
+        let local = cosine_hemisphere(u.to_array());
+        let beyond = u_side >= sides[0].0;
+        let wi = if beyond { local * -1.0 } else { local };
+        let (value, pdf) = self.with_multiple(wi, self.scattered_once(wi));
+        (local.z > 0.0 && pdf > 0.0).then(|| BsdfSample {
+            wi: wi.to_world(&self.axes).normalize().into(),
+            weight: Vec3::splat(value / pdf),
+            pdf,
+            through: beyond.then_some(self.interface),
+        })
+    }
+
     /// - `u_choice`: reflects or refracts at the microfacet that `u` chooses; uniform in `[0, 1)`.
     ///
     /// `None` for light that single scattering loses.
-    pub fn sample(&self, u_choice: f32, u: Vec2) -> Option<BsdfSample> {
+    pub fn sample(&self, mut u_choice: f32, u: Vec2) -> Option<BsdfSample> {
         let Interface { eta, squeeze, .. } = self.interface;
+        if let Some(multiple) = self.multiple {
+            if u_choice < multiple.lost {
+                return self.sample_multiple(multiple, u_choice / multiple.lost, u);
+            }
+            u_choice = ((u_choice - multiple.lost) / (1.0 - multiple.lost)).min(1.0f32.next_down());
+        }
         let half = ggx::sample_visible_normal(self.wo, self.alpha, u.to_array());
         let (reflectance, cos_t) = fresnel(self.cos_o(half), eta);
         let reflects = u_choice < reflectance;
@@ -88,12 +161,14 @@ impl RoughGlass {
         }
         // Of light at the microfacet the share that gets away: G2 / G1.
         let seen = 1.0 + self.lambda_o;
-        let (both, scale, (_, pdf)) = if reflects {
+        let (both, scale, once) = if reflects {
             (self.both_above(wi), 1.0, self.reflected(half, wi))
         } else {
             (self.above_and_below(wi), squeeze * squeeze, self.refracted(half, wi))
         };
-        let weight = Vec3::splat((both * seen).min(1.0) * scale);
+        let (value, pdf) = self.with_multiple(wi, once);
+        let weight = if self.multiple.is_some() { value / pdf } else { (both * seen).min(1.0) * scale };
+        let weight = Vec3::splat(weight);
         let through = (!reflects).then_some(self.interface);
         (pdf > 0.0).then(|| BsdfSample { wi: wi.to_world(&self.axes).normalize().into(), weight, pdf, through })
     }
@@ -145,7 +220,7 @@ impl RoughGlass {
 }
 
 /// Β(1 + a, 1 + b), for `a`, `b` from 0 on.
-fn beta_of_next(a: f64, b: f64) -> f64 {
+pub(crate) fn beta_of_next(a: f64, b: f64) -> f64 {
     (ln_factorial(a) + ln_factorial(b) - ln_factorial(a + b + 1.0)).exp()
 }
 
@@ -191,7 +266,11 @@ mod tests {
     }
 
     fn lobe(alpha: f32, eta: f32) -> Lobe {
-        Lobe::RoughGlass { interface: interface(eta), alpha }
+        Lobe::RoughGlass { interface: interface(eta), alpha, compensate: false }
+    }
+
+    fn whole_lobe(alpha: f32, eta: f32) -> Lobe {
+        Lobe::RoughGlass { interface: interface(eta), alpha, compensate: true }
     }
 
     fn direction(cos: f32) -> Vec3 {
@@ -369,8 +448,40 @@ mod tests {
     }
 
     #[test]
+    fn compensation_makes_a_furnace_white_and_is_sampled_as_its_pdf_says() {
+        for (_, alpha, cos, eta) in views() {
+            let (whole, once, wo, n) = (whole_lobe(alpha, eta), lobe(alpha, eta), direction(cos), 1 << 15);
+            let lost = f64::from(glass_loss::lost(cos, alpha, eta));
+            let (mut returned, mut given_back, mut pdf) = (0.0, 0.0, 0.0);
+            for i in 0..n {
+                let sampler = Sampler::new(9, 0, 0, i);
+                if let Some(s) = whole.sample(wo, Vec3::Z, || sampler.single(2), sampler.pair(0)) {
+                    let scale = if s.through.is_some() { eta * eta } else { 1.0 };
+                    returned += f64::from(s.weight.x / scale) / f64::from(n);
+                }
+                // What is given back is broad: even directions find it.
+                let u = Sampler::new(10, 0, 0, i).pair(0);
+                let z = 2.0 * u.x - 1.0;
+                let (sin, cos_phi) = (TAU as f32 * u.y).sin_cos();
+                let wi = Vec3::new((1.0 - z * z).sqrt() * cos_phi, (1.0 - z * z).sqrt() * sin, z);
+                let (a, b) = (whole.eval(wo, wi, Vec3::Z), once.eval(wo, wi, Vec3::Z));
+                let (scale, per_sample) = (if z < 0.0 { eta * eta } else { 1.0 }, 2.0 * TAU / f64::from(n));
+                given_back += f64::from((a.0.x - b.0.x) / scale) * per_sample;
+                pdf += (f64::from(a.1) - f64::from(b.1) * (1.0 - lost)) * per_sample;
+            }
+            let name =
+                format!("α {alpha}, cos {cos}, η {eta}: {returned} back, {given_back} of {lost} lost, pdf {pdf}");
+            assert!((returned - 1.0).abs() < 0.015, "{name}");
+            if alpha > 0.05 {
+                assert!((given_back - lost).abs() < 0.03 * lost + 1e-3, "{name}");
+                assert!((pdf - lost).abs() < 0.03 * lost + 1e-3, "{name}");
+            }
+        }
+    }
+
+    #[test]
     fn light_goes_both_ways_alike() {
-        for case in 0..4000 {
+        for case in 0..8000 {
             let sampler = Sampler::new(case, 1, 0, 0);
             let (a, b, c) = (sampler.pair(0), sampler.pair(1), sampler.pair(2));
             let (alpha, eta) = (0.02 + 0.98 * c.x, [1.0 / 1.5, 1.5, 1.0 / 1.1, 2.0][case as usize % 4]);
@@ -383,7 +494,7 @@ mod tests {
             if o.z.abs().min(i.z.abs()) < 1e-2 {
                 continue;
             }
-            let lobe = lobe(alpha, eta);
+            let lobe = if case < 4000 { lobe(alpha, eta) } else { whole_lobe(alpha, eta) };
             let f = |o: Vec3, i: Vec3| lobe.eval(o, i, Vec3::Z).0.x / i.z.abs();
             // Over n² on the side that light arrives at, which is 1 below.
             let n2 = |w: Vec3| if w.z > 0.0 { eta * eta } else { 1.0 };
@@ -442,15 +553,19 @@ mod tests {
             seed in any::<u32>(),
         ) {
             prop_assume!(!is_smooth(alpha, eta));
-            let (lobe, wo) = (lobe(alpha, eta), direction(cos));
+            let (lobe, whole, wo) = (lobe(alpha, eta), whole_lobe(alpha, eta), direction(cos));
             let wi = Vec3::from(wi).normalize_or(Vec3::X);
-            for (o, i) in [(wo, wi), (wi, wo), (wo, -wo), (wo, wo)] {
+            for (lobe, (o, i)) in [lobe, whole].into_iter().flat_map(|lobe| [(wo, wi), (wi, wo), (wo, -wo), (wo, wo)].map(|ways| (lobe, ways))) {
                 let (value, pdf) = lobe.eval(o, i, Vec3::Z);
                 prop_assert!(value.is_finite() && value.x >= 0.0 && pdf.is_finite() && pdf >= 0.0, "{value} {pdf}");
             }
             let sampler = Sampler::new(seed, 0, 0, 0);
             for u in [sampler.pair(0), Vec2::ZERO, Vec2::splat(1.0f32.next_down())] {
                 for choice in [sampler.single(1), 0.0, 1.0f32.next_down()] {
+                    if let Some(s) = whole.sample(wo, Vec3::Z, || choice, u) {
+                        prop_assert!(s.wi.is_finite() && s.pdf > 0.0 && s.pdf.is_finite(), "{s:?}");
+                        prop_assert!(s.weight.is_finite() && s.weight.x >= 0.0, "{s:?}");
+                    }
                     let Some(s) = lobe.sample(wo, Vec3::Z, || choice, u) else { continue };
                     prop_assert!(s.wi.is_finite() && (s.wi.length() - 1.0).abs() < 1e-5, "{s:?}");
                     prop_assert!(s.pdf > 0.0 && s.pdf.is_finite(), "{s:?}");

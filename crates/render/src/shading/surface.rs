@@ -114,7 +114,7 @@ impl Vertex {
     ///
     /// - `wo`: unit, towards the viewer there.
     #[inline]
-    pub fn seen_from_behind(&self, wo: Vec3) -> Self {
+    pub fn seen_through(&self, wo: Vec3) -> Self {
         let (geometric_normal, smooth_normal) = (-self.geometric_normal, -self.smooth_normal);
         Self { geometric_normal, smooth_normal, front: !self.front, lift: Vec3::ZERO, ..*self }.seen_along(wo)
     }
@@ -122,8 +122,8 @@ impl Vertex {
     /// The shading normal that counts for a viewer at `wo`, on the other side; on this side. A surface that is asked with it how
     /// it scatters between the two does so as seen from there.
     #[inline]
-    pub fn normal_seen_from_behind(&self, wo: Vec3) -> Vec3 {
-        -self.seen_from_behind(wo).normal
+    pub fn normal_from_behind(&self, wo: Vec3) -> Vec3 {
+        -self.seen_through(wo).normal
     }
 
     /// `wo` mirrored by the shading normal, unit.
@@ -286,8 +286,8 @@ fn collect(
             }
         }
         Material::Glass { .. } => push(clear_lobe(scene, sides, leaf), weight),
-        Material::RoughGlass { alpha, .. } => {
-            push(rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.uv)), weight);
+        Material::RoughGlass { alpha, compensate, .. } => {
+            push(rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.uv), *compensate), weight);
         }
         _ => {
             if let Some(lobe) = lobe_at(scene, id, vertex, None) {
@@ -307,10 +307,10 @@ fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lo
 
 /// Glass as it is with microfacets of a width; smooth where these change no direction.
 #[inline]
-fn rough_lobe(smooth: Lobe, alpha: f32) -> Lobe {
+fn rough_lobe(smooth: Lobe, alpha: f32, compensate: bool) -> Lobe {
     match smooth {
         Lobe::Glass(interface) if !rough_glass::is_smooth(alpha, interface.eta) => {
-            Lobe::RoughGlass { interface, alpha: alpha.min(1.0) }
+            Lobe::RoughGlass { interface, alpha: alpha.min(1.0), compensate }
         }
         _ => smooth,
     }
@@ -343,7 +343,9 @@ pub(crate) fn lobe_at(
             compensate: *compensate,
         }),
         Material::Glass { .. } => Some(clear_lobe(scene, &mut sides, 0)),
-        Material::RoughGlass { alpha, .. } => Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv))),
+        Material::RoughGlass { alpha, compensate, .. } => {
+            Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *compensate))
+        }
         Material::Emissive { .. } | Material::Phong { .. } | Material::Blend { .. } => None,
     }
 }

@@ -333,7 +333,7 @@ impl LightPathStep<'_> {
             return None;
         }
         let vertex =
-            if through.is_some() { self.vertex.seen_from_behind(to_camera) } else { self.vertex.seen_along(to_camera) };
+            if through.is_some() { self.vertex.seen_through(to_camera) } else { self.vertex.seen_along(to_camera) };
         // Light and camera on the same side of the true surface, unless light passes through it.
         if vertex.wo.dot(vertex.geometric_normal) <= 0.0 || through.is_none() && !vertex.is_reached_from(to_light) {
             return None;
@@ -412,7 +412,7 @@ impl LightPathStep<'_> {
         } else {
             let passes = sample.through.is_some();
             let seen = vertex.seen_along(sample.wi);
-            let normal = if passes { vertex.normal_seen_from_behind(sample.wi) } else { seen.normal };
+            let normal = if passes { vertex.normal_from_behind(sample.wi) } else { seen.normal };
             let (value, pdf) = surface.eval(sample.wi, vertex.wo, normal);
             let (cos_o, cos_i) = (sample.wi.dot(vertex.geometric_normal).abs(), vertex.wo.dot(vertex.geometric_normal));
             if pdf <= 0.0 || cos_i <= 0.0 || !passes && !seen.is_reached_from(vertex.wo) {

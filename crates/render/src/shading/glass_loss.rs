@@ -1,0 +1,174 @@
+//! What of its light a rough dielectric loses where it is scattered but once, by table.
+//!
+//! See [`crate::shading::rough_glass`] for what is done about it.
+
+use crate::core::material::SMALLEST_ALPHA;
+use crate::shading::dielectric::{fresnel, reflect, refract};
+use crate::shading::ggx;
+use crate::shading::rough_glass::beta_of_next;
+use firstlight_simd::Vector3;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+use std::sync::OnceLock;
+
+const N_COS: usize = 24;
+const N_ALPHA: usize = 16;
+/// Odd, so that index 1, about which losses bend, is one of them.
+const N_ETA: usize = 25;
+
+/// The largest (η − 1) / (η + 1) of the table, and with the other sign the smallest: indices from 1/4 to 4.
+const MOST_CONTRAST: f32 = 0.6;
+
+/// Losses bend most where the cosine is about as large as alpha: columns are even in the root of
+/// `cos (1 + BEND α) / (cos + BEND α)`.
+const BEND: f32 = 2.0;
+
+struct LossTable {
+    /// By contrast of the indices, root of alpha, cosine.
+    at_angles: Vec<f32>,
+    /// By contrast of the indices and root of alpha.
+    means: Vec<f32>,
+}
+
+/// Two neighbours in a table, and how far the place lies from the first to the second.
+struct Between {
+    first: usize,
+    part: f32,
+}
+
+impl Between {
+    /// - `x`: in 0..1.
+    fn new(x: f32, n: usize) -> Self {
+        let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
+        let first = (x as usize).min(n - 2);
+        Self { first, part: x - first as f32 }
+    }
+
+    fn mean(&self, at: impl Fn(usize) -> f32) -> f32 {
+        let (a, b) = (at(self.first), at(self.first + 1));
+        a + self.part * (b - a)
+    }
+}
+
+fn contrast_at(eta: f32) -> Between {
+    let contrast = (eta - 1.0) / (eta + 1.0) / MOST_CONTRAST;
+    Between::new(0.5 + 0.5 * contrast.abs().sqrt().copysign(contrast), N_ETA)
+}
+
+fn cos_at(cos: f32, alpha: f32) -> Between {
+    let bend = BEND * alpha;
+    Between::new((cos * (1.0 + bend) / (cos + bend)).sqrt(), N_COS)
+}
+
+fn alpha_at(alpha: f32) -> Between {
+    Between::new(alpha.max(0.0).sqrt(), N_ALPHA)
+}
+
+/// The share of light from one direction that a surface does not give back by single scattering.
+///
+/// - `cos`: with the normal; `alpha`: GGX width; `eta`: index on the side of the light over that beyond.
+pub(crate) fn lost(cos: f32, alpha: f32, eta: f32) -> f32 {
+    let table = table();
+    let columns = cos_at(cos, alpha.clamp(SMALLEST_ALPHA, 1.0));
+    contrast_at(eta).mean(|layer| {
+        alpha_at(alpha).mean(|row| columns.mean(|column| table.at_angles[(layer * N_ALPHA + row) * N_COS + column]))
+    })
+}
+
+/// The same of light that comes evenly from all around on one side.
+pub(crate) fn mean_lost(alpha: f32, eta: f32) -> f32 {
+    let table = table();
+    contrast_at(eta).mean(|layer| alpha_at(alpha).mean(|row| table.means[layer * N_ALPHA + row]))
+}
+
+fn table() -> &'static LossTable {
+    static TABLE: OnceLock<LossTable> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        let place = |i: usize| (i / N_COS / N_ALPHA, i / N_COS % N_ALPHA, i % N_COS);
+        let at_angles: Vec<f32> = (0..N_ETA * N_ALPHA * N_COS)
+            .into_par_iter()
+            .map(|i| {
+                let (layer, row, column) = place(i);
+                integrate(cos_of(column, row), alpha_of(row), eta_of(layer), 24, 16)
+            })
+            .collect();
+        let means = (0..N_ETA * N_ALPHA)
+            .map(|i| {
+                // ∫ 2 cos · lost dcos, in steps that are even in cos², of the table as it is read.
+                let (n, row) = (256, i % N_ALPHA);
+                let at = |cos: f32| cos_at(cos, alpha_of(row)).mean(|column| at_angles[i * N_COS + column]);
+                (0..n).map(|k| at(((k as f32 + 0.5) / n as f32).sqrt())).sum::<f32>() / n as f32
+            })
+            .collect();
+        LossTable { at_angles, means }
+    })
+}
+
+fn alpha_of(row: usize) -> f32 {
+    (row as f32 / (N_ALPHA - 1) as f32).powi(2).max(SMALLEST_ALPHA)
+}
+
+fn cos_of(column: usize, row: usize) -> f32 {
+    let (x, bend) = (column as f32 / (N_COS - 1) as f32, BEND * alpha_of(row));
+    // Grazing light itself has no frame; the limit is close enough.
+    (bend * x * x / (1.0 + bend - x * x)).max(1e-5)
+}
+
+fn eta_of(layer: usize) -> f32 {
+    // Dense about index 1.
+    let root = 2.0 * layer as f32 / (N_ETA - 1) as f32 - 1.0;
+    let contrast = MOST_CONTRAST * root * root.abs();
+    (1.0 + contrast) / (1.0 - contrast)
+}
+
+/// Over all visible normals, by the midpoint rule, as [`ggx::single_scattering_albedo`] is made.
+fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32 {
+    let wo = Vector3 { x: (1.0 - cos * cos).max(0.0).sqrt(), y: 0.0, z: cos };
+    let standard = Vector3 { x: wo.x * alpha, y: 0.0, z: wo.z }.normalize();
+    let lambda_o = ggx::lambda(wo, alpha);
+    let mut kept = 0.0;
+    for i in 0..n_radii {
+        // 1 − r², by its cube root: much of the loss is at the rim of the disc.
+        let rest = 1.0 - (i as f32 + 0.5) / n_radii as f32;
+        let (gap, weight) = (rest.powi(3), 3.0 * rest * rest);
+        let up = gap * (1.0 + standard.z);
+        let z = up - standard.z;
+        let sin = (1.0 - z * z).max(0.0).sqrt();
+        for k in 0..n_angles {
+            // The other half is its mirror image.
+            let (sin_phi, cos_phi) = (PI * (k as f32 + 0.5) / n_angles as f32).sin_cos();
+            let (x, y) = (sin * cos_phi + standard.x, sin * sin_phi);
+            let half = Vector3 { x: x * alpha, y: y * alpha, z: up }.normalize();
+            let (reflectance, cos_t) = fresnel(wo.dot(half).clamp(0.0, 1.0), eta);
+            let (above, below) = (reflect(wo, half), refract(wo, half, eta, cos_t));
+            let seen = 1.0 + lambda_o;
+            let mut back = 0.0;
+            if above.z > 0.0 {
+                back += reflectance * seen / (seen + ggx::lambda(above, alpha));
+            }
+            if below.z < 0.0 && reflectance < 1.0 {
+                let both = beta_of_next(f64::from(lambda_o), f64::from(ggx::lambda(below, alpha))) as f32;
+                back += (1.0 - reflectance) * both * seen;
+            }
+            kept += f64::from(weight * back);
+        }
+    }
+    (1.0 - kept / f64::from(n_radii * n_angles)).max(0.0) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_interpolates_the_integral() {
+        for alpha in [0.02, 0.1, 0.2, 0.33, 0.5, 0.7, 0.9, 1.0] {
+            for eta in [1.0 / 2.4, 1.0 / 1.5, 1.0 / 1.33, 0.97, 1.1, 1.33, 1.5, 1.7, 2.4] {
+                for cos in [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0] {
+                    let (table, integral) = (lost(cos, alpha, eta), integrate(cos, alpha, eta, 120, 60));
+                    assert!((table - integral).abs() < 0.016, "cos {cos}, α {alpha}, η {eta}: {table} for {integral}");
+                }
+            }
+        }
+    }
+}
