@@ -72,7 +72,7 @@ fn furnace(
         things.into_iter().map(|(shape, material, mesh)| (shape, Object { mesh, ..Object::plain(material) })).unzip();
     let mut settings = RenderSettings { integrator, ..RenderSettings::default() };
     if !simd {
-        settings.lanes = None;
+        settings.simd = None;
     }
     let way = match (integrator, simd) {
         (Integrator::Phong, _) => ", phong",

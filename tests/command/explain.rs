@@ -29,14 +29,14 @@ fn an_explanation_has_the_samples_of_the_film_and_its_parts_add_up() {
     // A light alone; with caustics; through a lens; under a sky, with metals and blends; several lights.
     for name in ["cornell", "cornell-balls", "dof-balls", "gallery", "veach-mis"] {
         let (scene, of_scene) = builtin(name);
-        for lanes in [of_scene.lanes, None] {
-            let settings = RenderSettings { seed: 3, integrator: Integrator::Path, lanes, ..of_scene };
-            let n = if lanes.is_some() { 16 } else { 4 };
+        for simd in [of_scene.simd, None] {
+            let settings = RenderSettings { seed: 3, integrator: Integrator::Path, simd, ..of_scene };
+            let n = if simd.is_some() { 16 } else { 4 };
             let mut film = Film::new(size.x, size.y);
             assert!(advance(&scene, &settings, &mut film, n, &NEVER).completed);
             for pixel in [(3, 3), (20, 16), (12, 25), (31, 27), (39, 31), (20, 2)].map(UVec2::from) {
                 let told = explain(&scene, &settings, size, pixel, 0..n).unwrap();
-                let at = format!("{name}, {pixel}, lanes {}", lanes.is_some());
+                let at = format!("{name}, {pixel}, lanes {}", simd.is_some());
                 for path in &told.paths {
                     let bad = firstlight::render::BadSample { x: pixel.x, y: pixel.y, sample: path.sample };
                     assert_eq!(path.radiance, replay_sample(&scene, &settings, size, bad), "{at}");
@@ -57,7 +57,7 @@ fn an_explanation_has_the_samples_of_the_film_and_its_parts_add_up() {
                 let sum: DVec3 = told.contributions().iter().map(|part| part.radiance).sum();
                 assert!((sum - told.mean()).abs().max_element() <= 1e-14 * told.mean().max_element(), "{at}: {sum}");
             }
-            if lanes.is_some() {
+            if simd.is_some() {
                 let pixel = UVec2::new(20, 25);
                 let alone = light_traced(&scene, &settings, size, pixel, 0..n, &NEVER).unwrap();
                 assert_eq!(alone, film.light_traced(pixel.x, pixel.y), "{name}");

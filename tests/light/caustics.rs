@@ -285,11 +285,11 @@ fn smooth_body(material: u32) -> (Shape, Object) {
 fn smooth_normals_gather_as_much_light_from_both_ends() {
     let scene = bench(vec![smooth_body(2)], 1.5);
     let (truth, truth_error) = mean_of_renders(&scene, settings(100, false), (16, 16), 4096, 8);
-    for lanes in [None, RenderSettings::default().lanes] {
-        let settings = RenderSettings { lanes, ..settings(11, true) };
+    for simd in [None, RenderSettings::default().simd] {
+        let settings = RenderSettings { simd, ..settings(11, true) };
         let (mean, error) = mean_of_renders(&scene, settings, (16, 16), 1024, 8);
-        println!("{lanes:?}: {mean:.5} ± {error:.5} for {truth:.5} ± {truth_error:.5}");
+        println!("{simd:?}: {mean:.5} ± {error:.5} for {truth:.5} ± {truth_error:.5}");
         assert!(error.hypot(truth_error) < 0.01 * truth, "too noisy to tell: {error} {truth_error}");
-        assert!((mean - truth).abs() < 4.0 * error.hypot(truth_error), "{lanes:?}: {mean} ± {error} for {truth}");
+        assert!((mean - truth).abs() < 4.0 * error.hypot(truth_error), "{simd:?}: {mean} ± {error} for {truth}");
     }
 }

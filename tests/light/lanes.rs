@@ -164,7 +164,7 @@ fn compare_with_one_at_a_time(integrator: Integrator) {
                 continue;
             }
             let lanes = RenderSettings { integrator, techniques, seed: 7, max_depth: 12, ..RenderSettings::default() };
-            let single = RenderSettings { lanes: None, ..lanes };
+            let single = RenderSettings { simd: None, ..lanes };
             let size = UVec2::new(24, 24);
             let (mut n_differing, n) = (0, if techniques == Techniques::ALL { 24 * 24 * 4 } else { 24 * 24 });
             let (mut sums, mut differing_by) = ([0.0f64; 2], 0.0);
@@ -197,13 +197,13 @@ fn lanes_light_what_one_path_at_a_time_lights() {
             let draw = |lanes, caustics| {
                 let techniques = Techniques { caustics, ..techniques };
                 let settings =
-                    RenderSettings { techniques, lanes, seed: 3, max_depth: 10, ..RenderSettings::default() };
+                    RenderSettings { techniques, simd: lanes, seed: 3, max_depth: 10, ..RenderSettings::default() };
                 let mut film = Film::new(48, 48);
                 advance(&scene, &settings, &mut film, 1, &|| false);
                 film.means().iter().map(|mean| f64::from(mean.y)).collect::<Vec<_>>()
             };
             let single = draw(None, true);
-            let lanes = draw(RenderSettings::default().lanes, true);
+            let lanes = draw(RenderSettings::default().simd, true);
             let without = draw(None, false);
             let differ = |a: f64, b: f64| (a - b).abs() > 1e-2 * b + 1e-5;
             let count = |a: &[f64], b: &[f64]| a.iter().zip(b).filter(|(a, b)| differ(**a, **b)).count();
@@ -225,7 +225,7 @@ fn all_instruction_sets_draw_the_same_picture() {
             (Integrator::Phong, PixelFilter::Box),
         ] {
             let draw = |set| {
-                let settings = RenderSettings { integrator, lanes: Some(set), filter, ..RenderSettings::default() };
+                let settings = RenderSettings { integrator, simd: Some(set), filter, ..RenderSettings::default() };
                 let mut film = Film::new(21, 19);
                 advance(&scene, &settings, &mut film, 4, &|| false);
                 film.means().iter().flat_map(|mean| mean.to_array().map(f32::to_bits)).collect::<Vec<_>>()

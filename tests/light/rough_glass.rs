@@ -202,7 +202,7 @@ fn in_an_even_world_it_takes_light_away_and_adds_none() {
             let scene = scene(shapes, vec![rough(alpha, ior), rough(0.5, 1.2)], Environment::Constant(Vec3::ONE), eye);
             let mut settings = RenderSettings::default();
             if !lanes {
-                settings.lanes = None;
+                settings.simd = None;
             }
             let (film, report) = render(&scene, &settings, 16, 16, 64);
             // No sample is brighter than its world: the bound of such scenes.

@@ -35,7 +35,7 @@ pub struct RenderSettings {
     /// With which instructions sixteen paths are shaded at a time; `None` shades one after the other, which is what
     /// tests compare with. All sets give the same bits.
     #[doc(hidden)]
-    pub lanes: Option<InstructionSet>,
+    pub simd: Option<InstructionSet>,
 }
 
 /// Settings that no picture comes of.
@@ -65,7 +65,7 @@ impl Default for RenderSettings {
             seed: 0,
             filter,
             techniques,
-            lanes: Some(InstructionSet::detect()),
+            simd: Some(InstructionSet::detect()),
         }
     }
 }

@@ -202,7 +202,7 @@ impl Wave {
         });
         let lens = pass.lens();
         let start = |paths: &mut PathBatch| {
-            if let Some(set) = pass.settings.lanes
+            if let Some(set) = pass.settings.simd
                 && lens.is_plain()
             {
                 for sample in samples.clone() {

@@ -141,7 +141,7 @@ impl PathWave {
     ) {
         self.next.start(self.paths.len(), scene.tables.features.glass, caustics.is_some());
         self.shadows.start(self.paths.len());
-        let set = settings.lanes.unwrap_or(InstructionSet::Portable);
+        let set = settings.simd.unwrap_or(InstructionSet::Portable);
         let kinds = &scene.tables.materials.kinds;
         self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
         let is_last = depth == settings.max_depth;
@@ -168,7 +168,7 @@ impl PathWave {
                 shadows: &mut self.shadows,
                 sets: &mut self.sets,
             };
-            match (settings.lanes, kind) {
+            match (settings.simd, kind) {
                 (Some(set), MISSES) if scene.tables.environment_sampler.is_none() => {
                     misses::shade_misses(set, scene, &self.paths, &self.sets, order, radiance);
                 }

@@ -20,7 +20,7 @@ pub(crate) struct CausticPass<'a> {
     pub max_depth: u32,
     pub seed: u32,
     /// `None` for one path at a time.
-    pub lanes: Option<InstructionSet>,
+    pub simd: Option<InstructionSet>,
     pub size: Vec2,
     pub filter: PixelFilter,
     /// The integral of the filter along one axis.
@@ -50,7 +50,7 @@ impl<'a> CausticPass<'a> {
             techniques: settings.techniques,
             max_depth: settings.max_depth,
             seed: settings.seed,
-            lanes: settings.lanes,
+            simd: settings.simd,
             size: size.as_vec2(),
             filter: settings.filter,
             filter_norm: settings.filter.integral(),

@@ -198,7 +198,7 @@ impl LightWave {
         let (surfaces, kinds) = (&scene.surfaces, &scene.tables.materials.kinds);
         self.next.start(self.paths.len(), scene.tables.features.glass, false);
         self.arrivals.start(self.paths.len());
-        let set = pass.lanes.unwrap_or(InstructionSet::Portable);
+        let set = pass.simd.unwrap_or(InstructionSet::Portable);
         self.sorted.sort(set, scene, kinds, &self.hits, self.paths.len());
         // Those behind the misses.
         for kind in 0..KINDS - 1 {
@@ -209,7 +209,7 @@ impl LightWave {
                 if n_vertices == 1 && pass.casters.of_hit(&hit) != self.paths.slot[i as usize] {
                     continue;
                 }
-                let has_lanes = pass.lanes.is_some() && simd::know(kind, surfaces, &hit);
+                let has_lanes = pass.simd.is_some() && simd::know(kind, surfaces, &hit);
                 if has_lanes { &mut self.together } else { &mut self.apart }.push(i);
             }
             if !self.together.is_empty() {

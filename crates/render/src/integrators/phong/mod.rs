@@ -107,7 +107,7 @@ impl PhongWave {
         let n_lights = tables.lights.n_each() + usize::from(tables.environment_sampler.is_some());
         self.shadows.start(scene, n_lights, n);
         let mut finish = Finish::new();
-        let Some(set) = settings.lanes else {
+        let Some(set) = settings.simd else {
             for i in 0..n {
                 self.shade_one(scene, depth, is_last, i, &mut finish, radiance);
             }
