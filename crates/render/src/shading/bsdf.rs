@@ -11,7 +11,7 @@ use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::metal::{Metal, schlick};
-use crate::shading::rough_glass::RoughGlass;
+use crate::shading::rough_glass::{RoughGlass, RoughGlassSample};
 use firstlight_kdtree::geometry::Frame;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
@@ -256,7 +256,13 @@ impl Scatter for Lobe {
                 Some(BsdfSample { wi: wi.into(), weight, pdf: found.pdf, through: None })
             }
             Self::RoughGlass { interface, alpha, compensate } => {
-                RoughGlass::new(normal, wo, alpha, interface, compensate).sample(u_choice(), u)
+                let surface = RoughGlass::new(normal, wo, alpha, interface, compensate);
+                surface.sample(u_choice(), u).map(|RoughGlassSample { wi, weight, pdf, passes }| BsdfSample {
+                    wi,
+                    weight: Vec3::splat(weight),
+                    pdf,
+                    through: passes.then_some(interface),
+                })
             }
             Self::Glass(interface) => {
                 let Interface { eta, squeeze, .. } = interface;

@@ -26,6 +26,30 @@ pub fn lambda<R: Real>(w: Vector3<R>, alpha: R) -> R {
     x * 0.5 / ((x + 1.0).sqrt() + 1.0)
 }
 
+/// G2 of one direction above the surface and one below: at a height that a share u of the surface lies under they are seen with
+/// probabilities u^Λₒ and (1 − u)^Λᵢ, and the mean over u is Euler's Β(1 + Λₒ, 1 + Λᵢ) (Heitz et al. 2016,
+/// "Multiple-Scattering Microfacet BSDFs with the Smith Model").
+pub fn above_and_below(lambda_o: f32, lambda_i: f32) -> f32 {
+    beta_of_next(f64::from(lambda_o), f64::from(lambda_i)) as f32
+}
+
+/// Β(1 + a, 1 + b), for `a`, `b` from 0 on.
+fn beta_of_next(a: f64, b: f64) -> f64 {
+    (ln_factorial(a) + ln_factorial(b) - ln_factorial(a + b + 1.0)).exp()
+}
+
+/// ln Γ(1 + x) for `x` from 0 on, to 1e-11: Stirling's series from 8 on, the recurrence below.
+fn ln_factorial(x: f64) -> f64 {
+    let (mut z, mut product) = (x + 1.0, 1.0);
+    while z < 8.0 {
+        product *= z;
+        z += 1.0;
+    }
+    let r = 1.0 / (z * z);
+    let series = (1.0 / 12.0 - r * (1.0 / 360.0 - r * (1.0 / 1260.0 - r / 1680.0))) / z;
+    (z - 0.5) * z.ln() - z + 0.5 * std::f64::consts::TAU.ln() + series - product.ln()
+}
+
 /// Reflection of `wo` to `wi` at visible normals.
 pub struct Reflection<R> {
     /// Unit, between the two.
@@ -251,6 +275,19 @@ mod tests {
             let integral = integrate_albedo(cos_theta, alpha, 200, 100);
             assert!((table / integral - 1.0).abs() < 5e-4, "cos {cos_theta}, α {alpha}: {table} for {integral}");
             assert!(integral <= 1.0 + 1e-6, "a surface must not make light");
+        }
+    }
+
+    #[test]
+    fn betas_are_what_tables_say() {
+        for (a, b, expected) in
+            [(0.0, 0.0, 1.0), (1.0, 1.0, 1.0 / 6.0), (2.0, 3.0, 1.0 / 60.0), (0.5, 0.5, std::f64::consts::PI / 8.0)]
+        {
+            assert!((beta_of_next(a, b) / expected - 1.0).abs() < 1e-9, "{a}, {b}");
+        }
+        for a in [1e-9, 0.1, 5.0, 7.5, 1e3, 1e7] {
+            assert!((beta_of_next(a, 0.0) * (1.0 + a) - 1.0).abs() < 1e-6, "{a}");
+            assert!(beta_of_next(a, 1e7) < 1e-6);
         }
     }
 }

@@ -5,7 +5,6 @@
 use crate::core::material::SMALLEST_ALPHA;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
-use crate::shading::rough_glass::beta_of_next;
 use firstlight_simd::Vector3;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -147,7 +146,7 @@ fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32
                 back += reflectance * seen / (seen + ggx::lambda(above, alpha));
             }
             if below.z < 0.0 && reflectance < 1.0 {
-                let both = beta_of_next(f64::from(lambda_o), f64::from(ggx::lambda(below, alpha))) as f32;
+                let both = ggx::above_and_below(lambda_o, ggx::lambda(below, alpha));
                 back += (1.0 - reflectance) * both * seen;
             }
             kept += f64::from(weight * back);

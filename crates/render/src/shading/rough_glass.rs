@@ -6,14 +6,12 @@
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
-use crate::shading::bsdf::BsdfSample;
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::glass_loss;
 use crate::shading::interface::Interface;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
-use std::f64::consts::TAU;
 
 /// Below this product of α and |η − 1| refracted directions are spread by less than directions in `f32` can tell apart.
 const SMALLEST_SPREAD: f32 = 3e-5;
@@ -76,6 +74,19 @@ pub(crate) struct RoughGlass {
     multiple: Option<Multiple>,
 }
 
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RoughGlassSample {
+    /// Unit, in the world.
+    pub wi: Vec3,
+    /// f · |cos| / pdf.
+    pub weight: f32,
+    /// Per steradian.
+    pub pdf: f32,
+    /// Whether it leads beyond.
+    pub passes: bool,
+}
+
 impl RoughGlass {
     /// - `normal`: unit, on the side of `wo`; `interface`: not smooth as [`is_smooth`] tells; `compensate`: give back what single
     ///   scattering loses.
@@ -128,23 +139,23 @@ impl RoughGlass {
     }
 
     /// A direction of [`Multiple`].
-    fn sample_multiple(&self, Multiple { sides, .. }: Multiple, u_side: f32, u: Vec2) -> Option<BsdfSample> {
+    fn sample_multiple(&self, Multiple { sides, .. }: Multiple, u_side: f32, u: Vec2) -> Option<RoughGlassSample> {
         let local = cosine_hemisphere(u.to_array());
         let beyond = u_side >= sides[0].0;
         let wi = if beyond { local * -1.0 } else { local };
         let (value, pdf) = self.with_multiple(wi, self.scattered_once(wi));
-        (local.z > 0.0 && pdf > 0.0).then(|| BsdfSample {
+        (local.z > 0.0 && pdf > 0.0).then(|| RoughGlassSample {
             wi: wi.to_world(&self.axes).normalize().into(),
-            weight: Vec3::splat(value / pdf),
+            weight: value / pdf,
             pdf,
-            through: beyond.then_some(self.interface),
+            passes: beyond,
         })
     }
 
     /// - `u_choice`: reflects or refracts at the microfacet that `u` chooses; uniform in `[0, 1)`.
     ///
     /// `None` for light that single scattering loses.
-    pub fn sample(&self, mut u_choice: f32, u: Vec2) -> Option<BsdfSample> {
+    pub fn sample(&self, mut u_choice: f32, u: Vec2) -> Option<RoughGlassSample> {
         let Interface { eta, squeeze, .. } = self.interface;
         if let Some(multiple) = self.multiple {
             if u_choice < multiple.lost {
@@ -168,9 +179,12 @@ impl RoughGlass {
         };
         let (value, pdf) = self.with_multiple(wi, once);
         let weight = if self.multiple.is_some() { value / pdf } else { (both * seen).min(1.0) * scale };
-        let weight = Vec3::splat(weight);
-        let through = (!reflects).then_some(self.interface);
-        (pdf > 0.0).then(|| BsdfSample { wi: wi.to_world(&self.axes).normalize().into(), weight, pdf, through })
+        (pdf > 0.0).then(|| RoughGlassSample {
+            wi: wi.to_world(&self.axes).normalize().into(),
+            weight,
+            pdf,
+            passes: !reflects,
+        })
     }
 
     /// [`Self::eval`] of a direction above the surface, `half` being the microfacet that mirrors it.
@@ -207,33 +221,14 @@ impl RoughGlass {
         1.0 / (1.0 + self.lambda_o + self.lambda_i(wi))
     }
 
-    /// The same of one above and one below: at a height that a share u of the surface lies under they are seen with
-    /// probabilities u^Λₒ and (1 − u)^Λᵢ, and the mean over u is Euler's Β(1 + Λₒ, 1 + Λᵢ) (Heitz et al. 2016,
-    /// "Multiple-Scattering Microfacet BSDFs with the Smith Model").
+    /// The same of one above and one below.
     fn above_and_below(&self, wi: Vector3<f32>) -> f32 {
-        beta_of_next(f64::from(self.lambda_o), f64::from(self.lambda_i(wi))) as f32
+        ggx::above_and_below(self.lambda_o, self.lambda_i(wi))
     }
 
     fn lambda_i(&self, wi: Vector3<f32>) -> f32 {
         ggx::lambda(Vector3 { z: wi.z.abs().max(SMALLEST_COS), ..wi }, self.alpha)
     }
-}
-
-/// Β(1 + a, 1 + b), for `a`, `b` from 0 on.
-pub(crate) fn beta_of_next(a: f64, b: f64) -> f64 {
-    (ln_factorial(a) + ln_factorial(b) - ln_factorial(a + b + 1.0)).exp()
-}
-
-/// ln Γ(1 + x) for `x` from 0 on, to 1e-11: Stirling's series from 8 on, the recurrence below.
-fn ln_factorial(x: f64) -> f64 {
-    let (mut z, mut product) = (x + 1.0, 1.0);
-    while z < 8.0 {
-        product *= z;
-        z += 1.0;
-    }
-    let r = 1.0 / (z * z);
-    let series = (1.0 / 12.0 - r * (1.0 / 360.0 - r * (1.0 / 1260.0 - r / 1680.0))) / z;
-    (z - 0.5) * z.ln() - z + 0.5 * TAU.ln() + series - product.ln()
 }
 
 #[cfg(test)]
@@ -245,6 +240,7 @@ mod tests {
     use crate::test_statistics::ChiSquared;
     use glam::DVec3;
     use proptest::prelude::*;
+    use std::f64::consts::TAU;
 
     const ALPHAS: [f32; 10] = [1e-3, 3e-3, 0.01, 0.03, 0.06, 0.1, 0.2, 0.4, 0.7, 1.0];
     /// Cosine of incidence, and index on its side over that beyond: from outside, from inside, nearly alike.
@@ -528,19 +524,6 @@ mod tests {
         }
         assert!([0.0, -1.0, f32::NAN, 0.5 * SMALLEST_ALPHA].into_iter().all(|alpha| is_smooth(alpha, 1.5)));
         assert!(is_smooth(1.0, 1.0) && is_smooth(0.5, f32::NAN) && !is_smooth(SMALLEST_ALPHA, 1.5));
-    }
-
-    #[test]
-    fn betas_are_what_tables_say() {
-        for (a, b, expected) in
-            [(0.0, 0.0, 1.0), (1.0, 1.0, 1.0 / 6.0), (2.0, 3.0, 1.0 / 60.0), (0.5, 0.5, std::f64::consts::PI / 8.0)]
-        {
-            assert!((beta_of_next(a, b) / expected - 1.0).abs() < 1e-9, "{a}, {b}");
-        }
-        for a in [1e-9, 0.1, 5.0, 7.5, 1e3, 1e7] {
-            assert!((beta_of_next(a, 0.0) * (1.0 + a) - 1.0).abs() < 1e-6, "{a}");
-            assert!(beta_of_next(a, 1e7) < 1e-6);
-        }
     }
 
     proptest! {
