@@ -132,9 +132,9 @@ fn help(source: &str) -> Vec<(usize, String)> {
     lines.filter_map(|(line, n)| Some((n, line.trim().strip_prefix("/// ")?.to_owned()))).collect()
 }
 
-/// A field, a scene or a channel of a film by its name alone, or a whole scene.
+/// A field, a scene or a part of a film by its name alone, or a whole scene.
 fn is_grammar(text: &str) -> bool {
-    ["eye", "ball", "balls"].contains(&text)
+    ["eye", "ball", "balls", "lamps"].contains(&text)
         || text.ends_with(".ron")
         || text.starts_with("lamps.")
         || text.contains("camera: (")
