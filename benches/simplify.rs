@@ -11,7 +11,8 @@ use firstlight::mesh::procedural::{SerpentKnot, serpent_knot};
 use firstlight::mesh::simplify::{Method, Target, simplify};
 use firstlight::mesh::{Deviation, Mesh, Topology};
 use firstlight::report::cpu_seconds;
-use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
+use firstlight::scene::model::{ModelNormals, ModelOptions};
+use firstlight::scene::obj::load_obj_with;
 use glam::Vec3;
 use meshopt::{SimplifyOptions, VertexDataAdapter};
 use std::path::Path;
@@ -69,7 +70,7 @@ fn main() {
 }
 
 fn load(path: &str) -> Mesh {
-    let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
+    let options = ModelOptions { normals: ModelNormals::Ignore, ..ModelOptions::default() };
     load_obj_with(Path::new(path), &options).unwrap_or_else(|error| panic!("{error}")).mesh
 }
 

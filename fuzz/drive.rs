@@ -8,7 +8,7 @@ use bevy_ecs::world::World;
 use firstlight::frame::read_film_file_within;
 use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, Prepared, RenderSettings, advance};
 use firstlight::scene::file::{ObjectPart, SceneFile};
-use firstlight::scene::obj::{ObjNormals, ObjOptions, load_obj_with};
+use firstlight::scene::model::{ModelFormat, ModelNormals, ModelOptions, load_model};
 use firstlight::scene::{
     Extraction, ImageMetadata, ImageScene, Limits, LoadOptions, MeshSource, Rendering, SceneInputs, SceneSource, load,
     read_picture_within,
@@ -43,11 +43,11 @@ fn write(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-fn read_model(path: &Path) {
-    let computed = ObjOptions::default().normals;
-    for normals in [computed, ObjNormals::Ignore] {
-        let options = ObjOptions { normals, max_bytes: LIMITS.model_bytes, max_library_bytes: LIMITS.library_bytes };
-        match load_obj_with(path, &options) {
+fn read_model(path: &Path, format: ModelFormat) {
+    let computed = ModelOptions::default().normals;
+    for normals in [computed, ModelNormals::OfPositions, ModelNormals::Ignore] {
+        let options = ModelOptions { normals, max_bytes: LIMITS.model_bytes, max_library_bytes: LIMITS.library_bytes };
+        match load_model(path, format, &options) {
             Ok(model) => {
                 model.mesh.validate().expect("a mesh that was read is sound");
                 assert!(!model.mesh.triangles.is_empty() && !model.materials.is_empty());
@@ -60,13 +60,21 @@ fn read_model(path: &Path) {
 }
 
 pub fn obj(bytes: &[u8]) {
-    read_model(&write("fuzz.obj", bytes));
+    read_model(&write("fuzz.obj", bytes), ModelFormat::Obj);
+}
+
+pub fn ply(bytes: &[u8]) {
+    read_model(&write("fuzz.ply", bytes), ModelFormat::Ply);
+}
+
+pub fn stl(bytes: &[u8]) {
+    read_model(&write("fuzz.stl", bytes), ModelFormat::Stl);
 }
 
 pub fn mtl(bytes: &[u8]) {
     write("fuzz.mtl", bytes);
     let text = b"mtllib fuzz.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 2\n";
-    read_model(&write("with-fuzz.obj", text));
+    read_model(&write("with-fuzz.obj", text), ModelFormat::Obj);
 }
 
 pub fn scene(bytes: &[u8]) {

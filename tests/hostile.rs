@@ -159,6 +159,16 @@ fn models() {
 }
 
 #[test]
+fn ply_models() {
+    assault("ply", drive::ply, 4000, MIB, 64);
+}
+
+#[test]
+fn stl_models() {
+    assault("stl", drive::stl, 2500, MIB, 64);
+}
+
+#[test]
 fn material_libraries() {
     assault("mtl", drive::mtl, 2000, MIB, 64);
 }

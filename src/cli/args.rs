@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// What to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Built-in scene, scene file (.ron), model (.obj), or picture rendered by firstlight (.png, .exr).
+    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl), or picture rendered by firstlight (.png, .exr).
     #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     pub scene: OsString,
     #[command(flatten)]
@@ -23,7 +23,7 @@ pub struct SceneArgs {
 /// Several things to open, in the same way.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
-    /// Built-in scenes, scene files (.ron), models (.obj), or pictures rendered by firstlight (.png, .exr).
+    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl), or pictures rendered by firstlight (.png, .exr).
     #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     pub scenes: Vec<OsString>,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `firstlight simplify IN.obj -o OUT.obj`: fewer triangles, with the error measured.
+//! `firstlight simplify IN -o OUT.obj`: fewer triangles, with the error measured.
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
@@ -9,20 +9,21 @@ use super::waiting::Waiting;
 use clap::{Args, ValueEnum};
 use firstlight::mesh::simplify::{Method, SimplifyError, Target, simplify};
 use firstlight::mesh::{Deviation, Distances, Faults, Topology};
-use firstlight::scene::obj::{ImportedObj, ObjExtras, ObjNormals, ObjOptions, load_obj_with, save_obj};
+use firstlight::scene::model::{ImportedModel, ModelFormat, ModelNormals, ModelOptions, load_model};
+use firstlight::scene::obj::{ObjExtras, save_obj};
 use std::path::PathBuf;
 use std::time::Instant;
 
 pub const EXAMPLES: &str = "\
 Examples:
   firstlight simplify bunny.obj -o small.obj --ratio 10%
-  firstlight simplify bunny.obj -o close.obj --error 0.1%";
+  firstlight simplify scan.ply -o close.obj --error 0.1%";
 
 #[derive(Args, Clone, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct SimplifyArgs {
-    /// Model (Wavefront OBJ).
-    #[arg(value_name = "IN.obj")]
+    /// Model (.obj, .ply, .stl).
+    #[arg(value_name = "IN")]
     input: PathBuf,
     /// Output file; an existing file is replaced.
     #[arg(short, long, value_name = "OUT.obj")]
@@ -63,18 +64,25 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
     // A result that cannot be written is not worth the wait.
     if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
-        let message = format!("{}: the output name must end in .obj (Wavefront OBJ)", args.output.display());
+        let message = format!(
+            "{}: the output name must end in .obj: simplified models are written as Wavefront OBJ",
+            args.output.display()
+        );
         return Err(Failure::Usage(message));
     }
+    let Some(format) = ModelFormat::of(&args.input) else {
+        let (input, models) = (args.input.display(), ModelFormat::extensions());
+        return Err(Failure::Usage(format!("{input}: unsupported file format: expected a model ({models})")));
+    };
     let mut files = OverwriteArgs::default().files();
     files.read(&args.input)?;
     files.write(&args.output)?;
     let waiting = Waiting::new(format!("reading {}", args.input.display()));
     // Computed normals would be written as if they were the file's: without any, the next reader computes its own.
-    let mut model = load_obj_with(&args.input, &ObjOptions::default()).map_err(|error| failed(&error))?;
+    let mut model = load_model(&args.input, format, &ModelOptions::default()).map_err(|error| failed(&error))?;
     if !model.normals_from_file {
-        let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
-        model = load_obj_with(&args.input, &options).map_err(|error| failed(&error))?;
+        let options = ModelOptions { normals: ModelNormals::Ignore, ..ModelOptions::default() };
+        model = load_model(&args.input, format, &options).map_err(|error| failed(&error))?;
     }
     files.read_all(model.libraries.iter().cloned())?;
     for warning in model.warnings.iter().chain(&model.material_warnings) {
@@ -106,7 +114,9 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
     if missed {
         remark(format_args!("warning: borders, seams and non-manifold edges allow no fewer than {after} triangles"));
     }
-    let names: Vec<String> = model.materials.iter().map(|material| material.name.clone()).collect();
+    // A material that no library describes would only be missed.
+    let kept = model.materials.iter().filter(|_| format == ModelFormat::Obj);
+    let names: Vec<String> = kept.map(|material| material.name.clone()).collect();
     let comment = format!("{after} of {before} triangles, simplified by firstlight");
     let extras = ObjExtras { materials: &names, libraries: &model.libraries, comment: &comment };
     waiting.next(format!("writing {}", args.output.display()));
@@ -153,7 +163,7 @@ pub fn run(args: &SimplifyArgs, stop: &Stop) -> Result<(), Failure> {
 }
 
 /// What is not as a simplifier would have it, and what becomes of it; a sentence each.
-fn faults(model: &ImportedObj) -> Vec<String> {
+fn faults(model: &ImportedModel) -> Vec<String> {
     let (triangles, edges) = (Faults::of(&model.mesh), Topology::of(&model.mesh));
     let counted = |count: usize, fate: &str| (count > 0).then(|| format!("{count} {fate}"));
     let left_out = Faults { flat: 0, ..triangles };

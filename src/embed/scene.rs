@@ -33,7 +33,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Opens a model (`.obj`), a scene file (`.ron`), an image that firstlight saved (`.png`, `.exr`), or a built-in scene by
+    /// Opens a model (`.obj`, `.ply`, `.stl`), a scene file (`.ron`), an image that firstlight saved (`.png`, `.exr`), or a built-in scene by
     /// its name.
     ///
     /// # Errors

@@ -70,7 +70,7 @@ impl Remake {
 
     /// For people.
     pub fn title(&self) -> String {
-        let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = &self.source;
+        let name = self.source.name();
         match self.for_whom {
             ForWhom::Object(_) => format!("simplifying {name}"),
             ForWhom::NewObject { .. } => format!("loading {name}"),

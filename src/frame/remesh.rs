@@ -88,10 +88,10 @@ pub fn take(world: &mut World, remade: Remade) {
             let placement = Placement { translation: place - factor * foot, linear };
             let origin =
                 MeshOrigin { source: job.source.clone(), shading: job.shading, simplify, own_materials: false };
-            let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = &job.source;
+            let name = job.source.name();
             let stem = std::path::Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
             let bundle = (Shape::Mesh(mesh), placement, MaterialSlots(vec![material]), origin, measure);
-            let entity = super::edit::spawn(world, &stem.unwrap_or_else(|| name.clone()), bundle);
+            let entity = super::edit::spawn(world, &stem.unwrap_or_else(|| name.to_owned()), bundle);
             world.resource_mut::<Selection>().choose(entity, false);
         }
     }

@@ -108,8 +108,11 @@ impl SceneContent {
         (file.film, file.display) = (FilmPart::default(), DisplayPart::default());
         (file.integrator, file.max_depth) = (Integrator::default(), None);
         for object in &mut file.objects {
-            if let ObjectPart::Mesh { source: MeshSource::Obj(path), .. } = object {
-                path.clear();
+            // Nor what format it has.
+            if let ObjectPart::Mesh { source, .. } = object
+                && source.file().is_some()
+            {
+                *source = MeshSource::Obj(String::new());
             }
         }
         for (_, texture) in &mut file.textures.0 {

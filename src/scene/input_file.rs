@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 pub enum FileKind {
     /// The text of a scene.
     Scene,
-    /// A model (OBJ).
+    /// A model (OBJ, PLY, STL).
     Model,
     /// A material library (MTL).
     Library,

@@ -72,7 +72,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
         SceneSource::Model(path) => {
             let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-            let mesh_source = MeshSource::Obj(file);
+            let mesh_source = MeshSource::of_file(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
             let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder), Ok)?;
             let mut file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
@@ -170,8 +170,7 @@ fn resolve(
         match object {
             ObjectPart::Mesh { source, shading, simplify, .. } => {
                 let read = || {
-                    let (MeshSource::Obj(name) | MeshSource::Builtin(name)) = source;
-                    options.say(&format!("loading {name}"));
+                    options.say(&format!("loading {}", source.name()));
                     let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
                     let loaded = kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok);
                     let warnings = loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);

@@ -1,8 +1,9 @@
-//! The meshes that a scene names: from OBJ files or made by the program, shaded as asked, with their own materials.
+//! The meshes that a scene names: from files or made by the program, shaded as asked, with their own materials.
 
 use super::error::SceneError;
 use super::file::MaterialPart;
-use super::obj::{ImportedMaterial, ImportedObj, ObjNormals, ObjOptions, load_obj_with};
+use super::model::{ImportedModel, ModelFormat, ModelNormals, ModelOptions, load_model};
+use super::obj::ImportedMaterial;
 use super::relative::text_to_path;
 use super::sources::{MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
@@ -68,9 +69,9 @@ pub fn load_mesh(
     simplify: Option<f64>,
     folder: &Path,
 ) -> Result<LoadedMesh, SceneError> {
-    match source {
-        MeshSource::Obj(file) => read_obj(source, &folder.join(text_to_path(file)), shading, simplify),
-        MeshSource::Builtin(_) => {
+    match source.file() {
+        Some((_, file)) => read_file(source, &folder.join(text_to_path(file)), shading, simplify),
+        None => {
             let mesh = MeshBase::read(source, shading, simplify, folder)?.finish(shading, simplify)?;
             Ok(LoadedMesh {
                 mesh: Arc::new(mesh),
@@ -108,12 +109,14 @@ impl MeshBase {
         simplify: Option<f64>,
         folder: &Path,
     ) -> Result<Self, SceneError> {
-        let (mesh, crease) = match source {
-            MeshSource::Obj(file) => {
-                let (imported, crease) = read_obj_base(&folder.join(text_to_path(file)), shading, simplify.is_some())?;
+        let (mesh, crease) = match source.file() {
+            Some((format, file)) => {
+                let path = folder.join(text_to_path(file));
+                let (imported, crease) = read_base(&path, format, shading, simplify.is_some())?;
                 (imported.mesh, crease)
             }
-            MeshSource::Builtin(name) => {
+            None => {
+                let name = source.name();
                 builtin_mesh(name).ok_or_else(|| SceneError::new(format!("there is no built-in mesh `{name}`")))?
             }
         };
@@ -149,11 +152,11 @@ fn finish(
 ) -> Result<Mesh, SceneError> {
     let mesh = simplified(mesh, simplify)?;
     // Normals that reading gave are those that were asked for.
-    let keeps = shading != MeshShading::Flat && matches!(source, MeshSource::Obj(_)) && !mesh.normals.is_empty();
+    let keeps = shading != MeshShading::Flat && source.file().is_some() && !mesh.normals.is_empty();
     Ok(if keeps { mesh } else { shaded(mesh, shading, crease) })
 }
 
-fn read_obj(
+fn read_file(
     source: &MeshSource,
     path: &Path,
     shading: MeshShading,
@@ -161,7 +164,8 @@ fn read_obj(
 ) -> Result<LoadedMesh, SceneError> {
     // Before it is read: what changes in the meantime is read again.
     let before = stamp(path);
-    let (mut imported, crease) = read_obj_base(path, shading, simplify.is_some())?;
+    let format = source.file().map_or(ModelFormat::Obj, |(format, _)| format);
+    let (mut imported, crease) = read_base(path, format, shading, simplify.is_some())?;
     imported.mesh = finish(imported.mesh, source, shading, simplify, crease)?;
     let mesh = Arc::new(imported.mesh);
     let files = std::iter::once((path.to_owned(), before))
@@ -184,21 +188,26 @@ fn read_obj(
 }
 
 /// The file as simplification wants it, and the crease angle of normals that are still to be computed.
-fn read_obj_base(path: &Path, shading: MeshShading, simplify: bool) -> Result<(ImportedObj, Option<f32>), SceneError> {
+fn read_base(
+    path: &Path,
+    format: ModelFormat,
+    shading: MeshShading,
+    simplify: bool,
+) -> Result<(ImportedModel, Option<f32>), SceneError> {
     let read = |normals| {
-        load_obj_with(path, &ObjOptions { normals, ..ObjOptions::default() })
+        load_model(path, format, &ModelOptions { normals, ..ModelOptions::default() })
             .map_err(|error| SceneError::new(error.to_string()))
     };
-    let computed = ObjOptions::default().normals;
-    let ObjNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
+    let computed = ModelOptions::default().normals;
+    let ModelNormals::FileOrComputed { crease_angle } = computed else { return Ok((read(computed)?, None)) };
     let mut imported = read(match shading {
         MeshShading::Auto => computed,
-        MeshShading::Smooth if !simplify => ObjNormals::OfPositions,
-        MeshShading::Smooth | MeshShading::Flat => ObjNormals::Ignore,
+        MeshShading::Smooth if !simplify => ModelNormals::OfPositions,
+        MeshShading::Smooth | MeshShading::Flat => ModelNormals::Ignore,
     })?;
     // Normals that were computed would hold simplification back at every crease; they are computed after it.
     if shading == MeshShading::Auto && simplify && !imported.normals_from_file {
-        imported.mesh = read(ObjNormals::Ignore)?.mesh;
+        imported.mesh = read(ModelNormals::Ignore)?.mesh;
     }
     Ok((imported, Some(crease_angle)))
 }

@@ -1,7 +1,7 @@
 //! The scene as a bevy_ecs world: components, the scene file, importers, built-in scenes, and the flat snapshot
 //! that the renderer works on.
 //!
-//! The way of a scene: text or OBJ → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`] (entities)
+//! The way of a scene: text or model → [`load`] (files, meshes, trees; any thread) → [`LoadedScene::spawn`] (entities)
 //! → [`Extraction`] (a [`crate::render::Prepared`] about an origin near the camera).
 
 mod bad_value;
@@ -25,17 +25,20 @@ mod load;
 mod loaded;
 mod meshes;
 mod metadata_draft;
+pub mod model;
 pub mod obj;
 mod orientation;
 mod outputs;
 mod picture;
 mod placement;
+pub mod ply;
 mod relative;
 mod save;
 mod source;
 mod sources;
 mod spawn;
 mod stamp;
+pub mod stl;
 mod trees;
 pub(crate) mod units;
 mod up_axis;

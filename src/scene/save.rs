@@ -95,8 +95,8 @@ fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
         }
     };
     for object in &mut file.objects {
-        if let ObjectPart::Mesh { source: MeshSource::Obj(path), .. } = object {
-            moved(path);
+        if let ObjectPart::Mesh { source, .. } = object {
+            source.file_mut().into_iter().for_each(moved);
         }
     }
     for (_, texture) in &mut file.textures.0 {

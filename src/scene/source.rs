@@ -2,6 +2,7 @@
 
 use super::builtin::{BUILTIN_SCENES, builtin_text};
 use super::error::{SceneError, suggestion};
+use super::model::ModelFormat;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +13,7 @@ pub enum SceneSource {
     Builtin(String),
     /// A scene file (RON).
     Scene(PathBuf),
-    /// A model (OBJ), to be framed.
+    /// A model of any [`ModelFormat`], to be framed.
     Model(PathBuf),
     /// A picture that was made by this program (PNG, EXR), for the scene that it shows, as it shows it.
     Picture(PathBuf),
@@ -39,21 +40,24 @@ impl SceneSource {
         if !path.is_file() && builtin_text(word).is_some() {
             return Ok(Self::Builtin(word.to_owned()));
         }
+        let models = ModelFormat::extensions();
         match extension.as_deref() {
             Some("ron") => Ok(Self::Scene(path.to_path_buf())),
-            Some("obj") => Ok(Self::Model(path.to_path_buf())),
+            _ if ModelFormat::of(path).is_some() => Ok(Self::Model(path.to_path_buf())),
             Some("png" | "exr") => Ok(Self::Picture(path.to_path_buf())),
             _ if path.is_dir() => Err(SceneError::in_file(
                 path,
-                "is a folder: expected a scene (.ron), a model (.obj) or a picture (.png, .exr)",
+                format!("is a folder: expected a scene (.ron), a model ({models}) or a picture (.png, .exr)"),
             )),
             Some("hdr") if path.exists() => {
                 let message = "is an environment image: add it to a scene or a model with --env FILE.hdr";
                 Err(SceneError::in_file(path, message))
             }
             _ if path.exists() => {
-                let message = "unsupported file format: expected a scene (.ron), a model (.obj) or a picture rendered by \
-                               firstlight (.png, .exr); convert other models to .obj";
+                let message = format!(
+                    "unsupported file format: expected a scene (.ron), a model ({models}) or a picture rendered by \
+                     firstlight (.png, .exr); convert other models to .obj"
+                );
                 Err(SceneError::in_file(path, message))
             }
             _ => {

@@ -1,10 +1,12 @@
 //! Where textures, meshes and the light of the environment come from: what a scene file says of them, and what the world
 //! keeps to save them again.
 
+use super::model::ModelFormat;
 use super::value::Rgb;
 use crate::render::Wrap;
 use glam::{DVec2, Vec3};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Radiance from infinitely far away.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -85,8 +87,53 @@ pub enum TextureSource {
 pub enum MeshSource {
     /// Wavefront OBJ, relative to the scene file.
     Obj(String),
+    /// PLY, likewise.
+    Ply(String),
+    /// STL, likewise.
+    Stl(String),
     /// A mesh that the program makes.
     Builtin(String),
+}
+
+impl MeshSource {
+    /// A model of this format.
+    pub fn model(format: ModelFormat, file: String) -> Self {
+        match format {
+            ModelFormat::Obj => Self::Obj(file),
+            ModelFormat::Ply => Self::Ply(file),
+            ModelFormat::Stl => Self::Stl(file),
+        }
+    }
+
+    /// A model of the format that its name tells, else OBJ.
+    pub fn of_file(file: String) -> Self {
+        Self::model(ModelFormat::of(Path::new(&file)).unwrap_or(ModelFormat::Obj), file)
+    }
+
+    /// Format and path, if it is a file.
+    pub fn file(&self) -> Option<(ModelFormat, &str)> {
+        match self {
+            Self::Obj(file) => Some((ModelFormat::Obj, file)),
+            Self::Ply(file) => Some((ModelFormat::Ply, file)),
+            Self::Stl(file) => Some((ModelFormat::Stl, file)),
+            Self::Builtin(_) => None,
+        }
+    }
+
+    /// The path, if it is a file.
+    pub fn file_mut(&mut self) -> Option<&mut String> {
+        match self {
+            Self::Obj(file) | Self::Ply(file) | Self::Stl(file) => Some(file),
+            Self::Builtin(_) => None,
+        }
+    }
+
+    /// The path, or the name of what the program makes.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Obj(name) | Self::Ply(name) | Self::Stl(name) | Self::Builtin(name) => name,
+        }
+    }
 }
 
 /// How the shading normals of a mesh are found.

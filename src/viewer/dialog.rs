@@ -6,6 +6,7 @@
 
 use crate::frame::{Command, Edit, Id, NewThing, Waker};
 use crate::render::Wrap;
+use crate::scene::model::ModelFormat;
 use crate::scene::{MeshSource, TextureSource};
 use glam::DVec2;
 use std::ffi::OsString;
@@ -36,11 +37,11 @@ impl DialogPurpose {
     }
 
     /// Patterns of names, as shells write them.
-    fn patterns(self) -> &'static str {
+    fn patterns(self) -> String {
         match self {
-            Self::Open => "*.ron *.obj *.png *.exr",
-            Self::AddMesh => "*.obj",
-            Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr",
+            Self::Open => format!("*.ron {} *.png *.exr", ModelFormat::patterns()),
+            Self::AddMesh => ModelFormat::patterns(),
+            Self::Texture { .. } => "*.png *.jpg *.jpeg *.hdr *.exr".to_owned(),
         }
     }
 
@@ -50,7 +51,7 @@ impl DialogPurpose {
             Self::Open => Command::Open { path },
             Self::AddMesh => {
                 let path = crate::scene::path_to_text(&path);
-                Command::Edit(Edit::Add(NewThing::Mesh(MeshSource::Obj(path))))
+                Command::Edit(Edit::Add(NewThing::Mesh(MeshSource::of_file(path))))
             }
             Self::Texture { id } => {
                 let part = TextureSource::Image {
@@ -177,7 +178,7 @@ mod tests {
         assert!(zenity.iter().any(|word| word.contains("*.ron")), "{zenity:?}");
         assert_eq!(
             words(DialogKind::Kdialog, DialogPurpose::AddMesh),
-            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj"]
+            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl"]
         );
     }
 

@@ -7,5 +7,6 @@ mod neutral;
 mod obj;
 mod outputs;
 mod pictures;
+mod ply_stl;
 mod save;
 mod scene;

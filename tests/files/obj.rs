@@ -2,19 +2,20 @@
 
 use firstlight::mesh::{Mesh, Topology};
 use firstlight::scene::ReadError;
-use firstlight::scene::obj::{ImportedObj, LineProblem, ObjError, ObjNormals, ObjOptions, load_obj, load_obj_with};
+use firstlight::scene::model::{ImportedModel, ModelNormals, ModelOptions};
+use firstlight::scene::obj::{LineProblem, ObjError, load_obj, load_obj_with};
 use glam::{DVec3, Vec3, dvec3};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
-fn load_bytes(bytes: &[u8]) -> Result<ImportedObj, ObjError> {
+fn load_bytes(bytes: &[u8]) -> Result<ImportedModel, ObjError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.obj");
     std::fs::write(&path, bytes).unwrap();
     load_obj(&path)
 }
 
-fn load_text(text: &str) -> ImportedObj {
+fn load_text(text: &str) -> ImportedModel {
     load_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -128,7 +129,7 @@ fn normals_can_be_ignored_so_that_file_vertices_stay_one() {
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n",
     )
     .unwrap();
-    let options = ObjOptions { normals: ObjNormals::Ignore, ..ObjOptions::default() };
+    let options = ModelOptions { normals: ModelNormals::Ignore, ..ModelOptions::default() };
     let mesh = load_obj_with(&path, &options).unwrap().mesh;
     assert_eq!((mesh.positions.len(), mesh.normals.len()), (4, 0));
     assert_eq!(load_obj(&path).unwrap().mesh.positions.len(), 6);

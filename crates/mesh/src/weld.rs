@@ -1,6 +1,6 @@
 //! Vertices at exactly the same place, found and numbered.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Which vertices share a place: texture seams and duplicated vertices vanish in it.
 ///
@@ -16,6 +16,24 @@ pub struct Welding {
 impl Welding {
     /// Linear time on average. `positions` must hold no NaN and at most `u32::MAX` entries.
     pub fn of(positions: &[Vec3]) -> Self {
+        // Adding zero turns −0 into 0 and changes nothing else.
+        let words = |p: Vec3| (p + Vec3::ZERO).to_array().map(|v| u64::from(v.to_bits()));
+        Self::by(positions, |p| {
+            let [x, y, z] = words(p);
+            mix(mix(x | y << 32).wrapping_add(z.wrapping_mul(GOLDEN)))
+        })
+    }
+
+    /// The same of positions in double precision.
+    pub fn of_f64(positions: &[DVec3]) -> Self {
+        Self::by(positions, |p| {
+            let [x, y, z] = (p + DVec3::ZERO).to_array().map(f64::to_bits);
+            mix(mix(mix(x).wrapping_add(y.wrapping_mul(GOLDEN))).wrapping_add(z.wrapping_mul(GOLDEN)))
+        })
+    }
+
+    /// - `hash`: equal for positions that compare equal.
+    fn by<P: Copy + PartialEq>(positions: &[P], hash: impl Fn(P) -> u64) -> Self {
         // Open addressing at half load: the standard map spends most of its time on a hash that resists attack;
         // here a bad input can only cost time, and the finaliser below leaves no cheap way to collide.
         const FREE: u32 = u32::MAX;
@@ -58,16 +76,14 @@ impl Welding {
     }
 }
 
-/// Equal for positions that compare equal. The mixing steps are those of SplitMix64 (Steele, Lea, Flood 2014).
-fn hash(position: Vec3) -> u64 {
-    // Adding zero turns −0 into 0 and changes nothing else.
-    let [x, y, z] = (position + Vec3::ZERO).to_array().map(|v| u64::from(v.to_bits()));
-    let mix = |mut h: u64| {
-        h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        h = (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        h ^ (h >> 31)
-    };
-    mix(mix(x | y << 32).wrapping_add(z.wrapping_mul(0x9e37_79b9_7f4a_7c15)))
+/// 2⁶⁴ over the golden ratio.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
+fn mix(mut h: u64) -> u64 {
+    h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    h = (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    h ^ (h >> 31)
 }
 
 #[cfg(test)]
@@ -79,6 +95,8 @@ mod tests {
     fn equal_places_share_a_number_and_signs_of_zero_do_not_matter() {
         let points = [vec3(0.0, 1.0, 2.0), vec3(1.0, 0.0, 0.0), vec3(-0.0, 1.0, 2.0), vec3(1.0, -0.0, 0.0)];
         assert_eq!(Welding::of(&points), Welding { place: vec![0, 1, 0, 1], first: vec![0, 1] });
+        assert_eq!(Welding::of_f64(&points.map(Vec3::as_dvec3)), Welding::of(&points));
+        assert_eq!(Welding::of_f64(&[DVec3::ONE, DVec3::ONE * (1.0 + 1e-15)]).len(), 2);
     }
 
     #[test]

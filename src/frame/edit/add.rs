@@ -28,7 +28,7 @@ pub enum NewThing {
     PointLight,
     /// A diffuse cube on the ground.
     Cube,
-    /// A built-in mesh or an OBJ file; read beside the picture.
+    /// A built-in mesh or a model file; read beside the picture.
     Mesh(MeshSource),
 }
 

@@ -8,8 +8,6 @@
 mod error;
 mod mtl;
 mod parse;
-mod polygon;
-mod warnings;
 mod write;
 
 pub use error::{LineProblem, ObjError};
@@ -18,78 +16,24 @@ pub(super) use write::{NewObj, save_new_obj};
 pub use write::{ObjExtras, save_obj};
 
 use self::parse::{Corner, ParsedObj};
-use self::warnings::Warnings;
-use crate::mesh::{Mesh, NormalWeight};
-use crate::scene::{FileKind, InputFile, Limits, text_to_path};
+use super::model::imported::{ImportedModel, ModelNormals, ModelOptions, has_area, with_normals};
+use super::model::polygon;
+use super::model::warnings::Warnings;
+use crate::mesh::Mesh;
+use crate::scene::{FileKind, InputFile, text_to_path};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// A model as its file has it.
-#[derive(Clone, Debug)]
-pub struct ImportedObj {
-    /// Its `slots` index `materials`.
-    pub mesh: Mesh,
-    /// Only materials that faces use. One whose name the libraries lack has its name and nothing else.
-    pub materials: Vec<ImportedMaterial>,
-    /// The material libraries that were found.
-    pub libraries: Vec<PathBuf>,
-    /// Whether every corner had a usable normal in the file; otherwise they were computed.
-    pub normals_from_file: bool,
-    /// Faces of more than three corners; they were cut into triangles.
-    pub polygons: usize,
-    /// What was left out or replaced, one sentence each.
-    pub warnings: Vec<String>,
-    /// The same of the materials, which matter only to those who use them.
-    pub material_warnings: Vec<String>,
-}
-
-/// Where shading normals come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ObjNormals {
-    /// From the file; where it has none, computed with angle weights. Computed edges stay hard where triangles
-    /// meet at more than `crease_angle` radians.
-    FileOrComputed {
-        /// Largest angle between triangles across which normals are averaged, radians.
-        crease_angle: f32,
-    },
-    /// Area-weighted at each position of the file, whatever normals it has and however texture coordinates split
-    /// its vertices.
-    OfPositions,
-    /// None: the mesh has no normals, and vertices are split only where texture coordinates differ.
-    Ignore,
-}
-
 /// More `mtllib` lines than this are left out.
 const MAX_LIBRARIES: usize = 256;
-
-/// How to read, and how much at most.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjOptions {
-    /// Where shading normals come from.
-    pub normals: ObjNormals,
-    /// Larger files are refused. Loading takes up to about 25 bytes of memory for each byte of the file.
-    pub max_bytes: u64,
-    /// Larger material libraries are left out.
-    pub max_library_bytes: u64,
-}
-
-impl Default for ObjOptions {
-    /// A crease angle of 60°: the right angles of boxes stay hard, and curves come out smooth even when they are
-    /// coarse (the faces of an icosahedron meet at 42°, those of an 8-sided column at 45°).
-    fn default() -> Self {
-        let normals = ObjNormals::FileOrComputed { crease_angle: 60_f32.to_radians() };
-        let limits = Limits::of_this_process();
-        Self { normals, max_bytes: limits.model_bytes, max_library_bytes: limits.library_bytes }
-    }
-}
 
 /// [`load_obj_with`] and the default options.
 ///
 /// # Errors
 /// As [`load_obj_with`].
-pub fn load_obj(path: &Path) -> Result<ImportedObj, ObjError> {
-    load_obj_with(path, &ObjOptions::default())
+pub fn load_obj(path: &Path) -> Result<ImportedModel, ObjError> {
+    load_obj_with(path, &ModelOptions::default())
 }
 
 /// Loads a model and the material libraries it names.
@@ -99,7 +43,7 @@ pub fn load_obj(path: &Path) -> Result<ImportedObj, ObjError> {
 ///
 /// # Errors
 /// When the file cannot be read, a line of it has the wrong form, or it holds no mesh.
-pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, ObjError> {
+pub fn load_obj_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ObjError> {
     let bytes = read(path, options.max_bytes)?;
     let mut parsed =
         parse::parse(&bytes).map_err(|(line, problem)| ObjError::Line { path: path.into(), line, problem })?;
@@ -114,7 +58,7 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     if parsed.lines_and_points > 0 {
         warnings.push(format!("{}: {} line or point elements were ignored", path.display(), parsed.lines_and_points));
     }
-    if !matches!(options.normals, ObjNormals::FileOrComputed { .. }) {
+    if !matches!(options.normals, ModelNormals::FileOrComputed { .. }) {
         parsed.normals.clear();
     }
     let corners = MeshCorners::of(&parsed);
@@ -134,23 +78,17 @@ pub fn load_obj_with(path: &Path, options: &ObjOptions) -> Result<ImportedObj, O
     mesh.slots = if parsed.materials.len() > 1 { slots } else { Vec::new() };
     mesh.uvs = corners.uvs;
     let (mesh, normals_from_file) = match options.normals {
-        ObjNormals::FileOrComputed { crease_angle } => with_normals(mesh, &corners.normals, crease_angle),
-        ObjNormals::OfPositions if corners.origins.is_empty() => (mesh.with_vertex_normals(), false),
-        ObjNormals::OfPositions => (mesh.with_normals_of_vertices(|vertex| corners.origins[vertex as usize]), false),
-        ObjNormals::Ignore => (mesh, false),
+        ModelNormals::FileOrComputed { crease_angle } => with_normals(mesh, &corners.normals, crease_angle),
+        ModelNormals::OfPositions if corners.origins.is_empty() => (mesh.with_vertex_normals(), false),
+        ModelNormals::OfPositions => (mesh.with_normals_of_vertices(|vertex| corners.origins[vertex as usize]), false),
+        ModelNormals::Ignore => (mesh, false),
     };
     mesh.validate().map_err(mesh_error)?;
     let mut of_materials = Warnings::default();
     let polygons = parsed.arities.iter().filter(|&&corners| corners > 3).count();
     let (materials, libraries) = find_materials(path, parsed, options.max_library_bytes, &mut of_materials);
     let (warnings, material_warnings) = (warnings.into_list(), of_materials.into_list());
-    Ok(ImportedObj { mesh, materials, libraries, normals_from_file, polygons, warnings, material_warnings })
-}
-
-/// Differences and products of `f32` numbers are exact enough in `f64` for corners on a line to give exactly nothing.
-fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
-    let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
-    (b - a).cross(c - a) != DVec3::ZERO
+    Ok(ImportedModel { mesh, materials, libraries, normals_from_file, polygons, warnings, material_warnings })
 }
 
 fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ObjError> {
@@ -248,25 +186,6 @@ impl MeshCorners {
         }
         (triangles, slots, dropped)
     }
-}
-
-/// Uses the file's normals where they have a length, computed ones elsewhere; says whether all were the file's.
-fn with_normals(mesh: Mesh, from_file: &[Vec3], crease_angle: f32) -> (Mesh, bool) {
-    let missing = from_file.iter().filter(|n| **n == Vec3::ZERO).count();
-    if from_file.is_empty() || missing == from_file.len() {
-        return (mesh.with_smooth_normals(NormalWeight::Angle, Some(crease_angle)), false);
-    }
-    if missing == 0 {
-        return (Mesh { normals: from_file.to_vec(), ..mesh }, true);
-    }
-    // A crease would split vertices whose normals the file has given.
-    let mut mesh = mesh.with_smooth_normals(NormalWeight::Angle, None);
-    for (normal, &given) in mesh.normals.iter_mut().zip(from_file) {
-        if given != Vec3::ZERO {
-            *normal = given;
-        }
-    }
-    (mesh, false)
 }
 
 fn find_materials(

@@ -1,6 +1,6 @@
 //! Materials of an OBJ file (MTL), as numbers and paths.
 
-use super::warnings::Warnings;
+use crate::scene::model::warnings::Warnings;
 use crate::scene::{FileKind, InputFile};
 use glam::Vec3;
 use std::io::Cursor;

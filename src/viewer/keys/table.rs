@@ -309,7 +309,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
-                effect: "open a scene (.ron), a model (.obj) or a saved picture (.png, .exr)",
+                effect: "open a scene (.ron), a model (.obj, .ply, .stl) or a saved picture (.png, .exr)",
             },
         ],
     },
@@ -358,7 +358,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             Binding { triggers: &[Trigger::Mouse("Panel: Display")], effect: "exposure, tone curve, inspection view" },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Add")],
-                effect: "a sphere, a plane, a cube, a light, a built-in mesh or an OBJ file",
+                effect: "a sphere, a plane, a cube, a light, a built-in mesh or a model (OBJ, PLY, STL)",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Selected")],

@@ -86,7 +86,7 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
             asked.dialog = Some(DialogPurpose::AddMesh);
         }
         if (ui.button("Add").clicked() || entered) && !path.trim().is_empty() {
-            asked.edit(Edit::Add(NewThing::Mesh(MeshSource::Obj(path.trim().to_owned()))));
+            asked.edit(Edit::Add(NewThing::Mesh(MeshSource::of_file(path.trim().to_owned()))));
         }
     });
 }

@@ -1,6 +1,8 @@
+//! What is told about a model that could be read all the same.
+
 /// Sentences for the user, no more than anyone would read: a hostile file can cause a million.
 #[derive(Debug, Default)]
-pub(super) struct Warnings {
+pub(in crate::scene) struct Warnings {
     list: Vec<String>,
     more: usize,
 }
@@ -8,7 +10,7 @@ pub(super) struct Warnings {
 impl Warnings {
     const MAX: usize = 100;
 
-    pub(super) fn push(&mut self, warning: String) {
+    pub(in crate::scene) fn push(&mut self, warning: String) {
         if self.list.len() < Self::MAX {
             self.list.push(warning);
         } else {
@@ -16,7 +18,7 @@ impl Warnings {
         }
     }
 
-    pub(super) fn into_list(mut self) -> Vec<String> {
+    pub(in crate::scene) fn into_list(mut self) -> Vec<String> {
         if self.more > 0 {
             self.list.push(format!("and {} more warnings of this kind", self.more));
         }

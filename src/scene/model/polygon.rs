@@ -11,15 +11,15 @@ const MAX_EARS: usize = 1024;
 /// Convex polygons become fans. Others lose one ear after another (Meisters 1975) in the plane of their Newell
 /// normal; what crosses itself or has no area falls back to the fan, so nothing fails. With more than [`MAX_EARS`]
 /// corners the polygon is taken for convex: a triangle on its two halves, and so on with each of them.
-pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
+pub(in crate::scene) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) {
     let count = corners.len();
     let fan = |from: &[usize], out: &mut Vec<[usize; 3]>| {
         out.extend((1..from.len().saturating_sub(1)).map(|i| [from[0], from[i], from[i + 1]]));
     };
-    let all: Vec<usize> = (0..count).collect();
     if count == 3 {
-        return fan(&all, triangles);
+        return triangles.push([0, 1, 2]);
     }
+    let all: Vec<usize> = (0..count).collect();
     if count > MAX_EARS {
         return halve(0, count - 1, triangles);
     }

@@ -1,0 +1,85 @@
+//! From numbered vertices to a mesh, for formats whose triangles name vertices by one number.
+
+use super::error::{ModelError, ModelProblem, Place};
+use super::imported::{ModelNormals, ModelOptions, has_area, with_normals};
+use super::warnings::Warnings;
+use crate::mesh::{Mesh, Welding};
+use glam::{DVec3, Vec2, Vec3};
+use std::path::Path;
+
+/// Vertices, and triangles that name them; every number is that of a vertex.
+#[derive(Debug, Default)]
+pub(in crate::scene) struct Indexed {
+    /// Finite, in the coordinates of the file.
+    pub positions: Vec<DVec3>,
+    /// Unit length, zero where missing; empty, or one a position.
+    pub normals: Vec<Vec3>,
+    /// Finite; empty, or one a position.
+    pub uvs: Vec<Vec2>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The mesh, and whether all of its normals are the file's.
+///
+/// Vertices that no triangle uses are left out, as are triangles that use a vertex twice.
+pub(in crate::scene) fn assemble(
+    path: &Path,
+    mut model: Indexed,
+    options: &ModelOptions,
+    warnings: &mut Warnings,
+) -> Result<(Mesh, bool), ModelError> {
+    let failed = |problem: ModelProblem| ModelError::of(path, Place::File, problem);
+    let before = model.triangles.len();
+    model.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
+    let dropped = before - model.triangles.len();
+    if model.triangles.is_empty() {
+        return Err(failed(ModelProblem::NoArea { triangles: before }));
+    }
+    if dropped > 0 {
+        warnings.push(format!("{}: {dropped} triangles use a vertex twice and were removed", path.display()));
+    }
+    model.leave_out_unused();
+    let mut mesh = Mesh::from_f64(&model.positions, model.triangles).map_err(|error| failed(error.into()))?;
+    if !mesh.triangles.iter().any(|&triangle| has_area(&mesh, triangle)) {
+        return Err(failed(ModelProblem::NoArea { triangles: before }));
+    }
+    mesh.uvs = model.uvs;
+    let (mesh, from_file) = match options.normals {
+        ModelNormals::FileOrComputed { crease_angle } => with_normals(mesh, &model.normals, crease_angle),
+        ModelNormals::OfPositions => {
+            // A vertex has one normal and one texture coordinate: seams are doubled vertices.
+            let welding = Welding::of_f64(&model.positions);
+            (mesh.with_normals_of_vertices(|vertex| welding.place[vertex as usize]), false)
+        }
+        ModelNormals::Ignore => (mesh, false),
+    };
+    mesh.validate().map_err(|error| failed(error.into()))?;
+    Ok((mesh, from_file))
+}
+
+impl Indexed {
+    /// What is used stays in its order.
+    fn leave_out_unused(&mut self) {
+        let mut used = vec![false; self.positions.len()];
+        self.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
+        if used.iter().all(|&used| used) {
+            return;
+        }
+        fn keep<T>(list: &mut Vec<T>, used: &[bool]) {
+            let mut used = used.iter();
+            list.retain(|_| *used.next().expect("a list is empty or as long as the positions"));
+        }
+        keep(&mut self.positions, &used);
+        keep(&mut self.normals, &used);
+        keep(&mut self.uvs, &used);
+        let mut next = 0;
+        let numbers: Vec<u32> = (used.iter())
+            .map(|&used| {
+                let number = next;
+                next += u32::from(used);
+                number
+            })
+            .collect();
+        self.triangles.iter_mut().flatten().for_each(|vertex| *vertex = numbers[*vertex as usize]);
+    }
+}

@@ -1,0 +1,33 @@
+//! Models of any format: which formats there are, and one way to read them all.
+//!
+//! A reader (`scene/obj`, `scene/ply`, `scene/stl`) gives an [`ImportedModel`] or an error that names the place in the file.
+//! What the readers share is here: polygons into triangles, normals, and the way from numbered vertices to a checked
+//! mesh. Start reading at [`load_model`].
+
+pub(in crate::scene) mod assemble;
+pub(in crate::scene) mod error;
+mod format;
+pub(in crate::scene) mod imported;
+pub(in crate::scene) mod polygon;
+pub(in crate::scene) mod warnings;
+
+pub use error::{ModelError, ModelProblem, Place};
+pub use format::ModelFormat;
+pub use imported::{ImportedModel, ModelNormals, ModelOptions};
+
+use super::obj::load_obj_with;
+use super::ply::load_ply_with;
+use super::stl::load_stl_with;
+use std::path::Path;
+
+/// Loads a model of this format.
+///
+/// # Errors
+/// When the file cannot be read, or is no model with area.
+pub fn load_model(path: &Path, format: ModelFormat, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
+    match format {
+        ModelFormat::Obj => Ok(load_obj_with(path, options)?),
+        ModelFormat::Ply => load_ply_with(path, options),
+        ModelFormat::Stl => load_stl_with(path, options),
+    }
+}

@@ -1,0 +1,124 @@
+//! What can be wrong with a PLY file.
+
+/// What is wrong with a PLY file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlyProblem {
+    /// The first line is another.
+    #[error("is not a PLY file: its first line is not `ply`")]
+    NotPly,
+    /// The header does not end, or not soon enough.
+    #[error("the header has no line `end_header` within {limit} bytes: the file is truncated or not a PLY file")]
+    EndlessHeader {
+        /// Bytes that a header may have.
+        limit: usize,
+    },
+    /// No line, or a late one, says how numbers are stored.
+    #[error("expected `format ascii 1.0`, `format binary_little_endian 1.0` or `format binary_big_endian 1.0`")]
+    Format,
+    /// A line of the header is none that is known.
+    #[error("`{text}` is not a line of a PLY header; expected {expected}")]
+    HeaderLine {
+        /// The line.
+        text: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// A property has a type that does not exist.
+    #[error("`{text}` is not a type; expected char, uchar, short, ushort, int, uint, float or double")]
+    Type {
+        /// The type, as written.
+        text: String,
+    },
+    /// An element is declared twice.
+    #[error("element `{name}` is declared twice")]
+    Twice {
+        /// Its name.
+        name: String,
+    },
+    /// There is nothing that a mesh is made of.
+    #[error("has no faces: expected an element `face` or `tristrips` (point clouds are not supported)")]
+    NoFaces,
+    /// Vertices have no place.
+    #[error("element `vertex` has no properties x, y and z")]
+    NoPositions,
+    /// Faces have no corners.
+    #[error("element `{element}` has no list of whole numbers `vertex_indices` or `vertex_index`")]
+    NoIndices {
+        /// Its name.
+        element: &'static str,
+    },
+    /// There are more vertices than 32 bits can number.
+    #[error("the header declares {count} vertices, more than 32-bit indices can name")]
+    TooManyVertices {
+        /// How many the header declares.
+        count: u64,
+    },
+    /// The file cannot hold what the header declares.
+    #[error(
+        "the header declares {declared} of element `{element}`, but the file has room for {room} at most: it is truncated"
+    )]
+    NoRoom {
+        /// Name of the element.
+        element: String,
+        /// How many the header declares.
+        declared: u64,
+        /// How many fit into what is left of the file.
+        room: u64,
+    },
+    /// The file ends too soon.
+    #[error("the file ends in element `{element}` {row} of {declared}: it is truncated")]
+    Truncated {
+        /// Name of the element.
+        element: String,
+        /// Its number, from 0.
+        row: u64,
+        /// How many the header declares.
+        declared: u64,
+    },
+    /// A line of text has too few numbers or too many.
+    #[error("element `{element}` {row} has a line of {found} numbers, which does not fit the properties in the header")]
+    Numbers {
+        /// Name of the element.
+        element: String,
+        /// Its number, from 0.
+        row: u64,
+        /// How many the line has.
+        found: usize,
+    },
+    /// A word is no number.
+    #[error("`{text}` is not a number")]
+    NotNumber {
+        /// The word.
+        text: String,
+    },
+    /// The length of a list is negative or no whole number.
+    #[error("a list of element `{element}` {row} has a length of {length}")]
+    Length {
+        /// Name of the element.
+        element: String,
+        /// Its number, from 0.
+        row: u64,
+        /// The length, as written.
+        length: String,
+    },
+    /// A vertex has a number that is NaN or infinite.
+    #[error("the {what} of vertex {vertex} is not finite")]
+    NotFinite {
+        /// Position or texture coordinate.
+        what: &'static str,
+        /// Its number, from 0.
+        vertex: u64,
+    },
+    /// A face names a vertex that does not exist.
+    #[error("element `{element}` {row} uses vertex {index}, but the file has {count} (counted from 0)")]
+    OutOfRange {
+        /// Face or tristrips.
+        element: &'static str,
+        /// Its number, from 0.
+        row: u64,
+        /// The index, as written.
+        index: String,
+        /// Number of vertices.
+        count: u64,
+    },
+}

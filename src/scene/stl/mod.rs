@@ -1,0 +1,110 @@
+//! STL (stereolithography): triangles without connections, as text or in binary.
+//!
+//! Corners at exactly the same position become one vertex, so the mesh is connected; normals of facets are ignored, for
+//! they say nothing that the corners do not. Start reading at [`load_stl`].
+
+mod binary;
+mod error;
+mod text;
+
+pub use error::StlProblem;
+
+use super::model::assemble::{Indexed, assemble};
+use super::model::error::{ModelError, ModelProblem, Place};
+use super::model::imported::{ImportedModel, ModelOptions};
+use super::model::warnings::Warnings;
+use super::obj::ImportedMaterial;
+use crate::mesh::Welding;
+use crate::scene::input_file::{FileKind, InputFile};
+use glam::DVec3;
+use std::path::Path;
+
+/// [`load_stl_with`] and the default options.
+///
+/// # Errors
+/// When the file cannot be read, or is no model with area.
+pub fn load_stl(path: &Path) -> Result<ImportedModel, ModelError> {
+    load_stl_with(path, &ModelOptions::default())
+}
+
+/// Loads all solids of an STL file as one mesh, text or binary by what the file holds.
+///
+/// # Errors
+/// When the file cannot be read, or is no model with area.
+pub fn load_stl_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, ModelError> {
+    let bytes = InputFile::open_within(path, FileKind::Model, options.max_bytes)
+        .and_then(InputFile::bytes)
+        .map_err(|error| ModelError::of(path, Place::File, error))?;
+    let parsed = if is_text(&bytes) { text::parse(&bytes) } else { binary::parse(&bytes) };
+    let Soup { corners, polygons, notes } = parsed.map_err(|(place, problem)| ModelError::of(path, place, problem))?;
+    drop(bytes);
+    let failed = |problem: StlProblem| ModelError::of(path, Place::File, ModelProblem::Stl(problem));
+    if corners.is_empty() {
+        return Err(failed(StlProblem::Empty));
+    }
+    if u32::try_from(corners.len()).is_err() {
+        return Err(failed(StlProblem::TooMany));
+    }
+    let mut warnings = Warnings::default();
+    notes.into_iter().for_each(|note| warnings.push(format!("{}: {note}", path.display())));
+    let welding = Welding::of_f64(&corners);
+    let model = Indexed {
+        positions: welding.first.iter().map(|&corner| corners[corner as usize]).collect(),
+        triangles: welding.place.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect(),
+        ..Indexed::default()
+    };
+    drop((corners, welding));
+    let (mesh, normals_from_file) = assemble(path, model, options, &mut warnings)?;
+    Ok(ImportedModel {
+        mesh,
+        materials: vec![ImportedMaterial::default()],
+        libraries: Vec::new(),
+        normals_from_file,
+        polygons,
+        warnings: warnings.into_list(),
+        material_warnings: Vec::new(),
+    })
+}
+
+/// Corners of triangles, three by three.
+#[derive(Debug, Default)]
+struct Soup {
+    /// Finite.
+    corners: Vec<DVec3>,
+    /// Facets of more than three vertices.
+    polygons: usize,
+    /// What a person should know.
+    notes: Vec<String>,
+}
+
+type Located = (Place, StlProblem);
+
+/// Text begins with `solid`, but so do the headers of many binary files: they are known by their length, or by bytes that
+/// no text has.
+fn is_text(bytes: &[u8]) -> bool {
+    if binary::has_right_length(bytes) {
+        return false;
+    }
+    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let begins_with = |word: &[u8]| start.get(..word.len()).is_some_and(|first| first.eq_ignore_ascii_case(word));
+    let is_plain = |byte: &u8| *byte >= b' ' || byte.is_ascii_whitespace();
+    (begins_with(b"solid") || begins_with(b"facet")) && bytes.iter().take(1024).all(is_plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn binary_files_that_begin_like_text_are_binary() {
+        let mut binary = b"solid of a program".to_vec();
+        binary.resize(80, b' ');
+        binary.extend(1_u32.to_le_bytes());
+        binary.extend([0; 50]);
+        assert!(!is_text(&binary));
+        binary.pop();
+        assert!(!is_text(&binary), "a truncated file is still binary");
+        assert!(is_text(b"solid a\nendsolid a\n") && is_text(b" SOLID\n") && is_text(b"facet normal 0 0 1"));
+        assert!(!is_text(b"") && !is_text(b"ply\n"));
+    }
+}

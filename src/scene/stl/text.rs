@@ -1,0 +1,127 @@
+//! STL as text: `solid`, facets of one loop each, `endsolid`; in any case of letters and on any lines.
+
+use super::error::StlProblem;
+use super::{Located, Soup};
+use crate::printable;
+use crate::scene::model::Place;
+use crate::scene::model::polygon::triangulate;
+use glam::DVec3;
+
+/// Words with the line that they stand in.
+struct Words<'a> {
+    left: &'a [u8],
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    /// The next word; empty at the end of the file.
+    fn next(&mut self) -> &'a [u8] {
+        let start = self.left.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(self.left.len());
+        let (space, rest) = self.left.split_at(start);
+        // A `\r` that no `\n` follows ends a line too.
+        let ends = |at: usize| space[at] == b'\n' || space[at] == b'\r' && space.get(at + 1) != Some(&b'\n');
+        self.line += (0..space.len()).filter(|&at| ends(at)).count();
+        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        let (word, rest) = rest.split_at(end);
+        self.left = rest;
+        word
+    }
+
+    /// Names may hold any words.
+    fn skip_line(&mut self) {
+        let end = self.left.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(self.left.len());
+        self.left = &self.left[end..];
+    }
+
+    fn wrong(&self, found: &[u8], expected: &'static str) -> Located {
+        let problem = if found.is_empty() {
+            StlProblem::End { expected }
+        } else {
+            StlProblem::Word { text: printable::name(&String::from_utf8_lossy(found)).to_string(), expected }
+        };
+        (Place::Line(self.line), problem)
+    }
+
+    fn expect(&mut self, words: [&[u8]; 2], expected: &'static str) -> Result<(), Located> {
+        for word in words {
+            let found = self.next();
+            if !found.eq_ignore_ascii_case(word) {
+                return Err(self.wrong(found, expected));
+            }
+        }
+        Ok(())
+    }
+
+    fn position(&mut self) -> Result<DVec3, Located> {
+        let mut position = [0.0; 3];
+        for coordinate in &mut position {
+            let word = self.next();
+            let number = str::from_utf8(word).ok().and_then(|text| text.parse().ok());
+            *coordinate = number
+                .filter(|number: &f64| number.is_finite())
+                .ok_or_else(|| self.wrong(word, "a coordinate of a vertex, a finite number"))?;
+        }
+        Ok(DVec3::from_array(position))
+    }
+}
+
+/// Reads all solids of the text.
+pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Located> {
+    let mut words = Words { left: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), line: 1 };
+    let mut soup = Soup::default();
+    let (mut corners, mut cut) = (Vec::new(), Vec::new());
+    let mut is_open = false;
+    loop {
+        let word = words.next();
+        if word.eq_ignore_ascii_case(b"solid") {
+            is_open = true;
+            words.skip_line();
+        } else if word.eq_ignore_ascii_case(b"endsolid") {
+            is_open = false;
+            words.skip_line();
+        } else if word.eq_ignore_ascii_case(b"facet") {
+            facet(&mut words, &mut corners)?;
+            cut.clear();
+            triangulate(&corners, &mut cut);
+            soup.corners.extend(cut.iter().flatten().map(|&corner| corners[corner]));
+            soup.polygons += usize::from(corners.len() > 3);
+        } else if word.is_empty() {
+            break;
+        } else {
+            return Err(words.wrong(word, "`facet`, `endsolid` or `solid`"));
+        }
+    }
+    if is_open {
+        soup.notes.push("has no `endsolid` at its end: it may be incomplete".into());
+    }
+    Ok(soup)
+}
+
+/// What follows the word `facet`, to `endfacet`.
+fn facet(words: &mut Words, corners: &mut Vec<DVec3>) -> Result<(), Located> {
+    let word = words.next();
+    if !word.eq_ignore_ascii_case(b"normal") {
+        return Err(words.wrong(word, "`normal`"));
+    }
+    // Whatever they are: they are not used.
+    for _ in 0..3 {
+        words.next();
+    }
+    words.expect([b"outer", b"loop"], "`outer loop`")?;
+    corners.clear();
+    loop {
+        let word = words.next();
+        if word.eq_ignore_ascii_case(b"vertex") {
+            corners.push(words.position()?);
+        } else if word.eq_ignore_ascii_case(b"endloop") {
+            break;
+        } else {
+            return Err(words.wrong(word, "`vertex` or `endloop`"));
+        }
+    }
+    if corners.len() < 3 {
+        return Err((Place::Line(words.line), StlProblem::FewCorners { corners: corners.len() }));
+    }
+    let word = words.next();
+    if word.eq_ignore_ascii_case(b"endfacet") { Ok(()) } else { Err(words.wrong(word, "`endfacet`")) }
+}
