@@ -108,8 +108,9 @@ struct Colours {
 
 impl Colours {
     fn add(&mut self, encoded: [f64; 3]) {
-        // Comparing with 0 first also makes 0 of NaN.
-        let linear = DVec3::from_array(encoded.map(|share| decode_srgb(share.max(0.0).min(1.0)))).as_vec3();
+        // NaN is 0.
+        let share = |share: f64| if share > 0.0 { share.min(1.0) } else { 0.0 };
+        let linear = DVec3::from_array(encoded.map(|encoded| decode_srgb(share(encoded)))).as_vec3();
         self.differ |= *self.first.get_or_insert(linear) != linear;
         self.sum += linear.as_dvec3();
         self.count += 1;
