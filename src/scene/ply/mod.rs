@@ -24,6 +24,7 @@ use crate::render::decode_srgb;
 use crate::scene::input_file::{FileKind, InputFile};
 use glam::{DVec2, DVec3, Vec3};
 use std::path::Path;
+use std::sync::LazyLock;
 
 /// [`load_ply_with`] and the default options.
 ///
@@ -107,10 +108,17 @@ struct Colours {
 }
 
 impl Colours {
-    fn add(&mut self, encoded: [f64; 3]) {
-        // NaN is 0.
-        let share = |share: f64| if share > 0.0 { share.min(1.0) } else { 0.0 };
-        let linear = DVec3::from_array(encoded.map(|encoded| decode_srgb(share(encoded)))).as_vec3();
+    /// - `encoded`: sRGB, of which `white` is all.
+    fn add(&mut self, encoded: [f64; 3], white: f64) {
+        // Most files have bytes, and the transfer function takes longer than all the rest of a vertex.
+        static OF_BYTES: LazyLock<[f64; 256]> =
+            LazyLock::new(|| std::array::from_fn(|byte| decode_srgb(byte as f64 / 255.0)));
+        let linear = encoded.map(|value| match value as u8 {
+            byte if white == 255.0 && f64::from(byte) == value => OF_BYTES[usize::from(byte)],
+            _ if value.is_nan() => 0.0,
+            _ => decode_srgb((value / white).clamp(0.0, 1.0)),
+        });
+        let linear = DVec3::from_array(linear).as_vec3();
         self.differ |= *self.first.get_or_insert(linear) != linear;
         self.sum += linear.as_dvec3();
         self.count += 1;
@@ -252,7 +260,7 @@ impl Parsed {
                 self.vertices.uvs.push(uv);
             }
             if has_colours {
-                self.colours.add([red, green, blue].map(|value| value / white));
+                self.colours.add([red, green, blue], white);
             }
         }
         Ok(())
@@ -441,9 +449,9 @@ mod tests {
     fn colours_are_decoded_and_their_mean_is_that_of_light() {
         let mut colours = Colours::default();
         assert!(colours.material().name.is_empty());
-        colours.add([1.0, 0.0, f64::NAN]);
+        colours.add([1.0, 0.0, f64::NAN], 1.0);
         assert_eq!((colours.differ, colours.material().diffuse), (false, Some(Vec3::X)));
-        colours.add([0.0, 0.0, 7.0]);
+        colours.add([-1.0, 0.0, 300.0], 255.0);
         assert_eq!((colours.differ, colours.material().diffuse), (true, Some(Vec3::new(0.5, 0.0, 0.5))));
     }
 }
