@@ -153,17 +153,37 @@ impl LoadedScene {
 
 /// A texture as a scene file describes it; `None` where its `picture` cannot be had.
 pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc<ImageTexture>>) -> Option<Texture> {
-    let (pattern, scale, offset, rotate) = match part {
-        TextureSource::Checker { a, b, squares, offset, rotate } => {
-            (TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
-        }
-        TextureSource::Image { file, repeat, offset, rotate, wrap, smooth } => {
-            let image = picture(file)?;
-            (TexturePattern::Image { image, wrap: *wrap, smooth: *smooth }, *repeat, *offset, *rotate)
-        }
+    let placed = |pattern, scale: DVec2, offset: DVec2, rotate| Texture {
+        uv_matrix: Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate)),
+        uv_offset: as_vec2(offset),
+        ..Texture::new(pattern)
     };
-    let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate));
-    Some(Texture { pattern, uv_matrix, uv_offset: as_vec2(offset) })
+    Some(match part {
+        TextureSource::Checker { a, b, squares, offset, rotate } => {
+            placed(TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
+        }
+        &TextureSource::Image {
+            ref file,
+            repeat,
+            offset,
+            rotate,
+            wrap,
+            wrap_v,
+            smooth,
+            encoding,
+            channel,
+            tint,
+            uv_set,
+            vertex_colors,
+        } => {
+            let (image, wrap) = (picture(file)?, [wrap, wrap_v.unwrap_or(wrap)]);
+            let pattern = TexturePattern::Image { image, encoding, wrap, smooth };
+            Texture { channel, tint: tint.0, uv_set, vertex_colors, ..placed(pattern, repeat, offset, rotate) }
+        }
+        TextureSource::VertexColors { channel, tint } => {
+            Texture { channel: *channel, tint: tint.0, vertex_colors: true, ..Texture::new(TexturePattern::White) }
+        }
+    })
 }
 
 /// Removes whatever belongs to a scene.

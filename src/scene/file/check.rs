@@ -114,7 +114,15 @@ impl Check<'_> {
                 self.light(&format!("{path}/b"), *b);
                 (("squares", *squares), *offset, *rotate)
             }
-            TextureSource::Image { repeat, offset, rotate, .. } => (("repeat", *repeat), *offset, *rotate),
+            TextureSource::Image { repeat, offset, rotate, tint, uv_set, .. } => {
+                self.light(&format!("{path}/tint"), *tint);
+                if *uv_set > 1 {
+                    let message = format!("`uv_set` is {uv_set}, but must be 0 or 1");
+                    self.wrong(&format!("{path}/uv_set"), message);
+                }
+                (("repeat", *repeat), *offset, *rotate)
+            }
+            TextureSource::VertexColors { tint, .. } => return self.light(&format!("{path}/tint"), *tint),
         };
         let (field, DVec2 { x, y }) = size;
         // Beyond these, single precision has no such number.

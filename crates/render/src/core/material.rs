@@ -5,7 +5,7 @@
 //! material begins here: its variant, its [`kind`](Material::kind), its rows in `map`, `params_of` and
 //! [`of_kind`](Material::of_kind).
 
-use crate::core::texture::TextureId;
+use crate::core::texture::{Texture, TextureId};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
@@ -508,11 +508,21 @@ impl Material {
 
     /// Whether it, or a part of it, looks up a texture.
     pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
+        self.any_texture(materials, &mut |_| true)
+    }
+
+    /// Whether a texture of it, or of a part of it, asks for more than the first surface coordinates.
+    pub(crate) fn asks_for_more_than_uv(&self, materials: &[Self], textures: &[Texture]) -> bool {
+        self.any_texture(materials, &mut |id| textures[id as usize].asks_for_more_than_uv())
+    }
+
+    fn any_texture(&self, materials: &[Self], is_so: &mut impl FnMut(TextureId) -> bool) -> bool {
         self.params().into_iter().any(|(_, param)| match param {
-            Param::Reflectance(color) | Param::Radiance(color) => matches!(color, ColorInput::Texture(_)),
-            Param::Share(scalar) => matches!(scalar, ScalarInput::Texture(_)),
-            Param::Part(part) => materials[*part as usize].is_textured(materials),
-            Param::ConstantShare(_) | Param::Ior(_) | Param::Exponent(_) | Param::Absorption(_) => false,
+            Param::Reflectance(ColorInput::Texture(id))
+            | Param::Radiance(ColorInput::Texture(id))
+            | Param::Share(ScalarInput::Texture(id)) => is_so(*id),
+            Param::Part(part) => materials[*part as usize].any_texture(materials, is_so),
+            _ => false,
         })
     }
 }

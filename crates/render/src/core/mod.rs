@@ -5,6 +5,7 @@ pub(crate) mod color;
 pub(crate) mod counts;
 pub(crate) mod environment;
 pub(crate) mod filter;
+pub(crate) mod image_texture;
 pub(crate) mod material;
 pub(crate) mod settings;
 pub(crate) mod snapshot;
