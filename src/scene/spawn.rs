@@ -7,6 +7,7 @@ use super::components::{
 };
 use super::file::{InFile, LightPart, MaterialPart, ObjectPart};
 use super::loaded::LoadedScene;
+use super::own_materials::without_lost_textures;
 use super::placement::Placement;
 use super::sources::{EnvironmentSource, TextureSource};
 use super::units::radians;
@@ -201,6 +202,7 @@ pub(super) fn material(
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
     materials: &HashMap<&str, Entity>,
 ) -> SurfaceMaterial {
+    let part = without_lost_textures(part, |name| textures.contains_key(name));
     SurfaceMaterial(part.map(&mut FileToWorld { textures, materials }))
 }
 
@@ -210,25 +212,24 @@ struct FileToWorld<'a> {
     materials: &'a HashMap<&'a str, Entity>,
 }
 
+impl FileToWorld<'_> {
+    fn texture(&self, name: &str) -> Arc<SurfaceTexture> {
+        self.textures.get(name).expect("lost textures have been replaced").clone()
+    }
+}
+
 impl MapParams<InFile, InWorld> for FileToWorld<'_> {
     fn color(&mut self, color: &ColorValue) -> ColorParam {
         match color {
             ColorValue::Rgb(rgb) => ColorParam::Rgb(*rgb),
-            // Only a mesh's own picture can be missing, and that was said in a warning.
-            ColorValue::Texture(name) => self
-                .textures
-                .get(name.as_str())
-                .map_or(ColorParam::Rgb(glam::Vec3::splat(0.5)), |texture| ColorParam::Texture(texture.clone())),
+            ColorValue::Texture(name) => ColorParam::Texture(self.texture(name)),
         }
     }
 
     fn scalar(&mut self, scalar: &ScalarValue) -> ScalarParam {
         match scalar {
             ScalarValue::Number(value) => ScalarParam::Number(*value),
-            ScalarValue::Texture(name) => self
-                .textures
-                .get(name.as_str())
-                .map_or(ScalarParam::Number(0.5), |texture| ScalarParam::Texture(texture.clone())),
+            ScalarValue::Texture(name) => ScalarParam::Texture(self.texture(name)),
         }
     }
 

@@ -251,7 +251,9 @@ impl PathWave {
         };
         let mut sides = (scene.tables.features.glass)
             .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
-        if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
+        if let Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } =
+            &scene.shading.materials[material as usize]
+        {
             if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
                 self.scatter_told(step, &blend);
             }

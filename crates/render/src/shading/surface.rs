@@ -312,6 +312,22 @@ fn collect(
                 push(clear_lobe(scene, sides, leaf), weight * transparency);
             }
         }
+        Material::Principled { base_color, metallic, roughness, transmission, .. } => {
+            let [metallic, roughness, transmission] =
+                [metallic, roughness, transmission].map(|s| s.eval(scene, vertex.texture_point).clamp(0.0, 1.0));
+            let (color, alpha) = (base_color.eval(scene, vertex.texture_point), roughness * roughness);
+            let parts = [(1.0 - metallic) * (1.0 - transmission), (1.0 - metallic) * transmission, metallic];
+            if parts[0] > 0.0 {
+                push(Lobe::Diffuse { albedo: color }, weight * parts[0]);
+            }
+            if parts[1] > 0.0 {
+                push(rough_lobe(clear_lobe(scene, sides, leaf), alpha, true), weight * parts[1]);
+            }
+            if parts[2] > 0.0 {
+                let fresnel = crate::core::material::Fresnel::Schlick;
+                push(Lobe::Metal { alpha, reflectance: color, fresnel, compensate: true }, weight * parts[2]);
+            }
+        }
         Material::Glass { .. } => push(clear_lobe(scene, sides, leaf), weight),
         Material::RoughGlass { alpha, compensate, .. } => {
             push(
@@ -376,7 +392,9 @@ pub(crate) fn lobe_at(
         Material::RoughGlass { alpha, compensate, .. } => {
             Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *compensate))
         }
-        Material::Emissive { .. } | Material::Phong { .. } | Material::Blend { .. } => None,
+        Material::Emissive { .. } | Material::Phong { .. } | Material::Principled { .. } | Material::Blend { .. } => {
+            None
+        }
     }
 }
 
