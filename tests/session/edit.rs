@@ -6,7 +6,7 @@ use firstlight::frame::{
     Bookmarks, Command, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection, Session,
     SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::{Inspection, MaterialKind, Wrap};
+use firstlight::render::{Inspection, MaterialKind};
 use firstlight::scene::{
     ColorParam, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight, Rgb, SceneSource,
     Shape, SurfaceMaterial, TextureSource,
