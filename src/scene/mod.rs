@@ -16,6 +16,7 @@ mod extent;
 mod extract;
 pub mod file;
 mod fingerprint;
+pub mod gltf;
 pub mod image_metadata;
 pub mod input_file;
 mod inputs;
