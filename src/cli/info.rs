@@ -217,7 +217,8 @@ impl Told<'_> {
                 let bytes = mesh.positions.len() * 12
                     + mesh.triangles.len() * 12
                     + mesh.normals.len() * 12
-                    + mesh.uvs.len() * 8
+                    + (mesh.uvs.len() + mesh.uvs2.len()) * 8
+                    + (mesh.colors.len() + mesh.tangents.len()) * 16
                     + mesh.slots.len() * 2;
                 meshes.insert(Arc::as_ptr(mesh) as usize, bytes);
             }

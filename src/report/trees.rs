@@ -235,9 +235,8 @@ impl ModelScene {
         let geometry = Geometry::build(shapes, objects);
         // Five squares along the model. At two sizes away the lights bring an irradiance of about 3.
         let squares = Texture {
-            pattern: TexturePattern::Checker { a: Vec3::splat(0.8), b: Vec3::splat(0.02) },
             uv_matrix: Mat2::from_diagonal(Vec2::splat(5.0 / size)),
-            uv_offset: Vec2::ZERO,
+            ..Texture::new(TexturePattern::Checker { a: Vec3::splat(0.8), b: Vec3::splat(0.02) })
         };
         let radiance = 24.0 / (PI * 0.01 * 0.01);
         let materials = vec![

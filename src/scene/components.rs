@@ -143,6 +143,8 @@ pub fn textures_of(material: &Material) -> impl Iterator<Item = &Arc<SurfaceText
     material.params().into_iter().filter_map(|(_, param)| match param {
         Param::Reflectance(ColorParam::Texture(texture))
         | Param::Radiance(ColorParam::Texture(texture))
+        | Param::Factor(ColorParam::Texture(texture))
+        | Param::Map(ColorParam::Texture(texture))
         | Param::Share(ScalarParam::Texture(texture)) => Some(texture),
         _ => None,
     })

@@ -16,6 +16,7 @@ use super::file::{
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
 use super::meshes::LoadedMesh;
+use super::own_materials::{ByTextureName, without_lost_textures};
 use super::placement::Placement;
 use super::relative::path_to_text;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
@@ -23,10 +24,10 @@ use super::units::radians;
 use super::value::{ColorValue, Rgb, ScalarValue};
 use super::view::{Lens, Projection, View};
 use crate::mesh::Mesh;
-use crate::render::{Environment, MapParams, MaterialKind, Param};
+use crate::render::{Environment, MapParams};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, World};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -176,31 +177,14 @@ impl<'a> Writer<'a> {
         let Shape::Mesh(mesh) = shape else { return false };
         let Some(loaded) = self.loaded else { return false };
         let Some(known) = self.loaded_meshes.get(&address(mesh)) else { return false };
-        let color = |written: &ColorValue, now: &ColorParam| match (written, now) {
-            (ColorValue::Rgb(a), ColorParam::Rgb(b)) => a == b,
-            (ColorValue::Texture(name), ColorParam::Texture(texture)) => *name == texture.name,
-            // Its picture could not be had.
-            (ColorValue::Texture(name), ColorParam::Rgb(rgb)) => {
-                !loaded.pictures.contains_key(name) && *rgb == Vec3::splat(0.5)
-            }
-            (ColorValue::Rgb(_), ColorParam::Texture(_)) => false,
+        let sources: HashMap<&str, &TextureSource> =
+            known.textures.iter().map(|(name, source, _)| (name.as_str(), source)).collect();
+        let could_be_had = |name: &str| match sources.get(name) {
+            Some(TextureSource::Image { file, .. }) => loaded.pictures.contains_key(file),
+            source => source.is_some(),
         };
         let same = |written: &MaterialPart, now: &Material| {
-            // The file of a mesh has no metals, whose Fresnel term is no parameter.
-            written.kind() == now.kind()
-                && written.kind() != MaterialKind::Metal
-                && written.params().into_iter().zip(now.params()).all(|((_, written), (_, now))| match (written, now) {
-                    (Param::Reflectance(a), Param::Reflectance(b)) | (Param::Radiance(a), Param::Radiance(b)) => {
-                        color(a, b)
-                    }
-                    (Param::Share(ScalarValue::Number(a)), Param::Share(ScalarParam::Number(b))) => a == b,
-                    (Param::ConstantShare(a), Param::ConstantShare(b))
-                    | (Param::Ior(a), Param::Ior(b))
-                    | (Param::Exponent(a), Param::Exponent(b)) => a == b,
-                    (Param::Absorption(a), Param::Absorption(b)) => a.0 == *b,
-                    // The file of a mesh has no blends, and no textures for numbers.
-                    _ => false,
-                })
+            without_lost_textures(written, could_be_had) == now.map(&mut ByTextureName(&sources))
         };
         known.slots.len() == slots.len()
             && known.slots.iter().zip(slots).all(|((name, part), slot)| {

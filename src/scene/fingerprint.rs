@@ -53,17 +53,25 @@ impl Fingerprint {
     }
 
     fn with_mesh(self, mesh: &Mesh) -> Self {
-        self.with_floats(mesh.positions.iter().flat_map(|p| p.to_array()))
+        let plain = self
+            .with_floats(mesh.positions.iter().flat_map(|p| p.to_array()))
             .with(mesh.center.to_array().into_iter().flat_map(|x| x.to_bits().to_le_bytes()))
             .with(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()))
             .with_floats(mesh.normals.iter().flat_map(|n| n.to_array()))
             .with_floats(mesh.uvs.iter().flat_map(|uv| uv.to_array()))
-            .with(mesh.slots.iter().flat_map(|slot| slot.to_le_bytes()))
+            .with(mesh.slots.iter().flat_map(|slot| slot.to_le_bytes()));
+        if [mesh.uvs2.len(), mesh.colors.len(), mesh.tangents.len()] == [0; 3] {
+            return plain;
+        }
+        plain
+            .with_floats(mesh.uvs2.iter().flat_map(|uv| uv.to_array()))
+            .with_floats(mesh.colors.iter().flat_map(|color| color.to_array()))
+            .with_floats(mesh.tangents.iter().flat_map(|tangent| tangent.to_array()))
     }
 
     fn with_picture(self, picture: &ImageTexture) -> Self {
         self.with([picture.width, picture.height].into_iter().flat_map(u32::to_le_bytes))
-            .with_floats(picture.texels.iter().flat_map(|texel| texel.to_array()))
+            .with_floats((0..picture.len()).flat_map(|i| picture.linear(i).to_array()))
     }
 }
 

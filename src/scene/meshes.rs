@@ -9,8 +9,7 @@ use super::sources::{MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
 use super::value::{ColorValue, Rgb, ScalarValue};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
-use crate::render::Wrap;
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -275,14 +274,7 @@ impl LoadedMesh {
     fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorValue> {
         let file = file?;
         let name = file.display().to_string();
-        let part = TextureSource::Image {
-            file: name.clone(),
-            repeat: DVec2::ONE,
-            offset: DVec2::ZERO,
-            rotate: 0.0,
-            wrap: Wrap::Repeat,
-            smooth: true,
-        };
+        let part = TextureSource::image(name.clone());
         self.textures.push((name.clone(), part, file.clone()));
         Some(ColorValue::Texture(name))
     }

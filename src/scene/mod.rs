@@ -30,6 +30,7 @@ pub mod model;
 pub mod obj;
 mod orientation;
 mod outputs;
+mod own_materials;
 mod picture;
 mod placement;
 pub mod ply;

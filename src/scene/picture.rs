@@ -2,7 +2,7 @@
 
 use super::input_file::{FileKind, InputFile, ReadError};
 use super::limits::Limits;
-use crate::render::ImageTexture;
+use crate::render::{ImageTexture, Texels};
 use glam::Vec3;
 use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::io::{BufRead, BufReader, Seek};
@@ -44,7 +44,7 @@ impl From<PictureError> for String {
     }
 }
 
-/// Reads PNG, JPEG, HDR or EXR; 8- and 16-bit pictures are taken as sRGB. Returns a warning beside the picture when
+/// Reads PNG, JPEG, HDR or EXR, each kept in its own depth. Returns a warning beside the picture when
 /// some of its numbers had to be left out.
 ///
 /// # Errors
@@ -64,19 +64,31 @@ pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture
     }
     let picture = decode_picture(reader, limits)?;
     let (width, height) = (picture.width(), picture.height());
-    let is_float = matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
-    let mut texels: Vec<Vec3> = if is_float {
-        picture.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect()
-    } else {
-        let curve: Vec<f32> = (0..=u16::MAX).map(|value| linear_from_srgb(f32::from(value) / 65535.0)).collect();
-        let to_linear = |value: u16| curve[usize::from(value)];
-        picture.into_rgb16().pixels().map(|pixel| Vec3::from_array(pixel.0.map(to_linear))).collect()
-    };
-    let is_good = |texel: &Vec3| texel.is_finite() && texel.cmpge(Vec3::ZERO).all();
-    let bad = texels.iter().filter(|texel| !is_good(texel)).count();
-    texels.iter_mut().filter(|texel| !is_good(texel)).for_each(|texel| *texel = Vec3::ZERO);
+    let (texels, bad) = texels_of(picture);
     let warning = (bad > 0).then(|| format!("{bad} pixels are negative or not finite and were set to black"));
     Ok((ImageTexture { width, height, texels }, warning))
+}
+
+/// The pixels in their own depth, and how many of them were no colour and are black now.
+pub(crate) fn texels_of(picture: DynamicImage) -> (Texels, usize) {
+    let texels = match picture {
+        DynamicImage::ImageLuma8(pixels) => Texels::U8 { channels: 1, data: pixels.into_raw() },
+        DynamicImage::ImageLumaA8(pixels) => Texels::U8 { channels: 2, data: pixels.into_raw() },
+        DynamicImage::ImageRgb8(pixels) => Texels::U8 { channels: 3, data: pixels.into_raw() },
+        DynamicImage::ImageRgba8(pixels) => Texels::U8 { channels: 4, data: pixels.into_raw() },
+        DynamicImage::ImageLuma16(pixels) => Texels::U16 { channels: 1, data: pixels.into_raw() },
+        DynamicImage::ImageLumaA16(pixels) => Texels::U16 { channels: 2, data: pixels.into_raw() },
+        DynamicImage::ImageRgb16(pixels) => Texels::U16 { channels: 3, data: pixels.into_raw() },
+        DynamicImage::ImageRgba16(pixels) => Texels::U16 { channels: 4, data: pixels.into_raw() },
+        other => {
+            let mut texels: Vec<Vec3> = other.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
+            let is_good = |texel: &Vec3| texel.is_finite() && texel.cmpge(Vec3::ZERO).all();
+            let bad = texels.iter().filter(|texel| !is_good(texel)).count();
+            texels.iter_mut().filter(|texel| !is_good(texel)).for_each(|texel| *texel = Vec3::ZERO);
+            return (Texels::F32(texels), bad);
+        }
+    };
+    (texels, 0)
 }
 
 /// A picture of whatever format its first bytes tell, not decoded yet.
@@ -110,11 +122,6 @@ pub(crate) fn decode_picture<R: BufRead + Seek>(
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
-/// The sRGB transfer function backwards (IEC 61966-2-1).
-fn linear_from_srgb(encoded: f32) -> f32 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,8 +134,9 @@ mod tests {
         let (picture, warning) = read_picture(&path).unwrap();
         assert_eq!((picture.width, picture.height, warning), (2, 1, None));
         // Byte 188 is the usual stand-in for half the light.
-        assert!(picture.texels[0].abs_diff_eq(Vec3::new(0.0, 0.5029, 1.0), 1e-3), "{}", picture.texels[0]);
-        assert_eq!(picture.texels[1], Vec3::X);
+        assert!(picture.linear(0).abs_diff_eq(Vec3::new(0.0, 0.5029, 1.0), 1e-3), "{}", picture.linear(0));
+        assert_eq!(picture.linear(1), Vec3::X);
+        assert_eq!(picture.bytes(), 6, "in its own depth");
     }
 
     /// A few hundred bytes that would take gigabytes are refused by their size; devices and pipes are not opened.

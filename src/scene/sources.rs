@@ -3,7 +3,7 @@
 
 use super::model::ModelFormat;
 use super::value::Rgb;
-use crate::render::Wrap;
+use crate::render::{Channel, Encoding, Wrap};
 use glam::{DVec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -75,10 +75,57 @@ pub enum TextureSource {
         /// What the texture shows beside the picture.
         #[serde(default, skip_serializing_if = "is_default")]
         wrap: Wrap,
+        /// The same along v, where it differs.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        wrap_v: Option<Wrap>,
         /// Bilinear between texels, or the nearest texel.
         #[serde(default = "yes")]
         smooth: bool,
+        /// What the numbers of the picture mean.
+        #[serde(default, skip_serializing_if = "is_default")]
+        encoding: Encoding,
+        /// The channel that is looked up; the colour when not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        channel: Option<Channel>,
+        /// Colours are multiplied with it.
+        #[serde(default = "white", skip_serializing_if = "is_white")]
+        tint: Rgb,
+        /// Which texture coordinates of a mesh: 0 or 1.
+        #[serde(default, skip_serializing_if = "is_default")]
+        uv_set: u8,
+        /// Colours are multiplied with those of the vertices.
+        #[serde(default, skip_serializing_if = "is_default")]
+        vertex_colors: bool,
     },
+    /// The colours of the vertices of a mesh, white where it has none.
+    VertexColors {
+        /// The channel that is looked up; the colour when not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        channel: Option<Channel>,
+        /// Colours are multiplied with it.
+        #[serde(default = "white", skip_serializing_if = "is_white")]
+        tint: Rgb,
+    },
+}
+
+impl TextureSource {
+    /// A picture as it is, once across the surface.
+    pub fn image(file: String) -> Self {
+        Self::Image {
+            file,
+            repeat: DVec2::ONE,
+            offset: DVec2::ZERO,
+            rotate: 0.0,
+            wrap: Wrap::Repeat,
+            wrap_v: None,
+            smooth: true,
+            encoding: Encoding::Auto,
+            channel: None,
+            tint: white(),
+            uv_set: 0,
+            vertex_colors: false,
+        }
+    }
 }
 
 /// Where the triangles of a mesh come from.
@@ -151,6 +198,10 @@ pub enum MeshShading {
 
 fn white() -> Rgb {
     Rgb(Vec3::ONE)
+}
+
+fn is_white(value: &Rgb) -> bool {
+    *value == white()
 }
 
 fn one_by_one() -> DVec2 {

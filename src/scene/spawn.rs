@@ -9,6 +9,7 @@ use super::file::{InFile, MaterialPart, ObjectPart};
 use super::inputs::WithLight;
 use super::light::LightKind;
 use super::loaded::LoadedScene;
+use super::own_materials::without_lost_textures;
 use super::placement::Placement;
 use super::sources::{EnvironmentSource, TextureSource};
 use super::units::radians;
@@ -157,17 +158,37 @@ impl LoadedScene {
 
 /// A texture as a scene file describes it; `None` where its `picture` cannot be had.
 pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc<ImageTexture>>) -> Option<Texture> {
-    let (pattern, scale, offset, rotate) = match part {
-        TextureSource::Checker { a, b, squares, offset, rotate } => {
-            (TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
-        }
-        TextureSource::Image { file, repeat, offset, rotate, wrap, smooth } => {
-            let image = picture(file)?;
-            (TexturePattern::Image { image, wrap: *wrap, smooth: *smooth }, *repeat, *offset, *rotate)
-        }
+    let placed = |pattern, scale: DVec2, offset: DVec2, rotate| Texture {
+        uv_matrix: Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate)),
+        uv_offset: as_vec2(offset),
+        ..Texture::new(pattern)
     };
-    let uv_matrix = Mat2::from_diagonal(as_vec2(scale)) * Mat2::from_angle(radians(rotate));
-    Some(Texture { pattern, uv_matrix, uv_offset: as_vec2(offset) })
+    Some(match part {
+        TextureSource::Checker { a, b, squares, offset, rotate } => {
+            placed(TexturePattern::Checker { a: a.0, b: b.0 }, *squares, *offset, *rotate)
+        }
+        &TextureSource::Image {
+            ref file,
+            repeat,
+            offset,
+            rotate,
+            wrap,
+            wrap_v,
+            smooth,
+            encoding,
+            channel,
+            tint,
+            uv_set,
+            vertex_colors,
+        } => {
+            let (image, wrap) = (picture(file)?, [wrap, wrap_v.unwrap_or(wrap)]);
+            let pattern = TexturePattern::Image { image, encoding, wrap, smooth };
+            Texture { channel, tint: tint.0, uv_set, vertex_colors, ..placed(pattern, repeat, offset, rotate) }
+        }
+        TextureSource::VertexColors { channel, tint } => {
+            Texture { channel: *channel, tint: tint.0, vertex_colors: true, ..Texture::new(TexturePattern::White) }
+        }
+    })
 }
 
 /// Removes whatever belongs to a scene.
@@ -185,6 +206,7 @@ pub(super) fn material(
     textures: &HashMap<&str, Arc<SurfaceTexture>>,
     materials: &HashMap<&str, Entity>,
 ) -> SurfaceMaterial {
+    let part = without_lost_textures(part, |name| textures.contains_key(name));
     SurfaceMaterial(part.map(&mut FileToWorld { textures, materials }))
 }
 
@@ -194,25 +216,24 @@ struct FileToWorld<'a> {
     materials: &'a HashMap<&'a str, Entity>,
 }
 
+impl FileToWorld<'_> {
+    fn texture(&self, name: &str) -> Arc<SurfaceTexture> {
+        self.textures.get(name).expect("lost textures have been replaced").clone()
+    }
+}
+
 impl MapParams<InFile, InWorld> for FileToWorld<'_> {
     fn color(&mut self, color: &ColorValue) -> ColorParam {
         match color {
             ColorValue::Rgb(rgb) => ColorParam::Rgb(*rgb),
-            // Only a mesh's own picture can be missing, and that was said in a warning.
-            ColorValue::Texture(name) => self
-                .textures
-                .get(name.as_str())
-                .map_or(ColorParam::Rgb(glam::Vec3::splat(0.5)), |texture| ColorParam::Texture(texture.clone())),
+            ColorValue::Texture(name) => ColorParam::Texture(self.texture(name)),
         }
     }
 
     fn scalar(&mut self, scalar: &ScalarValue) -> ScalarParam {
         match scalar {
             ScalarValue::Number(value) => ScalarParam::Number(*value),
-            ScalarValue::Texture(name) => self
-                .textures
-                .get(name.as_str())
-                .map_or(ScalarParam::Number(0.5), |texture| ScalarParam::Texture(texture.clone())),
+            ScalarValue::Texture(name) => ScalarParam::Texture(self.texture(name)),
         }
     }
 

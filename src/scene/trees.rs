@@ -152,8 +152,9 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
         return Err(format!("vertex {i} of the mesh is not finite"));
     }
     let per_vertex = |len: usize| len == 0 || len == n;
-    if !per_vertex(mesh.normals.len()) || !per_vertex(mesh.uvs.len()) {
-        return Err("the mesh needs one normal and one texture coordinate per vertex, or none".to_owned());
+    let attributes = [mesh.normals.len(), mesh.uvs.len(), mesh.uvs2.len(), mesh.colors.len(), mesh.tangents.len()];
+    if !attributes.into_iter().all(per_vertex) {
+        return Err("the mesh needs one value of each attribute per vertex, or none".to_owned());
     }
     if !mesh.slots.is_empty() && mesh.slots.len() != mesh.triangles.len() {
         return Err("the mesh needs one material slot per triangle, or none".to_owned());

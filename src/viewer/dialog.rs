@@ -5,10 +5,8 @@
 //! the picture goes on.
 
 use crate::frame::{Command, Edit, Id, NewThing, Waker};
-use crate::render::Wrap;
 use crate::scene::model::ModelFormat;
 use crate::scene::{MeshSource, TextureSource};
-use glam::DVec2;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command as Program, Stdio};
@@ -54,14 +52,7 @@ impl DialogPurpose {
                 Command::Edit(Edit::Add(NewThing::Mesh(MeshSource::of_file(path))))
             }
             Self::Texture { id } => {
-                let part = TextureSource::Image {
-                    file: crate::scene::path_to_text(&path),
-                    repeat: DVec2::ONE,
-                    offset: DVec2::ZERO,
-                    rotate: 0.0,
-                    wrap: Wrap::default(),
-                    smooth: true,
-                };
+                let part = TextureSource::image(crate::scene::path_to_text(&path));
                 Command::Edit(Edit::Paint { id, part })
             }
         }

@@ -4,7 +4,7 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, ColorInput, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object,
+    BadSample, ColorInput, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object,
     PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap,
     advance, replay_sample,
 };
@@ -103,15 +103,15 @@ fn room_with(
     let objects = objects.collect();
     let geometry = Geometry::build(things.into_iter().map(|((shape, _), _)| shape).collect(), objects);
     let texture = |pattern, scale| Texture {
-        pattern,
         uv_matrix: Mat2::from_diagonal(Vec2::splat(scale)),
         uv_offset: Vec2::new(0.1, 0.0),
+        ..Texture::new(pattern)
     };
     let texels = (0..12).map(|i| Vec3::new(0.1 + 0.06 * i as f32, 0.5, 0.9 - 0.07 * i as f32)).collect();
-    let image = Arc::new(ImageTexture { width: 4, height: 3, texels });
+    let image = Arc::new(ImageTexture::from_linear(4, 3, texels));
     let textures = vec![
         texture(TexturePattern::Checker { a: Vec3::splat(0.7), b: Vec3::new(0.1, 0.3, 0.5) }, 9.0),
-        texture(TexturePattern::Image { image, wrap: Wrap::Repeat, smooth: false }, 0.7),
+        texture(TexturePattern::Image { image, encoding: Encoding::Auto, wrap: [Wrap::Repeat; 2], smooth: false }, 0.7),
     ];
     let shading = Shading { air, ..Shading::new(materials, textures, environment) };
     let mut camera = camera(Vec3::new(0.2, 1.6, 5.0), Vec3::new(0.0, 0.6, 0.0), 42.0);
@@ -125,7 +125,7 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
     let slanted = || (quad(Vec3::new(-2.5, 1.0, 1.0), Vec3::new(0.1, 0.6, 0.1), Vec3::new(0.2, 0.1, 0.8)), None);
     let many = || (0..20).map(|i| (sphere(Vec3::new(i as f32 * 0.2 - 2.0, 2.6, 0.5), 0.08), None)).collect::<Vec<_>>();
     let texels = (0..32).map(|i| Vec3::new(0.1 + 0.02 * i as f32, 0.4, if i == 9 { 8.0 } else { 0.3 })).collect();
-    let image = Arc::new(ImageTexture { width: 8, height: 4, texels });
+    let image = Arc::new(ImageTexture::from_linear(8, 4, texels));
     let picture = Environment::Image { image, scale: Vec3::ONE, rotation: 0.4 };
     let triangle =
         Shape::Triangle { vertices: [Vec3::new(-1.0, 3.0, 0.0), Vec3::new(1.0, 3.0, 0.0), Vec3::new(0.0, 3.0, 1.0)] };

@@ -162,7 +162,7 @@ fn a_white_furnace_stays_white() {
     }
     // Surroundings that are sampled: all of a metal's light comes by its highlight.
     let (width, height) = (16, 8);
-    let image = ImageTexture { width, height, texels: vec![Vec3::ONE; (width * height) as usize] };
+    let image = ImageTexture::from_linear(width, height, vec![Vec3::ONE; (width * height) as usize]);
     let picture = Environment::Image { image: Arc::new(image), scale: Vec3::ONE, rotation: 0.0 };
     let ahead = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 2.0);
     let scene = scene(vec![(sphere(Vec3::ZERO, 0.9), 0)], vec![metal], picture, ahead);

@@ -6,7 +6,7 @@ use firstlight::frame::{
     Bookmarks, Command, Edit, Focus, FocusTarget, MeshMeasure, NewThing, Projector, Property, Selection, Session,
     SessionOptions, Target, wanted_mesh,
 };
-use firstlight::render::{Inspection, MaterialKind, Wrap};
+use firstlight::render::{Inspection, MaterialKind};
 use firstlight::scene::{
     ColorParam, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight, Rgb, SceneSource,
     Shape, SurfaceMaterial, TextureSource,
@@ -416,14 +416,7 @@ fn colours_become_textures_and_textures_change() {
     assert_eq!(texture(&driver), Some(("checker".to_owned(), checker(3.0))), "it keeps its name");
     assert_eq!(driver.session.status().restarts, restarts + 1, "and the picture shows it");
     // A picture is read beside.
-    let picture = TextureSource::Image {
-        file: file.to_string_lossy().into_owned(),
-        repeat: DVec2::ONE,
-        offset: DVec2::ZERO,
-        rotate: 0.0,
-        wrap: Wrap::Repeat,
-        smooth: true,
-    };
+    let picture = TextureSource::image(file.to_string_lossy().into_owned());
     driver.edit([Edit::Paint { id, part: picture.clone() }]);
     driver.until(Session::is_idle);
     assert_eq!(texture(&driver), Some(("stripes".to_owned(), picture)));
@@ -435,14 +428,7 @@ fn colours_become_textures_and_textures_change() {
     driver.edit([Edit::Undo, Edit::Undo, Edit::Undo]);
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);
     // What cannot be read is told, and changes nothing.
-    let missing = TextureSource::Image {
-        file: "nowhere.png".to_owned(),
-        repeat: DVec2::ONE,
-        offset: DVec2::ZERO,
-        rotate: 0.0,
-        wrap: Wrap::Repeat,
-        smooth: true,
-    };
+    let missing = TextureSource::image("nowhere.png".to_owned());
     driver.edit([Edit::Paint { id, part: missing }]);
     driver.until(|session| session.status().messages.iter().any(|message| message.text.contains("nowhere.png")));
     assert_eq!(driver.get::<SurfaceMaterial>("red"), plain);

@@ -49,6 +49,18 @@ pub enum MeshError {
         /// Index of the vertex.
         vertex: usize,
     },
+    /// A vertex colour is negative, NaN or infinite.
+    #[error("the color of vertex {vertex} is negative, NaN or infinite")]
+    BadColor {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// A tangent is not of unit length, or its `w` is neither 1 nor -1.
+    #[error("the tangent of vertex {vertex} is not of length 1 with a sign")]
+    BadTangent {
+        /// Index of the vertex.
+        vertex: usize,
+    },
     /// A list that is not empty has another length than it must have.
     #[error("there are {found} {what}, but {expected} were expected")]
     WrongCount {
@@ -125,6 +137,9 @@ impl Mesh {
         let lists = [
             ("normals", self.normals.len(), self.positions.len()),
             ("texture coordinates", self.uvs.len(), self.positions.len()),
+            ("second texture coordinates", self.uvs2.len(), self.positions.len()),
+            ("vertex colors", self.colors.len(), self.positions.len()),
+            ("tangents", self.tangents.len(), self.positions.len()),
             ("material slots", self.slots.len(), self.triangles.len()),
         ];
         for (what, found, expected) in lists {
@@ -137,6 +152,15 @@ impl Mesh {
         }
         if let Some(vertex) = self.uvs.iter().position(|uv| !uv.is_finite()) {
             return Err(MeshError::UvNotFinite { vertex });
+        }
+        if let Some(vertex) = self.uvs2.iter().position(|uv| !uv.is_finite()) {
+            return Err(MeshError::UvNotFinite { vertex });
+        }
+        if let Some(vertex) = self.colors.iter().position(|color| !color.is_finite() || color.min_element() < 0.0) {
+            return Err(MeshError::BadColor { vertex });
+        }
+        if let Some(vertex) = self.tangents.iter().position(|t| !t.truncate().is_normalized() || t.w.abs() != 1.0) {
+            return Err(MeshError::BadTangent { vertex });
         }
         Ok(())
     }

@@ -20,7 +20,7 @@ pub use normals::NormalWeight;
 pub use topology::Topology;
 pub use weld::Welding;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// An indexed triangle mesh in a space of its own, stored about its centre so that `f32` suffices.
 ///
@@ -37,6 +37,13 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// One texture coordinate a vertex, or empty.
     pub uvs: Vec<Vec2>,
+    /// A second texture coordinate a vertex, or empty.
+    pub uvs2: Vec<Vec2>,
+    /// One colour a vertex, linear Rec. 709 with alpha, or empty.
+    pub colors: Vec<Vec4>,
+    /// One tangent a vertex, or empty: `xyz` is the direction in which the first texture coordinate grows, unit; the bitangent
+    /// is `w · normal × xyz`, `w` being 1 or -1.
+    pub tangents: Vec<Vec4>,
     /// One material slot a triangle, or empty when all use slot 0.
     pub slots: Vec<u16>,
 }

@@ -110,14 +110,22 @@ impl Mesh {
                 }
                 self.triangles[t][k] = *copies.entry((original, group)).or_insert_with(|| {
                     self.positions.push(self.positions[original as usize]);
-                    if !self.uvs.is_empty() {
-                        self.uvs.push(self.uvs[original as usize]);
-                    }
+                    repeat(&mut self.uvs, original);
+                    repeat(&mut self.uvs2, original);
+                    repeat(&mut self.colors, original);
+                    repeat(&mut self.tangents, original);
                     self.normals.push(normal);
                     self.positions.len() as u32 - 1
                 });
             }
         }
+    }
+}
+
+/// The attribute of a vertex once more, at the end; nothing where there is no such attribute.
+fn repeat<T: Copy>(attribute: &mut Vec<T>, vertex: u32) {
+    if let Some(&value) = attribute.get(vertex as usize) {
+        attribute.push(value);
     }
 }
 

@@ -27,7 +27,9 @@ pub use crate::core::material::{
 pub use crate::core::settings::{Integrator, RenderSettings, SettingsError};
 pub use crate::core::snapshot::{Geometry, Object, Shading, Snapshot};
 pub use crate::core::techniques::Techniques;
-pub use crate::core::texture::{ImageTexture, Texture, TextureId, TexturePattern, Wrap};
+pub use crate::core::texture::{
+    Channel, Encoding, ImageTexture, Texels, Texture, TextureId, TexturePattern, TexturePoint, Wrap,
+};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,

@@ -43,7 +43,7 @@ pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(
             let same = matches!(&texture.part, TextureSource::Image { file: other, .. } if other == file);
             same.then(|| image.clone())
         }),
-        TextureSource::Checker { .. } => None,
+        TextureSource::Checker { .. } | TextureSource::VertexColors { .. } => None,
     };
     if let (TextureSource::Image { file, .. }, None) = (&part, &known) {
         let folder = world.get_resource::<CurrentScene>().map(|scene| scene.0.folder.clone()).unwrap_or_default();
@@ -75,6 +75,7 @@ fn make(
     let name = match (old, &part) {
         (Some(ColorParam::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
         (_, TextureSource::Checker { .. }) => free_name(world, "checker"),
+        (_, TextureSource::VertexColors { .. }) => free_name(world, "vertex colors"),
         (_, TextureSource::Image { file, .. }) => {
             let stem = Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
             free_name(world, &stem.unwrap_or_else(|| "picture".to_owned()))
@@ -85,7 +86,8 @@ fn make(
 
 fn same_source(a: &TextureSource, b: &TextureSource) -> bool {
     match (a, b) {
-        (TextureSource::Checker { .. }, TextureSource::Checker { .. }) => true,
+        (TextureSource::Checker { .. }, TextureSource::Checker { .. })
+        | (TextureSource::VertexColors { .. }, TextureSource::VertexColors { .. }) => true,
         (TextureSource::Image { file: a, .. }, TextureSource::Image { file: b, .. }) => a == b,
         _ => false,
     }

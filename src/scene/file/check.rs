@@ -112,7 +112,15 @@ impl Check<'_> {
                 self.light(&format!("{path}/b"), *b);
                 (("squares", *squares), *offset, *rotate)
             }
-            TextureSource::Image { repeat, offset, rotate, .. } => (("repeat", *repeat), *offset, *rotate),
+            TextureSource::Image { repeat, offset, rotate, tint, uv_set, .. } => {
+                self.light(&format!("{path}/tint"), *tint);
+                if *uv_set > 1 {
+                    let message = format!("`uv_set` is {uv_set}, but must be 0 or 1");
+                    self.wrong(&format!("{path}/uv_set"), message);
+                }
+                (("repeat", *repeat), *offset, *rotate)
+            }
+            TextureSource::VertexColors { tint, .. } => return self.light(&format!("{path}/tint"), *tint),
         };
         let (field, DVec2 { x, y }) = size;
         // Beyond these, single precision has no such number.
@@ -135,9 +143,17 @@ impl Check<'_> {
         for (field, param) in material.params() {
             let path = format!("{path}/{field}");
             match param {
-                Param::Reflectance(color) => self.share(&path, field, color),
-                Param::Radiance(ColorValue::Rgb(rgb)) => self.light(&path, Rgb(*rgb)),
-                Param::Radiance(ColorValue::Texture(texture)) => self.texture_name(&path, texture),
+                Param::Reflectance(color) | Param::Map(color) => self.share(&path, field, color),
+                Param::Radiance(ColorValue::Rgb(rgb)) | Param::Factor(ColorValue::Rgb(rgb)) => {
+                    self.light(&path, Rgb(*rgb));
+                }
+                Param::Radiance(ColorValue::Texture(texture)) | Param::Factor(ColorValue::Texture(texture)) => {
+                    self.texture_name(&path, texture);
+                }
+                Param::Number(value) => self.finite(&path, f64::from(*value)),
+                Param::Cutoff(Some(value)) if !(0.0..=1.0).contains(value) => {
+                    self.wrong(&path, format!("`{field}` is {value}, but must lie in 0..1"));
+                }
                 Param::Share(scalar) => self.scalar(&path, field, scalar),
                 Param::ConstantShare(value) if !(0.0..=1.0).contains(value) => {
                     self.wrong(&path, format!("`{field}` is {value}, but must lie in 0..1"));
@@ -160,7 +176,7 @@ impl Check<'_> {
                         return;
                     }
                 }
-                Param::ConstantShare(_) | Param::Exponent(_) | Param::Ior(_) => {}
+                Param::ConstantShare(_) | Param::Exponent(_) | Param::Ior(_) | Param::Flag(_) | Param::Cutoff(_) => {}
             }
         }
         if let MaterialPart::Blend { weight, .. } = material {

@@ -38,7 +38,9 @@ fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
             Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
             Some(ColorParam::Texture(texture)) => match &texture.part {
                 TextureSource::Checker { a, b, .. } => [a.0, b.0],
-                TextureSource::Image { .. } => [Vec3::splat(0.75), Vec3::splat(0.1)],
+                TextureSource::Image { .. } | TextureSource::VertexColors { .. } => {
+                    [Vec3::splat(0.75), Vec3::splat(0.1)]
+                }
             },
             None => [Vec3::splat(0.5); 2],
         },

@@ -76,6 +76,7 @@ pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
                 })
             });
         }
+        TextureSource::VertexColors { .. } => {}
     }
     if new != *part {
         asked.edit(Edit::Paint { id, part: new });

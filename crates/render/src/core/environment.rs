@@ -50,7 +50,7 @@ impl Environment {
                 let uv = direction_to_uv(dir, *rotation);
                 let x = ((uv.x * image.width as f32) as u32).min(image.width - 1);
                 let y = ((uv.y * image.height as f32) as u32).min(image.height - 1);
-                *scale * image.texels[(y * image.width + x) as usize]
+                *scale * image.linear((y * image.width + x) as usize)
             }
         }
     }
@@ -82,7 +82,7 @@ impl EnvironmentSampler {
         let weights: Vec<f32> = (0..width * height)
             .map(|i| {
                 let sin_theta = (PI * ((i / width) as f32 + 0.5) / height as f32).sin();
-                luminance(*scale * image.texels[i]).max(0.0) * sin_theta
+                luminance(*scale * image.linear(i)).max(0.0) * sin_theta
             })
             .collect();
         let distribution = PictureDistribution::new(width, height, &weights)?;
@@ -132,7 +132,7 @@ mod tests {
         let texels = (0..width * height)
             .map(|i| if i == 5 * width + 9 { Vec3::splat(500.0) } else { Vec3::new(0.2, 0.3, 0.5) })
             .collect();
-        let image = Arc::new(ImageTexture { width, height, texels });
+        let image = Arc::new(ImageTexture::from_linear(width, height, texels));
         Environment::Image { image, scale: Vec3::splat(2.0), rotation: 0.7 }
     }
 

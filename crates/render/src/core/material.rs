@@ -5,6 +5,12 @@
 //! material begins here: its variant, its [`kind`](Material::kind), its rows in `map`, `params_of` and
 //! [`of_kind`](Material::of_kind).
 
+use super::material_defaults::{
+    along_tangent, black, dull, flat, glass_ior, half, is_along_tangent, is_black, is_default, is_flat, is_half,
+    is_one, is_one_number, is_white, is_yes, is_zero, light_grey, one, one_scalar, white, yes, zero,
+};
+pub use super::material_kind::{MaterialKind, Param, ParamMut, ParamRef};
+pub use super::material_queries::Emission;
 use crate::core::texture::TextureId;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -163,6 +169,80 @@ pub enum Material<P: Params = InSnapshot> {
         #[serde(default, skip_serializing_if = "is_default")]
         absorption: P::Rgb,
     },
+    /// Layers by the parameters of glTF 2.0 and of most programs: a clear coat, on a sheen, on a base that is metal, or a
+    /// dielectric over what scatters or lets light through; see `shading/principled`.
+    Principled {
+        /// Share of light that the base returns, per channel, 0..1.
+        #[serde(default = "light_grey")]
+        base_color: P::Color,
+        /// Share of the base that is metal, 0..1.
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        metallic: P::Scalar,
+        /// Root of the width α of the base's microfacets, 0..1.
+        #[serde(default = "half")]
+        roughness: P::Scalar,
+        /// Index of refraction of the dielectric.
+        #[serde(default = "glass_ior")]
+        ior: f32,
+        /// Strength of the reflection of the dielectric, 0..1.
+        #[serde(default = "one_scalar", skip_serializing_if = "is_one")]
+        specular: P::Scalar,
+        /// Colour of the reflection of the dielectric at normal incidence, a factor per channel, 0 or more.
+        #[serde(default = "white", skip_serializing_if = "is_white")]
+        specular_color: P::Color,
+        /// Share of the dielectric that lets light through in place of scattering it, 0..1.
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        transmission: P::Scalar,
+        /// Light that passes goes on as through a pane without thickness: it is not refracted, and nothing absorbs it.
+        #[serde(default, skip_serializing_if = "is_default")]
+        thin_walled: bool,
+        /// Per metre inside (Beer–Lambert).
+        #[serde(default, skip_serializing_if = "is_default")]
+        absorption: P::Rgb,
+        /// Ratio of the width of the lobe along the tangent to that across grows from 1 to 1/α, 0..1; see
+        /// `KHR_materials_anisotropy`.
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        anisotropy: P::Scalar,
+        /// Degrees from the tangent, counter-clockwise, to the direction of anisotropy.
+        #[serde(default, skip_serializing_if = "is_default")]
+        anisotropy_rotation: f32,
+        /// Red and green: direction of anisotropy about the tangent, 0.5 being 0; blue: factor of its strength.
+        #[serde(default = "along_tangent", skip_serializing_if = "is_along_tangent")]
+        anisotropy_map: P::Color,
+        /// Strength of the sheen of fibres at grazing angles, per channel, 0..1.
+        #[serde(default = "black", skip_serializing_if = "is_black")]
+        sheen_color: P::Color,
+        /// Root of the width of the sheen, 0..1.
+        #[serde(default = "half", skip_serializing_if = "is_half")]
+        sheen_roughness: P::Scalar,
+        /// Share of the surface that has a clear coat with an index of 1.5, 0..1.
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        clearcoat: P::Scalar,
+        /// Root of the width α of the coat's microfacets, 0..1.
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        clearcoat_roughness: P::Scalar,
+        /// Normals of the coat about the smooth normal, as in `normal_map`.
+        #[serde(default = "flat", skip_serializing_if = "is_flat")]
+        clearcoat_normal_map: P::Color,
+        /// Radiance that the front sends out beside what it reflects, W·sr⁻¹·m⁻².
+        #[serde(default = "black", skip_serializing_if = "is_black")]
+        emission: P::Color,
+        /// Share of the surface that is there, 0..1: rays pass the rest straight.
+        #[serde(default = "one_scalar", skip_serializing_if = "is_one")]
+        opacity: P::Scalar,
+        /// The surface is there where its opacity is at least this, and nowhere else, 0..1.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        opacity_cutoff: Option<f32>,
+        /// Normals in the frame of tangent, bitangent and normal, 0..1 standing for −1..1.
+        #[serde(default = "flat", skip_serializing_if = "is_flat")]
+        normal_map: P::Color,
+        /// Factor of the slope of `normal_map`.
+        #[serde(default = "one", skip_serializing_if = "is_one_number")]
+        normal_scale: f32,
+        /// The back is a surface as well, and shines as the front does; otherwise rays pass it.
+        #[serde(default = "yes", skip_serializing_if = "is_yes")]
+        two_sided: bool,
+    },
     /// f = (1 − weight) f_a + weight f_b, and the same for emission. At most one part is emissive, and then `weight`
     /// is constant: see [`Emission::of`].
     Blend {
@@ -179,88 +259,6 @@ pub enum Material<P: Params = InSnapshot> {
         radiance: P::Color,
     },
 }
-
-/// The kinds of [`Material`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum MaterialKind {
-    /// Emits light: [`Material::Emissive`].
-    Emissive,
-    /// Lambertian reflection: [`Material::Diffuse`].
-    Diffuse,
-    /// Perfect mirror: [`Material::Mirror`].
-    Mirror,
-    /// Smooth dielectric: [`Material::Glass`].
-    Glass,
-    /// GGX microfacets that reflect and refract: [`Material::RoughGlass`].
-    RoughGlass,
-    /// GGX microfacets: [`Material::Metal`].
-    Metal,
-    /// The classic local model: [`Material::Phong`].
-    Phong,
-    /// Weighted sum of two materials: [`Material::Blend`].
-    Blend,
-}
-
-impl MaterialKind {
-    /// The kinds that a material can be turned into; a blend needs two others.
-    pub const PLAIN: [Self; 7] =
-        [Self::Diffuse, Self::Mirror, Self::Metal, Self::Glass, Self::RoughGlass, Self::Phong, Self::Emissive];
-
-    pub(crate) const N: usize = Self::Blend as usize + 1;
-
-    /// As in a scene file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Emissive => "emissive",
-            Self::Diffuse => "diffuse",
-            Self::Mirror => "mirror",
-            Self::Glass => "glass",
-            Self::RoughGlass => "rough_glass",
-            Self::Metal => "metal",
-            Self::Phong => "phong",
-            Self::Blend => "blend",
-        }
-    }
-}
-
-/// A parameter of a material, by what may stand in it.
-#[derive(Clone, Copy, Debug)]
-pub enum Param<Color, Scalar, Number, Rgb, Part> {
-    /// Share of light per channel, 0..1.
-    Reflectance(Color),
-    /// W·sr⁻¹·m⁻².
-    Radiance(Color),
-    /// 0..1.
-    Share(Scalar),
-    /// 0..1, the same everywhere.
-    ConstantShare(Number),
-    /// Index of refraction, above 0.
-    Ior(Number),
-    /// 0 or more.
-    Exponent(Number),
-    /// Per metre.
-    Absorption(Rgb),
-    /// Another material, of which a blend consists.
-    Part(Part),
-}
-
-/// To be read.
-pub type ParamRef<'a, P> = Param<
-    &'a <P as Params>::Color,
-    &'a <P as Params>::Scalar,
-    &'a f32,
-    &'a <P as Params>::Rgb,
-    &'a <P as Params>::Material,
->;
-
-/// To be changed.
-pub type ParamMut<'a, P> = Param<
-    &'a mut <P as Params>::Color,
-    &'a mut <P as Params>::Scalar,
-    &'a mut f32,
-    &'a mut <P as Params>::Rgb,
-    &'a mut <P as Params>::Material,
->;
 
 /// Names as in a scene file; of a reference to a material, or of a mutable one.
 macro_rules! params_of {
@@ -288,6 +286,55 @@ macro_rules! params_of {
                 ("ior", Param::Ior(ior)),
                 ("absorption", Param::Absorption(absorption)),
             ],
+            Material::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+                transmission,
+                thin_walled,
+                absorption,
+                anisotropy,
+                anisotropy_rotation,
+                anisotropy_map,
+                sheen_color,
+                sheen_roughness,
+                clearcoat,
+                clearcoat_roughness,
+                clearcoat_normal_map,
+                emission,
+                opacity,
+                opacity_cutoff,
+                normal_map,
+                normal_scale,
+                two_sided,
+            } => vec![
+                ("base_color", Param::Reflectance(base_color)),
+                ("metallic", Param::Share(metallic)),
+                ("roughness", Param::Share(roughness)),
+                ("ior", Param::Ior(ior)),
+                ("specular", Param::Share(specular)),
+                ("specular_color", Param::Factor(specular_color)),
+                ("transmission", Param::Share(transmission)),
+                ("thin_walled", Param::Flag(thin_walled)),
+                ("absorption", Param::Absorption(absorption)),
+                ("anisotropy", Param::Share(anisotropy)),
+                ("anisotropy_rotation", Param::Number(anisotropy_rotation)),
+                ("anisotropy_map", Param::Map(anisotropy_map)),
+                ("sheen_color", Param::Reflectance(sheen_color)),
+                ("sheen_roughness", Param::Share(sheen_roughness)),
+                ("clearcoat", Param::Share(clearcoat)),
+                ("clearcoat_roughness", Param::Share(clearcoat_roughness)),
+                ("clearcoat_normal_map", Param::Map(clearcoat_normal_map)),
+                ("emission", Param::Radiance(emission)),
+                ("opacity", Param::Share(opacity)),
+                ("opacity_cutoff", Param::Cutoff(opacity_cutoff)),
+                ("normal_map", Param::Map(normal_map)),
+                ("normal_scale", Param::Number(normal_scale)),
+                ("two_sided", Param::Flag(two_sided)),
+            ],
             Material::Blend { weight, a, b } => {
                 vec![("weight", Param::Share(weight)), ("a", Param::Part(a)), ("b", Param::Part(b))]
             }
@@ -304,6 +351,7 @@ macro_rules! color_of {
             | Material::Mirror { reflectance: color }
             | Material::Metal { reflectance: color, .. }
             | Material::Phong { diffuse: color, .. }
+            | Material::Principled { base_color: color, .. }
             | Material::Emissive { radiance: color } => Some(color),
             Material::Glass { .. } | Material::RoughGlass { .. } | Material::Blend { .. } => None,
         }
@@ -349,6 +397,55 @@ impl<P: Params> Material<P> {
                 ior: *ior,
                 absorption: rgb(absorption),
             },
+            Self::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+                transmission,
+                thin_walled,
+                absorption,
+                anisotropy,
+                anisotropy_rotation,
+                anisotropy_map,
+                sheen_color,
+                sheen_roughness,
+                clearcoat,
+                clearcoat_roughness,
+                clearcoat_normal_map,
+                emission,
+                opacity,
+                opacity_cutoff,
+                normal_map,
+                normal_scale,
+                two_sided,
+            } => Material::Principled {
+                base_color: to.color(base_color),
+                metallic: to.scalar(metallic),
+                roughness: to.scalar(roughness),
+                ior: *ior,
+                specular: to.scalar(specular),
+                specular_color: to.color(specular_color),
+                transmission: to.scalar(transmission),
+                thin_walled: *thin_walled,
+                absorption: rgb(absorption),
+                anisotropy: to.scalar(anisotropy),
+                anisotropy_rotation: *anisotropy_rotation,
+                anisotropy_map: to.color(anisotropy_map),
+                sheen_color: to.color(sheen_color),
+                sheen_roughness: to.scalar(sheen_roughness),
+                clearcoat: to.scalar(clearcoat),
+                clearcoat_roughness: to.scalar(clearcoat_roughness),
+                clearcoat_normal_map: to.color(clearcoat_normal_map),
+                emission: to.color(emission),
+                opacity: to.scalar(opacity),
+                opacity_cutoff: *opacity_cutoff,
+                normal_map: to.color(normal_map),
+                normal_scale: *normal_scale,
+                two_sided: *two_sided,
+            },
             Self::Blend { weight, a, b } => {
                 Material::Blend { weight: to.scalar(weight), a: to.material(a), b: to.material(b) }
             }
@@ -377,6 +474,7 @@ impl<P: Params> Material<P> {
             Self::RoughGlass { .. } => MaterialKind::RoughGlass,
             Self::Metal { .. } => MaterialKind::Metal,
             Self::Phong { .. } => MaterialKind::Phong,
+            Self::Principled { .. } => MaterialKind::Principled,
             Self::Blend { .. } => MaterialKind::Blend,
         }
     }
@@ -418,9 +516,39 @@ impl<P: Params> Material<P> {
                 ior: glass_ior(),
                 absorption: P::Rgb::default(),
             },
+            MaterialKind::Principled => Self::principled(color),
             MaterialKind::Emissive => Self::Emissive { radiance: color },
             MaterialKind::Blend => return None,
         })
+    }
+
+    /// A principled material of this colour, with the defaults of a scene file for all the rest.
+    pub fn principled(base_color: P::Color) -> Self {
+        Self::Principled {
+            base_color,
+            metallic: zero(),
+            roughness: half(),
+            ior: glass_ior(),
+            specular: one_scalar(),
+            specular_color: white(),
+            transmission: zero(),
+            thin_walled: false,
+            absorption: P::Rgb::default(),
+            anisotropy: zero(),
+            anisotropy_rotation: 0.0,
+            anisotropy_map: along_tangent(),
+            sheen_color: black(),
+            sheen_roughness: half(),
+            clearcoat: zero(),
+            clearcoat_roughness: zero(),
+            clearcoat_normal_map: flat(),
+            emission: black(),
+            opacity: one_scalar(),
+            opacity_cutoff: None,
+            normal_map: flat(),
+            normal_scale: 1.0,
+            two_sided: true,
+        }
     }
 
     /// What the material is known by: albedo, reflectance, diffuse colour or radiance; `None` where it has no colour.
@@ -432,114 +560,5 @@ impl<P: Params> Material<P> {
     /// See [`Self::color`].
     pub fn color_mut(&mut self) -> Option<&mut P::Color> {
         color_of!(self)
-    }
-}
-
-fn white<C: From<Vec3>>() -> C {
-    Vec3::ONE.into()
-}
-
-fn zero<S: From<f32>>() -> S {
-    0.0.into()
-}
-
-fn is_zero<S: From<f32> + PartialEq>(scalar: &S) -> bool {
-    *scalar == zero()
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
-}
-
-fn one() -> f32 {
-    1.0
-}
-
-fn glass_ior() -> f32 {
-    1.5
-}
-
-fn dull() -> f32 {
-    20.0
-}
-
-impl Material {
-    /// Whether light can pass through the surface.
-    pub(crate) fn is_clear(&self) -> bool {
-        match self {
-            Self::Glass { .. } | Self::RoughGlass { .. } => true,
-            Self::Phong { transparency, .. } => *transparency > 0.0,
-            _ => false,
-        }
-    }
-
-    /// Whether it, or a part of it, lets light pass.
-    pub(crate) fn has_clear_part(&self, materials: &[Self]) -> bool {
-        match self {
-            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_clear_part(materials)),
-            _ => self.is_clear(),
-        }
-    }
-
-    /// Whether the inside of it takes light away.
-    pub(crate) fn absorbs(&self) -> bool {
-        match self {
-            Self::Glass { absorption, .. } | Self::RoughGlass { absorption, .. } | Self::Phong { absorption, .. } => {
-                self.is_clear() && *absorption != Vec3::ZERO
-            }
-            _ => false,
-        }
-    }
-
-    /// Whether it, or a part of it, is specular everywhere: a mirror or glass.
-    pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
-        match self {
-            Self::Mirror { .. } | Self::Glass { .. } => true,
-            Self::Metal { alpha, .. } | Self::RoughGlass { alpha, .. } => {
-                matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA)
-            }
-            Self::Phong { specular, transparency, .. } => {
-                *transparency > 0.0 || !matches!(specular, ScalarInput::Constant(share) if *share <= 0.0)
-            }
-            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].is_specular(materials)),
-            Self::Diffuse { .. } | Self::Emissive { .. } => false,
-        }
-    }
-
-    /// Whether it, or a part of it, looks up a texture.
-    pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
-        self.params().into_iter().any(|(_, param)| match param {
-            Param::Reflectance(color) | Param::Radiance(color) => matches!(color, ColorInput::Texture(_)),
-            Param::Share(scalar) => matches!(scalar, ScalarInput::Texture(_)),
-            Param::Part(part) => materials[*part as usize].is_textured(materials),
-            Param::ConstantShare(_) | Param::Ior(_) | Param::Exponent(_) | Param::Absorption(_) => false,
-        })
-    }
-}
-
-/// The light that a material adds itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Emission {
-    /// Radiance of the emissive material, W·m⁻²·sr⁻¹, before `scale`.
-    pub radiance: ColorInput,
-    /// Share of an emissive part in a blend.
-    pub scale: f32,
-}
-
-impl Emission {
-    /// The emission of a material, looked for in blends; `None` for one that does not shine.
-    pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
-        match &materials[id as usize] {
-            Material::Emissive { radiance: ColorInput::Constant(Vec3::ZERO) } => None,
-            Material::Emissive { radiance } => Some(Self { radiance: *radiance, scale: 1.0 }),
-            Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
-                let part = |id, share: f32| {
-                    let emission = Self::of(materials, id)?;
-                    (share > 0.0).then_some(Self { scale: share * emission.scale, ..emission })
-                };
-                part(*a, 1.0 - weight).or_else(|| part(*b, *weight))
-            }
-            _ => None,
-        }
     }
 }

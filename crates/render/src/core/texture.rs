@@ -1,7 +1,8 @@
 //! Colours that vary over a surface.
 
+pub use super::image_texture::{Encoding, ImageTexture, Texels};
 use firstlight_simd::{Elementary, Real};
-use glam::{Mat2, Vec2, Vec3};
+use glam::{Mat2, Vec2, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -21,7 +22,21 @@ pub enum Wrap {
     Clamp,
 }
 
-/// A pattern and how surface coordinates find their place in it.
+/// One channel of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// Alpha; 1 where the picture has none.
+    A,
+}
+
+/// A pattern, how surface coordinates find their place in it, and what becomes of its colours.
 ///
 /// Surface coordinates: `uv` of a mesh or quad (0..1), longitude and latitude of a sphere (0..1, v = 1 at +Y of
 /// the object), metres along two axes of an infinite plane.
@@ -29,15 +44,25 @@ pub enum Wrap {
 pub struct Texture {
     /// What the texture shows.
     pub pattern: TexturePattern,
+    /// Which coordinates of a mesh it uses: 0 for the first, 1 for the second. Other shapes have one set.
+    pub uv_set: u8,
     /// Applied to surface coordinates first: rotation and scale.
     pub uv_matrix: Mat2,
     /// Added after `uv_matrix`.
     pub uv_offset: Vec2,
+    /// The channel that is looked up, for all of red, green and blue; `None` for the colour.
+    pub channel: Option<Channel>,
+    /// Colours are multiplied with it.
+    pub tint: Vec3,
+    /// Colours are multiplied with those of the vertices of a mesh.
+    pub vertex_colors: bool,
 }
 
 /// Colours over pattern coordinates.
 #[derive(Clone, Debug)]
 pub enum TexturePattern {
+    /// White everywhere: for vertex colours by themselves.
+    White,
     /// Squares of side 1 in pattern coordinates; the one at (0, 0)..(1, 1) has colour `a`.
     Checker {
         /// Colour of squares whose whole coordinates have an even sum, linear Rec. 709.
@@ -49,39 +74,85 @@ pub enum TexturePattern {
     Image {
         /// The picture.
         image: Arc<ImageTexture>,
-        /// What the texture shows outside 0..1.
-        wrap: Wrap,
+        /// What its numbers mean.
+        encoding: Encoding,
+        /// What the texture shows outside 0..1, along u and along v.
+        wrap: [Wrap; 2],
         /// Bilinear when true, else the nearest texel.
         smooth: bool,
     },
 }
 
-/// A picture in linear Rec. 709, row by row from the top.
-#[derive(Debug, PartialEq)]
-pub struct ImageTexture {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// One texel per pixel, `width · height` of them.
-    pub texels: Vec<Vec3>,
+/// A place on a surface, as textures ask for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexturePoint {
+    /// First and second surface coordinates.
+    pub uv: [Vec2; 2],
+    /// The interpolated colour of the vertices with alpha, linear Rec. 709; white where there is none.
+    pub color: Vec4,
+}
+
+impl From<Vec2> for TexturePoint {
+    fn from(uv: Vec2) -> Self {
+        Self { uv: [uv; 2], color: Vec4::ONE }
+    }
 }
 
 impl Texture {
-    /// The colour at a surface coordinate.
+    /// A pattern in surface coordinates as they are, with its colours as they are.
+    pub fn new(pattern: TexturePattern) -> Self {
+        Self {
+            pattern,
+            uv_set: 0,
+            uv_matrix: Mat2::IDENTITY,
+            uv_offset: Vec2::ZERO,
+            channel: None,
+            tint: Vec3::ONE,
+            vertex_colors: false,
+        }
+    }
+
+    /// The colour at a place.
     #[inline]
-    pub fn eval(&self, uv: Vec2) -> Vec3 {
+    pub fn eval(&self, point: impl Into<TexturePoint>) -> Vec3 {
+        let point = point.into();
+        let uv = point.uv[usize::from(self.uv_set.min(1))];
         let p = Vec2::from(self.pattern_coordinates(uv.to_array()));
-        match &self.pattern {
+        let mut texel = match &self.pattern {
+            TexturePattern::White => Vec4::ONE,
             TexturePattern::Checker { a, b } => {
                 if is_even_square(p.to_array()) {
-                    *a
+                    a.extend(1.0)
                 } else {
-                    *b
+                    b.extend(1.0)
                 }
             }
-            TexturePattern::Image { image, wrap, smooth: false } => image.nearest(p, *wrap),
-            TexturePattern::Image { image, wrap, smooth: true } => image.bilinear(p, *wrap),
+            TexturePattern::Image { image, encoding, wrap, smooth: false } => image.nearest(p, *wrap, *encoding),
+            TexturePattern::Image { image, encoding, wrap, smooth: true } => image.bilinear(p, *wrap, *encoding),
+        };
+        if self.vertex_colors {
+            texel *= point.color;
+        }
+        self.chosen(texel) * self.tint
+    }
+
+    /// Whether the colours are those of the pattern at the first surface coordinates.
+    pub(crate) fn is_plain(&self) -> bool {
+        !self.asks_for_more_than_uv() && self.channel.is_none() && self.tint == Vec3::ONE
+    }
+
+    /// Whether it looks at what only meshes have: second surface coordinates or colours of vertices.
+    pub(crate) fn asks_for_more_than_uv(&self) -> bool {
+        self.uv_set != 0 || self.vertex_colors
+    }
+
+    fn chosen(&self, texel: Vec4) -> Vec3 {
+        match self.channel {
+            None => texel.truncate(),
+            Some(Channel::R) => Vec3::splat(texel.x),
+            Some(Channel::G) => Vec3::splat(texel.y),
+            Some(Channel::B) => Vec3::splat(texel.z),
+            Some(Channel::A) => Vec3::splat(texel.w),
         }
     }
 
@@ -92,15 +163,17 @@ impl Texture {
         [u * m.x_axis.x + v * m.y_axis.x + offset.x, u * m.x_axis.y + v * m.y_axis.y + offset.y]
     }
 
-    /// The mean colour over the pattern, for the power of lights.
+    /// The mean colour over the pattern, for the power of lights; vertices count as white.
     pub fn mean(&self) -> Vec3 {
-        match &self.pattern {
-            TexturePattern::Checker { a, b } => 0.5 * (*a + *b),
-            TexturePattern::Image { image, .. } => {
-                let sum: glam::DVec3 = image.texels.iter().map(|t| t.as_dvec3()).sum();
-                (sum / image.texels.len().max(1) as f64).as_vec3()
+        let mean = match &self.pattern {
+            TexturePattern::White => Vec4::ONE,
+            TexturePattern::Checker { a, b } => (0.5 * (*a + *b)).extend(1.0),
+            TexturePattern::Image { image, encoding, .. } => {
+                let texels = (0..image.len()).map(|i| image.texels.texel(i, *encoding).as_dvec4());
+                (texels.sum::<glam::DVec4>() / image.len().max(1) as f64).as_vec4()
             }
-        }
+        };
+        self.chosen(mean) * self.tint
     }
 }
 
@@ -113,22 +186,22 @@ pub(crate) fn is_even_square<R: Elementary>([x, y]: [R; 2]) -> R::Mask {
 }
 
 impl ImageTexture {
-    fn texel(&self, x: i64, y: i64, wrap: Wrap) -> Vec3 {
-        let x = wrap.apply(x, i64::from(self.width));
-        let y = wrap.apply(y, i64::from(self.height));
-        self.texels[(y * i64::from(self.width) + x) as usize]
+    fn texel(&self, x: i64, y: i64, wrap: [Wrap; 2], encoding: Encoding) -> Vec4 {
+        let x = wrap[0].apply(x, i64::from(self.width));
+        let y = wrap[1].apply(y, i64::from(self.height));
+        self.texels.texel((y * i64::from(self.width) + x) as usize, encoding)
     }
 
-    fn nearest(&self, uv: Vec2, wrap: Wrap) -> Vec3 {
+    fn nearest(&self, uv: Vec2, wrap: [Wrap; 2], encoding: Encoding) -> Vec4 {
         let (x, y) = (uv.x * self.width as f32, (1.0 - uv.y) * self.height as f32);
-        self.texel(x.floor() as i64, y.floor() as i64, wrap)
+        self.texel(x.floor() as i64, y.floor() as i64, wrap, encoding)
     }
 
-    fn bilinear(&self, uv: Vec2, wrap: Wrap) -> Vec3 {
+    fn bilinear(&self, uv: Vec2, wrap: [Wrap; 2], encoding: Encoding) -> Vec4 {
         let (x, y) = (uv.x * self.width as f32 - 0.5, (1.0 - uv.y) * self.height as f32 - 0.5);
         let (fx, fy) = (x - x.floor(), y - y.floor());
         let (x, y) = (x.floor() as i64, y.floor() as i64);
-        let row = |y| self.texel(x, y, wrap).lerp(self.texel(x + 1, y, wrap), fx);
+        let row = |y| self.texel(x, y, wrap, encoding).lerp(self.texel(x + 1, y, wrap, encoding), fx);
         row(y).lerp(row(y + 1), fy)
     }
 }
@@ -136,6 +209,8 @@ impl ImageTexture {
 impl Wrap {
     fn apply(self, i: i64, n: i64) -> i64 {
         match self {
+            // Most places lie within the picture, and a division is slow.
+            _ if (0..n).contains(&i) => i,
             Self::Repeat => i.rem_euclid(n),
             Self::Clamp => i.clamp(0, n - 1),
             Self::Mirror => {
@@ -150,31 +225,50 @@ impl Wrap {
 mod tests {
     use super::*;
 
-    fn checker() -> Texture {
-        let pattern = TexturePattern::Checker { a: Vec3::ONE, b: Vec3::ZERO };
-        Texture { pattern, uv_matrix: Mat2::IDENTITY, uv_offset: Vec2::ZERO }
-    }
-
     #[test]
     fn checker_alternates_on_both_sides_of_zero() {
+        let checker = Texture::new(TexturePattern::Checker { a: Vec3::ONE, b: Vec3::ZERO });
         for x in -3..3 {
             for y in -3..3 {
                 let expected = if (x + y) % 2 == 0 { Vec3::ONE } else { Vec3::ZERO };
-                assert_eq!(checker().eval(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)), expected, "square {x}, {y}");
+                assert_eq!(checker.eval(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)), expected, "square {x}, {y}");
             }
         }
     }
 
     #[test]
     fn top_row_of_a_picture_is_at_v_1_and_wraps() {
-        let texels = vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
-        let image = ImageTexture { width: 2, height: 2, texels };
+        let image = ImageTexture::from_linear(2, 2, vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE]);
+        let nearest = |u, v, wrap| image.nearest(Vec2::new(u, v), [wrap; 2], Encoding::Auto).truncate();
         for (u, v, expected) in [(0.25, 0.75, Vec3::X), (0.75, 0.75, Vec3::Y), (0.25, 0.25, Vec3::Z)] {
-            assert_eq!(image.nearest(Vec2::new(u, v), Wrap::Repeat), expected);
-            assert_eq!(image.nearest(Vec2::new(u - 1.0, v + 2.0), Wrap::Repeat), expected);
-            assert_eq!(image.bilinear(Vec2::new(u, v), Wrap::Repeat), expected);
+            assert_eq!(nearest(u, v, Wrap::Repeat), expected);
+            assert_eq!(nearest(u - 1.0, v + 2.0, Wrap::Repeat), expected);
+            let between = image.bilinear(Vec2::new(u, v), [Wrap::Repeat; 2], Encoding::Auto).truncate();
+            assert_eq!(between, expected);
         }
-        assert_eq!(image.nearest(Vec2::new(1.25, 0.75), Wrap::Mirror), Vec3::Y);
-        assert_eq!(image.nearest(Vec2::new(9.0, 9.0), Wrap::Clamp), Vec3::Y);
+        assert_eq!(nearest(1.25, 0.75, Wrap::Mirror), Vec3::Y);
+        assert_eq!(nearest(9.0, 9.0, Wrap::Clamp), Vec3::Y);
+        let along_u = image.nearest(Vec2::new(1.25, 1.75), [Wrap::Mirror, Wrap::Repeat], Encoding::Auto);
+        assert_eq!(along_u.truncate(), Vec3::Y);
+    }
+
+    #[test]
+    fn channels_tints_and_vertices_change_what_a_texture_shows() {
+        let image = Arc::new(ImageTexture {
+            width: 1,
+            height: 1,
+            texels: Texels::U8 { channels: 4, data: vec![255, 51, 0, 102] },
+        });
+        let pattern =
+            TexturePattern::Image { image, encoding: Encoding::Linear, wrap: [Wrap::Repeat; 2], smooth: true };
+        let texture = Texture::new(pattern);
+        let point = TexturePoint { uv: [Vec2::ZERO; 2], color: Vec4::new(0.5, 1.0, 1.0, 0.5) };
+        assert_eq!(texture.eval(point), Vec3::new(1.0, 0.2, 0.0));
+        let alpha = Texture { channel: Some(Channel::A), ..texture.clone() };
+        assert_eq!(alpha.eval(point), Vec3::splat(0.4));
+        assert_eq!(Texture { vertex_colors: true, ..alpha }.eval(point), Vec3::splat(0.2));
+        let tinted = Texture { tint: Vec3::new(0.5, 1.0, 2.0), vertex_colors: true, ..texture };
+        assert_eq!(tinted.eval(point), Vec3::new(0.25, 0.2, 0.0));
+        assert_eq!(tinted.mean(), Vec3::new(0.5, 0.2, 0.0));
     }
 }

@@ -298,9 +298,9 @@ fn albedo(snapshot: &Prepared, vertex: &Vertex, material: MaterialId, depth: u32
         Material::Blend { .. } if depth > 16 => Vec3::ZERO,
         Material::Blend { weight, a, b } => {
             let part = |id| albedo(snapshot, vertex, id, depth + 1);
-            part(*a).lerp(part(*b), weight.eval(snapshot, vertex.uv).clamp(0.0, 1.0))
+            part(*a).lerp(part(*b), weight.eval(snapshot, vertex.texture_point).clamp(0.0, 1.0))
         }
-        plain => plain.color().map_or(Vec3::ONE, |color| color.eval(snapshot, vertex.uv)),
+        plain => plain.color().map_or(Vec3::ONE, |color| color.eval(snapshot, vertex.texture_point)),
     }
 }
 

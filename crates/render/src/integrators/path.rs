@@ -233,8 +233,7 @@ impl PathWave {
         {
             let with_light_paths = caustics.and_then(|pass| pass.camera_weight(&path.track, path.media, &hit, &vertex));
             let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
-            let weight = emission.scale * weight;
-            radiance[path.slot as usize] += path.throughput * weight * emission.radiance.eval(scene, vertex.uv);
+            radiance[path.slot as usize] += path.throughput * weight * vertex.emitted(scene, &emission);
         }
         if depth == settings.max_depth {
             return;
@@ -252,7 +251,9 @@ impl PathWave {
         };
         let mut sides = (scene.tables.features.glass)
             .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
-        if let Material::Blend { .. } | Material::Phong { .. } = &scene.shading.materials[material as usize] {
+        if let Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } =
+            &scene.shading.materials[material as usize]
+        {
             if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
                 self.scatter_told(step, &blend);
             }

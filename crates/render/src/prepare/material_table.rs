@@ -2,6 +2,7 @@
 
 use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, MaterialKind, SMALLEST_ALPHA, ScalarInput};
 use crate::core::snapshot::Geometry;
+use crate::core::texture::Texture;
 use crate::prepare::arrays::push;
 use firstlight_simd::padded;
 use glam::Vec3;
@@ -48,10 +49,11 @@ pub(crate) const SEVERAL: MaterialId = MaterialId::MAX;
 pub(crate) const COATED: usize = MaterialKind::N;
 
 impl MaterialTable {
-    pub fn build(geometry: &Geometry, materials: &[Material]) -> Self {
+    pub fn build(geometry: &Geometry, materials: &[Material], textures: &[Texture]) -> Self {
+        let asks_for_more = |id: MaterialId| materials[id as usize].asks_for_more_than_uv(materials, textures);
         let mut table = Self::default();
         let mut parts_of_classics = Vec::new();
-        for material in materials {
+        for (id, material) in (0..).zip(materials) {
             table.add(material, materials);
             let mut parts = [(0, 0.0); 2];
             match material {
@@ -75,7 +77,12 @@ impl MaterialTable {
                 }
                 _ => {}
             }
-            let kind = if parts[0].1 > 0.0 { COATED } else { material.kind() as usize };
+            let kind = match material.kind() {
+                // Lanes know one pair of surface coordinates: what asks for more is shaded as blends of many parts are.
+                kind if kind != MaterialKind::Emissive && asks_for_more(id) => MaterialKind::Blend as usize,
+                _ if parts[0].1 > 0.0 => COATED,
+                kind => kind as usize,
+            };
             table.kinds.of_material.push(kind as u32);
             table.kinds.present |= 1 << kind;
             for (k, (row, weight)) in parts.into_iter().enumerate() {

@@ -177,7 +177,7 @@ impl Tables {
             bodies,
             contacts,
             environment_sampler,
-            materials: MaterialTable::build(geometry, materials),
+            materials: MaterialTable::build(geometry, materials, textures),
             classic: ClassicTable::build(materials),
             casters,
             features,

@@ -1,6 +1,7 @@
 //! From a hit to everything that shading needs to know of the place.
 
-use crate::core::material::{ColorInput, MAX_LOBES, Material, MaterialId, ScalarInput};
+use crate::core::material::{ColorInput, Emission, MAX_LOBES, Material, MaterialId, ScalarInput};
+use crate::core::texture::TexturePoint;
 use crate::prepare::bodies::Boundary;
 use crate::prepare::light::shape::sphere_uv;
 use crate::prepare::prepared::Prepared;
@@ -12,7 +13,8 @@ use crate::shading::rough_glass;
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
 use firstlight_kdtree::{Hit, Shape};
 use firstlight_simd::{Real, Vector3, three};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
+use std::ops::{Add, Mul};
 
 /// A point on a surface, seen along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +28,8 @@ pub(crate) struct Vertex {
     pub normal: Vec3,
     /// The same whoever looks from this side, even where it faces away.
     pub smooth_normal: Vec3,
-    /// Surface coordinates, see [`crate::core::texture::Texture`]; on spheres only for materials that ask for them.
-    pub uv: Vec2,
+    /// What textures ask for; on spheres only for materials that look something up.
+    pub texture_point: TexturePoint,
     /// Whether the ray met the front: the outside of a closed surface.
     pub front: bool,
     /// Unit, back along the ray.
@@ -49,6 +51,8 @@ impl Vertex {
         let geometric_normal = side * point.geometric_normal;
         let mut smooth_normal = geometric_normal;
         let mut uv = Vec2::new(hit.u, hit.v);
+        let mut uv2 = None;
+        let mut color = Vec4::ONE;
         let mut lift = Vec3::ZERO;
         match &geometry.tree.shapes()[hit.object as usize] {
             Shape::Mesh { world_from_object, .. } => {
@@ -72,7 +76,13 @@ impl Vertex {
                     lift = world_from_object.transform_vector3(lift_of(&corners, &normals, &weights.to_array()).into());
                 }
                 if !mesh.uvs.is_empty() {
-                    uv = weights.x * mesh.uvs[a] + weights.y * mesh.uvs[b] + weights.z * mesh.uvs[c];
+                    uv = interpolated(&mesh.uvs, [a, b, c], weights);
+                }
+                if !mesh.uvs2.is_empty() {
+                    uv2 = Some(interpolated(&mesh.uvs2, [a, b, c], weights));
+                }
+                if !mesh.colors.is_empty() {
+                    color = interpolated(&mesh.colors, [a, b, c], weights);
                 }
             }
             Shape::Plane { point: origin, normal } => {
@@ -97,8 +107,15 @@ impl Vertex {
         }
         let (position, error) = (point.position, point.error);
         let normal = geometric_normal;
-        let vertex = Self { position, error, geometric_normal, normal, smooth_normal, uv, front, wo, lift };
+        let texture_point = TexturePoint { uv: [uv, uv2.unwrap_or(uv)], color };
+        let vertex = Self { position, error, geometric_normal, normal, smooth_normal, texture_point, front, wo, lift };
         vertex.seen_along(wo)
+    }
+
+    /// What a surface of this emission sends out here, W·m⁻²·sr⁻¹. Colours of vertices do not tint light.
+    #[inline]
+    pub fn emitted(&self, scene: &Prepared, emission: &Emission) -> Vec3 {
+        emission.scale * emission.radiance.eval(scene, TexturePoint { color: Vec4::ONE, ..self.texture_point })
     }
 
     /// The same point as seen from elsewhere on the same side.
@@ -175,6 +192,16 @@ pub(crate) fn lift_of<R: Real>(corners: &[Vector3<R>; 3], normals: &[Vector3<R>;
     lifts[0] + lifts[1] + lifts[2]
 }
 
+/// An attribute of a mesh at a point of a triangle.
+#[inline]
+fn interpolated<T: Copy + Add<Output = T>>(attribute: &[T], corners: [usize; 3], weights: Vec3) -> T
+where
+    f32: Mul<T, Output = T>,
+{
+    let [a, b, c] = corners.map(|corner| attribute[corner]);
+    weights.x * a + weights.y * b + weights.z * c
+}
+
 /// The material of a hit.
 #[inline]
 pub(crate) fn material_of(scene: &Prepared, hit: &Hit) -> MaterialId {
@@ -183,20 +210,20 @@ pub(crate) fn material_of(scene: &Prepared, hit: &Hit) -> MaterialId {
 
 impl ColorInput {
     #[inline]
-    pub(crate) fn eval(self, scene: &Prepared, uv: Vec2) -> Vec3 {
+    pub(crate) fn eval(self, scene: &Prepared, point: impl Into<TexturePoint>) -> Vec3 {
         match self {
             Self::Constant(color) => color,
-            Self::Texture(id) => scene.shading.textures[id as usize].eval(uv),
+            Self::Texture(id) => scene.shading.textures[id as usize].eval(point),
         }
     }
 }
 
 impl ScalarInput {
     #[inline]
-    pub(crate) fn eval(self, scene: &Prepared, uv: Vec2) -> f32 {
+    pub(crate) fn eval(self, scene: &Prepared, point: impl Into<TexturePoint>) -> f32 {
         match self {
             Self::Constant(value) => value,
-            Self::Texture(id) => scene.shading.textures[id as usize].eval(uv).x,
+            Self::Texture(id) => scene.shading.textures[id as usize].eval(point).x,
         }
     }
 }
@@ -267,16 +294,16 @@ fn collect(
     *n_leaves += u32::from(material.is_clear());
     match material {
         Material::Blend { weight: share, a, b } => {
-            let share = share.eval(scene, vertex.uv).clamp(0.0, 1.0);
+            let share = share.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
             collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), push);
             collect(scene, *b, vertex, sides, n_leaves, weight * share, push);
         }
         _ if weight == 0.0 => {}
         Material::Phong { diffuse, specular, transparency, .. } => {
-            let specular = specular.eval(scene, vertex.uv).clamp(0.0, 1.0);
+            let specular = specular.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
             let opaque = weight * (1.0 - transparency);
             if opaque * (1.0 - specular) > 0.0 {
-                push(Lobe::Diffuse { albedo: diffuse.eval(scene, vertex.uv) }, opaque * (1.0 - specular));
+                push(Lobe::Diffuse { albedo: diffuse.eval(scene, vertex.texture_point) }, opaque * (1.0 - specular));
             }
             if opaque * specular > 0.0 {
                 push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
@@ -285,9 +312,28 @@ fn collect(
                 push(clear_lobe(scene, sides, leaf), weight * transparency);
             }
         }
+        Material::Principled { base_color, metallic, roughness, transmission, .. } => {
+            let [metallic, roughness, transmission] =
+                [metallic, roughness, transmission].map(|s| s.eval(scene, vertex.texture_point).clamp(0.0, 1.0));
+            let (color, alpha) = (base_color.eval(scene, vertex.texture_point), roughness * roughness);
+            let parts = [(1.0 - metallic) * (1.0 - transmission), (1.0 - metallic) * transmission, metallic];
+            if parts[0] > 0.0 {
+                push(Lobe::Diffuse { albedo: color }, weight * parts[0]);
+            }
+            if parts[1] > 0.0 {
+                push(rough_lobe(clear_lobe(scene, sides, leaf), alpha, true), weight * parts[1]);
+            }
+            if parts[2] > 0.0 {
+                let fresnel = crate::core::material::Fresnel::Schlick;
+                push(Lobe::Metal { alpha, reflectance: color, fresnel, compensate: true }, weight * parts[2]);
+            }
+        }
         Material::Glass { .. } => push(clear_lobe(scene, sides, leaf), weight),
         Material::RoughGlass { alpha, compensate, .. } => {
-            push(rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.uv), *compensate), weight);
+            push(
+                rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.texture_point), *compensate),
+                weight,
+            );
         }
         _ => {
             if let Some(lobe) = lobe_at(scene, id, vertex, None) {
@@ -332,7 +378,7 @@ pub(crate) fn lobe_at(
     vertex: &Vertex,
     mut sides: Option<&mut Sides>,
 ) -> Option<Lobe> {
-    let uv = vertex.uv;
+    let uv = vertex.texture_point;
     match &scene.shading.materials[id as usize] {
         Material::Diffuse { albedo } => Some(Lobe::Diffuse { albedo: albedo.eval(scene, uv) }),
         Material::Mirror { reflectance } => Some(Lobe::Mirror { reflectance: reflectance.eval(scene, uv) }),
@@ -346,7 +392,9 @@ pub(crate) fn lobe_at(
         Material::RoughGlass { alpha, compensate, .. } => {
             Some(rough_lobe(clear_lobe(scene, &mut sides, 0), alpha.eval(scene, uv), *compensate))
         }
-        Material::Emissive { .. } | Material::Phong { .. } | Material::Blend { .. } => None,
+        Material::Emissive { .. } | Material::Phong { .. } | Material::Principled { .. } | Material::Blend { .. } => {
+            None
+        }
     }
 }
 

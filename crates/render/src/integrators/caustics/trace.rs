@@ -276,8 +276,10 @@ fn surface_at(
     let scene = pass.scene;
     let material = material_of(scene, hit);
     let vertex = Vertex::new(scene, ray, hit, material);
-    let is_blend =
-        matches!(scene.shading.materials[material as usize], Material::Blend { .. } | Material::Phong { .. });
+    let is_blend = matches!(
+        scene.shading.materials[material as usize],
+        Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. }
+    );
     let glass = scene.tables.features.glass;
     let mut sides = glass.then(|| Sides::new(scene, sets, media, ray, hit, material, vertex.front));
     let surface = if is_blend {

@@ -57,7 +57,7 @@ impl Finish {
         n_leaves: &mut u32,
         weight: f32,
     ) {
-        let uv = vertex.uv;
+        let uv = vertex.texture_point;
         let material = &scene.shading.materials[id as usize];
         let leaf = *n_leaves;
         *n_leaves += u32::from(material.is_clear());
@@ -177,7 +177,7 @@ impl Passage {
         self.n_leaves += u32::from(material.is_clear());
         let share = match material {
             Material::Blend { weight: share, a, b } => {
-                let share = share.eval(scene, vertex.uv).clamp(0.0, 1.0);
+                let share = share.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
                 self.add(scene, *a, vertex, sides, weight * (1.0 - share));
                 self.add(scene, *b, vertex, sides, weight * share);
                 return;

@@ -193,7 +193,7 @@ impl PhongWave {
                     tables.lights.pdf_each(id, from, ray.dir, from.distance(vertex.position))
                 }),
             };
-            radiance[slot] += path.throughput * share * emission.scale * emission.radiance.eval(scene, vertex.uv);
+            radiance[slot] += path.throughput * share * vertex.emitted(scene, &emission);
         }
         if is_last {
             return;

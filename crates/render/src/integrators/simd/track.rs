@@ -99,8 +99,10 @@ impl<S: Simd> BounceMisStates<'_, S> {
                 let (vertex, wi) = (vertices.vertex(lane), Vec3::new(wi[0][lane], wi[1][lane], wi[2][lane]));
                 let material = at.materials[i];
                 pdfs[lane] = match at.scene.shading.materials[material as usize] {
-                    Material::Blend { .. } | Material::Phong { .. } => blend_at(at.scene, material, &vertex, None)
-                        .map_or(0.0, |blend| blend.eval(wi, vertex.wo, vertex.normal).1),
+                    Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } => {
+                        blend_at(at.scene, material, &vertex, None)
+                            .map_or(0.0, |blend| blend.eval(wi, vertex.wo, vertex.normal).1)
+                    }
                     _ => lobe_at(at.scene, material, &vertex, None)
                         .map_or(0.0, |lobe| lobe.eval(wi, vertex.wo, vertex.normal).1),
                 };

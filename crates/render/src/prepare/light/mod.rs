@@ -87,13 +87,19 @@ impl LightTable {
                                 let slot = mesh.slots.get(t).map_or(0, |&s| usize::from(s));
                                 let Some(emission) = emission.get(slot).copied().flatten() else { return u32::MAX };
                                 let triangle = mesh.triangles[t];
-                                let uv = |k: usize| match mesh.uvs.get(triangle[k] as usize) {
-                                    Some(uv) => *uv,
-                                    None => [Vec2::ZERO, Vec2::X, Vec2::Y][k],
+                                let uv = |k: usize, set: u8| {
+                                    let second = mesh.uvs2.get(triangle[k] as usize).filter(|_| set > 0);
+                                    match second.or(mesh.uvs.get(triangle[k] as usize)) {
+                                        Some(uv) => *uv,
+                                        None => [Vec2::ZERO, Vec2::X, Vec2::Y][k],
+                                    }
                                 };
-                                let is_textured = matches!(emission.radiance, ColorInput::Texture(_));
+                                let corner_uvs = match emission.radiance {
+                                    ColorInput::Constant(_) => None,
+                                    ColorInput::Texture(id) => Some(order.map(|k| uv(k, textures[id as usize].uv_set))),
+                                };
                                 let vertices = order.map(|k| corner(triangle[k]));
-                                push_with(emission, LightShape::triangle(vertices), is_textured.then(|| order.map(uv)))
+                                push_with(emission, LightShape::triangle(vertices), corner_uvs)
                             })
                             .collect();
                         if only.is_some() { ObjectLights::All(first) } else { ObjectLights::Some(ids) }

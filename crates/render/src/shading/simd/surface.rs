@@ -223,7 +223,8 @@ impl<S: Simd> SurfaceLanes<S> {
                 (arrays[0][lane], arrays[1][lane], arrays[2][lane]) = (value.x, value.y, value.z);
             }
             scalars[0][lane] = vertex.geometric_normal.abs().dot(vertex.error);
-            (scalars[1][lane], scalars[2][lane]) = (vertex.uv.x, vertex.uv.y);
+            let uv = vertex.texture_point.uv[0];
+            (scalars[1][lane], scalars[2][lane]) = (uv.x, uv.y);
             self.front |= Mask::from(vertex.front) << lane;
         }
         let [position, geometric_normal, normal, reach_normal, lifted] = &vectors;
@@ -282,7 +283,7 @@ impl StoredPlaces {
             geometric_normal: at(&self.geometric_normal),
             normal: at(&self.normal),
             smooth_normal: at(&self.normal),
-            uv: Vec2::new(self.uv[0][lane], self.uv[1][lane]),
+            texture_point: Vec2::new(self.uv[0][lane], self.uv[1][lane]).into(),
             front: self.front >> lane & 1 != 0,
             wo: at(&self.wo),
             lift: Vec3::ZERO,

@@ -27,7 +27,9 @@ pub(crate) fn looked_up<S: Simd>(
     let (mut color, mut rest) = (color, textured);
     if let ColorInput::Texture(id) = inputs[first as usize] {
         let texture = &scene.shading.textures[id as usize];
-        if let TexturePattern::Checker { a, b } = &texture.pattern {
+        if let TexturePattern::Checker { a, b } = &texture.pattern
+            && texture.is_plain()
+        {
             let even = is_even_square(texture.pattern_coordinates(place.uv));
             let alike = textured & row.equals(first);
             let found = select_vector(even, Vector::splat(s, *a), Vector::splat(s, *b));

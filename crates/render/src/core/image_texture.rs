@@ -1,0 +1,164 @@
+//! Pictures in memory, each in the depth of its file.
+
+use glam::{Vec3, Vec4};
+use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
+
+/// A picture, row by row from the top.
+#[derive(Debug, PartialEq)]
+pub struct ImageTexture {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// The pixels, `width · height` of them.
+    pub texels: Texels,
+}
+
+/// Pixels in the depth of their file; channels of a pixel stand side by side.
+#[derive(Debug, PartialEq)]
+pub enum Texels {
+    /// 8 bits a channel; 1 to 4 channels: grey, grey and alpha, RGB, RGBA.
+    U8 {
+        /// Channels of a pixel, 1..=4.
+        channels: usize,
+        /// All channels of all pixels.
+        data: Vec<u8>,
+    },
+    /// 16 bits a channel, channels likewise.
+    U16 {
+        /// Channels of a pixel, 1..=4.
+        channels: usize,
+        /// All channels of all pixels.
+        data: Vec<u16>,
+    },
+    /// Linear numbers, red, green and blue; alpha is 1.
+    F32(Vec<Vec3>),
+}
+
+/// What the numbers of a picture mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// Integers are sRGB, floating-point numbers are linear.
+    #[default]
+    Auto,
+    /// Integers are linear as well: for normals, roughness and other data. Alpha always is.
+    Linear,
+}
+
+impl ImageTexture {
+    /// From linear numbers, `width · height` of them.
+    pub fn from_linear(width: u32, height: u32, texels: Vec<Vec3>) -> Self {
+        Self { width, height, texels: Texels::F32(texels) }
+    }
+
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.texels.len()
+    }
+
+    /// Whether there is no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The linear colour of pixel `i`, counted row by row from the top.
+    #[inline]
+    pub fn linear(&self, i: usize) -> Vec3 {
+        self.texels.texel(i, Encoding::Auto).truncate()
+    }
+
+    /// Bytes in memory.
+    pub fn bytes(&self) -> usize {
+        match &self.texels {
+            Texels::U8 { data, .. } => data.len(),
+            Texels::U16 { data, .. } => 2 * data.len(),
+            Texels::F32(data) => size_of::<Vec3>() * data.len(),
+        }
+    }
+}
+
+impl Texels {
+    fn len(&self) -> usize {
+        match self {
+            Self::U8 { channels, data } => data.len() / channels,
+            Self::U16 { channels, data } => data.len() / channels,
+            Self::F32(data) => data.len(),
+        }
+    }
+
+    /// Pixel `i`, linear, with alpha.
+    #[inline]
+    pub fn texel(&self, i: usize, encoding: Encoding) -> Vec4 {
+        match self {
+            Self::U8 { channels, data } => {
+                let curve = match encoding {
+                    Encoding::Auto => srgb_bytes(),
+                    Encoding::Linear => linear_bytes(),
+                };
+                let pixel = &data[i * channels..][..*channels];
+                widened(pixel, |value| curve[usize::from(value)], |alpha| linear_bytes()[usize::from(alpha)])
+            }
+            Self::U16 { channels, data } => {
+                let share = |value: u16| f32::from(value) / 65535.0;
+                let pixel = &data[i * channels..][..*channels];
+                match encoding {
+                    Encoding::Auto => widened(pixel, |value| srgb_words()[usize::from(value)], share),
+                    Encoding::Linear => widened(pixel, share, share),
+                }
+            }
+            Self::F32(data) => data[i].extend(1.0),
+        }
+    }
+}
+
+/// Grey goes to all three colours; alpha is 1 where there is none.
+#[inline]
+fn widened<T: Copy>(pixel: &[T], color: impl Fn(T) -> f32, alpha: impl Fn(T) -> f32) -> Vec4 {
+    match *pixel {
+        [grey] => Vec3::splat(color(grey)).extend(1.0),
+        [grey, a] => Vec3::splat(color(grey)).extend(alpha(a)),
+        [r, g, b] => Vec4::new(color(r), color(g), color(b), 1.0),
+        [r, g, b, a] => Vec4::new(color(r), color(g), color(b), alpha(a)),
+        _ => unreachable!("pixels have 1 to 4 channels"),
+    }
+}
+
+fn srgb_bytes() -> &'static [f32; 256] {
+    static CURVE: OnceLock<[f32; 256]> = OnceLock::new();
+    CURVE.get_or_init(|| std::array::from_fn(|value| linear_from_srgb(value as f32 / 255.0)))
+}
+
+fn linear_bytes() -> &'static [f32; 256] {
+    static CURVE: OnceLock<[f32; 256]> = OnceLock::new();
+    CURVE.get_or_init(|| std::array::from_fn(|value| value as f32 / 255.0))
+}
+
+fn srgb_words() -> &'static [f32] {
+    static CURVE: OnceLock<Vec<f32>> = OnceLock::new();
+    CURVE.get_or_init(|| (0..=u16::MAX).map(|value| linear_from_srgb(f32::from(value) / 65535.0)).collect())
+}
+
+/// The sRGB transfer function backwards (IEC 61966-2-1).
+fn linear_from_srgb(encoded: f32) -> f32 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_become_linear_light_and_data_stay_as_they_are() {
+        let picture = ImageTexture { width: 1, height: 1, texels: Texels::U8 { channels: 2, data: vec![188, 51] } };
+        // Byte 188 is the usual stand-in for half the light.
+        assert!(picture.texels.texel(0, Encoding::Auto).abs_diff_eq(Vec4::new(0.5029, 0.5029, 0.5029, 0.2), 1e-3));
+        assert_eq!(picture.texels.texel(0, Encoding::Linear), Vec3::splat(188.0 / 255.0).extend(0.2));
+        let deep = Texels::U16 { channels: 4, data: vec![0, 188 * 257, u16::MAX, 13107] };
+        let texel = deep.texel(0, Encoding::Auto);
+        assert_eq!(texel, Vec4::new(0.0, picture.linear(0).x, 1.0, 0.2), "8 and 16 bits agree");
+        assert_eq!(deep.texel(0, Encoding::Linear).y, 188.0 / 255.0);
+        assert_eq!((picture.len(), picture.bytes()), (1, 2));
+    }
+}

@@ -1,0 +1,116 @@
+//! What the renderer asks of the materials of a snapshot: what lets light through, what is specular, what shines.
+
+use super::material::{ColorInput, Material, MaterialId, Param, SMALLEST_ALPHA, ScalarInput};
+use crate::core::texture::{Texture, TextureId};
+use glam::Vec3;
+
+impl Material {
+    /// Whether light can pass through the surface.
+    pub(crate) fn is_clear(&self) -> bool {
+        match self {
+            Self::Glass { .. } | Self::RoughGlass { .. } => true,
+            Self::Phong { transparency, .. } => *transparency > 0.0,
+            Self::Principled { transmission, thin_walled, .. } => !thin_walled && can_be_above_zero(transmission),
+            _ => false,
+        }
+    }
+
+    /// Whether it, or a part of it, lets light pass.
+    pub(crate) fn has_clear_part(&self, materials: &[Self]) -> bool {
+        match self {
+            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_clear_part(materials)),
+            _ => self.is_clear(),
+        }
+    }
+
+    /// Whether the inside of it takes light away.
+    pub(crate) fn absorbs(&self) -> bool {
+        match self {
+            Self::Glass { absorption, .. }
+            | Self::RoughGlass { absorption, .. }
+            | Self::Phong { absorption, .. }
+            | Self::Principled { absorption, .. } => self.is_clear() && *absorption != Vec3::ZERO,
+            _ => false,
+        }
+    }
+
+    /// Whether it, or a part of it, is specular everywhere: a mirror or glass.
+    pub(crate) fn is_specular(&self, materials: &[Self]) -> bool {
+        match self {
+            Self::Mirror { .. } | Self::Glass { .. } => true,
+            Self::Metal { alpha, .. } | Self::RoughGlass { alpha, .. } => {
+                matches!(alpha, ScalarInput::Constant(alpha) if *alpha < SMALLEST_ALPHA)
+            }
+            Self::Phong { specular, transparency, .. } => {
+                *transparency > 0.0 || !matches!(specular, ScalarInput::Constant(share) if *share <= 0.0)
+            }
+            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].is_specular(materials)),
+            Self::Principled { metallic, roughness, transmission, .. } => {
+                // What the base mirrors in the main; the faint reflection of a dielectric or a coat is left to camera paths.
+                let is_smooth = matches!(roughness, ScalarInput::Constant(r) if r * r < SMALLEST_ALPHA);
+                is_smooth && (can_be_above_zero(metallic) || can_be_above_zero(transmission))
+            }
+            Self::Diffuse { .. } | Self::Emissive { .. } => false,
+        }
+    }
+
+    /// Whether it, or a part of it, looks up a texture.
+    pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
+        self.any_texture(materials, &mut |_| true)
+    }
+
+    /// Whether a texture of it, or of a part of it, asks for more than the first surface coordinates.
+    pub(crate) fn asks_for_more_than_uv(&self, materials: &[Self], textures: &[Texture]) -> bool {
+        self.any_texture(materials, &mut |id| textures[id as usize].asks_for_more_than_uv())
+    }
+
+    fn any_texture(&self, materials: &[Self], is_so: &mut impl FnMut(TextureId) -> bool) -> bool {
+        self.params().into_iter().any(|(_, param)| match param {
+            Param::Reflectance(ColorInput::Texture(id))
+            | Param::Radiance(ColorInput::Texture(id))
+            | Param::Factor(ColorInput::Texture(id))
+            | Param::Map(ColorInput::Texture(id))
+            | Param::Share(ScalarInput::Texture(id)) => is_so(*id),
+            Param::Part(part) => materials[*part as usize].any_texture(materials, is_so),
+            _ => false,
+        })
+    }
+}
+
+/// Whether a parameter is more than 0 somewhere, as far as one can tell without looking it up.
+fn can_be_above_zero(scalar: &ScalarInput) -> bool {
+    !matches!(scalar, ScalarInput::Constant(value) if *value <= 0.0)
+}
+
+/// The light that a material adds itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance of the emissive material, W·m⁻²·sr⁻¹, before `scale`.
+    pub radiance: ColorInput,
+    /// Share of an emissive part in a blend.
+    pub scale: f32,
+    /// Whether the back shines as well.
+    pub two_sided: bool,
+}
+
+impl Emission {
+    /// The emission of a material, looked for in blends; `None` for one that does not shine.
+    pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
+        match &materials[id as usize] {
+            Material::Emissive { radiance: ColorInput::Constant(Vec3::ZERO) } => None,
+            Material::Emissive { radiance } => Some(Self { radiance: *radiance, scale: 1.0, two_sided: false }),
+            Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. } => None,
+            Material::Principled { emission, two_sided, .. } => {
+                Some(Self { radiance: *emission, scale: 1.0, two_sided: *two_sided })
+            }
+            Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
+                let part = |id, share: f32| {
+                    let emission = Self::of(materials, id)?;
+                    (share > 0.0).then_some(Self { scale: share * emission.scale, ..emission })
+                };
+                part(*a, 1.0 - weight).or_else(|| part(*b, *weight))
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Materials that the file of a mesh brings: what becomes of them without their pictures, and whether they are still as
+//! the file has them.
+
+use super::components::{ColorParam, InWorld, ScalarParam, SurfaceTexture};
+use super::file::{InFile, MaterialPart};
+use super::sources::TextureSource;
+use super::value::{ColorValue, ScalarValue};
+use crate::render::{MapParams, Material, Param};
+use bevy_ecs::prelude::Entity;
+use std::collections::HashMap;
+
+/// The material with a plain value for each texture that could not be had; a warning has told of it.
+///
+/// - `is_there`: whether there is a texture of this name.
+pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str) -> bool) -> MaterialPart {
+    let mut part = part.clone();
+    let plain = Material::<InFile>::principled(ColorValue::grey(0.5));
+    let is_layered = part.kind() == plain.kind();
+    let lost_color = |color: &ColorValue| matches!(color, ColorValue::Texture(name) if !is_there(name));
+    for (name, param) in part.params_mut() {
+        match param {
+            Param::Reflectance(color) | Param::Radiance(color) | Param::Factor(color) | Param::Map(color)
+                if lost_color(color) =>
+            {
+                *color = ColorValue::grey(0.5);
+                if is_layered {
+                    let usual = plain.params().into_iter().find(|(usual, _)| *usual == name);
+                    if let Some((
+                        _,
+                        Param::Reflectance(usual) | Param::Radiance(usual) | Param::Factor(usual) | Param::Map(usual),
+                    )) = usual
+                    {
+                        *color = usual.clone();
+                    }
+                }
+            }
+            Param::Share(scalar) if matches!(&*scalar, ScalarValue::Texture(name) if !is_there(name)) => {
+                let usual = plain.params().into_iter().find(|(usual, _)| is_layered && *usual == name);
+                *scalar = match usual {
+                    Some((_, Param::Share(usual))) => usual.clone(),
+                    _ => ScalarValue::Number(0.5),
+                };
+            }
+            _ => {}
+        }
+    }
+    part
+}
+
+/// A material of the world by the names of its textures, where these are as the file of the mesh has them.
+pub(super) struct ByTextureName<'a>(pub &'a HashMap<&'a str, &'a TextureSource>);
+
+impl ByTextureName<'_> {
+    /// No texture has an empty name.
+    fn name(&self, texture: &SurfaceTexture) -> String {
+        let is_same = self.0.get(texture.name.as_str()).is_some_and(|source| **source == texture.part);
+        if is_same { texture.name.clone() } else { String::new() }
+    }
+}
+
+impl MapParams<InWorld, InFile> for ByTextureName<'_> {
+    fn color(&mut self, color: &ColorParam) -> ColorValue {
+        match color {
+            ColorParam::Rgb(rgb) => ColorValue::Rgb(*rgb),
+            ColorParam::Texture(texture) => ColorValue::Texture(self.name(texture)),
+        }
+    }
+
+    fn scalar(&mut self, scalar: &ScalarParam) -> ScalarValue {
+        match scalar {
+            ScalarParam::Number(value) => ScalarValue::Number(*value),
+            ScalarParam::Texture(texture) => ScalarValue::Texture(self.name(texture)),
+        }
+    }
+
+    /// Files of meshes have no blends.
+    fn material(&mut self, _: &Entity) -> String {
+        String::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lost_textures_leave_a_surface_that_looks_usual() {
+        let texture = || ColorValue::Texture("lost".to_owned());
+        let Material::Principled { base_color, .. } = Material::<InFile>::principled(texture()) else { unreachable!() };
+        let mut part = Material::<InFile>::principled(base_color);
+        if let Material::Principled { normal_map, opacity, emission, metallic, .. } = &mut part {
+            (*normal_map, *emission) = (texture(), texture());
+            *opacity = ScalarValue::Texture("lost".to_owned());
+            *metallic = ScalarValue::Texture("there".to_owned());
+        }
+        let mut expected = Material::<InFile>::principled(ColorValue::Rgb(glam::Vec3::splat(0.5)));
+        if let Material::Principled { metallic, .. } = &mut expected {
+            *metallic = ScalarValue::Texture("there".to_owned());
+        }
+        assert_eq!(without_lost_textures(&part, |name| name == "there"), expected);
+        let lost = MaterialPart::Diffuse { albedo: texture() };
+        assert_eq!(without_lost_textures(&lost, |_| false), MaterialPart::Diffuse { albedo: ColorValue::grey(0.5) });
+    }
+}
