@@ -8,8 +8,8 @@ use super::error::{GltfError, GltfProblem, Located, place};
 use super::json::{BufferView, Root};
 use super::meshopt;
 use super::uri::{Uri, resolve};
-use crate::scene::Limits;
 use crate::scene::input_file::{FileKind, InputFile};
+use crate::scene::limits::Limits;
 use crate::scene::relative::path_to_text;
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -138,7 +138,7 @@ impl Document {
         &self.files
     }
 
-    pub(super) fn error(&self, located: Located) -> GltfError {
+    pub(in crate::scene) fn error(&self, located: Located) -> GltfError {
         GltfError::at(&self.path, located)
     }
 

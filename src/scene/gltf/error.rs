@@ -1,8 +1,9 @@
 //! Why a glTF file could not be opened: which file, which part of it, what was expected.
 
+use crate::mesh::MeshError;
 use crate::printable::name;
 use crate::scene::input_file::ReadError;
-use crate::scene::model::ModelProblem;
+use crate::scene::limits::Limits;
 use std::path::{Path, PathBuf};
 
 /// Why a glTF file could not be opened.
@@ -25,7 +26,7 @@ impl GltfError {
 }
 
 /// A part of the file, and what is wrong there.
-pub(super) type Located = (String, GltfProblem);
+pub(in crate::scene) type Located = (String, GltfProblem);
 
 /// `list[index]`.
 pub(super) fn place(list: &str, index: impl std::fmt::Display) -> String {
@@ -87,7 +88,7 @@ pub enum GltfProblem {
         count: u64,
     },
     /// The file asks for more memory than models may.
-    #[error("its meshes have more than {limit} vertices and indices together: {}", crate::scene::Limits::advice())]
+    #[error("its meshes have more than {limit} vertices and indices together: {}", Limits::advice())]
     TooLarge {
         /// The most that is read.
         limit: u64,
@@ -182,7 +183,7 @@ pub enum GltfProblem {
     },
     /// The triangles are no mesh.
     #[error(transparent)]
-    Model(#[from] Box<ModelProblem>),
+    Mesh(#[from] MeshError),
 }
 
 fn known(names: &[String]) -> String {

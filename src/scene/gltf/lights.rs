@@ -10,7 +10,7 @@ use serde_json::Value;
 const NAME: &str = "KHR_lights_punctual";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum LightKind {
+pub(in crate::scene) enum LightKind {
     Point,
     /// Angles from the axis, radians.
     Spot { inner: f64, outer: f64 },
@@ -18,7 +18,7 @@ pub(super) enum LightKind {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct GltfLight {
+pub(in crate::scene) struct GltfLight {
     pub name: Option<String>,
     pub kind: LightKind,
     /// Colour times intensity: W·sr⁻¹, of directional lights W·m⁻².

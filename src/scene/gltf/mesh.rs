@@ -1,17 +1,18 @@
 //! From the triangles of a file to a checked [`Mesh`], with tangents where a material needs them.
 
 use super::animation::Pose;
+use super::assembly::{MeshKey, Posed};
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};
 use super::nodes::Tree;
 use super::primitives::{Deformation, SlotKey, Triangles};
 use crate::mesh::Mesh;
-use crate::scene::model::{ModelNormals, ModelProblem};
+use crate::scene::model::imported::ModelNormals;
 use glam::Vec4;
 
 /// A mesh of a file.
 #[derive(Debug)]
-pub(super) struct BuiltMesh {
+pub(in crate::scene) struct BuiltMesh {
     pub mesh: Mesh,
     /// One a slot.
     pub keys: Vec<SlotKey>,
@@ -20,6 +21,19 @@ pub(super) struct BuiltMesh {
 }
 
 impl Document {
+    /// The mesh of this key, posed.
+    ///
+    /// # Errors
+    /// As [`Self::built_mesh`].
+    pub(in crate::scene) fn mesh_of(
+        &self,
+        key: MeshKey,
+        posed: &Posed,
+        normals: &ModelNormals,
+    ) -> Result<BuiltMesh, Located> {
+        self.built_mesh(key.mesh, key.node.map(|node| (node, &posed.tree, &posed.pose)), normals)
+    }
+
     /// The mesh `index`, as the node has it that is posed: with its weights and its skin. Without a node, with the
     /// weights of the mesh.
     ///
@@ -55,7 +69,7 @@ impl Document {
             })
             .collect();
         let from_file = needs.iter().zip(&has_tangents).all(|(needs, has)| !needs || *has);
-        let wrong = |error: crate::mesh::MeshError| here(GltfProblem::Model(Box::new(ModelProblem::Mesh(error))));
+        let wrong = |error: crate::mesh::MeshError| here(GltfProblem::Mesh(error));
         let list = std::mem::take(&mut triangles.triangles);
         let mut mesh = Mesh::from_f64(&triangles.positions, list).map_err(wrong)?;
         mesh.uvs = triangles.uvs;
@@ -70,7 +84,6 @@ impl Document {
             }
             ModelNormals::Ignore => {}
         }
-        let _ = (&triangles.tangents, from_file);
         if needs.contains(&true) && *normals != ModelNormals::Ignore && !mesh.normals.is_empty() {
             let own = matches!(normals, ModelNormals::FileOrComputed { .. }) && from_file;
             if own && triangles.tangents.len() == mesh.positions.len() {

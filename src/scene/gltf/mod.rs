@@ -8,10 +8,14 @@
 
 mod accessor;
 mod animation;
+mod assembly;
+pub(in crate::scene) mod baked;
 mod cameras;
 mod container;
 mod document;
-mod error;
+pub(in crate::scene) mod error;
+mod facts;
+pub(in crate::scene) mod images;
 mod instancing;
 mod json;
 mod lights;
@@ -22,8 +26,16 @@ mod names;
 mod nodes;
 mod primitives;
 mod skin;
+mod surfaces;
 mod uri;
 
 pub use cameras::{GltfCamera, Lens};
 pub use document::{Document, ReadOptions};
 pub use error::{GltfError, GltfProblem};
+pub use facts::GltfFacts;
+
+pub(in crate::scene) use assembly::{Assembly, MeshKey, PlacedLight, Posed};
+pub(in crate::scene) use error::Located;
+pub(in crate::scene) use lights::LightKind;
+pub(in crate::scene) use mesh::BuiltMesh;
+pub(in crate::scene) use surfaces::Surfaces;

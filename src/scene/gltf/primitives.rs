@@ -23,7 +23,7 @@ pub(super) struct Deformation<'a> {
 
 /// What tells one slot from another: its material, and its materials by variant.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct SlotKey {
+pub(in crate::scene) struct SlotKey {
     /// The default material where there is none.
     pub material: Option<u32>,
     /// Material by number of the variant.
@@ -294,7 +294,8 @@ impl Document {
     }
 }
 
-fn variants_of(primitive: &json::Primitive) -> BTreeMap<u32, u32> {
+/// Material by number of the variant.
+pub(super) fn variants_of(primitive: &json::Primitive) -> BTreeMap<u32, u32> {
     let mut variants = BTreeMap::new();
     let mappings = primitive.extensions.get("KHR_materials_variants").and_then(|extension| extension.get("mappings"));
     for mapping in mappings.and_then(serde_json::Value::as_array).into_iter().flatten() {
