@@ -363,12 +363,19 @@ mod tests {
                 let at = Vec3::new(8.0 * a.x - 4.0, 3.0 * a.y, 8.0 * b.x - 4.0);
                 let (size, turn) = (0.02 + 0.3 * b.y * b.y, 6.3 * c.x);
                 let (u, v) = (Vec3::new(turn.cos(), 0.2, turn.sin()) * size, Vec3::new(0.0, size, size * c.y));
-                let shape = match i % 3 {
-                    0 => LightShape::Sphere { center: at, radius: size },
-                    1 => LightShape::quad(at, u, v),
-                    _ => LightShape::triangle([at, at + u, at + v]),
-                };
                 let radiance = 0.1 + 20.0 * c.y.powi(4);
+                let shape = match i % 7 {
+                    0 => LightShape::Sphere { center: at, radius: size },
+                    1 | 5 => LightShape::quad(at, u, v),
+                    2 => LightShape::triangle([at, at + u, at + v]),
+                    3 => LightShape::Point { position: at, cone: None },
+                    4 => {
+                        let outer = 0.1 + 1.4 * f64::from(a.y);
+                        let cone = crate::core::delta_light::Cone::new(u.normalize(), outer * f64::from(b.x), outer);
+                        LightShape::Point { position: at, cone: Some(cone) }
+                    }
+                    _ => LightShape::Directional { to_light: (u + v).normalize(), reach: 8.0 },
+                };
                 let emission =
                     Emission { radiance: ColorInput::Constant(Vec3::splat(radiance)), scale: 1.0, two_sided: false };
                 Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corner_uvs: None }
