@@ -1,7 +1,8 @@
-//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file says them.
+//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file says
+//! them.
 //!
-//! What the file lacks is added as around any other model ([`super::default_scene`]): a sky and a key light where it has no
-//! light at all, a camera where it has none, and a ground where it has neither.
+//! What the file lacks is added as around any other model ([`super::default_scene`]): a sky and a key light where it
+//! has no light at all, a camera where it has none, and a ground where it has neither.
 
 use super::choice::ModelChoice;
 use super::default_scene;
@@ -13,6 +14,7 @@ use super::own_materials::texture_names;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 use super::value::Rgb;
 use glam::{DAffine3, DVec3, Vec3};
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
@@ -75,7 +77,7 @@ impl Maker<'_> {
         let mut built: HashMap<_, Option<Arc<BuiltMesh>>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
             let at = placed.key.node.and(choice.at);
-            if !built.contains_key(&placed.key) {
+            if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let mesh = match self.documents.mesh(self.opened, placed.key, at) {
                     Ok(mesh) => {
                         warnings.extend(mesh.warnings.iter().map(|warning| self.told(warning)));
@@ -87,7 +89,7 @@ impl Maker<'_> {
                     }
                     Err(located) => return Err(self.wrong(located)),
                 };
-                built.insert(placed.key, mesh);
+                entry.insert(mesh);
             }
             let Some(Some(mesh)) = built.get(&placed.key) else { continue };
             let name = placed.name.clone().unwrap_or_else(|| format!("mesh {}", i + 1));
@@ -140,9 +142,9 @@ impl Maker<'_> {
         let chosen = self.chosen(&cameras)?;
         let has_light = !assembly.lights.is_empty() || emits;
         let mut file = SceneFile {
-            camera: chosen.cloned().unwrap_or_else(|| {
-                default_scene::camera(bounds.0, bounds.1, DVec3::ONE, self.wish.aspect)
-            }),
+            camera: chosen
+                .cloned()
+                .unwrap_or_else(|| default_scene::camera(bounds.0, bounds.1, DVec3::ONE, self.wish.aspect)),
             cameras: Named(if cameras.len() > 1 { cameras.clone() } else { Vec::new() }),
             film: FilmPart::default(),
             integrator: crate::render::Integrator::default(),
@@ -216,12 +218,7 @@ impl Maker<'_> {
         }
     }
 
-    fn cameras(
-        &self,
-        assembly: &Assembly,
-        center: DVec3,
-        warnings: &mut Vec<String>,
-    ) -> Vec<(String, CameraPart)> {
+    fn cameras(&self, assembly: &Assembly, center: DVec3, warnings: &mut Vec<String>) -> Vec<(String, CameraPart)> {
         assembly.cameras.iter().map(|camera| (camera.name.clone(), self.camera(camera, center, warnings))).collect()
     }
 
@@ -318,10 +315,7 @@ fn extend(bounds: &mut (DVec3, DVec3), mesh: &BuiltMesh, world: &DAffine3) {
 }
 
 /// Those that the materials name, in their order.
-fn textures_of(
-    materials: &Named<super::file::MaterialPart>,
-    all: &[(String, TextureSource)],
-) -> Named<TextureSource> {
+fn textures_of(materials: &Named<super::file::MaterialPart>, all: &[(String, TextureSource)]) -> Named<TextureSource> {
     let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
     Named(all.iter().filter(|(name, _)| names.contains(name)).cloned().collect())
 }

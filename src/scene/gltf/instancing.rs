@@ -8,12 +8,14 @@ use serde_json::Value;
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
 impl Document {
-    /// From the coordinates of the mesh to those of the node, once for each copy; the mesh itself without the extension.
+    /// From the coordinates of the mesh to those of the node, once for each copy; the mesh itself without the
+    /// extension.
     pub(super) fn instances(&self, node: u32) -> Result<Vec<DAffine3>, Located> {
         let json = self.node(node)?;
         let Some(extension) = json.extensions.get(NAME) else { return Ok(vec![DAffine3::IDENTITY]) };
         let accessor = |name: &str| {
-            let number = extension.get("attributes").and_then(|attributes| attributes.get(name)).and_then(Value::as_u64);
+            let number =
+                extension.get("attributes").and_then(|attributes| attributes.get(name)).and_then(Value::as_u64);
             number.map(|number| u32::try_from(number).unwrap_or(u32::MAX))
         };
         let [moves, turns, scales] = ["TRANSLATION", "ROTATION", "SCALE"].map(accessor);

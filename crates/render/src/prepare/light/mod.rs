@@ -27,6 +27,7 @@ use crate::prepare::light::shape::{LightShape, sphere_as_point};
 use crate::sampling::Sampler;
 use firstlight_kdtree::Shape;
 use glam::{Vec2, Vec3};
+use std::cell::OnceCell;
 
 /// How many sample dimensions [`LightTable::sample_each`] uses.
 pub(crate) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
@@ -60,6 +61,9 @@ impl LightTable {
         delta_lights: &[DeltaLight],
     ) -> Self {
         let mut lights = Vec::new();
+        // A picture is gone through once, however many triangles show it.
+        let means: Vec<OnceCell<f32>> = textures.iter().map(|_| OnceCell::new()).collect();
+        let mean_of = |id: u32| *means[id as usize].get_or_init(|| luminance(textures[id as usize].mean()));
         let by_object = geometry
             .objects
             .iter()
@@ -73,7 +77,7 @@ impl LightTable {
                     emission.scale
                         * match emission.radiance {
                             ColorInput::Constant(radiance) => luminance(radiance),
-                            ColorInput::Texture(id) => luminance(textures[id as usize].mean()),
+                            ColorInput::Texture(id) => mean_of(id),
                         }
                 };
                 let first = lights.len() as u32;
