@@ -225,7 +225,7 @@ impl LightItem {
                 (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
             }
             LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
-            // Of the rays that leave the axis by 90° at most, those near it are the brightest: as those of a flat light.
+            // Its rays leave the axis by 90° at most, and those near it are the brightest: as those of a flat light.
             LightShape::Point { position, cone: Some(spot) } => {
                 (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
             }
