@@ -483,6 +483,7 @@ impl<P: Params> Material<P> {
     pub fn n_lobes(&self) -> usize {
         match self {
             Self::Phong { .. } => 3,
+            Self::Principled { .. } => 2,
             _ => 1,
         }
     }

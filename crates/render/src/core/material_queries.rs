@@ -54,6 +54,34 @@ impl Material {
         }
     }
 
+    /// Whether it spreads light that passes, and so asks for light on both sides.
+    pub(crate) fn scatters_through(&self) -> bool {
+        match self {
+            Self::RoughGlass { .. } => true,
+            Self::Principled { transmission, .. } => can_be_above_zero(transmission),
+            _ => false,
+        }
+    }
+
+    /// Whether light that passes it takes one of several ways, so that only sampling finds it.
+    pub(crate) fn is_blended(&self) -> bool {
+        matches!(self, Self::Blend { .. } | Self::Principled { .. })
+    }
+
+    /// Whether it looks up normals or turns its highlights, and so asks for tangents.
+    pub(crate) fn asks_for_tangents(&self) -> bool {
+        let Self::Principled { normal_map, clearcoat_normal_map, anisotropy, .. } = self else { return false };
+        normal_map.is_normal_map() || clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
+    }
+
+    /// The same of it or of a part of it.
+    pub(crate) fn has_tangents(&self, materials: &[Self]) -> bool {
+        match self {
+            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_tangents(materials)),
+            _ => self.asks_for_tangents(),
+        }
+    }
+
     /// Whether it, or a part of it, looks up a texture.
     pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
         self.any_texture(materials, &mut |_| true)
@@ -74,6 +102,13 @@ impl Material {
             Param::Part(part) => materials[*part as usize].any_texture(materials, is_so),
             _ => false,
         })
+    }
+}
+
+impl ColorInput {
+    /// Whether normals of this map differ from those of the surface.
+    pub(crate) fn is_normal_map(&self) -> bool {
+        !matches!(self, Self::Constant(color) if *color == Vec3::new(0.5, 0.5, 1.0))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::driver::renderer::mean_bounces;
 use crate::film::develop::encode_srgb;
 use crate::film::tiles::Film;
 use crate::prepare::prepared::Prepared;
-use crate::shading::surface::{Vertex, material_of};
+use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use glam::{UVec2, Vec2, Vec3};

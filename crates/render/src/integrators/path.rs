@@ -20,7 +20,6 @@ use crate::integrators::simd::{emitters, misses, shade};
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
-use crate::shading::bsdf::Scatter;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension};
 use crate::shading::guided::Guided;
 use crate::shading::interface::MediumId;
@@ -28,7 +27,11 @@ use crate::shading::lights::{choose_light_point, emitter_weight, environment_lig
 use crate::shading::medium::MediumSets;
 use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch, ShadowBatch};
-use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at};
+use crate::shading::principled::at::principled_at;
+use crate::shading::scatter::Scatter;
+use crate::shading::sides::Sides;
+use crate::shading::surface::{blend_at, lobe_at};
+use crate::shading::vertex::Vertex;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::Vec3;
@@ -251,9 +254,12 @@ impl PathWave {
         };
         let mut sides = (scene.tables.features.glass)
             .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
-        if let Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } =
-            &scene.shading.materials[material as usize]
-        {
+        let of_vertex = &scene.shading.materials[material as usize];
+        if let Material::Principled { .. } = of_vertex {
+            if let Some(layers) = principled_at(scene, material, &vertex, &mut sides.as_mut(), 0, true) {
+                self.scatter_told(step, &layers);
+            }
+        } else if let Material::Blend { .. } | Material::Phong { .. } = of_vertex {
             if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
                 self.scatter_told(step, &blend);
             }
@@ -341,7 +347,7 @@ impl PathWave {
                 wi: sample.wi,
                 pdf: sample.pdf,
                 through: sample.through,
-                blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+                blended: scene.shading.materials[material as usize].is_blended(),
                 before: step.path.media,
                 after: path.media,
             };

@@ -108,7 +108,7 @@ impl MaterialTable {
             parts: table.parts.map(padded),
             weights: table.weights.map(padded),
             textured_emission: materials.iter().any(is_textured_emitter),
-            two_sided: materials.iter().any(|material| matches!(material, Material::RoughGlass { .. })),
+            two_sided: materials.iter().any(Material::scatters_through),
             of_object: padded(of_object),
         }
     }

@@ -43,6 +43,8 @@ pub(crate) struct Tables {
     pub(crate) ambient: AmbientLight,
     /// Whether each material looks up a texture, and so needs surface coordinates.
     pub(crate) textured: Vec<bool>,
+    /// Whether each material asks for tangents.
+    pub(crate) with_tangents: Vec<bool>,
     /// What each material adds itself.
     pub(crate) emission: Vec<Option<Emission>>,
     pub(crate) lights: LightTable,
@@ -171,6 +173,7 @@ impl Tables {
         Self {
             ambient: AmbientLight::of(environment),
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
+            with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: radiance_bound(environment, &emission, materials),
             emission,
             lights,

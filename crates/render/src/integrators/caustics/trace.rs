@@ -19,13 +19,17 @@ use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
 use crate::prepare::guide::Trace;
 use crate::sampling::{Sampler, hash_u32};
-use crate::shading::bsdf::{Blend, BsdfSample, Lobe, Scatter};
+use crate::shading::blend::Blend;
+use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
 use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch};
-use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at, material_of};
+use crate::shading::scatter::{BsdfSample, Scatter};
+use crate::shading::sides::Sides;
+use crate::shading::surface::{blend_at, lobe_at};
+use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::{Vec2, Vec3};
@@ -398,7 +402,7 @@ impl LightPathStep<'_> {
             wi: sample.wi,
             pdf: sample.pdf,
             through: sample.through,
-            blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+            blended: scene.shading.materials[material as usize].is_blended(),
             before,
             after: path.media,
         };

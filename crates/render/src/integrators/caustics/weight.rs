@@ -21,7 +21,7 @@ use crate::prepare::casters::NO_CASTER;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lights::power_weight;
 use crate::shading::mis_state::MisState;
-use crate::shading::surface::Vertex;
+use crate::shading::vertex::Vertex;
 use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;

@@ -3,7 +3,7 @@
 use crate::core::material::{MaterialId, MaterialKind};
 use crate::prepare::material_table::{Kinds, SEVERAL};
 use crate::prepare::prepared::Prepared;
-use crate::shading::surface::material_of;
+use crate::shading::vertex::material_of;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 
