@@ -54,6 +54,20 @@ impl Material {
         }
     }
 
+    /// Whether rays may pass its surfaces as if they were not there.
+    pub(crate) fn is_cutout(&self) -> bool {
+        match self {
+            Self::Principled { two_sided, opacity, opacity_cutoff, .. } => {
+                let is_whole = match opacity {
+                    ScalarInput::Constant(opacity) => *opacity >= opacity_cutoff.unwrap_or(1.0),
+                    ScalarInput::Texture(_) => false,
+                };
+                !is_whole || (!two_sided && !self.is_clear())
+            }
+            _ => false,
+        }
+    }
+
     /// Whether it spreads light that passes, and so asks for light on both sides.
     pub(crate) fn scatters_through(&self) -> bool {
         match self {
@@ -126,18 +140,27 @@ pub struct Emission {
     pub scale: f32,
     /// Whether the back shines as well.
     pub two_sided: bool,
+    /// Share of the surface that is there, and from which share on it is there as a whole.
+    pub opacity: (ScalarInput, Option<f32>),
 }
 
 impl Emission {
+    const WHOLE: (ScalarInput, Option<f32>) = (ScalarInput::Constant(1.0), None);
+
     /// The emission of a material, looked for in blends; `None` for one that does not shine.
     pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
         match &materials[id as usize] {
             Material::Emissive { radiance: ColorInput::Constant(Vec3::ZERO) } => None,
-            Material::Emissive { radiance } => Some(Self { radiance: *radiance, scale: 1.0, two_sided: false }),
-            Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. } => None,
-            Material::Principled { emission, two_sided, .. } => {
-                Some(Self { radiance: *emission, scale: 1.0, two_sided: *two_sided })
+            Material::Emissive { radiance } => {
+                Some(Self { radiance: *radiance, scale: 1.0, two_sided: false, opacity: Self::WHOLE })
             }
+            Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. } => None,
+            Material::Principled { emission, two_sided, opacity, opacity_cutoff, .. } => Some(Self {
+                radiance: *emission,
+                scale: 1.0,
+                two_sided: *two_sided,
+                opacity: (*opacity, *opacity_cutoff),
+            }),
             Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
                 let part = |id, share: f32| {
                     let emission = Self::of(materials, id)?;

@@ -226,7 +226,7 @@ fn hits_by_row<T: Send>(
             }
             rays.clear();
             (0..size.x).for_each(|x| rays.push(&middle_ray(snapshot, x, y, size)));
-            snapshot.geometry.tree.closest_hits(rays, RayClass::Coherent, hits);
+            snapshot.closest_hits(rays, RayClass::Coherent, hits);
             Some((0..rays.len()).map(|i| see(&rays.get(i), hits.get(i))).collect())
         })
         .collect();

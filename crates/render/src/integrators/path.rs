@@ -103,7 +103,6 @@ impl PathWave {
         start(&mut self.paths);
         self.paths.begin_in(self.camera);
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
-        let tree = &scene.geometry.tree;
         for depth in 1..=settings.max_depth {
             if self.paths.is_empty() {
                 break;
@@ -114,7 +113,7 @@ impl PathWave {
             self.depth = depth;
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
-            tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
             if let Some(record) = &mut self.record {
                 record.see_hits(&self.paths, &self.hits);
@@ -123,7 +122,7 @@ impl PathWave {
             if let Some(record) = &mut self.record {
                 record.see_shaded(&self.paths, radiance);
             }
-            self.shadows.settle(radiance, |rays, occluded| tree.any_hits(rays, class, occluded));
+            self.shadows.settle(radiance, |rays, occluded| scene.any_hits(rays, class, occluded));
             if let Some(record) = &mut self.record {
                 record.see_settled(scene, &self.shadows, radiance);
             }
@@ -232,10 +231,10 @@ impl PathWave {
         let material = self.sorted.materials[i];
         let vertex = Vertex::new(scene, &ray, &hit, material);
         if let Some(emission) = scene.tables.emission[material as usize]
-            && vertex.front
+            && (vertex.front || emission.two_sided)
         {
             let with_light_paths = caustics.and_then(|pass| pass.camera_weight(&path.track, path.media, &hit, &vertex));
-            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, &vertex));
             radiance[path.slot as usize] += path.throughput * weight * vertex.emitted(scene, &emission);
         }
         if depth == settings.max_depth {

@@ -43,6 +43,8 @@ pub(crate) struct Tables {
     pub(crate) ambient: AmbientLight,
     /// Whether each material looks up a texture, and so needs surface coordinates.
     pub(crate) textured: Vec<bool>,
+    /// Whether surfaces of each material may not be there, see [`Material::is_cutout`].
+    pub(crate) cutouts: Vec<bool>,
     /// Whether each material asks for tangents.
     pub(crate) with_tangents: Vec<bool>,
     /// What each material adds itself.
@@ -73,6 +75,8 @@ pub struct Features {
     pub environment: bool,
     /// Some material looks up a texture.
     pub textures: bool,
+    /// Some surfaces have holes or no back.
+    pub cutouts: bool,
     /// Something specular gathers the light of some emitter, so paths are traced from lights as well.
     pub caustics: bool,
 }
@@ -169,10 +173,12 @@ impl Tables {
             environment: !matches!(environment, Environment::Black),
             textures: materials.iter().any(|material| material.is_textured(materials)),
             caustics: casters.is_some(),
+            cutouts: materials.iter().any(Material::is_cutout),
         };
         Self {
             ambient: AmbientLight::of(environment),
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
+            cutouts: materials.iter().map(Material::is_cutout).collect(),
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: radiance_bound(environment, &emission, materials),
             emission,

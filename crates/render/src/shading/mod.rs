@@ -2,6 +2,7 @@
 
 pub(crate) mod blend;
 pub(crate) mod bsdf;
+pub(crate) mod cutouts;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
 pub(crate) mod ggx;

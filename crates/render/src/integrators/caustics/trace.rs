@@ -106,12 +106,11 @@ impl LightWave {
             }
             n_vertices += 1;
             counts.bounce += self.paths.len() as u64;
-            let tree = &pass.scene.geometry.tree;
-            tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             pass.scene.settle(&self.paths.rays, &mut self.hits);
             self.scatter(pass, n_vertices);
             let arrivals = &mut self.arrivals;
-            tree.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
+            pass.scene.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
             counts.shadow += arrivals.rays.len() as u64;
             for i in 0..arrivals.rays.len() {
                 if !arrivals.occluded[i] {
@@ -140,7 +139,7 @@ impl LightWave {
                 return None;
             }
             n_vertices += 1;
-            pass.scene.geometry.tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             pass.scene.settle(&self.paths.rays, &mut self.hits);
             self.next.start(self.paths.len(), pass.scene.tables.features.glass, false);
             for i in 0..self.paths.len() {

@@ -97,7 +97,7 @@ impl CausticPass<'_> {
         if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
             return None;
         }
-        let light = self.scene.tables.lights.light_of(hit.object, hit.prim)?;
+        let light = self.scene.tables.lights.light_of(hit.object, hit.prim, vertex.front)?;
         let cos = vertex.wo.dot(vertex.geometric_normal);
         let density = self.casters.density(&self.scene.tables.lights, light, track.caster, vertex.position, cos);
         Some(self.weight_against(track.ratio * density))

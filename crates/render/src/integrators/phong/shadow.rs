@@ -124,7 +124,7 @@ impl Shadows {
             let batch = &mut self.asked[k].batch;
             if !batch.rays.is_empty() {
                 n_rays += batch.rays.len() as u64;
-                batch.settle(radiance, |rays, occluded| scene.geometry.tree.any_hits(rays, class, occluded));
+                batch.settle(radiance, |rays, occluded| scene.any_hits(rays, class, occluded));
             }
         }
         n_rays
@@ -155,7 +155,7 @@ impl Shadows {
                 break;
             }
             n_rays += self.rays.len() as u64;
-            scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
+            scene.closest_hits(&self.rays, class, &mut self.hits);
             scene.settle(&self.rays, &mut self.hits);
             self.next_rays.clear();
             self.next_lights.clear();

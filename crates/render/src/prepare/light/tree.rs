@@ -352,9 +352,13 @@ mod tests {
                     _ => LightShape::triangle([at, at + u, at + v]),
                 };
                 let radiance = 0.1 + 20.0 * c.y.powi(4);
-                let emission =
-                    Emission { radiance: ColorInput::Constant(Vec3::splat(radiance)), scale: 1.0, two_sided: false };
-                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corner_uvs: None }
+                let emission = Emission {
+                    radiance: ColorInput::Constant(Vec3::splat(radiance)),
+                    scale: 1.0,
+                    two_sided: false,
+                    opacity: (crate::core::material::ScalarInput::Constant(1.0), None),
+                };
+                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corners: None }
             })
             .collect()
     }

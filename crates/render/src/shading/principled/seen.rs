@@ -161,7 +161,10 @@ impl<'a> Seen<'a> {
             }
             if of.sheen != Vec3::ZERO {
                 let half = (self.wo + local).normalize();
-                let sheen = sheen::value(self.wo.z, local.z, half.z, of.sheen_alpha);
+                // Narrow sheens would return more than all light at grazing angles: what is too much is left out both ways.
+                let most =
+                    [self.wo.z, local.z].map(|cos| sheen_albedo(cos, of.sheen_alpha)).into_iter().fold(1.0, f32::max);
+                let sheen = sheen::value(self.wo.z, local.z, half.z, of.sheen_alpha) / most;
                 value += of.sheen * (below_coat * sheen * local.z);
             }
         }

@@ -48,7 +48,7 @@ fn surfaces() -> Vec<(&'static str, Principled)> {
     let glass = Principled { dielectric: 0.4, diffuse: 0.4 * color, ..plain() };
     vec![
         ("dielectric", plain()),
-        ("smooth dielectric", Principled { alpha: [0.01; 2], ..plain() }),
+        ("glossy dielectric", Principled { alpha: [0.06; 2], ..plain() }),
         ("rough dielectric", Principled { alpha: [1.0; 2], ..plain() }),
         ("metal", metal.clone()),
         ("brushed metal", Principled { alpha: [0.6, 0.1], tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..metal.clone() }),
