@@ -1,6 +1,7 @@
 //! What the renderer asks of the materials of a snapshot: what lets light through, what is specular, what shines.
 
-use super::material::{ColorInput, Material, MaterialId, Param, SMALLEST_ALPHA, ScalarInput};
+use super::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use super::material_kind::Param;
 use crate::core::texture::{Texture, TextureId};
 use glam::Vec3;
 

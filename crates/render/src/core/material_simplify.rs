@@ -114,7 +114,8 @@ mod tests {
 
     fn set(material: &mut Material, name: &str, value: f32) {
         let mut params = material.params_mut().into_iter();
-        let Some((_, crate::core::material::Param::Share(scalar))) = params.find(|(found, _)| *found == name) else {
+        let Some((_, crate::core::material_kind::Param::Share(scalar))) = params.find(|(found, _)| *found == name)
+        else {
             panic!("no share is called {name}");
         };
         *scalar = ScalarInput::Constant(value);

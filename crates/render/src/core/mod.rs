@@ -9,7 +9,7 @@ pub(crate) mod image_texture;
 pub(crate) mod material;
 mod material_defaults;
 pub(crate) mod material_kind;
-mod material_queries;
+pub(crate) mod material_queries;
 mod material_simplify;
 pub(crate) mod settings;
 pub(crate) mod snapshot;

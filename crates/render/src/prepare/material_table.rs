@@ -1,6 +1,7 @@
 //! What shading looks up by material, as arrays that sixteen lanes read at once.
 
-use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, MaterialKind, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material_kind::MaterialKind;
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
 use crate::prepare::arrays::push;

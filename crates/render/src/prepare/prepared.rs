@@ -2,7 +2,8 @@
 
 use crate::core::camera::Camera;
 use crate::core::environment::{Environment, EnvironmentSampler};
-use crate::core::material::{Emission, Material};
+use crate::core::material::Material;
+use crate::core::material_queries::Emission;
 use crate::core::snapshot::{Geometry, Shading, Snapshot};
 use crate::prepare::ambient::AmbientLight;
 use crate::prepare::bodies::{Bodies, Boundary};

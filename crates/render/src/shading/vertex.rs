@@ -1,6 +1,7 @@
 //! From a hit to everything that shading needs to know of the place.
 
-use crate::core::material::{ColorInput, Emission, Material, MaterialId, ScalarInput};
+use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
+use crate::core::material_queries::Emission;
 use crate::core::texture::TexturePoint;
 use crate::prepare::light::shape::sphere_uv;
 use crate::prepare::prepared::Prepared;

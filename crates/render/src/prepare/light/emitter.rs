@@ -1,6 +1,7 @@
 //! One light, and what it sends from a point.
 
-use crate::core::material::{ColorInput, Emission, ScalarInput};
+use crate::core::material::{ColorInput, ScalarInput};
+use crate::core::material_queries::Emission;
 use crate::core::techniques::Techniques;
 use crate::core::texture::{Texture, TexturePoint};
 use crate::prepare::light::shape::{LightPoint, LightShape, sphere_uv};

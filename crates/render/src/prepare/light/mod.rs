@@ -13,7 +13,7 @@ pub(crate) mod shape;
 mod tree;
 mod tree_simd;
 
-use crate::core::material::Emission;
+use crate::core::material_queries::Emission;
 use crate::core::snapshot::Geometry;
 use crate::core::techniques::Techniques;
 use crate::core::texture::Texture;

@@ -1,7 +1,8 @@
 //! Which lights the primitives of an object are.
 
 use crate::core::color::luminance;
-use crate::core::material::{ColorInput, Emission, ScalarInput};
+use crate::core::material::{ColorInput, ScalarInput};
+use crate::core::material_queries::Emission;
 use crate::core::snapshot::Object;
 use crate::core::texture::{Texture, TexturePoint};
 use crate::prepare::light::emitter::Light;

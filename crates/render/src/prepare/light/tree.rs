@@ -331,7 +331,8 @@ fn partition(items: &mut [LightItem], is_below: impl Fn(&LightItem) -> bool) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::material::{ColorInput, Emission};
+    use crate::core::material::ColorInput;
+    use crate::core::material_queries::Emission;
     use crate::core::techniques::Techniques;
     use crate::prepare::light::tree_simd::LightTreeArrays;
     use crate::sampling::Sampler;
