@@ -106,17 +106,18 @@ fn sampled_directions_follow_their_pdf_and_carry_f_over_it() {
                 assert!((pdf - sample.pdf).abs() <= 2e-3 * pdf, "{name}, cos {cos}: {pdf} for {}", sample.pdf);
                 assert!((value / pdf - sample.weight).length() <= 4e-3 * sample.weight.length(), "{name}, cos {cos}");
             }
-            let mut expected: Vec<f64> = integrals(16, |wi| f64::from(surface.eval(wo, wi, Vec3::Z).1))
-                .into_iter()
-                .map(|share| share * f64::from(n))
-                .collect();
-            let found: f64 = expected.iter().sum();
-            assert!(found < 1.005 * f64::from(n), "{name}, cos {cos}: the pdf integrates to {}", found / f64::from(n));
-            expected.push((f64::from(n) - found).max(0.0));
             // A narrow lobe is not integrated well bin by bin.
             let is_narrow = surface.alpha[0].min(surface.alpha[1]) < 0.05
                 || (surface.coat > 0.0 && surface.coat_alpha < 0.05)
                 || cos < 0.1;
+            let mut expected: Vec<f64> =
+                integrals(if is_narrow { 48 } else { 16 }, |wi| f64::from(surface.eval(wo, wi, Vec3::Z).1))
+                    .into_iter()
+                    .map(|share| share * f64::from(n))
+                    .collect();
+            let found: f64 = expected.iter().sum();
+            assert!(found < 1.005 * f64::from(n), "{name}, cos {cos}: the pdf integrates to {}", found / f64::from(n));
+            expected.push((f64::from(n) - found).max(0.0));
             if is_narrow {
                 let mut of_rings = [vec![0.0; 5], vec![0.0; 5]];
                 for (sums, bins) in of_rings.iter_mut().zip([&counts, &expected]) {
@@ -165,7 +166,7 @@ fn a_white_base_returns_all_light_and_nothing_returns_more() {
                 assert!(found.max_element() <= 1.008, "{name}");
                 // The coat hides some of the reflection of what is below it, and grazing light of tables without end is hard.
                 let is_whole = !name.starts_with("coat") && !name.starts_with("sheen") && cos > 0.02;
-                let least = if is_whole { 0.994 } else { 0.93 };
+                let least = if is_whole { 0.994 } else { 0.9 };
                 assert!(found.min_element() >= least, "{name}");
             }
         }
