@@ -2,7 +2,7 @@
 //!
 //! All are tables of integrals over the visible microfacets, made at the first use.
 
-use crate::shading::ggx::{self, Bounce, single_scattering_albedo};
+use crate::shading::ggx::{mean_schlick, single_scattering_albedo};
 use crate::shading::sheen;
 use std::f32::consts::PI;
 use std::sync::OnceLock;
@@ -19,14 +19,9 @@ impl SchlickAlbedo {
     /// Seen under an angle; within 10⁻³ of the integral.
     #[inline]
     pub fn new(cos_theta: f32, alpha: f32) -> Self {
-        if alpha < ggx::TABLE_LEAST_ALPHA {
-            let grazing = (1.0 - cos_theta.clamp(0.0, 1.0)).powi(5);
-            return Self { facing: 1.0 - grazing, grazing };
-        }
-        static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-        let table = TABLE.get_or_init(|| ggx::table_of(Bounce::Schlick));
-        let grazing = ggx::looked_up(table, cos_theta, alpha);
-        Self { facing: single_scattering_albedo(cos_theta, alpha) - grazing, grazing }
+        let whole = single_scattering_albedo(cos_theta, alpha);
+        let grazing = whole * mean_schlick(cos_theta, alpha);
+        Self { facing: whole - grazing, grazing }
     }
 
     /// Mean over all directions, weighted by their cosine.
