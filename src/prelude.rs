@@ -4,8 +4,8 @@ pub use crate::embed::{Error, Flow, Image, RenderOptions, Scene};
 pub use crate::frame::{Command, Progress, Session, SessionOptions, Target};
 pub use crate::render::{Integrator, PixelFilter};
 pub use crate::scene::{
-    ColorParam, Lens, Material, MaterialSlots, Placement, PointLight, Projection, ScalarParam, SceneEnvironment, Shape,
-    SurfaceMaterial, View,
+    ColorParam, DirectionalLight, Lens, Material, MaterialSlots, Placement, PointLight, Projection, ScalarParam,
+    SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
 };
 pub use bevy_ecs::prelude::{Entity, Name, World};
 pub use glam::{DVec3, Vec3};

@@ -10,7 +10,7 @@ use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::render::{Environment, Film};
 use firstlight::scene::{
-    self, Extraction, FilmSize, Lens, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
+    self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
 };
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
@@ -93,7 +93,16 @@ impl Told<'_> {
         row("materials", counts(self.materials()));
         row("textures", shading.textures.len().to_string());
         let emitters = counted(self.emitters(), "emissive object", "emissive objects");
-        row("lights", format!("{emitters}, {}", counted(inputs.lights.len(), "point light", "point lights")));
+        let [points, spots, directional] = self.lights();
+        let mut lights = format!("{emitters}, {}", counted(points, "point light", "point lights"));
+        for (n, one, many) in
+            [(spots, "spot light", "spot lights"), (directional, "directional light", "directional lights")]
+        {
+            if n > 0 {
+                lights += &format!(", {}", counted(n, one, many));
+            }
+        }
+        row("lights", lights);
         row("environment", environment(&shading.environment));
         let lens = self.lens();
         row("camera", if lens.enabled { self.aperture() } else { "pinhole".to_owned() });
@@ -135,7 +144,9 @@ impl Told<'_> {
             "materials": self.materials(),
             "textures": shading.textures.len(),
             "emissive_objects": self.emitters(),
-            "point_lights": inputs.lights.len(),
+            "point_lights": self.lights()[0],
+            "spot_lights": self.lights()[1],
+            "directional_lights": self.lights()[2],
             "environment": environment(&shading.environment),
             "lens_radius": if lens.enabled { lens.radius } else { 0.0 },
             "width": film.width,
@@ -165,6 +176,19 @@ impl Told<'_> {
         let glowing: HashSet<_> = self.inputs.materials.iter().filter(emits).map(|material| material.entity).collect();
         let glows = |object: &&ObjectInput| object.slots.iter().any(|slot| glowing.contains(slot));
         self.inputs.objects.iter().filter(glows).count()
+    }
+
+    /// Point lights, spot lights, directional lights.
+    fn lights(&self) -> [usize; 3] {
+        let mut counts = [0; 3];
+        for light in &self.inputs.lights {
+            counts[match light.light {
+                LightKind::Point(_) => 0,
+                LightKind::Spot(_) => 1,
+                LightKind::Directional(_) => 2,
+            }] += 1;
+        }
+        counts
     }
 
     fn lens(&self) -> Lens {

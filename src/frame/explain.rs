@@ -127,7 +127,7 @@ impl SnapshotNames {
         let lights: BTreeMap<_, _> = inputs.lights.iter().map(|light| (light.entity, light)).collect();
         let name = |(i, entity): (usize, _)| match (objects.get(entity), lights.get(entity)) {
             (Some(object), _) => object.name.clone().unwrap_or_else(|| format!("{} {i}", object.shape.kind())),
-            (_, Some(light)) => light.name.clone().unwrap_or_else(|| format!("point light {i}")),
+            (_, Some(light)) => light.name.clone().unwrap_or_else(|| format!("{} {i}", light.light.name())),
             _ => format!("object {i}"),
         };
         Self { origin: extraction.origin, names: extraction.entities.iter().enumerate().map(name).collect() }

@@ -11,8 +11,8 @@ use super::rig::Rig;
 use super::selection::Selection;
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    DisplaySettings, Lens, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight, Projection, Rendering,
-    SceneEnvironment, Shape, SurfaceMaterial, View,
+    DirectionalLight, DisplaySettings, Lens, LightKind, MaterialSlots, MeshOrigin, Ordinal, Placement, PointLight,
+    Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View, WithLight,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{
@@ -31,7 +31,7 @@ struct EntityState {
     placement: Option<Placement>,
     slots: Option<MaterialSlots>,
     material: Option<SurfaceMaterial>,
-    light: Option<PointLight>,
+    light: Option<LightKind>,
     origin: Option<MeshOrigin>,
 }
 
@@ -229,6 +229,8 @@ type UndoParts = Or<(
     Changed<MaterialSlots>,
     Changed<SurfaceMaterial>,
     Changed<PointLight>,
+    Changed<SpotLight>,
+    Changed<DirectionalLight>,
     Changed<MeshOrigin>,
 )>;
 
@@ -241,7 +243,9 @@ pub fn notice(
     camera: Query<(), Or<(Changed<View>, Changed<Projection>, Changed<Lens>)>>,
     mut shapes: RemovedComponents<Shape>,
     mut materials: RemovedComponents<SurfaceMaterial>,
-    mut lights: RemovedComponents<PointLight>,
+    mut point_lights: RemovedComponents<PointLight>,
+    mut spot_lights: RemovedComponents<SpotLight>,
+    mut directional_lights: RemovedComponents<DirectionalLight>,
     mut names: RemovedComponents<Name>,
     environment: Option<Res<SceneEnvironment>>,
     rendering: Option<Res<Rendering>>,
@@ -249,7 +253,8 @@ pub fn notice(
     mut had_environment: Local<bool>,
     mut history: ResMut<History>,
 ) {
-    let removed = shapes.read().count() + materials.read().count() + lights.read().count() + names.read().count();
+    let lights = point_lights.read().count() + spot_lights.read().count() + directional_lights.read().count();
+    let removed = shapes.read().count() + materials.read().count() + lights + names.read().count();
     let environment_changed = environment.as_ref().is_some_and(|environment| environment.is_changed())
         || std::mem::replace(&mut *had_environment, environment.is_some()) != environment.is_some();
     let settings_changed = rendering.is_some_and(|rendering| rendering.is_changed())
@@ -302,7 +307,7 @@ fn read_entities(
     world: &mut World,
     old: &Arc<BTreeMap<Entity, Arc<EntityState>>>,
 ) -> Arc<BTreeMap<Entity, Arc<EntityState>>> {
-    type UndoPart = Or<(With<Shape>, With<SurfaceMaterial>, With<PointLight>)>;
+    type UndoPart = Or<(With<Shape>, With<SurfaceMaterial>, WithLight)>;
     let entities: Vec<Entity> = world.query_filtered::<Entity, UndoPart>().iter(world).collect();
     let read = |entity: Entity| {
         let state = EntityState {
@@ -312,7 +317,7 @@ fn read_entities(
             placement: world.get(entity).copied(),
             slots: world.get(entity).cloned(),
             material: world.get(entity).cloned(),
-            light: world.get(entity).copied(),
+            light: LightKind::of(world, entity),
             origin: world.get(entity).cloned(),
         };
         match old.get(&entity) {
@@ -341,7 +346,7 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
         put(world, entity, &target.slots);
         put(world, entity, &target.shape);
         put(world, entity, &target.material);
-        put(world, entity, &target.light);
+        LightKind::put(target.light, world, entity);
         put(world, entity, &target.origin);
         put(world, entity, &target.ordinal);
         put(world, entity, &target.name);

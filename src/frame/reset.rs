@@ -5,15 +5,15 @@
 //! | exposure, tone curve | [`Level::Redraw`] | all samples |
 //! | target, threads, pause | [`Level::Reschedule`] | all samples |
 //! | camera, lens, light model, depth, seed | [`Level::Restart`] | trees, lights, textures |
-//! | material, texture, environment, light power | [`Level::Shading`] | all trees |
-//! | object or light moved, added, removed, given another material | [`Level::TopTree`] | every mesh's own tree |
+//! | material, texture, environment, light power, a light that no ray can hit moved | [`Level::Shading`] | all trees |
+//! | object or other light moved, any added, removed, given another material | [`Level::TopTree`] | every mesh's own tree |
 //! | a mesh or a cloud of spheres | [`Level::MeshTree`] | other trees |
 //! | picture size | [`Level::Resize`] | the scene side |
 
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
-    CameraInput, LightInput, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape, SnapshotPart, View,
-    origin_for,
+    CameraInput, LightInput, LightKind, MaterialInput, ObjectInput, SceneEnvironment, SceneInputs, Shape, SnapshotPart,
+    View, origin_for,
 };
 use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
@@ -197,14 +197,36 @@ fn compare_objects(old: &ObjectInput, new: &ObjectInput, label: &str, changes: &
 }
 
 fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut Changes) {
-    if old.placement.translation != new.placement.translation {
-        changes.add(Level::TopTree, format!("{label} moved"));
+    // A sphere is in the tree; all other lights are in the table of lights alone.
+    let is_sphere = |light: &LightInput| light.light.radius() > 0.0;
+    let level = if is_sphere(old) || is_sphere(new) { Level::TopTree } else { Level::Shading };
+    let place = |light: &LightInput| {
+        let shines_everywhere = matches!(light.light, LightKind::Directional(_));
+        let position = (!shines_everywhere).then_some(light.placement.translation);
+        (position, light.light.direction(&light.placement))
+    };
+    if place(old) != place(new) {
+        changes.add(level, format!("{label} moved"));
     }
-    if old.light.radius != new.light.radius {
+    if old.light.radius() != new.light.radius() {
         changes.add(Level::TopTree, format!("size of {label}"));
     }
-    if old.light.intensity != new.light.intensity {
+    if old.light.strength() != new.light.strength() {
         changes.add(Level::Shading, format!("power of {label}"));
+    }
+    match (old.light, new.light) {
+        (LightKind::Point(_), LightKind::Point(_)) | (LightKind::Directional(_), LightKind::Directional(_)) => {}
+        (LightKind::Spot(old), LightKind::Spot(new)) => {
+            if (old.inner_angle_deg, old.outer_angle_deg) != (new.inner_angle_deg, new.outer_angle_deg) {
+                changes.add(Level::Shading, format!("cone of {label}"));
+            }
+        }
+        _ => changes.add(level, format!("kind of {label}")),
+    }
+    // What is wrong with a light is told when everything is made anew.
+    let problem = |light: &LightInput| light.light.check(&light.placement).err();
+    if problem(old) != problem(new) {
+        changes.add(Level::TopTree, label.to_owned());
     }
 }
 
@@ -240,7 +262,7 @@ macro_rules! named {
         }
     )*};
 }
-named!(ObjectInput: |object| object.shape.kind(), LightInput: |_| "point light", MaterialInput: |_| "material");
+named!(ObjectInput: |object| object.shape.kind(), LightInput: |light| light.light.name(), MaterialInput: |_| "material");
 
 /// Finds what came, what went, and what changed; `structure` is the level of coming and going.
 fn compare_lists<T: Named + PartialEq>(

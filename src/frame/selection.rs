@@ -4,7 +4,7 @@ use super::resources::RenderState;
 use super::rig::Rig;
 use crate::geometry::Ray;
 use crate::render::Camera;
-use crate::scene::{Extraction, Placement, PointLight, Projection, View};
+use crate::scene::{Extraction, LightKind, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
@@ -114,8 +114,8 @@ impl OwnBox {
 
 /// The box around an object or a light as it is in the picture; of what has no end, its own point.
 pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
-    if let Some(light) = world.get::<PointLight>(entity) {
-        let (min, max) = (DVec3::splat(-light.radius), DVec3::splat(light.radius));
+    if let Some(light) = LightKind::of(world, entity) {
+        let (min, max) = (DVec3::splat(-light.radius()), DVec3::splat(light.radius()));
         let at = world.get::<Placement>(entity)?.translation;
         return Some(OwnBox { min, max, world_from_box: DAffine3::from_translation(at) });
     }

@@ -16,8 +16,8 @@ use super::views::ViewTrail;
 use super::worker::{Job, Orders};
 use crate::render::RenderSettings;
 use crate::scene::{
-    CameraInput, DisplaySettings, Extraction, Lens, LoadedScene, MaterialSlots, Ordinal, Placement, PointLight,
-    Projection, Rendering, SceneInputs, SceneQueries, Shape, SurfaceMaterial, Trees, View,
+    CameraInput, DirectionalLight, DisplaySettings, Extraction, Lens, LoadedScene, MaterialSlots, Ordinal, Placement,
+    PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, SpotLight, SurfaceMaterial, Trees, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
@@ -39,6 +39,8 @@ pub struct Touched<'w, 's> {
             Changed<MaterialSlots>,
             Changed<SurfaceMaterial>,
             Changed<PointLight>,
+            Changed<SpotLight>,
+            Changed<DirectionalLight>,
             Changed<View>,
             Changed<Projection>,
             Changed<Lens>,
@@ -50,7 +52,9 @@ pub struct Touched<'w, 's> {
     placements: RemovedComponents<'w, 's, Placement>,
     slots: RemovedComponents<'w, 's, MaterialSlots>,
     materials: RemovedComponents<'w, 's, SurfaceMaterial>,
-    lights: RemovedComponents<'w, 's, PointLight>,
+    point_lights: RemovedComponents<'w, 's, PointLight>,
+    spot_lights: RemovedComponents<'w, 's, SpotLight>,
+    directional_lights: RemovedComponents<'w, 's, DirectionalLight>,
     views: RemovedComponents<'w, 's, View>,
     projections: RemovedComponents<'w, 's, Projection>,
     lenses: RemovedComponents<'w, 's, Lens>,
@@ -66,7 +70,9 @@ impl Touched<'_, '_> {
             + self.placements.read().count()
             + self.slots.read().count()
             + self.materials.read().count()
-            + self.lights.read().count()
+            + self.point_lights.read().count()
+            + self.spot_lights.read().count()
+            + self.directional_lights.read().count()
             + self.views.read().count()
             + self.projections.read().count()
             + self.lenses.read().count()

@@ -10,7 +10,7 @@ use super::file::{CameraPart, DisplayPart, SceneFile};
 use super::units::{LEAST_SINE, lens_radius_of};
 use super::view::{Lens, Projection, View, unit_direction};
 use crate::render::{Film, RenderSettings};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Degrees. Below this, all rays of a picture are one and the same in `f32`.
 pub const LEAST_VFOV_DEG: f64 = 1e-6;
@@ -61,6 +61,35 @@ fn check_point(field: &'static str, point: DVec3) -> Result<(), BadValue> {
 
 fn check_size(field: &'static str, size: f64) -> Result<(), BadValue> {
     if is_size(size) { Ok(()) } else { Err(BadValue::out_of_range(field, number(size), size_rule())) }
+}
+
+/// Light or absorption.
+pub(crate) fn check_light(field: &'static str, light: Vec3) -> Result<(), BadValue> {
+    if light.is_finite() && light.cmpge(Vec3::ZERO).all() {
+        return Ok(());
+    }
+    let Vec3 { x, y, z } = light;
+    Err(BadValue::out_of_range(field, format!("({x}, {y}, {z})"), "be finite and not negative"))
+}
+
+/// The radius of a point light; metres.
+pub(crate) fn check_light_radius(radius: f64) -> Result<(), BadValue> {
+    if radius == 0.0 || is_size(radius) {
+        return Ok(());
+    }
+    Err(BadValue::out_of_range("radius", number(radius), format!("be 0 or {}", size_rule())))
+}
+
+/// The cone of a spot light; degrees from its axis.
+pub(crate) fn check_cone(inner_deg: f64, outer_deg: f64) -> Result<(), BadValue> {
+    if !(outer_deg > 0.0 && outer_deg <= 90.0) {
+        return Err(BadValue::out_of_range("outer_angle", number(outer_deg), "lie above 0 and at most at 90 degrees"));
+    }
+    if !(inner_deg >= 0.0 && inner_deg <= outer_deg) {
+        let rule = format!("lie between 0 and `outer_angle`, which is {} degrees", number(outer_deg));
+        return Err(BadValue::out_of_range("inner_angle", number(inner_deg), rule));
+    }
+    Ok(())
 }
 
 /// The unit vector along a direction of any finite length.

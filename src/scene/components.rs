@@ -4,7 +4,7 @@
 //! |---|---|
 //! | object | [`Shape`], [`Placement`], [`MaterialSlots`] |
 //! | material | [`SurfaceMaterial`] |
-//! | point light | [`PointLight`], [`Placement`] |
+//! | light | [`PointLight`], [`SpotLight`] or [`DirectionalLight`], [`Placement`] |
 //! | camera | [`View`](super::View), [`Projection`](super::Projection), [`Lens`](super::Lens) |
 //!
 //! Any of them may have a `Name`. Spawn, change and remove them with ordinary bevy_ecs calls: the picture follows.
@@ -213,14 +213,45 @@ pub struct SurfaceTexture {
     pub texture: render::Texture,
 }
 
-/// Shines evenly into all directions; to the path tracer it is a small glowing ball.
+/// Shines evenly into all directions; to the path tracer it is a small glowing sphere or a point.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 #[require(Placement)]
 pub struct PointLight {
     /// Radiant intensity, W·sr⁻¹.
     pub intensity: Vec3,
-    /// Metres.
+    /// Metres. With 0 it is a point: it casts hard shadows, and no ray ever hits it.
     pub radius: f64,
+}
+
+/// Shines from a point into a cone; no ray ever hits it.
+///
+/// At the angle a from the axis it sends `intensity` · t², with t = (cos a − cos outer) / (cos inner − cos outer),
+/// clamped to 0..1.
+///
+/// Source: glTF 2.0, KHR_lights_punctual.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[require(Placement)]
+pub struct SpotLight {
+    /// Radiant intensity within the inner cone, W·sr⁻¹.
+    pub intensity: Vec3,
+    /// Along the axis of the cone, away from its tip, in the light's own space: its [`Placement`] turns it. Any length
+    /// but 0.
+    pub direction: DVec3,
+    /// Degrees from the axis, from 0 to the outer angle; the intensity falls off from here on.
+    pub inner_angle_deg: f64,
+    /// Degrees from the axis, above 0 and at most 90; no light beyond.
+    pub outer_angle_deg: f64,
+}
+
+/// Shines from infinitely far away, parallel; no ray ever hits it. The air absorbs nothing of its light, as of the
+/// environment's.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[require(Placement)]
+pub struct DirectionalLight {
+    /// On a surface that faces the light, W·m⁻².
+    pub irradiance: Vec3,
+    /// Where the light goes, in the light's own space: its [`Placement`] turns it. Any length but 0.
+    pub direction: DVec3,
 }
 
 /// Where the mesh of an object came from, for saving and reloading it.

@@ -11,8 +11,7 @@ use super::components::{
     SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
 use super::file::{
-    CameraPart, DisplayPart, FilmPart, InFile, LightPart, MaterialPart, Named, ObjectPart, RadiiPart, SceneFile,
-    TransformPart,
+    CameraPart, DisplayPart, FilmPart, InFile, MaterialPart, Named, ObjectPart, RadiiPart, SceneFile, TransformPart,
 };
 use super::inputs::SceneInputs;
 use super::loaded::LoadedScene;
@@ -59,12 +58,7 @@ impl Description {
         let rendering = world.get_resource::<Rendering>().copied().unwrap_or_default().0;
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
         let display = world.get_resource::<DisplaySettings>().copied().unwrap_or_default().0;
-        let lights = inputs.lights.iter().map(|light| LightPart::Point {
-            name: light.name.clone(),
-            position: light.placement.translation,
-            intensity: Rgb(light.light.intensity),
-            radius: light.light.radius,
-        });
+        let lights = inputs.lights.iter().map(|light| light.light.to_part(light.name.clone(), &light.placement));
         let (view, projection, lens) =
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {

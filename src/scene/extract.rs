@@ -3,8 +3,9 @@
 //! Placements are `f64`; the snapshot is `f32` about an [`origin`](Extraction::origin) near the camera. Each part is
 //! rebuilt on its own ([`SnapshotPart`]), and trees of meshes and clouds are made once and kept ([`Trees`]).
 
-use super::components::{ColorParam, GREY, InWorld, Material, PointLight, ScalarParam, Shape, SurfaceTexture};
-use super::inputs::{CameraInput, ObjectInput, SceneInputs};
+use super::components::{ColorParam, GREY, InWorld, Material, ScalarParam, Shape, SurfaceTexture};
+use super::inputs::{CameraInput, LightInput, ObjectInput, SceneInputs};
+use super::light::LightKind;
 use super::placement::Placement;
 use super::trees::{Trees, address};
 use super::units::radians;
@@ -12,8 +13,8 @@ use super::view::{Lens, Projection, View};
 use crate::kdtree::{self};
 use crate::mesh::Mesh;
 use crate::render::{
-    self, Camera, ColorInput, Geometry, InSnapshot, MAX_LOBES, MapParams, MaterialId, Object, Prepared, ScalarInput,
-    Shading, Snapshot, TextureId,
+    self, Camera, ColorInput, Cone, DeltaLight, Geometry, InSnapshot, MAX_LOBES, MapParams, MaterialId, Object,
+    Prepared, ScalarInput, Shading, Snapshot, TextureId,
 };
 use bevy_ecs::prelude::Entity;
 use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec3};
@@ -38,10 +39,12 @@ pub struct Extraction {
     pub origin: DVec3,
     /// The snapshot about `origin`, with its tables.
     pub prepared: Prepared,
-    /// Objects that were left out, and why.
+    /// Objects and lights that were left out, and why.
     pub problems: Vec<String>,
     /// The entity of each object of the snapshot.
     pub entities: Vec<Entity>,
+    /// The entity of each light without size, in the order of [`Shading::delta_lights`].
+    pub delta_lights: Vec<Entity>,
     ids: HashMap<MaterialKey, MaterialId>,
     order: Vec<MaterialKey>,
 }
@@ -90,26 +93,32 @@ impl Extraction {
                 }
             }
         }
+        let mut delta_lights = Vec::new();
         for light in &inputs.lights {
-            let center = (light.placement.translation - origin).as_vec3();
-            let radius = light.light.radius as f32;
-            if !(radius.is_normal() && radius > 0.0 && center.is_finite()) {
-                problems.push(format!("point light {} is ignored: its radius is {radius}", light.entity));
+            if let Err(bad) = light.light.check(&light.placement) {
+                problems.push(format!("{} {} is ignored: {bad}", light.light.name(), light.entity));
                 continue;
             }
+            if delta_light(light, origin).is_some() {
+                delta_lights.push(light.entity);
+                continue;
+            }
+            let center = (light.placement.translation - origin).as_vec3();
+            let radius = light.light.radius() as f32;
             geometry.0.push(kdtree::Shape::Sphere { center, radius });
             let glow = materials.id(MaterialKey::Light(light.entity));
             geometry.1.push(Object { is_point_light: true, ..Object::plain(glow) });
             entities.push(light.entity);
         }
         let geometry = Geometry::build(geometry.0, geometry.1);
-        let shading = shading_of(inputs, &mut materials);
+        let shading = shading_of(inputs, &mut materials, origin);
         let camera = camera_in(&camera_of(inputs), origin);
         Self {
             origin,
             prepared: Prepared::new(Snapshot::new(geometry, shading, camera)),
             problems,
             entities,
+            delta_lights,
             ids: materials.ids,
             order: materials.order,
         }
@@ -144,7 +153,7 @@ impl Extraction {
         if part == SnapshotPart::Shading {
             let mut materials =
                 MaterialIds { ids: std::mem::take(&mut self.ids), order: std::mem::take(&mut self.order) };
-            let shading = Arc::new(shading_of(inputs, &mut materials));
+            let shading = Arc::new(shading_of(inputs, &mut materials, self.origin));
             self.prepared = self.prepared.with_shading(shading);
             (self.ids, self.order) = (materials.ids, materials.order);
         }
@@ -279,9 +288,9 @@ impl MaterialIds {
 }
 
 /// The shading under the materials that `table` lists; what they blend is added to it.
-fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds) -> Shading {
+fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds, origin: DVec3) -> Shading {
     let by_entity: HashMap<Entity, &Material> = inputs.materials.iter().map(|m| (m.entity, &m.material)).collect();
-    let lights: HashMap<Entity, &PointLight> = inputs.lights.iter().map(|light| (light.entity, &light.light)).collect();
+    let lights: HashMap<Entity, LightKind> = inputs.lights.iter().map(|light| (light.entity, light.light)).collect();
     let mut textures = TextureTable::default();
     let mut materials = Vec::new();
     // Blends add to the table while it is walked, so its length is asked anew each time.
@@ -297,13 +306,33 @@ fn shading_of(inputs: &SceneInputs, table: &mut MaterialIds) -> Shading {
                 radiance: ColorInput::Constant(lights.get(&entity).map_or(
                     Vec3::ZERO,
                     // A sphere of radiance L and radius r has the radiant intensity π r² L in every direction.
-                    |light| light.intensity * (1.0 / (PI * light.radius.powi(2))) as f32,
+                    |light| light.strength() * (1.0 / (PI * light.radius().powi(2))) as f32,
                 )),
             },
         });
     }
     let (environment, air) = (inputs.environment.light.clone(), inputs.environment.air);
-    Shading { air, ..Shading::new(materials, textures.textures, environment) }
+    let delta_lights = inputs.lights.iter().filter_map(|light| delta_light(light, origin)).collect();
+    Shading { air, delta_lights, ..Shading::new(materials, textures.textures, environment) }
+}
+
+/// A light that no ray can hit, about `origin`; `None` for one that is a sphere, and for what cannot shine.
+fn delta_light(LightInput { light, placement, .. }: &LightInput, origin: DVec3) -> Option<DeltaLight> {
+    light.check(placement).ok()?;
+    let position = (placement.translation - origin).as_vec3();
+    Some(match light {
+        LightKind::Point(light) if light.radius > 0.0 => return None,
+        LightKind::Point(light) => DeltaLight::Point { position, intensity: light.intensity },
+        LightKind::Spot(spot) => {
+            let axis = light.direction(placement)?.as_vec3().normalize();
+            let cone = Cone::new(axis, spot.inner_angle_deg.to_radians(), spot.outer_angle_deg.to_radians());
+            DeltaLight::Spot { position, intensity: spot.intensity, cone }
+        }
+        LightKind::Directional(directional) => DeltaLight::Directional {
+            direction: light.direction(placement)?.as_vec3().normalize(),
+            irradiance: directional.irradiance,
+        },
+    })
 }
 
 fn material_of(

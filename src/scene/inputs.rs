@@ -1,11 +1,14 @@
 //! What the picture depends on, copied out of the world in a fixed order.
 
 use super::bad_value::BadValue;
-use super::components::{Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape, SurfaceMaterial};
+use super::components::{
+    DirectionalLight, Material, MaterialSlots, Ordinal, PointLight, SceneEnvironment, Shape, SpotLight, SurfaceMaterial,
+};
+use super::light::LightKind;
 use super::placement::Placement;
 use super::view::{Lens, Projection, View};
 use bevy_ecs::name::Name;
-use bevy_ecs::prelude::{Entity, Query, Res, World};
+use bevy_ecs::prelude::{Entity, Or, Query, Res, With, World};
 use bevy_ecs::system::{SystemParam, SystemState};
 use std::collections::HashSet;
 
@@ -16,7 +19,7 @@ pub struct SceneInputs {
     pub objects: Vec<ObjectInput>,
     /// Those that the objects use, directly or in a blend.
     pub materials: Vec<MaterialInput>,
-    /// All point lights.
+    /// All lights that are no objects.
     pub lights: Vec<LightInput>,
     /// The first camera.
     pub camera: Option<CameraInput>,
@@ -50,15 +53,15 @@ pub struct MaterialInput {
     pub material: Material,
 }
 
-/// What the picture depends on of a point light.
+/// What the picture depends on of a light that is no object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightInput {
     /// The entity in the world.
     pub entity: Entity,
     /// Its `Name`, if it has one.
     pub name: Option<String>,
-    /// Intensity and radius.
-    pub light: PointLight,
+    /// Its kind and numbers.
+    pub light: LightKind,
     /// Where it stands in the world.
     pub placement: Placement,
 }
@@ -88,12 +91,17 @@ impl CameraInput {
 
 type Ranked<'a, T> = (Entity, Option<&'a Ordinal>, Option<&'a Name>, T);
 
+type LightParts = (Option<&'static PointLight>, Option<&'static SpotLight>, Option<&'static DirectionalLight>);
+
+/// Whether an entity is a light that is no object.
+pub type WithLight = Or<(With<PointLight>, With<SpotLight>, With<DirectionalLight>)>;
+
 /// Read access to everything that the picture depends on.
 #[derive(SystemParam)]
 pub struct SceneQueries<'w, 's> {
     objects: Query<'w, 's, Ranked<'static, (&'static Shape, &'static Placement, &'static MaterialSlots)>>,
     materials: Query<'w, 's, Ranked<'static, &'static SurfaceMaterial>>,
-    lights: Query<'w, 's, Ranked<'static, (&'static PointLight, &'static Placement)>>,
+    lights: Query<'w, 's, Ranked<'static, (LightParts, &'static Placement)>, WithLight>,
     cameras: Query<'w, 's, Ranked<'static, (&'static View, &'static Projection, &'static Lens)>>,
     environment: Option<Res<'w, SceneEnvironment>>,
 }
@@ -118,10 +126,10 @@ impl SceneQueries<'_, '_> {
                 material: material.0.clone(),
             }),
             objects,
-            lights: in_order(self.lights.iter(), |entity, name, (light, placement)| LightInput {
+            lights: in_order(self.lights.iter(), |entity, name, ((point, spot, directional), placement)| LightInput {
                 entity,
                 name: text(name),
-                light: *light,
+                light: LightKind::first(point, spot, directional).expect("the query asks for one of them"),
                 placement: *placement,
             }),
             camera: self.cameras.iter().min_by_key(|(entity, rank, ..)| order(*rank, *entity)).map(

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Everything in the order of the scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inventory {
-    /// Objects and point lights.
+    /// Objects, and lights that are none.
     pub objects: Vec<ObjectEntry>,
     /// Also those that nothing uses.
     pub materials: Vec<MaterialEntry>,
@@ -28,7 +28,7 @@ pub struct ObjectEntry {
     pub entity: Entity,
     /// Its name, or its kind and a number.
     pub label: String,
-    /// Kind of its shape, as in [`Shape::kind`], or `point light`.
+    /// Kind of its shape, as in [`Shape::kind`], or of the light, as in [`LightKind::name`](super::LightKind::name).
     pub kind: &'static str,
 }
 
@@ -52,9 +52,9 @@ pub struct LightEntry {
     pub entity: Entity,
     /// Its name, or its kind and a number.
     pub label: String,
-    /// `point light`, or the kind of light that its shape makes it.
+    /// As in [`LightKind::name`](super::LightKind::name), or the kind of light that its shape makes it.
     pub kind: &'static str,
-    /// The emissive material, which may be a part of a blend; none for a point light, which has an intensity of its own.
+    /// The emissive material, which may be a part of a blend; none for a light that is no object.
     pub material: Option<Entity>,
 }
 
@@ -82,7 +82,7 @@ impl Inventory {
             objects.push(ObjectEntry { entity: object.entity, label, kind });
         }
         for (i, light) in inputs.lights.iter().enumerate() {
-            let (entity, kind) = (light.entity, "point light");
+            let (entity, kind) = (light.entity, light.light.name());
             let label = shown(&light.name).unwrap_or_else(|| format!("{kind} {i}"));
             lights.push(LightEntry { entity, label: label.clone(), kind, material: None });
             objects.push(ObjectEntry { entity, label, kind });

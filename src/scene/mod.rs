@@ -20,6 +20,7 @@ pub mod image_metadata;
 pub mod input_file;
 mod inputs;
 mod inventory;
+mod light;
 pub(crate) mod limits;
 mod load;
 mod loaded;
@@ -52,8 +53,8 @@ pub use bad_value::BadValue;
 pub use bounds::{check_film_size, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
 pub use components::{
-    Balls, ColorParam, DisplaySettings, FilmSize, GREY, InWorld, Material, MaterialSlots, MeshOrigin, Ordinal,
-    PointLight, Rendering, ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
+    Balls, ColorParam, DirectionalLight, DisplaySettings, FilmSize, GREY, InWorld, Material, MaterialSlots, MeshOrigin,
+    Ordinal, PointLight, Rendering, ScalarParam, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, SurfaceTexture,
 };
 pub use describe::{Description, camera_part};
 pub use error::{Problem, SceneError, suggestion};
@@ -62,8 +63,9 @@ pub use extract::{Extraction, SnapshotPart, origin_for};
 pub use fingerprint::{Fingerprint, SceneContent};
 pub use image_metadata::{ImageMetadata, ImageSamples, ImageScene, MetadataError};
 pub use input_file::{FileKind, InputFile, ReadError, plain_io};
-pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries};
+pub use inputs::{CameraInput, LightInput, MaterialInput, ObjectInput, SceneInputs, SceneQueries, WithLight};
 pub use inventory::{Inventory, LightEntry, MaterialEntry, ObjectEntry, users_of};
+pub use light::LightKind;
 pub use limits::Limits;
 pub use load::{LoadOptions, load};
 pub use loaded::LoadedScene;

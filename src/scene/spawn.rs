@@ -2,10 +2,12 @@
 
 use super::camera::{camera, unit};
 use super::components::{
-    ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, PointLight, Rendering,
-    ScalarParam, SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
+    ColorParam, DisplaySettings, FilmSize, InWorld, MaterialSlots, MeshOrigin, Ordinal, Rendering, ScalarParam,
+    SceneEnvironment, Shape, SurfaceMaterial, SurfaceTexture,
 };
-use super::file::{InFile, LightPart, MaterialPart, ObjectPart};
+use super::file::{InFile, MaterialPart, ObjectPart};
+use super::inputs::WithLight;
+use super::light::LightKind;
 use super::loaded::LoadedScene;
 use super::own_materials::without_lost_textures;
 use super::placement::Placement;
@@ -79,12 +81,14 @@ impl LoadedScene {
                 });
             }
         }
-        for LightPart::Point { name, position, intensity, radius } in &self.file.lights {
-            let light = PointLight { intensity: intensity.0, radius: *radius };
-            let mut entity = world.spawn((light, Placement::at(*position), next()));
-            if let Some(name) = name {
-                entity.insert(Name::new(name.clone()));
+        for part in &self.file.lights {
+            let (light, placement) = LightKind::from_part(part);
+            let mut entity = world.spawn((placement, next()));
+            if let Some(name) = part.name() {
+                entity.insert(Name::new(name.to_owned()));
             }
+            let entity = entity.id();
+            LightKind::put(Some(light), world, entity);
         }
         let (view, projection, lens) = camera(&self.file.camera);
         world.spawn((view, projection, lens, Name::new("camera"), next()));
@@ -189,7 +193,7 @@ pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc
 
 /// Removes whatever belongs to a scene.
 fn clear(world: &mut World) {
-    type OfAScene = Or<(With<Shape>, With<SurfaceMaterial>, With<PointLight>, With<View>)>;
+    type OfAScene = Or<(With<Shape>, With<SurfaceMaterial>, WithLight, With<View>)>;
     let old: Vec<Entity> = world.query_filtered::<Entity, OfAScene>().iter(world).collect();
     for entity in old {
         world.despawn(entity);

@@ -98,7 +98,34 @@ fn values_out_of_range_are_named_with_what_is_expected() {
         (with(&["film: (width: 4000000000, height: 4000000000)"]), "GiB"),
         (with(&["max_depth: 0"]), "use at least 1"),
         (with(&["environment: gradient(zenith: 1, horizon: inf, ground: 0)"]), "must be finite"),
-        (with(&["lights: [point(position: (0, 0, 0), intensity: 1, radius: 0)]"]), "the radius is 0"),
+        (with(&["lights: [point(position: (0, 0, 0), intensity: 1, radius: -1)]"]), "`radius` is -1, but must be 0 or"),
+        (with(&["lights: [spot(direction: (0, 0, 0), intensity: 1)]"]), "`direction` is (0, 0, 0), but must be finite"),
+        (
+            with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, inner_angle: 50)]"]),
+            "`inner_angle` is 50, but must lie between 0 and `outer_angle`, which is 45 degrees",
+        ),
+        (
+            with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, outer_angle: 91)]"]),
+            "`outer_angle` is 91, but must lie above 0 and at most at 90 degrees",
+        ),
+        (with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, outer_angle: 0)]"]), "`outer_angle` is 0, but must"),
+        (
+            with(&["lights: [spot(direction: (0, 1, 0), intensity: 1, inner_angle: -1)]"]),
+            "`inner_angle` is -1, but must",
+        ),
+        (
+            with(&["lights: [spot(direction: (0, 1, 0), intensity: -1)]"]),
+            "(-1, -1, -1) must be finite and not negative",
+        ),
+        (
+            with(&["lights: [directional(direction: (0, 0, 0), irradiance: 1)]"]),
+            "`direction` is (0, 0, 0), but must be",
+        ),
+        (with(&["lights: [directional(direction: (0, 1, 0), irradiance: -2)]"]), "(-2, -2, -2) must be finite"),
+        (
+            with(&["lights: [directional(direction: (0, 1, 0), irradiance: 1, transform: (scale: 0))]"]),
+            "the transform flattens the object",
+        ),
     ] {
         assert_says(&found, &["scene.ron:", expected]);
     }

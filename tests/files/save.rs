@@ -4,8 +4,9 @@ use bevy_ecs::prelude::World;
 use firstlight::frame::{Target, render_offline};
 use firstlight::render::Film;
 use firstlight::scene::{
-    BUILTIN_SCENES, Description, DisplaySettings, Extraction, Lens, LoadOptions, LoadedScene, Material, Placement,
-    PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, SurfaceMaterial, View, load, save_scene,
+    BUILTIN_SCENES, Description, DirectionalLight, DisplaySettings, Extraction, Lens, LoadOptions, LoadedScene,
+    Material, Placement, PointLight, Projection, Rendering, SceneInputs, SceneSource, Shape, SpotLight,
+    SurfaceMaterial, View, load, save_scene,
 };
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
@@ -127,6 +128,16 @@ proptest! {
             PointLight { intensity: Vec3::new(intensity, 0.1, 1.0 / 3.0), radius: 0.1 + radius },
             Placement::at(moved),
         ));
+        let linear = firstlight::scene::Linear::Turned { rotation_deg: turned, scale: DVec3::splat(radius + 1.0) };
+        let place = Placement { translation: moved, linear };
+        let (direction, irradiance) = (towards, Vec3::splat(intensity));
+        let [inner_angle_deg, outer_angle_deg] = [0.4 * vfov, 0.5 * vfov];
+        for placement in [place, Placement::at(eye)] {
+            let spot = SpotLight { intensity: irradiance, direction, inner_angle_deg, outer_angle_deg };
+            world.spawn((spot, placement));
+            world.spawn((DirectionalLight { irradiance, direction }, placement));
+        }
+        world.spawn((PointLight { intensity: irradiance, radius: 0.0 }, Placement::at(up)));
         let tip = Shape::Triangle { vertices: [DVec3::ZERO, DVec3::X + 1e-3 * moved, DVec3::Y + 1e-3 * turned] };
         let first = objects[0].slots.clone();
         world.spawn((tip, Placement::at(eye), firstlight::scene::MaterialSlots(first)));

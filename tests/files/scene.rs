@@ -44,7 +44,13 @@ const EVERYTHING: &str = r#"
         spheres(centers: [(0, 0, 0), (3, 0, 0)], radii: each([0.25, 0.5]), material: "mirror"),
         spheres(centers: [(0, 2, 0)], radii: all(0.125), material: "mirror"),
     ],
-    lights: [point(name: "bulb", position: (0, 2, 0), intensity: (3, 2, 1), radius: 0.5)],
+    lights: [
+        point(name: "bulb", position: (0, 2, 0), intensity: (3, 2, 1), radius: 0.5),
+        point(position: (0, 3, 0), intensity: 4, radius: 0),
+        spot(name: "lamp", position: (1, 0, 0), direction: (0, 0, -2), intensity: 5, inner_angle: 10, outer_angle: 20,
+            transform: (rotate: (0, 90, 0), translate: (0, 1, 0))),
+        directional(name: "sun", direction: (0, -3, 0), irradiance: (6, 5, 4), transform: (rotate: (0, 0, 90))),
+    ],
 )
 "#;
 

@@ -6,8 +6,8 @@ use firstlight::frame::{Command, FrameChanges, Level, Paused, Session, SessionOp
 use firstlight::mesh::procedural;
 use firstlight::render::{Environment, Integrator, ToneCurve};
 use firstlight::scene::{
-    Balls, ColorParam, GREY, Lens, Material, MaterialSlots, Placement, PointLight, Projection, Rendering,
-    SceneEnvironment, Shape, SurfaceMaterial, View,
+    Balls, ColorParam, DirectionalLight, GREY, Lens, Linear, Material, MaterialSlots, Placement, PointLight,
+    Projection, Rendering, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -46,6 +46,12 @@ impl Stage {
         assert!(stage.frame().contains(&Level::Resize), "the first frame starts everything");
         assert_eq!(stage.frame(), [], "the second has nothing to do");
         stage
+    }
+
+    fn light_of(&mut self, light: impl Component, placement: Placement) -> Entity {
+        let entity = self.session.world_mut().spawn((light, placement)).id();
+        self.frame();
+        entity
     }
 
     /// Runs one frame and tells the levels of what it found to be different.
@@ -114,6 +120,37 @@ fn each_component_has_its_level() {
     assert_eq!(stage.set(light, |light: &mut PointLight| light.radius = 0.2), [TopTree]);
     assert_eq!(stage.set(ball, |shape: &mut Shape| *shape = Shape::Sphere { radius: 0.5 }), [TopTree]);
     assert_eq!(stage.set(ball, |slots: &mut MaterialSlots| slots.0 = vec![blue]), [TopTree]);
+
+    // No ray can hit these: no tree knows them.
+    let up = Placement::at(DVec3::Y);
+    let point = stage.light_of(PointLight { intensity: Vec3::ONE, radius: 0.0 }, up);
+    let cone = SpotLight { intensity: Vec3::ONE, direction: DVec3::Z, inner_angle_deg: 1.0, outer_angle_deg: 2.0 };
+    let spot = stage.light_of(cone, up);
+    let sun = stage.light_of(DirectionalLight { irradiance: Vec3::ONE, direction: DVec3::Z }, up);
+    for light in [point, spot] {
+        assert_eq!(stage.set(light, |placement: &mut Placement| placement.translation.y = 2.0), [Shading]);
+        assert!(stage.cause().ends_with(" moved"), "{}", stage.cause());
+    }
+    assert_eq!(stage.set(sun, |placement: &mut Placement| placement.translation.y = 2.0), [], "it shines everywhere");
+    let turned = Linear::Turned { rotation_deg: DVec3::new(30.0, 0.0, 0.0), scale: DVec3::ONE };
+    assert_eq!(stage.set(point, |placement: &mut Placement| placement.linear = turned), []);
+    for light in [spot, sun] {
+        assert_eq!(stage.set(light, |placement: &mut Placement| placement.linear = turned), [Shading]);
+    }
+    assert_eq!(stage.set(point, |light: &mut PointLight| light.intensity = Vec3::splat(2.0)), [Shading]);
+    assert_eq!(stage.set(spot, |light: &mut SpotLight| light.intensity = Vec3::splat(2.0)), [Shading]);
+    assert!(stage.cause().starts_with("power of spot light "), "{}", stage.cause());
+    assert_eq!(stage.set(spot, |light: &mut SpotLight| light.outer_angle_deg = 3.0), [Shading]);
+    assert_eq!(stage.set(sun, |light: &mut DirectionalLight| light.irradiance = Vec3::splat(2.0)), [Shading]);
+    assert_eq!(stage.set(sun, |light: &mut DirectionalLight| light.direction = DVec3::X), [Shading]);
+    assert_eq!(stage.set(sun, |light: &mut DirectionalLight| light.direction = DVec3::ZERO), [Shading, TopTree]);
+    let mend = |light: &mut DirectionalLight| light.direction = DVec3::X;
+    assert_eq!(stage.set(sun, mend), [Shading, TopTree]);
+    let remove = |world: &mut World| {
+        world.entity_mut(sun).remove::<DirectionalLight>();
+    };
+    assert_eq!(stage.edit(remove), [TopTree]);
+    assert_eq!(stage.set(point, |light: &mut PointLight| light.radius = 0.2), [TopTree]);
 
     let torus = Arc::new(procedural::torus(1.0, 0.2, 16, 8));
     assert_eq!(stage.set(mesh, |shape: &mut Shape| *shape = Shape::Mesh(torus)), [MeshTree]);

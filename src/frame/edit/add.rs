@@ -7,8 +7,8 @@ use super::spot::{self, Spot};
 use crate::frame::selection::Selection;
 use crate::mesh::procedural;
 use crate::scene::{
-    ColorParam, GREY, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Ordinal, Placement, PointLight,
-    Shape, SurfaceMaterial,
+    ColorParam, DirectionalLight, GREY, LightKind, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource,
+    Ordinal, Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Entity, Has, World};
@@ -26,6 +26,10 @@ pub enum NewThing {
     AreaLight,
     /// A point light above.
     PointLight,
+    /// A spot light above that shines straight down.
+    SpotLight,
+    /// Parallel light from above, aslant.
+    DirectionalLight,
     /// A diffuse cube on the ground.
     Cube,
     /// A built-in mesh or a model file; read beside the picture.
@@ -34,7 +38,7 @@ pub enum NewThing {
 
 /// Whether the entity is an object or a light that stands in the scene.
 pub fn is_thing(world: &World, entity: Entity) -> bool {
-    world.get::<Shape>(entity).is_some() || world.get::<PointLight>(entity).is_some()
+    world.get::<Shape>(entity).is_some() || LightKind::of(world, entity).is_some()
 }
 
 pub fn add(world: &mut World, new: &NewThing) {
@@ -74,6 +78,22 @@ pub fn add(world: &mut World, new: &NewThing) {
                 "point light",
                 (light, Placement::at(place + spot::headroom(world, place, 5.0 * size) * DVec3::Y)),
             )
+        }
+        NewThing::SpotLight => {
+            let light = SpotLight {
+                intensity: Vec3::splat((100.0 * size * size) as f32),
+                direction: DVec3::NEG_Y,
+                inner_angle_deg: 20.0,
+                outer_angle_deg: 30.0,
+            };
+            let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
+            spawn(world, "spot light", (light, Placement::at(place + above)))
+        }
+        NewThing::DirectionalLight => {
+            let direction = DVec3::new(-1.0, -2.0, -1.0).normalize();
+            let light = DirectionalLight { irradiance: Vec3::splat(3.0), direction };
+            let above = spot::headroom(world, place, 5.0 * size) * DVec3::Y;
+            spawn(world, "directional light", (light, Placement::at(place + above)))
         }
         NewThing::Cube => {
             let material =
@@ -139,8 +159,9 @@ pub fn delete(world: &mut World) {
 /// Takes all that makes the entity a part of the scene.
 pub fn bury(world: &mut World, entity: Entity) {
     if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.remove::<(Shape, Placement, MaterialSlots, SurfaceMaterial, PointLight, MeshOrigin, Ordinal, Name)>();
+        entity.remove::<(Shape, Placement, MaterialSlots, SurfaceMaterial, MeshOrigin, Ordinal, Name)>();
     }
+    LightKind::put(None, world, entity);
 }
 
 pub fn duplicate(world: &mut World) {
@@ -162,9 +183,7 @@ pub fn duplicate(world: &mut World) {
                 copy.insert(origin);
             }
         }
-        if let Some(&light) = world.get::<PointLight>(entity) {
-            world.entity_mut(copy).insert(light);
-        }
+        LightKind::put(LightKind::of(world, entity), world, copy);
         copies.push(copy);
     }
     world.resource_mut::<Selection>().0 = copies;

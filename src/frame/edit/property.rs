@@ -11,10 +11,18 @@ pub enum Property {
     Rotation,
     /// Factors along the axes of the object, positive.
     Scale,
-    /// Of a sphere or of a point light, metres.
+    /// Of a sphere or of a point light, which may have none, metres.
     Radius,
-    /// Of a point light, W·sr⁻¹.
+    /// Of a point light or a spot light, W·sr⁻¹.
     Intensity,
+    /// Of a directional light, W·m⁻².
+    Irradiance,
+    /// Of a spot light or a directional light: where it shines before it is turned, any length but 0.
+    Direction,
+    /// Of a spot light, degrees from its axis; stays within the outer angle.
+    InnerAngle,
+    /// Of a spot light, degrees from its axis; takes the inner angle along.
+    OuterAngle,
     /// The colour of a material: albedo, reflectance, the diffuse share of Phong, or the radiance of a light.
     Color,
     /// GGX width, the square of what users call roughness.

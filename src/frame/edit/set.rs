@@ -3,7 +3,9 @@
 use super::property::Property;
 use super::sky;
 use crate::render::{Fresnel, MaterialKind, Param};
-use crate::scene::{ColorParam, Linear, Material, Placement, PointLight, Shape, SurfaceMaterial};
+use crate::scene::{
+    ColorParam, DirectionalLight, LightKind, Linear, Material, Placement, PointLight, Shape, SpotLight, SurfaceMaterial,
+};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
@@ -25,20 +27,17 @@ pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value:
         set_if_different(world, entity, placement);
         return Ok(());
     }
-    if property == Property::Radius && !(value.x > 0.0) {
+    let light = LightKind::of(world, entity);
+    let may_be_none = matches!(light, Some(LightKind::Point(_))) && value.x == 0.0;
+    if property == Property::Radius && !(value.x > 0.0 || may_be_none) {
         return Err("a radius must be above 0".to_owned());
     }
     if let (Some(Shape::Sphere { .. }), Property::Radius) = (world.get::<Shape>(entity), property) {
         set_if_different(world, entity, Shape::Sphere { radius: value.x });
         return Ok(());
     }
-    if let Some(&light) = world.get::<PointLight>(entity) {
-        let light = match property {
-            Property::Radius => PointLight { radius: value.x, ..light },
-            Property::Intensity => PointLight { intensity: value.max(DVec3::ZERO).as_vec3(), ..light },
-            _ => return Err(wrong()),
-        };
-        set_if_different(world, entity, light);
+    if let Some(light) = light {
+        LightKind::put(Some(with_property(light, property, value).ok_or_else(wrong)?), world, entity);
         return Ok(());
     }
     let mut material = world.get::<SurfaceMaterial>(entity).cloned().ok_or_else(wrong)?;
@@ -69,6 +68,32 @@ fn with_placement(placement: Placement, property: Property, value: DVec3) -> Opt
             Placement { translation, linear: Linear::Turned { rotation_deg, scale: value } }
         }
         (Property::Rotation | Property::Scale, _) => placement,
+        _ => return None,
+    })
+}
+
+/// `None` where the light has no such property, or would shine nowhere.
+fn with_property(light: LightKind, property: Property, value: DVec3) -> Option<LightKind> {
+    /// Degrees. A narrower cone has no light in `f32`.
+    const LEAST_CONE_DEG: f64 = 0.1;
+    Some(match (light, property) {
+        (LightKind::Point(_) | LightKind::Spot(_), Property::Intensity)
+        | (LightKind::Directional(_), Property::Irradiance) => light.with_strength(value.max(DVec3::ZERO).as_vec3()),
+        (LightKind::Point(light), Property::Radius) => LightKind::Point(PointLight { radius: value.x, ..light }),
+        (LightKind::Spot(light), Property::Direction) if value != DVec3::ZERO => {
+            LightKind::Spot(SpotLight { direction: value, ..light })
+        }
+        (LightKind::Directional(light), Property::Direction) if value != DVec3::ZERO => {
+            LightKind::Directional(DirectionalLight { direction: value, ..light })
+        }
+        (LightKind::Spot(light), Property::InnerAngle) => {
+            LightKind::Spot(SpotLight { inner_angle_deg: value.x.clamp(0.0, light.outer_angle_deg), ..light })
+        }
+        (LightKind::Spot(light), Property::OuterAngle) => {
+            let outer_angle_deg = value.x.clamp(LEAST_CONE_DEG, 90.0);
+            let inner_angle_deg = light.inner_angle_deg.min(outer_angle_deg);
+            LightKind::Spot(SpotLight { inner_angle_deg, outer_angle_deg, ..light })
+        }
         _ => return None,
     })
 }

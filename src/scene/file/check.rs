@@ -3,7 +3,8 @@
 use super::parts::{CameraPart, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
 use crate::render::{MAX_LOBES, Param};
 use crate::scene::bounds::{
-    check_film_size, check_max_depth, coordinate_rule, is_coordinate, is_size, number, size_rule, triple,
+    check_cone, check_film_size, check_light_radius, check_max_depth, coordinate_rule, is_coordinate, is_size, number,
+    size_rule, triple,
 };
 use crate::scene::error::suggestion;
 use crate::scene::meshes::BUILTIN_NAMES;
@@ -40,10 +41,7 @@ pub fn check(file: &SceneFile, most: usize) -> Found {
         check.object(&format!("objects/{i}"), object);
     }
     for (i, light) in file.lights.iter().enumerate() {
-        let LightPart::Point { position, intensity, radius, .. } = light;
-        check.point(&format!("lights/{i}/position"), *position);
-        check.light(&format!("lights/{i}/intensity"), *intensity);
-        check.size(&format!("lights/{i}/radius"), "the radius", *radius);
+        check.lamp(&format!("lights/{i}"), light);
     }
     check.found
 }
@@ -226,6 +224,32 @@ impl Check<'_> {
             }
         }
         (lobes, glowing)
+    }
+
+    fn lamp(&mut self, path: &str, light: &LightPart) {
+        match light {
+            LightPart::Point { position, intensity, radius, .. } => {
+                self.point(&format!("{path}/position"), *position);
+                self.light(&format!("{path}/intensity"), *intensity);
+                if let Err(bad) = check_light_radius(*radius) {
+                    self.wrong(&format!("{path}/radius"), bad);
+                }
+            }
+            LightPart::Spot { position, direction, intensity, inner_angle, outer_angle, transform, .. } => {
+                self.point(&format!("{path}/position"), *position);
+                self.direction(&format!("{path}/direction"), "`direction`", *direction);
+                self.light(&format!("{path}/intensity"), *intensity);
+                if let Err(bad) = check_cone(*inner_angle, *outer_angle) {
+                    self.wrong(&format!("{path}/{}", bad.field()), bad);
+                }
+                self.transform(&format!("{path}/transform"), transform);
+            }
+            LightPart::Directional { direction, irradiance, transform, .. } => {
+                self.direction(&format!("{path}/direction"), "`direction`", *direction);
+                self.light(&format!("{path}/irradiance"), *irradiance);
+                self.transform(&format!("{path}/transform"), transform);
+            }
+        }
     }
 
     fn object(&mut self, path: &str, object: &ObjectPart) {

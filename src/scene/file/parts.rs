@@ -39,7 +39,7 @@ pub struct SceneFile {
     /// Objects, in the order in which they come to be spawned.
     #[serde(default)]
     pub objects: Vec<ObjectPart>,
-    /// Point lights; everything else that emits is an object with an emissive material.
+    /// Lights that are no objects; everything else that emits is an object with an emissive material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightPart>,
 }
@@ -379,7 +379,7 @@ pub struct ScalePart(pub DVec3);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightPart {
-    /// A small glowing sphere that shines evenly into all directions.
+    /// A small glowing sphere, or a point, that shines evenly into all directions.
     Point {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -388,10 +388,54 @@ pub enum LightPart {
         position: DVec3,
         /// Radiant intensity, W·sr⁻¹.
         intensity: Rgb,
-        /// Metres; shadows are as soft as the sphere is large.
+        /// Metres; shadows are as soft as the sphere is large. With 0 it is a point, which no camera sees.
         #[serde(default = "default_light_radius")]
         radius: f64,
     },
+    /// A point that shines into a cone.
+    Spot {
+        /// Its name in lists and reports.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// The tip of the cone; the origin when not given.
+        #[serde(default, skip_serializing_if = "is_default")]
+        position: DVec3,
+        /// Along the axis of the cone, away from its tip; any length but 0.
+        direction: DVec3,
+        /// Radiant intensity within the inner cone, W·sr⁻¹.
+        intensity: Rgb,
+        /// Degrees from the axis; the intensity falls off from here on.
+        #[serde(default, skip_serializing_if = "is_default")]
+        inner_angle: f64,
+        /// Degrees from the axis, up to 90; no light beyond.
+        #[serde(default = "default_outer_angle")]
+        outer_angle: f64,
+        /// From these coordinates to the world; scale leaves the intensity as it is.
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+    /// Parallel light from infinitely far away.
+    Directional {
+        /// Its name in lists and reports.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Where the light goes; any length but 0.
+        direction: DVec3,
+        /// On a surface that faces the light, W·m⁻².
+        irradiance: Rgb,
+        /// From these coordinates to the world; only its rotation counts.
+        #[serde(default, skip_serializing_if = "is_default")]
+        transform: TransformPart,
+    },
+}
+
+impl LightPart {
+    /// Its name, if it has one.
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Point { name, .. } | Self::Spot { name, .. } | Self::Directional { name, .. } => name.as_deref(),
+        }
+    }
 }
 
 impl<'de> Deserialize<'de> for ScalePart {
@@ -443,6 +487,10 @@ fn default_vfov() -> f64 {
 
 fn default_light_radius() -> f64 {
     0.01
+}
+
+fn default_outer_angle() -> f64 {
+    45.0
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

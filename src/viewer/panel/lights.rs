@@ -5,7 +5,7 @@ use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_d
 use super::{Asked, PanelState};
 use crate::frame::{Edit, NewThing, Property, Selection, Session, sky_strength};
 use crate::render::Environment;
-use crate::scene::{ColorParam, EnvironmentSource, LightEntry, Material, PointLight, SurfaceMaterial};
+use crate::scene::{ColorParam, EnvironmentSource, LightEntry, LightKind, Material, SurfaceMaterial};
 use bevy_ecs::prelude::Entity;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
@@ -52,7 +52,12 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
     });
     ui.horizontal(|ui| {
         ui.weak("add");
-        for (label, thing) in [("Area light", NewThing::AreaLight), ("Point light", NewThing::PointLight)] {
+        for (label, thing) in [
+            ("Area", NewThing::AreaLight),
+            ("Point", NewThing::PointLight),
+            ("Spot", NewThing::SpotLight),
+            ("Directional", NewThing::DirectionalLight),
+        ] {
             if ui.button(label).clicked() {
                 asked.edit(Edit::Add(thing));
             }
@@ -64,9 +69,9 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
 fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Asked) {
     let world = session.world();
     ui.spacing_mut().interact_size.x = 30.0;
-    if let Some(light) = world.get::<PointLight>(entry.entity) {
-        if let Some(value) = color(ui, light.intensity, true) {
-            asked.edit(Edit::Set { id: entry.entity.to_bits(), property: Property::Intensity, value });
+    if let Some(light) = LightKind::of(world, entry.entity) {
+        if let Some(value) = color(ui, light.strength(), true) {
+            asked.edit(Edit::Set { id: entry.entity.to_bits(), property: strength_of(&light).1, value });
         }
         return;
     }
@@ -81,6 +86,14 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
             drop(ui.weak(&*crate::printable::name(&texture.name)))
         }
         _ => {}
+    }
+}
+
+/// What the strength of a light is called, and what sets it.
+pub fn strength_of(light: &LightKind) -> (&'static str, Property) {
+    match light {
+        LightKind::Point(_) | LightKind::Spot(_) => ("intensity", Property::Intensity),
+        LightKind::Directional(_) => ("irradiance", Property::Irradiance),
     }
 }
 

@@ -66,6 +66,8 @@ pub fn add(ui: &mut Ui, path: &mut String, asked: &mut Asked) {
             ("Cube", NewThing::Cube),
             ("Area light", NewThing::AreaLight),
             ("Point light", NewThing::PointLight),
+            ("Spot light", NewThing::SpotLight),
+            ("Directional light", NewThing::DirectionalLight),
         ] {
             if ui.button(label).clicked() {
                 asked.edit(Edit::Add(thing));

@@ -1,9 +1,10 @@
 //! Name, place, material and light of what is selected.
 
-use super::widgets::{color, name_field, number, proportional, row, rows, vector};
+use super::lights::strength_of;
+use super::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
 use super::{Asked, PanelState, material};
 use crate::frame::{Edit, Property, Selection, Session, gizmo};
-use crate::scene::{Linear, Placement, Shape};
+use crate::scene::{DirectionalLight, LightInput, LightKind, Linear, Placement, Shape, SpotLight};
 use egui::Ui;
 use glam::DVec3;
 
@@ -50,23 +51,49 @@ pub fn selected(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &
         material::of_object(ui, session, &inventory, object, asked);
     }
     if let Some(light) = light {
-        rows(ui, "light", |ui| {
-            row(ui, "position", |ui| {
-                if let Some(value) = vector(ui, light.placement.translation, 0.01) {
-                    asked.edit(Edit::Set { id, property: Property::Translation, value });
-                }
+        rows(ui, "light", |ui| light_rows(ui, id, light, asked));
+    }
+}
+
+fn light_rows(ui: &mut Ui, id: u64, input: &LightInput, asked: &mut Asked) {
+    let mut edit = |property, value: Option<DVec3>| {
+        if let Some(value) = value {
+            asked.edit(Edit::Set { id, property, value });
+        }
+    };
+    let LightInput { light, placement, .. } = input;
+    if !matches!(light, LightKind::Directional(_)) {
+        row(ui, "position", |ui| edit(Property::Translation, vector(ui, placement.translation, 0.01)));
+    }
+    if let LightKind::Spot(SpotLight { direction, .. }) | LightKind::Directional(DirectionalLight { direction, .. }) =
+        light
+    {
+        row(ui, "direction", |ui| edit(Property::Direction, vector(ui, *direction, 0.01)));
+        match placement.linear {
+            Linear::Turned { rotation_deg, .. } => {
+                row(ui, "rotation °", |ui| edit(Property::Rotation, vector(ui, rotation_deg, 0.5)));
+            }
+            Linear::Matrix(_) => row(ui, "rotation", |ui| drop(ui.weak("defined by a matrix"))),
+        }
+    }
+    let (name, property) = strength_of(light);
+    row(ui, name, |ui| ui.horizontal(|ui| edit(property, color(ui, light.strength(), true))));
+    let mut degrees = |ui: &mut Ui, name: &str, property, angle_deg: f64| {
+        row(ui, name, |ui| edit(property, number(ui, angle_deg, 0.2, 0.0..=90.0, "°").map(DVec3::splat)));
+    };
+    match light {
+        LightKind::Point(light) => {
+            row_with_hint(ui, "radius", "0: a point, which no camera sees", |ui| {
+                let radius = number(ui, light.radius, proportional(light.radius), 0.0..=1e9, " m");
+                // What is too small for a sphere is a point.
+                edit(Property::Radius, radius.map(|r| DVec3::splat(if r < 1e-9 { 0.0 } else { r })));
             });
-            row(ui, "intensity", |ui| {
-                ui.horizontal(|ui| {
-                    if let Some(value) = color(ui, light.light.intensity, true) {
-                        asked.edit(Edit::Set { id, property: Property::Intensity, value });
-                    }
-                })
-            });
-            row(ui, "radius", |ui| {
-                set_number(ui, id, Property::Radius, light.light.radius, " m", asked);
-            });
-        });
+        }
+        LightKind::Spot(light) => {
+            degrees(ui, "inner angle", Property::InnerAngle, light.inner_angle_deg);
+            degrees(ui, "outer angle", Property::OuterAngle, light.outer_angle_deg);
+        }
+        LightKind::Directional(_) => {}
     }
 }
 

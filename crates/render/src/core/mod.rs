@@ -3,6 +3,7 @@
 pub(crate) mod camera;
 pub(crate) mod color;
 pub(crate) mod counts;
+pub(crate) mod delta_light;
 pub(crate) mod environment;
 pub(crate) mod filter;
 pub(crate) mod image_texture;

@@ -5,6 +5,7 @@
 //! [`crate::prepare::prepared::Prepared`].
 
 use crate::core::camera::Camera;
+use crate::core::delta_light::DeltaLight;
 use crate::core::environment::Environment;
 use crate::core::material::{Material, MaterialId};
 use crate::core::texture::Texture;
@@ -86,6 +87,8 @@ pub struct Shading {
     pub environment: Environment,
     /// What the air outside of all glass absorbs, per metre; light from the environment has passed it already.
     pub air: Vec3,
+    /// Lights without size. They are in no tree: no ray hits them.
+    pub delta_lights: Vec<DeltaLight>,
 }
 
 impl Geometry {
@@ -106,8 +109,8 @@ impl Geometry {
 }
 
 impl Shading {
-    /// In clear air.
+    /// In clear air, without lights that have no size.
     pub fn new(materials: Vec<Material>, textures: Vec<Texture>, environment: Environment) -> Self {
-        Self { materials, textures, environment, air: Vec3::ZERO }
+        Self { materials, textures, environment, air: Vec3::ZERO, delta_lights: Vec::new() }
     }
 }

@@ -160,7 +160,7 @@ impl Prepared {
 
 impl Tables {
     fn build(geometry: &Geometry, shading: &Shading) -> Self {
-        let Shading { materials, textures, environment, air } = shading;
+        let Shading { materials, textures, environment, air, delta_lights: _ } = shading;
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(materials, id)).collect();
         let lights = LightTable::build(geometry, &emission, textures);
         let environment_sampler = EnvironmentSampler::build(environment);

@@ -1,0 +1,121 @@
+//! Lights without size: points, spots and parallel light. No ray ever hits one.
+
+use glam::Vec3;
+
+/// A light that shines from a single point or in a single direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DeltaLight {
+    /// Evenly into all directions.
+    Point {
+        /// Metres.
+        position: Vec3,
+        /// Radiant intensity, W·sr⁻¹.
+        intensity: Vec3,
+    },
+    /// Into a cone.
+    Spot {
+        /// Metres.
+        position: Vec3,
+        /// Radiant intensity within the inner cone, W·sr⁻¹.
+        intensity: Vec3,
+        /// The cone.
+        cone: Cone,
+    },
+    /// From infinitely far away.
+    Directional {
+        /// Unit, where the light goes.
+        direction: Vec3,
+        /// On a surface that faces the light, W·m⁻².
+        irradiance: Vec3,
+    },
+}
+
+/// How a spot light falls off from its axis.
+///
+/// Angles are kept as 1 − cos, which tells narrow cones apart where the cosine is 1 in `f32`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    /// Unit, away from the tip.
+    pub axis: Vec3,
+    /// 1 − cos of the angle up to which the light is whole.
+    pub inner: f32,
+    /// 1 − cos of the angle from which on there is none, 0..1; at least `inner`.
+    pub outer: f32,
+}
+
+impl Cone {
+    /// - `axis`: unit.
+    /// - `inner`, `outer`: radians from the axis, 0 ≤ `inner` ≤ `outer` ≤ π/2.
+    pub fn new(axis: Vec3, inner: f64, outer: f64) -> Self {
+        // 1 − cos a = 2 sin² (a/2)
+        let one_minus_cos = |angle: f64| (2.0 * (0.5 * angle).sin().powi(2)) as f32;
+        Self { axis, inner: one_minus_cos(inner), outer: one_minus_cos(outer) }
+    }
+
+    /// The share of the intensity that goes along `dir`, 0..1.
+    ///
+    /// - `dir`: unit, away from the tip.
+    ///
+    /// Source: glTF 2.0, KHR_lights_punctual.
+    #[inline]
+    pub fn falloff(&self, dir: Vec3) -> f32 {
+        self.falloff_at(0.5 * (dir - self.axis).length_squared())
+    }
+
+    /// The same at an angle, given as 1 − cos.
+    #[inline]
+    pub fn falloff_at(&self, one_minus_cos: f32) -> f32 {
+        if one_minus_cos <= self.inner {
+            return 1.0;
+        }
+        let t = ((self.outer - one_minus_cos) / (self.outer - self.inner)).clamp(0.0, 1.0);
+        if t.is_nan() { 0.0 } else { t * t }
+    }
+}
+
+impl DeltaLight {
+    /// Radiant intensity, W·sr⁻¹, or for a directional light its irradiance, W·m⁻².
+    pub fn strength(&self) -> Vec3 {
+        match *self {
+            Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
+            Self::Directional { irradiance, .. } => irradiance,
+        }
+    }
+
+    /// Radiant intensity along a unit direction, W·sr⁻¹; of a directional light, its irradiance.
+    #[inline]
+    pub fn towards(&self, dir: Vec3) -> Vec3 {
+        match self {
+            Self::Point { intensity, .. } => *intensity,
+            Self::Spot { intensity, cone, .. } => cone.falloff(dir) * *intensity,
+            Self::Directional { irradiance, .. } => *irradiance,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cone_falls_off_as_gltf_says() {
+        for (inner, outer) in [(0.0, 45.0), (20.0, 30.0), (0.05, 0.1), (89.0, 90.0)] {
+            let (inner, outer): (f64, f64) = (f64::to_radians(inner), f64::to_radians(outer));
+            let cone = Cone::new(Vec3::Z, inner, outer);
+            for i in 0..=60 {
+                let angle = outer * 1.1 * f64::from(i) / 60.0;
+                let t = ((angle.cos() - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0);
+                let dir = Vec3::new(angle.sin() as f32, 0.0, angle.cos() as f32);
+                let found = f64::from(cone.falloff(dir));
+                assert!((found - t * t).abs() < 2e-5, "{inner} {outer} {angle}: {found} for {}", t * t);
+            }
+        }
+    }
+
+    #[test]
+    fn equal_angles_make_a_sharp_edge() {
+        let cone = Cone::new(Vec3::Z, 0.5, 0.5);
+        let at = |angle: f32| cone.falloff(Vec3::new(angle.sin(), 0.0, angle.cos()));
+        assert_eq!([at(0.0), at(0.499), at(0.501), at(3.0)], [1.0, 1.0, 0.0, 0.0]);
+    }
+}
