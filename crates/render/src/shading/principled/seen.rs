@@ -47,6 +47,8 @@ pub(super) struct Seen<'a> {
     mean_past_all: Vec3,
     /// What a metal loses at one bounce over what it returns.
     lost: f32,
+    /// What a rough pane lets through over what it does by single scattering.
+    passed_again: Vec3,
     pmf: [f32; 4],
 }
 
@@ -111,6 +113,9 @@ impl<'a> Seen<'a> {
             Inside::Solid(_) => transmission.share,
             Inside::Thin(_) => transmission.share * luminance(transmission.tint * (Vec3::ONE - reflected)),
         });
+        // All that is not reflected passes (as Turquin 2019 for metals).
+        let once = Vec3::splat(base.facing + base.grazing) - reflected;
+        let passed_again = (Vec3::ONE - reflected) / once.max(Vec3::splat(1e-3));
         let sheen = luminance(of.sheen);
         let strength = [
             luminance(of.diffuse * past_all)
@@ -124,7 +129,7 @@ impl<'a> Seen<'a> {
             return None;
         }
         let pmf = strength.map(|one| one / sum);
-        Some(Self { of, frame, wo: local, coat, past_sheen, past_all, mean_past_all, lost, pmf })
+        Some(Self { of, frame, wo: local, coat, past_sheen, past_all, mean_past_all, lost, passed_again, pmf })
     }
 
     /// What reaches the layers below the coat, of light from one direction to the viewer.
@@ -209,7 +214,7 @@ impl<'a> Seen<'a> {
             // The reflected lobe on the other side.
             Inside::Thin(_) => {
                 let (half, f, density) = reflection(self.wo, above, self.of.alpha);
-                (f * self.passed(self.wo.dot(half)), density)
+                (f * self.passed(self.wo.dot(half)) * self.passed_again, density)
             }
         };
         (transmission.tint * (transmission.share * below) * f, self.pmf[3] * density)
