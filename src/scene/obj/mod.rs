@@ -6,6 +6,7 @@
 //! the way back.
 
 mod error;
+mod lines;
 mod mtl;
 mod parse;
 mod write;
