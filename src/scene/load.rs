@@ -263,7 +263,11 @@ impl LoadedScene {
     /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
     fn add_mesh_pictures(&mut self, options: &LoadOptions) {
         let textures = self.meshes_with_own_materials().flat_map(|mesh| &mesh.textures);
-        let files: Vec<(String, PathBuf)> = textures.map(|(name, _, file)| (name.clone(), file.clone())).collect();
+        let files = textures.filter_map(|(_, source, path)| match source {
+            TextureSource::Image { file, .. } => Some((file.clone(), path.clone())),
+            _ => None,
+        });
+        let files: Vec<(String, PathBuf)> = files.collect();
         for (name, path) in files {
             if let Err(error) = self.add_picture(&name, &path, options) {
                 self.warnings.push(format!("{error}; the texture is omitted"));

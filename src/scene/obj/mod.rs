@@ -12,7 +12,7 @@ mod parse;
 mod write;
 
 pub use error::{LineProblem, ObjError};
-pub use mtl::ImportedMaterial;
+pub use mtl::{ImportedMaterial, PbrMaterial};
 pub(super) use write::{NewObj, save_new_obj};
 pub use write::{ObjExtras, save_obj};
 
