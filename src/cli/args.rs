@@ -2,18 +2,20 @@
 
 use super::console::remark;
 use super::failure::Failure;
+use super::number::parse_seconds;
 use clap::{Args, ValueEnum};
 use firstlight::frame::check_film_source;
 use firstlight::render::{Integrator, PixelFilter};
 use firstlight::scene::whole_file::Replace;
-use firstlight::scene::{Files, LoadOptions, LoadedScene, SceneSource, UpAxis, load};
+use firstlight::scene::{Files, LoadOptions, LoadedScene, ModelChoice, SceneSource, UpAxis, load};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// What to open, and how.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl), or picture rendered by firstlight (.png, .exr).
+    /// Built-in scene, scene file (.ron), model (.obj, .ply, .stl, .glb, .gltf), or picture rendered by firstlight (.png,
+    /// .exr).
     #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     pub scene: OsString,
     #[command(flatten)]
@@ -23,7 +25,8 @@ pub struct SceneArgs {
 /// Several things to open, in the same way.
 #[derive(Args, Clone, Debug)]
 pub struct ScenesArgs {
-    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl), or pictures rendered by firstlight (.png, .exr).
+    /// Built-in scenes, scene files (.ron), models (.obj, .ply, .stl, .glb, .gltf), or pictures rendered by firstlight
+    /// (.png, .exr).
     #[arg(value_name = "SCENE|MODEL|PICTURE", default_value = "gallery")]
     pub scenes: Vec<OsString>,
     #[command(flatten)]
@@ -42,9 +45,33 @@ pub struct OpenArgs {
     /// Up axis of a model [default: detected from its shape].
     #[arg(long, value_enum)]
     pub up: Option<UpArg>,
+    /// Camera of a glTF model to look through, by name [default: the first].
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Moment of a glTF model's animations, in seconds [default: the stored pose].
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
+    pub at: Option<f64>,
+    /// Variant of a glTF model's materials, by name.
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+    /// Allow a glTF model to read files outside of its own folder.
+    #[arg(long)]
+    pub allow_outside: bool,
     /// Environment image (.hdr, .exr, .png, .jpg) that lights the scene instead of its own environment.
     #[arg(long, value_name = "FILE", visible_alias = "environment")]
     pub env: Option<PathBuf>,
+}
+
+impl OpenArgs {
+    /// What of a model is asked for.
+    pub fn choice(&self) -> ModelChoice {
+        ModelChoice {
+            camera: self.camera.clone(),
+            at: self.at,
+            variant: self.variant.clone(),
+            allow_outside: self.allow_outside,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -113,8 +140,9 @@ impl SceneArgs {
             check_film_source(&source)?;
         }
         let environment = self.how.env.as_deref();
-        let options =
-            LoadOptions { up: self.up(), aspect, environment, progress: Some(progress), ..LoadOptions::default() };
+        let choice = self.how.choice();
+        let (progress, choice) = (Some(progress), Some(&choice));
+        let options = LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;
         files.read_all(scene.files())?;
         for warning in &scene.warnings {

@@ -20,6 +20,14 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A finite number of seconds.
+pub fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("must be a finite number of seconds".to_owned()),
+    }
+}
+
 /// A relative error to stop at: `0.05`, or the same as `5%`. Above 1 only with the sign: who writes 5 means percent.
 pub fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = number_and_unit(text);

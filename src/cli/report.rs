@@ -32,7 +32,7 @@ const DEFAULT_PIXELS: f64 = 50_000.0;
 
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// Built-in scenes, scene files (.ron) or models (.obj, .ply, .stl) [default: all built-in scenes].
+    /// Built-in scenes, scene files (.ron) or models (.obj, .ply, .stl, .glb, .gltf) [default: all built-in scenes].
     #[arg(value_name = "SCENES")]
     scenes: Vec<OsString>,
     /// Converged linear picture (.exr) of the scene [default: rendered with 16 times the samples and cached].

@@ -94,6 +94,7 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
         threads,
         seed: args.seed.unwrap_or(0),
         up: args.scene.up(),
+        choice: args.scene.how.choice(),
         environment: args.scene.how.env.clone(),
         folder,
         record: args.record.clone(),

@@ -22,7 +22,7 @@ Examples:
 #[derive(Args, Clone, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct SimplifyArgs {
-    /// Model (.obj, .ply, .stl).
+    /// Model (.obj, .ply, .stl, .glb, .gltf).
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// Output file; an existing file is replaced.

@@ -5,8 +5,8 @@ use super::film_file::check_film_source;
 use super::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
 use crate::scene::{
-    LoadOptions, LoadedScene, MeshBase, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis, load,
-    read_picture,
+    LoadOptions, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis,
+    load, read_picture,
 };
 use bevy_ecs::prelude::{Entity, Resource};
 use std::path::PathBuf;
@@ -76,10 +76,12 @@ impl BackgroundTasks {
     /// Reads a scene; an earlier reading that is still under way is forgotten.
     ///
     /// - `how`: which axis of models points up, and the image that takes the place of the environment.
+    /// - `choice`: what of a model is shown.
     pub fn load(
         &self,
         source: SceneSource,
         how: (Option<UpAxis>, Option<PathBuf>),
+        choice: ModelChoice,
         aspect: f64,
         pool: Arc<rayon::ThreadPool>,
     ) {
@@ -106,6 +108,7 @@ impl BackgroundTasks {
                 hasty: true,
                 progress: Some(&say),
                 known: None,
+                choice: Some(&choice),
             };
             let result = guarded(|| {
                 pool.install(|| {

@@ -16,7 +16,7 @@ use super::status::{MessageKind, Status};
 use super::views::{Bookmarks, ViewTrail};
 use crate::render::ToneCurve;
 use crate::scene::bounds::MOST_STOPS;
-use crate::scene::{DisplaySettings, Lens, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
+use crate::scene::{DisplaySettings, Lens, ModelChoice, Ordinal, Projection, Rendering, SceneSource, UpAxis, View};
 use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
 use glam::DVec3;
@@ -190,7 +190,10 @@ impl CommandParams<'_, '_> {
             }
             Command::SetThreads { threads } => drop(self.threads.set_if_neq(Threads(threads.min(MAX_THREADS)))),
             Command::Open { path } => match SceneSource::parse(&path) {
-                Ok(source) => self.beside.load(source, (self.up.0, None), self.size.aspect(), self.renderer.0.pool()),
+                Ok(source) => {
+                    let choice = ModelChoice::default();
+                    self.beside.load(source, (self.up.0, None), choice, self.size.aspect(), self.renderer.0.pool());
+                }
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
             Command::SaveScene { path } => self.saving.requests.push(path),

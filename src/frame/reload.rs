@@ -92,7 +92,13 @@ pub fn reload(world: &mut World) {
     let options = world.resource::<ModelUp>().0;
     let work = move || {
         let (up, environment) = (current.up.or(options), current.environment.as_deref());
-        let options = LoadOptions { up, environment, known: Some(&current), ..LoadOptions::default() };
+        let options = LoadOptions {
+            up,
+            environment,
+            known: Some(&current),
+            choice: Some(&current.choice),
+            ..LoadOptions::default()
+        };
         let read = || pool.install(|| load(&source, &options));
         let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(read));
         let result = result.unwrap_or_else(|_| {

@@ -23,8 +23,8 @@ use super::worker::{Waker, Worker};
 use super::{Command, LatencyHistogram, Target};
 use crate::render::{Film, Prepared, RenderSettings};
 use crate::scene::{
-    BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, Rendering, SceneInputs,
-    SceneSource, UpAxis, check_film_size,
+    BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering,
+    SceneInputs, SceneSource, UpAxis, check_film_size,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};
@@ -190,10 +190,15 @@ impl Session {
 
     /// The same with an image in place of the scene's own environment.
     pub fn open_lit_by(&mut self, source: SceneSource, environment: Option<PathBuf>) {
+        self.open_choice(source, environment, ModelChoice::default());
+    }
+
+    /// The same of a model that has more than one camera, moment or variant.
+    pub fn open_choice(&mut self, source: SceneSource, environment: Option<PathBuf>, choice: ModelChoice) {
         let aspect = self.world.resource::<PictureSize>().aspect();
         let up = self.world.resource::<ModelUp>().0;
         let pool = self.world.resource::<Renderer>().0.pool();
-        self.world.resource::<BackgroundTasks>().load(source, (up, environment), aspect, pool);
+        self.world.resource::<BackgroundTasks>().load(source, (up, environment), choice, aspect, pool);
     }
 
     /// Takes over a scene that has been read already.

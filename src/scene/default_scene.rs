@@ -14,6 +14,70 @@ use glam::{DVec3, Vec3};
 /// Names of the parts, as a saved scene shows them.
 const CLAY: &str = "clay";
 const KEY_LIGHT: &str = "key light";
+const GROUND: &str = "ground";
+
+fn sky() -> EnvironmentSource {
+    EnvironmentSource::Gradient {
+        zenith: Rgb(Vec3::new(0.35, 0.5, 0.8)),
+        horizon: Rgb(Vec3::new(0.85, 0.9, 0.95)),
+        ground: Rgb(Vec3::splat(0.3)),
+    }
+}
+
+fn ground_material() -> MaterialPart {
+    MaterialPart::Diffuse { albedo: ColorValue::rgb(0.45, 0.45, 0.43) }
+}
+
+/// For a light as large as the model and five radii away: about three times the light of the sky.
+fn key_material() -> MaterialPart {
+    MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }
+}
+
+fn ground(material: String, (min, max): (DVec3, DVec3)) -> ObjectPart {
+    let center = 0.5 * (min + max);
+    ObjectPart::Plane {
+        name: Some(GROUND.to_owned()),
+        point: DVec3::new(center.x, min.y, center.z),
+        normal: DVec3::Y,
+        material,
+        transform: TransformPart::default(),
+    }
+}
+
+/// - `side`: the signs of where the front is.
+fn key_light(material: String, (min, max): (DVec3, DVec3), side: DVec3) -> ObjectPart {
+    let center = 0.5 * (min + max);
+    let radius = (0.5 * (max - min).length()).max(SceneFile::MIN_SIZE);
+    ObjectPart::Sphere {
+        name: Some(KEY_LIGHT.to_owned()),
+        center: center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize(),
+        radius,
+        material,
+        transform: TransformPart::default(),
+    }
+}
+
+/// Adds sky and key light to a scene that has none.
+pub fn light(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
+    let name = new_material(file, KEY_LIGHT, key_material());
+    file.objects.push(key_light(name, bounds, DVec3::ONE));
+    file.environment = sky();
+}
+
+/// Puts a ground below a scene.
+pub fn stand_on_ground(file: &mut SceneFile, bounds: (DVec3, DVec3)) {
+    let name = new_material(file, GROUND, ground_material());
+    file.objects.push(ground(name, bounds));
+}
+
+/// Adds a material under a name that is new.
+fn new_material(file: &mut SceneFile, wanted: &str, material: MaterialPart) -> String {
+    let is_taken = |name: &String| file.materials.names().any(|known| known == name);
+    let names = std::iter::once(wanted.to_owned()).chain((2..).map(|number: u64| format!("{wanted} {number}")));
+    let name = names.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
+    file.materials.0.push((name.clone(), material));
+    name
+}
 
 /// The scene of a model that is opened by itself.
 ///
@@ -22,35 +86,25 @@ const KEY_LIGHT: &str = "key light";
 pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspect: f64) -> SceneFile {
     let up = up.unwrap_or_else(|| guess_up(&loaded.mesh));
     let (min, max) = bounds(&loaded.mesh, up);
-    let center = 0.5 * (min + max);
-    let radius = (0.5 * (max - min).length()).max(SceneFile::MIN_SIZE);
     let transform = match up {
         UpAxis::Y => TransformPart::default(),
         UpAxis::Z => TransformPart { rotate: Some(DVec3::new(-90.0, 0.0, 0.0)), ..TransformPart::default() },
     };
     let material = |albedo| MaterialPart::Diffuse { albedo };
-    let mut materials = vec![
-        ("ground".to_owned(), material(ColorValue::rgb(0.45, 0.45, 0.43))),
-        // As large as the model and five radii away: about three times the light of the sky.
-        (KEY_LIGHT.to_owned(), MaterialPart::Emissive { radiance: ColorValue::rgb(26.0, 24.0, 21.0) }),
-    ];
+    let mut materials = vec![(GROUND.to_owned(), ground_material()), (KEY_LIGHT.to_owned(), key_material())];
     if loaded.slots.is_empty() {
         materials.push((CLAY.to_owned(), material(ColorValue::rgb(0.72, 0.56, 0.45))));
     }
     // Half a turn about the vertical, if the model looks the other way.
     let side = if faces_away(&loaded.mesh, up) { DVec3::new(-1.0, 1.0, -1.0) } else { DVec3::ONE };
-    let key = center + 5.0 * radius * side * DVec3::new(-0.55, 0.75, 0.6).normalize();
     SceneFile {
         camera: camera(min, max, side, aspect),
+        cameras: Named::default(),
         film: FilmPart::default(),
         integrator: Integrator::default(),
         max_depth: None,
         display: DisplayPart::default(),
-        environment: EnvironmentSource::Gradient {
-            zenith: Rgb(Vec3::new(0.35, 0.5, 0.8)),
-            horizon: Rgb(Vec3::new(0.85, 0.9, 0.95)),
-            ground: Rgb(Vec3::splat(0.3)),
-        },
+        environment: sky(),
         air: Rgb::default(),
         textures: Named::default(),
         materials: Named(materials),
@@ -64,20 +118,8 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
                 materials: None,
                 transform,
             },
-            ObjectPart::Plane {
-                name: Some("ground".to_owned()),
-                point: DVec3::new(center.x, min.y, center.z),
-                normal: DVec3::Y,
-                material: "ground".to_owned(),
-                transform: TransformPart::default(),
-            },
-            ObjectPart::Sphere {
-                name: Some(KEY_LIGHT.to_owned()),
-                center: key,
-                radius,
-                material: KEY_LIGHT.to_owned(),
-                transform: TransformPart::default(),
-            },
+            ground(GROUND.to_owned(), (min, max)),
+            key_light(KEY_LIGHT.to_owned(), (min, max), side),
         ],
         lights: Vec::new(),
     }
@@ -90,7 +132,7 @@ pub fn remove_key_light(file: &mut SceneFile) {
 }
 
 /// A three-quarter view from slightly above, as near as the box allows; `side` has the signs of where the front is.
-fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
+pub fn camera(min: DVec3, max: DVec3, side: DVec3, aspect: f64) -> CameraPart {
     const VFOV_DEG: f64 = 35.0;
     /// Room around the box.
     const MARGIN: f64 = 1.12;

@@ -63,6 +63,7 @@ impl Description {
             inputs.camera.map_or_else(Default::default, |camera| (camera.view, camera.projection, camera.lens));
         let file = SceneFile {
             camera: camera_part(&view, &projection, &lens, loaded.map(|loaded| &loaded.file.camera)),
+            cameras: loaded.map(|loaded| loaded.file.cameras.clone()).unwrap_or_default(),
             film: FilmPart { width, height, filter: rendering.filter },
             integrator: rendering.integrator,
             max_depth: (rendering.max_depth < u32::MAX).then_some(rendering.max_depth),
@@ -275,7 +276,9 @@ impl<'a> Writer<'a> {
         if let TextureSource::Image { file, .. } = &mut part {
             let from_mesh = self.loaded.and_then(|loaded| {
                 let textures = loaded.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
-                textures.clone().find(|(name, ..)| name == file).map(|(.., path)| path.clone())
+                let names_it =
+                    |source: &TextureSource| matches!(source, TextureSource::Image { file: of, .. } if of == file);
+                textures.clone().find(|(_, source, _)| names_it(source)).map(|(.., path)| path.clone())
             });
             if let Some(path) = from_mesh.and_then(|path| std::path::absolute(path).ok()) {
                 *file = path_to_text(&path);

@@ -1,14 +1,19 @@
 //! From a name or a path to everything a scene needs: text, meshes, pictures, trees. Runs on any thread.
 
 use super::builtin::{BUILTIN_SCENES, builtin_text};
+use super::choice::ModelChoice;
 use super::components::{Balls, Shape};
 use super::default_scene;
+use super::documents::Documents;
 use super::error::{Problem, SceneError, suggestion};
 use super::file::{ObjectPart, RadiiPart, SceneFile, ball_grid, locate};
+use super::gltf::images::part_of_model;
+use super::gltf_scene;
 use super::image_metadata::{ImageMetadata, MetadataError};
 use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
+use super::model::ModelFormat;
 use super::picture::read_picture;
 use super::relative::{path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
@@ -30,6 +35,8 @@ pub struct LoadOptions<'a> {
     pub environment: Option<&'a Path>,
     /// Width over height of the picture that a model is framed for; 16:9 when not given.
     pub aspect: Option<f64>,
+    /// Of a glTF model.
+    pub choice: Option<&'a ModelChoice>,
     /// Large meshes get trees that are built in a hurry ([`super::trees::Trees::hasty`]), for a first picture.
     pub hasty: bool,
     /// What was read before: of it is taken what has not changed on disk.
@@ -39,6 +46,10 @@ pub struct LoadOptions<'a> {
 }
 
 impl LoadOptions<'_> {
+    fn choice(&self) -> &ModelChoice {
+        self.choice.unwrap_or(&ModelChoice::DEFAULT)
+    }
+
     fn say(&self, text: &str) {
         if let Some(progress) = self.progress {
             progress(text);
@@ -56,25 +67,42 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
     }
     options.say(&format!("loading {}", source.title()));
     let start = Instant::now();
+    let documents = Documents::new(options.choice().allow_outside);
     let mut scene = match source {
         SceneSource::Builtin(name) => {
             let text = builtin_text(name).ok_or_else(|| {
                 let hint = suggestion(name, BUILTIN_SCENES.iter().map(|(name, _, _)| *name));
                 SceneError::new(format!("there is no built-in scene `{name}`{hint}"))
             })?;
-            resolve(source, SceneFile::parse(text, name)?, text, PathBuf::new(), options)?
+            resolve(source, SceneFile::parse(text, name)?, Some(text), PathBuf::new(), options, &documents)?
         }
         SceneSource::Scene(path) => {
             let text = read_text(path)?;
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-            resolve(source, SceneFile::parse(&text, path)?, &text, folder, options)?
+            resolve(source, SceneFile::parse(&text, path)?, Some(&text), folder, options, &documents)?
+        }
+        SceneSource::Model(path) if ModelFormat::of(path) == Some(ModelFormat::Gltf) => {
+            let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
+            let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+            let wish = gltf_scene::Wish {
+                file: &file,
+                choice: options.choice(),
+                aspect: options.aspect.unwrap_or(16.0 / 9.0),
+                is_lit: options.environment.is_some(),
+            };
+            let made = gltf_scene::generate(&documents, path, &wish)?;
+            let mut scene = resolve(source, made.file, None, folder, options, &documents)?;
+            scene.warnings.splice(0..0, made.warnings);
+            scene.facts = Some(made.facts);
+            scene
         }
         SceneSource::Model(path) => {
             let file = path.file_name().map(|name| path_to_text(name.as_ref())).unwrap_or_default();
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             let mesh_source = MeshSource::of_file(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
-            let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder), Ok)?;
+            let mesh =
+                kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder, &documents), Ok)?;
             let mut file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
             if options.environment.is_some() {
                 // The image has lights of its own.
@@ -86,7 +114,7 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             scene.warnings.extend(mesh.warnings.iter().chain(&mesh.material_warnings).cloned());
             let place = scene.file.objects.iter().position(|object| matches!(object, ObjectPart::Mesh { .. }));
             scene.meshes[place.expect("a showcase shows its mesh")] = Some(mesh);
-            scene.add_mesh_pictures(options);
+            scene.add_mesh_pictures(options, &documents);
             scene.up = options.up;
             if let Some(environment) = options.environment {
                 scene.light_by(environment, options)?;
@@ -119,7 +147,10 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
                     path.parent().map(Path::to_path_buf).unwrap_or_default()
                 }
             };
-            let mut scene = resolve(&source, SceneFile::parse(text, path)?, text, folder, &options)?;
+            let mut scene = {
+                let documents = Documents::new(options.choice().allow_outside);
+                resolve(&source, SceneFile::parse(text, path)?, Some(text), folder, &options, &documents)?
+            };
             scene.load_seconds = start.elapsed().as_secs_f64();
             let start = Instant::now();
             scene.build_trees(&options)?;
@@ -142,11 +173,13 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
 fn resolve(
     source: &SceneSource,
     file: SceneFile,
-    text: &str,
+    text: Option<&str>,
     folder: PathBuf,
     options: &LoadOptions,
+    documents: &Documents,
 ) -> Result<LoadedScene, SceneError> {
     let mut scene = LoadedScene::empty(source, file, folder);
+    scene.choice = options.choice().clone();
     if let Some(environment) = options.environment {
         scene.light_by(environment, options)?;
     }
@@ -156,7 +189,7 @@ fn resolve(
     let mut note = |path: String, error: &SceneError| {
         for problem in &error.problems {
             if problems.len() < SceneError::MAX_TOLD {
-                let at = Some(locate(text, &path));
+                let at = text.map(|text| locate(text, &path));
                 problems.push(Problem { file: Some(title.clone()), at, message: problem.to_string() });
             } else {
                 untold += 1;
@@ -172,7 +205,8 @@ fn resolve(
                 let read = || {
                     options.say(&format!("loading {}", source.name()));
                     let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
-                    let loaded = kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder), Ok);
+                    let loaded =
+                        kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder, documents), Ok);
                     let warnings = loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);
                     scene.warnings.extend_from_slice(warnings);
                     loaded
@@ -213,11 +247,11 @@ fn resolve(
     }
     for (place, file) in wanted {
         let path = scene.folder.join(text_to_path(&file));
-        if let Err(error) = scene.add_picture(&file, &path, options) {
+        if let Err(error) = scene.add_picture(&file, &path, options, documents) {
             note(place, &error);
         }
     }
-    scene.add_mesh_pictures(options);
+    scene.add_mesh_pictures(options, documents);
     let mut told = HashSet::new();
     let of_materials = scene.meshes_with_own_materials().flat_map(|mesh| &mesh.material_warnings);
     let of_materials: Vec<String> = of_materials.filter(|warning| told.insert(*warning)).cloned().collect();
@@ -231,45 +265,58 @@ impl LoadedScene {
         // The paths of a scene count from its folder; those of a scene without one, from the current folder.
         let is_here = self.folder.as_os_str().is_empty();
         let file = if is_here { path_to_text(path) } else { relative_path(&self.folder, path) };
-        self.add_picture(&file, path, options)?;
+        self.add_picture(&file, path, options, &Documents::default())?;
         self.file.environment = EnvironmentSource::Image { file, scale: Rgb(Vec3::ONE), rotate: 0.0 };
         self.environment = Some(path.to_path_buf());
         Ok(())
     }
 
-    fn add_picture(&mut self, name: &str, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
+    fn add_picture(
+        &mut self,
+        name: &str,
+        path: &Path,
+        options: &LoadOptions,
+        documents: &Documents,
+    ) -> Result<(), SceneError> {
         if self.pictures.contains_key(name) {
             return Ok(());
         }
-        let before = stamp(path);
+        // What is part of a model changes with it.
+        let part = part_of_model(path);
+        let on_disk = part.as_ref().map_or(path, |(model, _)| model);
+        let before = stamp(on_disk);
         if let Some(known) = options.known
-            && known.picture_files.get(name) == Some(&(path.to_owned(), before))
+            && known.picture_files.get(name) == Some(&(on_disk.to_owned(), before))
             && before.is_some()
             && let Some(picture) = known.pictures.get(name)
         {
             self.pictures.insert(name.to_owned(), picture.clone());
-            self.picture_files.insert(name.to_owned(), (path.to_owned(), before));
+            self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
             return Ok(());
         }
         options.say(&format!("loading {name}"));
         // Also where it cannot be read: it may come to be.
-        self.picture_files.insert(name.to_owned(), (path.to_owned(), before));
-        let (picture, warning) = read_picture(path).map_err(|reason| SceneError::in_file(path, reason))?;
+        self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
+        let read = match part {
+            Some((model, number)) => documents.picture(&model, number),
+            None => read_picture(path),
+        };
+        let (picture, warning) = read.map_err(|reason| SceneError::in_file(path, reason))?;
         self.warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
         self.pictures.insert(name.to_owned(), Arc::new(picture));
         Ok(())
     }
 
     /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
-    fn add_mesh_pictures(&mut self, options: &LoadOptions) {
+    fn add_mesh_pictures(&mut self, options: &LoadOptions, documents: &Documents) {
         let textures = self.meshes_with_own_materials().flat_map(|mesh| &mesh.textures);
-        let files = textures.filter_map(|(_, source, path)| match source {
+        let named = |(_, source, path): &(String, TextureSource, PathBuf)| match source {
             TextureSource::Image { file, .. } => Some((file.clone(), path.clone())),
             _ => None,
-        });
-        let files: Vec<(String, PathBuf)> = files.collect();
+        };
+        let files: Vec<(String, PathBuf)> = textures.filter_map(named).collect();
         for (name, path) in files {
-            if let Err(error) = self.add_picture(&name, &path, options) {
+            if let Err(error) = self.add_picture(&name, &path, options, documents) {
                 self.warnings.push(format!("{error}; the texture is omitted"));
             }
         }

@@ -1,7 +1,9 @@
 //! A scene that was read, with all that it points at.
 
+use super::choice::ModelChoice;
 use super::components::Balls;
 use super::file::SceneFile;
+use super::gltf::GltfFacts;
 use super::image_metadata::ImageMetadata;
 use super::meshes::LoadedMesh;
 use super::source::{SceneSource, UpAxis};
@@ -37,6 +39,10 @@ pub struct LoadedScene {
     pub up: Option<UpAxis>,
     /// The image that took the place of the scene's own environment.
     pub environment: Option<PathBuf>,
+    /// What of a model was asked for.
+    pub choice: ModelChoice,
+    /// What the glTF file has that was opened by itself.
+    pub facts: Option<GltfFacts>,
     /// What the picture said that this was opened by.
     pub shot: Option<ImageMetadata>,
     /// Reading and parsing.
@@ -59,6 +65,8 @@ impl LoadedScene {
             warnings: Vec::new(),
             up: None,
             environment: None,
+            choice: ModelChoice::DEFAULT,
+            facts: None,
             shot: None,
             load_seconds: 0.0,
             build_seconds: 0.0,

@@ -1,7 +1,10 @@
 //! The meshes that a scene names: from files or made by the program, shaded as asked, with their own materials.
 
+use super::documents::Documents;
 use super::error::SceneError;
 use super::file::MaterialPart;
+use super::gltf::MeshKey;
+use super::gltf_mesh::GltfMesh;
 use super::model::{ImportedModel, ModelFormat, ModelNormals, ModelOptions, load_model};
 use super::obj::{ImportedMaterial, PbrMaterial};
 use super::relative::text_to_path;
@@ -14,6 +17,9 @@ use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Edges of glTF meshes that are shaded anew are hard beyond this angle, radians.
+const CREASE: f32 = std::f32::consts::FRAC_PI_3;
 
 /// What `builtin("…")` may name.
 pub const BUILTIN_NAMES: &[&str] = &[
@@ -68,7 +74,18 @@ pub fn load_mesh(
     shading: MeshShading,
     simplify: Option<f64>,
     folder: &Path,
+    documents: &Documents,
 ) -> Result<LoadedMesh, SceneError> {
+    if let MeshSource::Gltf { file, mesh, node, at } = source {
+        let path = folder.join(text_to_path(file));
+        let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
+        let read = GltfMesh { path: &path, key, at: at.map(|at| at.0), shading, simplified: simplify.is_some() };
+        let base = read.base(documents).map_err(|error| SceneError::new(error.to_string()))?;
+        let mesh = Arc::new(finish(base.mesh, source, shading, simplify, Some(CREASE))?);
+        let (slots, textures, files) = (base.slots, base.textures, base.files);
+        let (warnings, material_warnings) = (base.warnings, base.material_warnings);
+        return Ok(LoadedMesh { mesh, slots, textures, warnings, material_warnings, files });
+    }
     match source.file() {
         Some((_, file)) => read_file(source, &folder.join(text_to_path(file)), shading, simplify),
         None => {
@@ -110,6 +127,15 @@ impl MeshBase {
         folder: &Path,
     ) -> Result<Self, SceneError> {
         let (mesh, crease) = match source.file() {
+            Some((ModelFormat::Gltf, file)) => {
+                let MeshSource::Gltf { mesh, node, at, .. } = source else { unreachable!("the format is glTF") };
+                let path = folder.join(text_to_path(file));
+                let key = mesh.map(|mesh| MeshKey { mesh, node: *node });
+                let at = at.map(|at| at.0);
+                let read = GltfMesh { path: &path, key, at, shading, simplified: simplify.is_some() };
+                let base = read.base(&Documents::default()).map_err(|error| SceneError::new(error.to_string()))?;
+                (base.mesh, Some(CREASE))
+            }
             Some((format, file)) => {
                 let path = folder.join(text_to_path(file));
                 let (imported, crease) = read_base(&path, format, shading, simplify.is_some())?;
@@ -150,10 +176,16 @@ fn finish(
     simplify: Option<f64>,
     crease: Option<f32>,
 ) -> Result<Mesh, SceneError> {
+    let (had_tangents, is_gltf) = (!mesh.tangents.is_empty(), matches!(source, MeshSource::Gltf { .. }));
     let mesh = simplified(mesh, simplify)?;
+    // A glTF mesh without normals is flat.
+    if is_gltf && shading == MeshShading::Auto && simplify.is_none() {
+        return Ok(mesh);
+    }
     // Normals that reading gave are those that were asked for.
     let keeps = shading != MeshShading::Flat && source.file().is_some() && !mesh.normals.is_empty();
-    Ok(if keeps { mesh } else { shaded(mesh, shading, crease) })
+    let mesh = if keeps { mesh } else { shaded(mesh, shading, crease) };
+    Ok(if had_tangents && mesh.tangents.is_empty() { mesh.with_tangents() } else { mesh })
 }
 
 fn read_file(
@@ -369,7 +401,7 @@ mod tests {
     fn every_builtin_mesh_can_be_had() {
         for name in BUILTIN_NAMES {
             let source = MeshSource::Builtin((*name).to_owned());
-            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new("")).unwrap();
+            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new(""), &Documents::new(false)).unwrap();
             loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         }
         assert!(BUILTIN_NAMES.is_sorted());

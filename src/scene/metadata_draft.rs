@@ -100,8 +100,13 @@ impl MetadataDraft {
             let content = self.content.fingerprint();
             let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
             // What was opened has an environment that its file does not name, or was itself written into a picture.
-            let is_own =
-                |it: &LoadedScene| it.environment.is_some() || it.shot.as_ref().is_some_and(|shot| shot.text.is_some());
+            // Nor does its file say which moment or variant of a model is shown.
+            let is_own = |it: &LoadedScene| {
+                it.environment.is_some()
+                    || it.choice.at.is_some()
+                    || it.choice.variant.is_some()
+                    || it.shot.as_ref().is_some_and(|shot| shot.text.is_some())
+            };
             let is_another = opened != Some(content) || self.loaded.as_ref().is_some_and(is_own);
             Prints { content, has_changed: is_another && self.description.loose_meshes.is_empty() }
         })

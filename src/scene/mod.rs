@@ -8,14 +8,19 @@ mod bad_value;
 pub(crate) mod bounds;
 mod builtin;
 mod camera;
+mod choice;
 mod components;
 mod default_scene;
 mod describe;
+mod documents;
 mod error;
 mod extent;
 mod extract;
 pub mod file;
 mod fingerprint;
+pub mod gltf;
+mod gltf_mesh;
+mod gltf_scene;
 pub mod image_metadata;
 pub mod input_file;
 mod inputs;
@@ -52,6 +57,7 @@ mod write_error;
 pub use bad_value::BadValue;
 pub use bounds::{check_film_size, check_max_depth, check_stops};
 pub use builtin::{BUILTIN_SCENES, builtin_text};
+pub use choice::ModelChoice;
 pub use components::{
     Balls, ColorParam, DirectionalLight, DisplaySettings, FilmSize, GREY, InWorld, Material, MaterialSlots, MeshOrigin,
     Ordinal, PointLight, Rendering, ScalarParam, SceneEnvironment, Shape, SpotLight, SurfaceMaterial, SurfaceTexture,
@@ -79,7 +85,7 @@ pub use placement::{Linear, Placement};
 pub use relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
 pub use save::{SavedScene, save_scene};
 pub use source::{SceneSource, UpAxis};
-pub use sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
+pub use sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 pub(crate) use spawn::texture_of;
 pub use stamp::{Stamp, stamp};
 pub use trees::Trees;

@@ -47,6 +47,30 @@ pub(super) fn without_lost_textures(part: &MaterialPart, is_there: impl Fn(&str)
     part
 }
 
+/// Names of the textures that a material uses.
+pub(super) fn texture_names(part: &MaterialPart) -> Vec<String> {
+    let mut names = Vec::new();
+    rename_textures(&mut part.clone(), |name| {
+        names.push(name.to_owned());
+        name.to_owned()
+    });
+    names
+}
+
+/// Gives the textures that a material uses other names.
+pub(super) fn rename_textures(part: &mut MaterialPart, mut to: impl FnMut(&str) -> String) {
+    for (_, param) in part.params_mut() {
+        match param {
+            Param::Reflectance(ColorValue::Texture(name))
+            | Param::Radiance(ColorValue::Texture(name))
+            | Param::Factor(ColorValue::Texture(name))
+            | Param::Map(ColorValue::Texture(name))
+            | Param::Share(ScalarValue::Texture(name)) => *name = to(name),
+            _ => {}
+        }
+    }
+}
+
 /// A material of the world by the names of its textures, where these are as the file of the mesh has them.
 pub(super) struct ByTextureName<'a>(pub &'a HashMap<&'a str, &'a TextureSource>);
 

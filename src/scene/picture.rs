@@ -1,11 +1,12 @@
 //! Picture files as textures: decoded once, linear, within limits.
 
+use super::gltf::images::{part_of_model, picture_of};
 use super::input_file::{FileKind, InputFile, ReadError};
 use super::limits::Limits;
 use crate::render::{ImageTexture, Texels};
 use glam::Vec3;
 use image::{DynamicImage, ImageDecoder, ImageReader};
-use std::io::{BufRead, BufReader, Seek};
+use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
 /// Pixels along one side at most.
@@ -20,8 +21,11 @@ pub enum PictureError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// The model that it is a part of cannot be read.
+    #[error("{0}")]
+    Model(String),
     /// The file begins as no picture that can be read does.
-    #[error("unsupported image format: use PNG, JPEG, HDR or EXR")]
+    #[error("unsupported image format: use PNG, JPEG, WebP, HDR or EXR")]
     Format,
     /// The picture has more pixels than the limits allow.
     #[error("has {width} x {height} pixels, above the limit of {limit} pixels for images: {}", Limits::advice())]
@@ -44,7 +48,7 @@ impl From<PictureError> for String {
     }
 }
 
-/// Reads PNG, JPEG, HDR or EXR, each kept in its own depth. Returns a warning beside the picture when
+/// Reads PNG, JPEG, WebP, HDR or EXR, each kept in its own depth. Returns a warning beside the picture when
 /// some of its numbers had to be left out.
 ///
 /// # Errors
@@ -53,12 +57,33 @@ pub fn read_picture(path: &Path) -> Result<(ImageTexture, Option<String>), Pictu
     read_picture_within(path, &Limits::of_this_process())
 }
 
+/// The same of bytes that are part of another file.
+///
+/// # Errors
+/// As [`read_picture_within`].
+pub(super) fn picture_of_bytes(bytes: &[u8]) -> Result<(ImageTexture, Option<String>), PictureError> {
+    let limits = Limits::of_this_process();
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(ReadError::from)?;
+    reader.limits(limits_of_decoder(&limits));
+    texture(reader, &limits)
+}
+
 /// The same within limits of the caller's choice.
 ///
 /// # Errors
 /// When the file cannot be read, is none of these formats, is too large or cannot be decoded.
 pub fn read_picture_within(path: &Path, limits: &Limits) -> Result<(ImageTexture, Option<String>), PictureError> {
-    let reader = picture_reader(path, limits)?;
+    if let Some((model, number)) = part_of_model(path) {
+        let bytes = picture_of(&model, number).map_err(|error| PictureError::Model(error.to_string()))?;
+        return picture_of_bytes(&bytes);
+    }
+    texture(picture_reader(path, limits)?, limits)
+}
+
+fn texture<R: BufRead + Seek>(
+    reader: ImageReader<R>,
+    limits: &Limits,
+) -> Result<(ImageTexture, Option<String>), PictureError> {
     if reader.format().is_none() {
         return Err(PictureError::Format);
     }
@@ -99,12 +124,16 @@ pub(crate) fn picture_reader(
     let file = InputFile::open_within(path, FileKind::Image, FileKind::Image.limit(limits));
     let mut reader =
         file.and_then(|file| ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(ReadError::from))?;
+    reader.limits(limits_of_decoder(limits));
+    Ok(reader)
+}
+
+fn limits_of_decoder(limits: &Limits) -> image::Limits {
     let mut of_decoder = image::Limits::default();
     of_decoder.max_image_width = Some(MAX_SIDE);
     of_decoder.max_image_height = Some(MAX_SIDE);
     of_decoder.max_alloc = Some(limits.picture_pixels.saturating_mul(BYTES_A_PIXEL));
-    reader.limits(of_decoder);
-    Ok(reader)
+    of_decoder
 }
 
 /// The pixels, if there are no more than the limit.

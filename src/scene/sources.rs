@@ -63,6 +63,9 @@ pub enum TextureSource {
     Image {
         /// Path of the picture, relative to the scene file.
         file: String,
+        /// Factors of u and v before rotation.
+        #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
+        stretch: DVec2,
         /// How often the picture fits along u and v.
         #[serde(default = "one_by_one", skip_serializing_if = "is_one_by_one")]
         repeat: DVec2,
@@ -113,6 +116,7 @@ impl TextureSource {
     pub fn image(file: String) -> Self {
         Self::Image {
             file,
+            stretch: DVec2::ONE,
             repeat: DVec2::ONE,
             offset: DVec2::ZERO,
             rotate: 0.0,
@@ -130,7 +134,7 @@ impl TextureSource {
 
 /// Where the triangles of a mesh come from.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum MeshSource {
     /// Wavefront OBJ, relative to the scene file.
     Obj(String),
@@ -138,8 +142,41 @@ pub enum MeshSource {
     Ply(String),
     /// STL, likewise.
     Stl(String),
+    /// glTF 2.0, likewise.
+    Gltf {
+        /// Path of the model, relative to the scene file.
+        file: String,
+        /// The number of the mesh in the file, from 0; all of its scene as one mesh when not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        mesh: Option<u32>,
+        /// The number of the node whose skin or weights move the vertices.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        node: Option<u32>,
+        /// Seconds into the animations; what the file stores when not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        at: Option<Seconds>,
+    },
     /// A mesh that the program makes.
     Builtin(String),
+}
+
+/// A moment, finite. Equal moments have equal bits.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Seconds(pub f64);
+
+impl PartialEq for Seconds {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.to_bits() == other.0.to_bits()
+    }
+}
+
+impl Eq for Seconds {}
+
+impl std::hash::Hash for Seconds {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        self.0.to_bits().hash(state);
+    }
 }
 
 impl MeshSource {
@@ -149,6 +186,7 @@ impl MeshSource {
             ModelFormat::Obj => Self::Obj(file),
             ModelFormat::Ply => Self::Ply(file),
             ModelFormat::Stl => Self::Stl(file),
+            ModelFormat::Gltf => Self::Gltf { file, mesh: None, node: None, at: None },
         }
     }
 
@@ -163,6 +201,7 @@ impl MeshSource {
             Self::Obj(file) => Some((ModelFormat::Obj, file)),
             Self::Ply(file) => Some((ModelFormat::Ply, file)),
             Self::Stl(file) => Some((ModelFormat::Stl, file)),
+            Self::Gltf { file, .. } => Some((ModelFormat::Gltf, file)),
             Self::Builtin(_) => None,
         }
     }
@@ -170,7 +209,7 @@ impl MeshSource {
     /// The path, if it is a file.
     pub fn file_mut(&mut self) -> Option<&mut String> {
         match self {
-            Self::Obj(file) | Self::Ply(file) | Self::Stl(file) => Some(file),
+            Self::Obj(file) | Self::Ply(file) | Self::Stl(file) | Self::Gltf { file, .. } => Some(file),
             Self::Builtin(_) => None,
         }
     }
@@ -179,6 +218,7 @@ impl MeshSource {
     pub fn name(&self) -> &str {
         match self {
             Self::Obj(name) | Self::Ply(name) | Self::Stl(name) | Self::Builtin(name) => name,
+            Self::Gltf { file, .. } => file,
         }
     }
 }

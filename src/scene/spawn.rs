@@ -169,6 +169,7 @@ pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc
         }
         &TextureSource::Image {
             ref file,
+            stretch,
             repeat,
             offset,
             rotate,
@@ -183,7 +184,9 @@ pub fn texture_of(part: &TextureSource, picture: impl FnOnce(&str) -> Option<Arc
         } => {
             let (image, wrap) = (picture(file)?, [wrap, wrap_v.unwrap_or(wrap)]);
             let pattern = TexturePattern::Image { image, encoding, wrap, smooth };
-            Texture { channel, tint: tint.0, uv_set, vertex_colors, ..placed(pattern, repeat, offset, rotate) }
+            let placed = placed(pattern, repeat, offset, rotate);
+            let uv_matrix = placed.uv_matrix * Mat2::from_diagonal(as_vec2(stretch));
+            Texture { channel, tint: tint.0, uv_set, vertex_colors, uv_matrix, ..placed }
         }
         TextureSource::VertexColors { channel, tint } => {
             Texture { channel: *channel, tint: tint.0, vertex_colors: true, ..Texture::new(TexturePattern::White) }

@@ -169,7 +169,7 @@ mod tests {
         assert!(zenity.iter().any(|word| word.contains("*.ron")), "{zenity:?}");
         assert_eq!(
             words(DialogKind::Kdialog, DialogPurpose::AddMesh),
-            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl"]
+            ["--title", "Add a model", "--getopenfilename", "/home/somebody/", "*.obj *.ply *.stl *.glb *.gltf"]
         );
     }
 

@@ -3,10 +3,11 @@
 
 use firstlight::kdtree::Shape;
 use firstlight::render::{
-    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PassReport, Prepared, RenderSettings, Shading,
-    Snapshot, advance,
+    Camera, ColorInput, DeltaLight, Environment, Film, Geometry, Material, Object, PassReport, Prepared,
+    RenderSettings, Shading, Snapshot, advance,
 };
 use glam::Vec3;
+use std::sync::Arc;
 
 pub fn diffuse(albedo: f32) -> Material {
     Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(albedo)) }
@@ -56,6 +57,11 @@ pub fn scene(
     let geometry = Geometry::build(shapes, objects);
     let shading = Shading::new(materials, Vec::new(), environment);
     Prepared::new(Snapshot::new(geometry, shading, camera))
+}
+
+/// The same with these lights without size.
+pub fn with_lights(scene: &Prepared, delta_lights: Vec<DeltaLight>) -> Prepared {
+    scene.with_shading(Arc::new(Shading { delta_lights, ..(*scene.shading).clone() }))
 }
 
 pub fn render(scene: &Prepared, settings: &RenderSettings, width: u32, height: u32, spp: u32) -> (Film, PassReport) {

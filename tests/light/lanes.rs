@@ -4,9 +4,9 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, ColorInput, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator, Material, Object,
-    PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture, TexturePattern, Wrap,
-    advance, replay_sample,
+    BadSample, ColorInput, Cone, DeltaLight, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator,
+    Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture,
+    TexturePattern, Wrap, advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -133,7 +133,26 @@ fn rooms() -> Vec<(&'static str, Prepared)> {
     let shining = || placed(procedural::icosphere(1), scaled(Vec3::new(0.5, -0.4, 0.5), Vec3::new(-0.5, 2.6, 0.5)));
     let small = || placed(procedural::icosphere(3), scaled(Vec3::splat(0.15), Vec3::new(1.2, 2.4, 1.0)));
     let sky = Environment::Gradient { zenith: Vec3::new(0.2, 0.4, 0.9), horizon: Vec3::ONE, ground: Vec3::splat(0.1) };
+    let cone = Cone::new(Vec3::new(0.3, -1.0, 0.1).normalize(), 0.3, 0.7);
+    let without_size = |n: usize| -> Vec<DeltaLight> {
+        (0..n)
+            .map(|i| {
+                let position = Vec3::new(2.0 - 4.0 * i as f32 / n as f32, 2.6, 0.5 + (i as f32).sin());
+                let intensity = Vec3::new(1.0, 0.8, 0.6) * (1.0 + (i % 4) as f32);
+                match i % 3 {
+                    0 => DeltaLight::Point { position, intensity },
+                    1 => DeltaLight::Spot { position, intensity, cone },
+                    _ => DeltaLight::Directional { direction: -position.normalize(), irradiance: 0.1 * intensity },
+                }
+            })
+            .collect()
+    };
+    let with = |scene: Prepared, n| with_lights(&scene, without_size(n));
+    let fog = Vec3::splat(0.03);
     vec![
+        ("without size", with(room(vec![], Environment::Black, fog), 3)),
+        ("without size, a ball and a quad", with(room(vec![ball(), lamp()], sky.clone(), fog), 5)),
+        ("many without size", with(room(vec![lamp(), ball()], Environment::Black, Vec3::ZERO), 40)),
         ("one quad", room(vec![lamp()], Environment::Black, Vec3::ZERO)),
         ("one ball", room(vec![ball()], Environment::Constant(Vec3::splat(0.3)), Vec3::ZERO)),
         ("both and a slanted one", room(vec![ball(), lamp(), slanted()], sky.clone(), Vec3::splat(0.05))),

@@ -4,6 +4,7 @@
 mod common;
 
 mod caustics;
+mod delta_lights;
 mod determinism;
 mod filters;
 mod lanes;

@@ -10,6 +10,7 @@ mod measure;
 mod normals;
 pub mod procedural;
 pub mod simplify;
+mod tangents;
 mod topology;
 mod weld;
 

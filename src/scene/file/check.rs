@@ -28,7 +28,10 @@ pub struct Found {
 pub fn check(file: &SceneFile, most: usize) -> Found {
     let (materials, textures) = (file.materials.iter().collect(), file.textures.names().collect());
     let mut check = Check { file, materials, textures, most, found: Found::default() };
-    check.camera(&file.camera);
+    check.camera("camera", &file.camera);
+    for (name, camera) in file.cameras.iter() {
+        check.camera(&format!("cameras/{name}"), camera);
+    }
     check.film();
     check.environment();
     for (name, texture) in file.textures.iter() {
@@ -70,9 +73,9 @@ impl Check<'_> {
         self.wrong(path, what + &hint);
     }
 
-    fn camera(&mut self, camera: &CameraPart) {
+    fn camera(&mut self, at: &str, camera: &CameraPart) {
         for bad in camera.components().err().into_iter().flatten() {
-            let path = if bad.field() == "camera" { "camera".to_owned() } else { format!("camera/{}", bad.field()) };
+            let path = if bad.field() == "camera" { at.to_owned() } else { format!("{at}/{}", bad.field()) };
             self.wrong(&path, bad);
         }
     }
@@ -295,6 +298,9 @@ impl Check<'_> {
                 }
                 for (i, name) in materials.iter().flatten().enumerate() {
                     self.material_name(&format!("{path}/materials/{i}"), name);
+                }
+                if let MeshSource::Gltf { at: Some(at), .. } = source {
+                    self.finite(&format!("{path}/source/at"), at.0);
                 }
                 if let MeshSource::Builtin(name) = source
                     && !BUILTIN_NAMES.contains(&name.as_str())

@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 pub struct SceneFile {
     /// From where the scene is seen, and through which lens.
     pub camera: CameraPart,
+    /// Further views, by name, to choose from; `camera` is the one that is looked through.
+    #[serde(default, skip_serializing_if = "Named::is_empty")]
+    pub cameras: Named<CameraPart>,
     /// Size and pixel filter.
     #[serde(default)]
     pub film: FilmPart,

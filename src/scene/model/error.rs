@@ -1,6 +1,7 @@
 //! Why a model could not be loaded: which file, which place in it, what was expected.
 
 use crate::mesh::MeshError;
+use crate::scene::gltf::error::GltfError;
 use crate::scene::input_file::ReadError;
 use crate::scene::obj::ObjError;
 use crate::scene::ply::PlyProblem;
@@ -14,6 +15,9 @@ pub enum ModelError {
     /// An OBJ file.
     #[error(transparent)]
     Obj(#[from] ObjError),
+    /// A glTF file.
+    #[error(transparent)]
+    Gltf(#[from] GltfError),
     /// A PLY or STL file.
     #[error("{}{place}: {problem}", path.display())]
     File {

@@ -11,35 +11,44 @@ pub enum ModelFormat {
     Ply,
     /// STL: ASCII or binary.
     Stl,
+    /// glTF 2.0, binary or text, with materials, lights and cameras.
+    Gltf,
 }
 
 impl ModelFormat {
     /// All of them, in the order in which they are named.
-    pub const ALL: [Self; 3] = [Self::Obj, Self::Ply, Self::Stl];
+    pub const ALL: [Self; 4] = [Self::Obj, Self::Ply, Self::Stl, Self::Gltf];
 
     /// How names of such files end, in lower case and without the dot.
-    pub fn extension(self) -> &'static str {
+    pub fn file_extensions(self) -> &'static [&'static str] {
         match self {
-            Self::Obj => "obj",
-            Self::Ply => "ply",
-            Self::Stl => "stl",
+            Self::Obj => &["obj"],
+            Self::Ply => &["ply"],
+            Self::Stl => &["stl"],
+            Self::Gltf => &["glb", "gltf"],
         }
     }
 
     /// The format that the name of a file tells, whatever the case of its letters.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
-        Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.extension()))
+        let has = |format: &Self| format.file_extensions().iter().any(|known| extension.eq_ignore_ascii_case(known));
+        Self::ALL.into_iter().find(has)
     }
 
-    /// Extensions as sentences name them: `.obj, .ply, .stl`.
+    /// Extensions as sentences name them: `.obj, .ply, .stl, .glb, .gltf`.
     pub fn extensions() -> String {
-        Self::ALL.map(|format| format!(".{}", format.extension())).join(", ")
+        Self::each(".").join(", ")
     }
 
-    /// Patterns of names, as shells write them: `*.obj *.ply *.stl`.
+    /// Patterns of names, as shells write them: `*.obj *.ply *.stl *.glb *.gltf`.
     pub fn patterns() -> String {
-        Self::ALL.map(|format| format!("*.{}", format.extension())).join(" ")
+        Self::each("*.").join(" ")
+    }
+
+    fn each(before: &str) -> Vec<String> {
+        let extensions = Self::ALL.into_iter().flat_map(Self::file_extensions);
+        extensions.map(|extension| format!("{before}{extension}")).collect()
     }
 }
 
@@ -50,8 +59,9 @@ mod tests {
     #[test]
     fn names_tell_formats_whatever_their_case() {
         assert_eq!(ModelFormat::of(Path::new("a/b.PLY")), Some(ModelFormat::Ply));
+        assert_eq!(ModelFormat::of(Path::new("a.gltf")), Some(ModelFormat::Gltf));
         assert_eq!(ModelFormat::of(Path::new("stl")), None);
-        assert_eq!(ModelFormat::extensions(), ".obj, .ply, .stl");
-        assert_eq!(ModelFormat::patterns(), "*.obj *.ply *.stl");
+        assert_eq!(ModelFormat::extensions(), ".obj, .ply, .stl, .glb, .gltf");
+        assert_eq!(ModelFormat::patterns(), "*.obj *.ply *.stl *.glb *.gltf");
     }
 }

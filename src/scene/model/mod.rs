@@ -1,6 +1,6 @@
 //! Models of any format: which formats there are, and one way to read them all.
 //!
-//! A reader (`scene/obj`, `scene/ply`, `scene/stl`) gives an [`ImportedModel`] or an error that names the place in the file.
+//! A reader (`scene/obj`, `scene/ply`, `scene/stl`, `scene/gltf`) gives an [`ImportedModel`] or an error that names the place in the file.
 //! What the readers share is here: polygons into triangles, normals, and the way from numbered vertices to a checked
 //! mesh. Start reading at [`load_model`].
 
@@ -15,6 +15,7 @@ pub use error::{ModelError, ModelProblem, Place};
 pub use format::ModelFormat;
 pub use imported::{ImportedModel, ModelNormals, ModelOptions};
 
+use super::gltf::baked::load_gltf_with;
 use super::obj::load_obj_with;
 use super::ply::load_ply_with;
 use super::stl::load_stl_with;
@@ -29,5 +30,6 @@ pub fn load_model(path: &Path, format: ModelFormat, options: &ModelOptions) -> R
         ModelFormat::Obj => Ok(load_obj_with(path, options)?),
         ModelFormat::Ply => load_ply_with(path, options),
         ModelFormat::Stl => load_stl_with(path, options),
+        ModelFormat::Gltf => Ok(load_gltf_with(path, options)?),
     }
 }

@@ -37,7 +37,7 @@ use crate::frame::{
     Command, Explaining, Focus, FocusTarget, LatencyHistogram, MessageKind, Session, SessionOptions, Target, Waker,
 };
 use crate::render::Inspection;
-use crate::scene::{SceneSource, UpAxis};
+use crate::scene::{ModelChoice, SceneSource, UpAxis};
 use leaving::Leaving;
 use memory::Memory;
 use serde_json::json;
@@ -63,6 +63,8 @@ pub struct ViewerOptions {
     pub seed: u32,
     /// Which axis of models points up; guessed when not given.
     pub up: Option<UpAxis>,
+    /// What of a glTF model is shown.
+    pub choice: ModelChoice,
     /// An image that takes the place of the scene's own environment.
     pub environment: Option<PathBuf>,
     /// Where kept pictures go.
@@ -264,7 +266,7 @@ impl App {
         if let Some(path) = &options.record {
             session.record(path, &options.source, options.up).map_err(|error| ViewerError::Session(error.into()))?;
         }
-        session.open_lit_by(options.source.clone(), options.environment.clone());
+        session.open_choice(options.source.clone(), options.environment.clone(), options.choice.clone());
         let memory = Memory::of_platform();
         let leaving = Leaving::new(memory.recovery(), waker.clone());
         let start = Instant::now();

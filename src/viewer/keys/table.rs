@@ -309,7 +309,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding {
                 triggers: &[Trigger::Mouse("Drop a file")],
-                effect: "open a scene (.ron), a model (.obj, .ply, .stl) or a saved picture (.png, .exr)",
+                effect: "open a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf) or a saved picture (.png, .exr)",
             },
         ],
     },

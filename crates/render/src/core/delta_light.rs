@@ -37,10 +37,10 @@ pub enum DeltaLight {
 pub struct Cone {
     /// Unit, away from the tip.
     pub axis: Vec3,
-    /// 1 − cos of the angle up to which the light is whole.
-    pub inner: f32,
-    /// 1 − cos of the angle from which on there is none, 0..1; at least `inner`.
+    /// 1 − cos of the angle from which on there is no light, 0..1.
     pub outer: f32,
+    /// One over the difference to 1 − cos of the angle up to which the light is whole; finite.
+    pub slope: f32,
 }
 
 impl Cone {
@@ -49,7 +49,8 @@ impl Cone {
     pub fn new(axis: Vec3, inner: f64, outer: f64) -> Self {
         // 1 − cos a = 2 sin² (a/2)
         let one_minus_cos = |angle: f64| (2.0 * (0.5 * angle).sin().powi(2)) as f32;
-        Self { axis, inner: one_minus_cos(inner), outer: one_minus_cos(outer) }
+        let (inner, outer) = (one_minus_cos(inner), one_minus_cos(outer));
+        Self { axis, outer, slope: 1.0 / (outer - inner).max(1e-30) }
     }
 
     /// The share of the intensity that goes along `dir`, 0..1.
@@ -65,11 +66,8 @@ impl Cone {
     /// The same at an angle, given as 1 − cos.
     #[inline]
     pub fn falloff_at(&self, one_minus_cos: f32) -> f32 {
-        if one_minus_cos <= self.inner {
-            return 1.0;
-        }
-        let t = ((self.outer - one_minus_cos) / (self.outer - self.inner)).clamp(0.0, 1.0);
-        if t.is_nan() { 0.0 } else { t * t }
+        let t = ((self.outer - one_minus_cos) * self.slope).clamp(0.0, 1.0);
+        t * t
     }
 }
 

@@ -148,6 +148,11 @@ pub struct Emission {
 impl Emission {
     const WHOLE: (ScalarInput, Option<f32>) = (ScalarInput::Constant(1.0), None);
 
+    /// Of a front that shines alike everywhere, W·m⁻²·sr⁻¹.
+    pub(crate) fn even(radiance: Vec3) -> Self {
+        Self { radiance: ColorInput::Constant(radiance), scale: 1.0, two_sided: false, opacity: Self::WHOLE }
+    }
+
     /// The emission of a material, looked for in blends; `None` for one that does not shine.
     pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
         match &materials[id as usize] {

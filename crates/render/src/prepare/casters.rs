@@ -10,8 +10,11 @@
 use crate::core::material::Material;
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
+use crate::prepare::bodies::Bodies;
+use crate::prepare::delta_lines::{self, DeltaLine, Outside};
 use crate::prepare::guide::Guide;
 use crate::prepare::light::LightTable;
+use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
 use crate::sampling::{AliasTable, Sampler, cosine_hemisphere, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
@@ -39,6 +42,10 @@ pub(crate) struct CasterTable {
     /// For each object the first of its casters, and whether each of its primitives is one.
     by_object: Vec<(u32, bool)>,
     pairs: Pairs,
+    outside: Outside,
+    /// What each light without size is inside of, behind as many lights with one; see
+    /// [`crate::prepare::bodies::Bodies::around`]. Empty where there are none.
+    media: Vec<Vec<u32>>,
     /// Made when it is first needed.
     pub(crate) guide: OnceLock<Guide>,
 }
@@ -65,10 +72,15 @@ pub(crate) struct LightLine {
     pub ray: Ray,
     /// What it has to hit first.
     pub caster: u32,
-    /// Per unit of étendue, 1 / (m² sr).
+    /// Per unit of étendue, 1 / (m² sr); of a light without size, per steradian or per square metre.
     pub density: f32,
-    /// W·m⁻²·sr⁻¹.
+    /// W·m⁻²·sr⁻¹; of a light without size, W·sr⁻¹ or W·m⁻².
     pub radiance: Vec3,
+    pub light: u32,
+    /// The light has no size, so no camera path finds it.
+    pub is_delta: bool,
+    /// From outside of the scene: the air has absorbed what it does.
+    pub is_far: bool,
 }
 
 impl CasterTable {
@@ -105,7 +117,24 @@ impl CasterTable {
             return None;
         }
         let pairs = Pairs::new(&casters, lights)?;
-        Some(Self { casters, by_object, pairs, guide: OnceLock::new() })
+        let outside = Outside::of(&geometry.tree);
+        Some(Self { casters, by_object, pairs, outside, media: Vec::new(), guide: OnceLock::new() })
+    }
+
+    /// Finds what lights without size are inside of.
+    pub fn with_media(mut self, geometry: &Geometry, bodies: &Bodies, lights: &LightTable) -> Self {
+        self.media = (lights.lights.iter())
+            .map(|light| match light.shape {
+                LightShape::Point { position, .. } => bodies.around(geometry, position),
+                _ => Vec::new(),
+            })
+            .collect();
+        self
+    }
+
+    /// Rows of the bodies that a light without size is inside of; none for all others.
+    pub fn media_of(&self, light: u32) -> &[u32] {
+        self.media.get(light as usize).map_or(&[], Vec::as_slice)
     }
 
     /// The caster that a hit lies on, [`NO_CASTER`] if none.
@@ -122,6 +151,21 @@ impl CasterTable {
         let (light_id, caster, _) = self.pairs.sample(self.casters.len(), sampler.single(DIM_PAIR));
         let light = lights.light(light_id);
         let Caster { center, radius } = self.casters[caster as usize];
+        if light.shape.delta().is_some() {
+            let line = delta_lines::sample(light, &self.outside, center, radius, sampler.pair(DIM_DIRECTION))?;
+            let DeltaLine { ray, density, strength: radiance, is_far } = line;
+            let density = density * self.pairs.pmf(self.casters.len(), light_id, caster);
+            let is_real = density > 0.0 && density.is_finite();
+            return is_real.then_some(LightLine {
+                ray,
+                caster,
+                density,
+                radiance,
+                light: light_id,
+                is_delta: true,
+                is_far,
+            });
+        }
         let u = sampler.pair(DIM_POINT);
         let point = match light.shape {
             LightShape::Sphere { center: light_center, radius: light_radius } => {
@@ -149,7 +193,8 @@ impl CasterTable {
         }
         let radiance = light.radiance(textures, point.normal, point.uv);
         let origin = robust::offset_ray_origin(point.position, point.error, point.normal, dir);
-        Some(LightLine { ray: Ray::new(origin, dir), caster, density, radiance })
+        let ray = Ray::new(origin, dir);
+        Some(LightLine { ray, caster, density, radiance, light: light_id, is_delta: false, is_far: false })
     }
 
     /// Density of [`Self::sample`] to start at `position` of a light in a direction of cosine `cos` with its normal, on
@@ -205,6 +250,9 @@ impl Caster {
 
     /// An estimate of the étendue between a light and the sphere, zero only where none of the light can see any of it.
     fn coupling(&self, light: &LightShape) -> f64 {
+        if light.delta().is_some() {
+            return delta_lines::coupling(light, self.center, self.radius);
+        }
         let light_area = light.area();
         if let LightShape::Sphere { center, radius } = light {
             let sin2 = (self.radius * self.radius / center.distance_squared(self.center)).min(1.0);
@@ -243,8 +291,10 @@ impl Pairs {
         if !(total > 0.0) {
             return None;
         }
-        let middle =
-            lights.iter().zip(&powers).map(|(light, &power)| light.shape.center().as_dvec3() * (power / total));
+        let is_far = |light: &Light| matches!(light.shape, LightShape::Directional { .. });
+        let near = lights.iter().zip(&powers).filter(|(light, _)| !is_far(light));
+        let near_total: f64 = near.clone().map(|(_, &power)| power).sum();
+        let middle = near.map(|(light, &power)| light.shape.center().as_dvec3() * (power / near_total));
         let middle = middle.sum::<glam::DVec3>().as_vec3();
         let share = |caster: &Caster| {
             let distance2 = caster.center.distance_squared(middle);

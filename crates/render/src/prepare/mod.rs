@@ -10,6 +10,7 @@ pub(crate) mod bound;
 pub(crate) mod casters;
 pub(crate) mod classic_table;
 pub(crate) mod contacts;
+pub(crate) mod delta_lines;
 pub(crate) mod guide;
 pub(crate) mod instance_table;
 pub(crate) mod light;

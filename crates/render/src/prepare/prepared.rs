@@ -126,7 +126,9 @@ impl Prepared {
 
     /// Whether anything shines, wherever it is.
     pub fn has_light(&self) -> bool {
-        self.tables.features.environment || self.tables.emission.iter().any(Option::is_some)
+        self.tables.features.environment
+            || self.tables.emission.iter().any(Option::is_some)
+            || !self.shading.delta_lights.is_empty()
     }
 
     /// The lights that can be sampled.
@@ -160,13 +162,16 @@ impl Prepared {
 
 impl Tables {
     fn build(geometry: &Geometry, shading: &Shading) -> Self {
-        let Shading { materials, textures, environment, air, delta_lights: _ } = shading;
+        let Shading { materials, textures, environment, air, delta_lights } = shading;
         let emission: Vec<_> = (0..materials.len() as u32).map(|id| Emission::of(materials, id)).collect();
-        let lights = LightTable::build(geometry, &emission, textures);
+        let lights = LightTable::build(geometry, &emission, textures, delta_lights);
         let environment_sampler = EnvironmentSampler::build(environment);
         let bodies = Bodies::build(geometry, materials);
         let contacts = Contacts::build(geometry, materials);
-        let casters = CasterTable::build(geometry, materials, &lights);
+        let mut casters = CasterTable::build(geometry, materials, &lights);
+        if !delta_lights.is_empty() {
+            casters = casters.map(|casters| casters.with_media(geometry, &bodies, &lights));
+        }
         let features = Features {
             glass: materials.iter().any(Material::is_clear),
             media: materials.iter().any(Material::absorbs) || *air != Vec3::ZERO,
@@ -181,7 +186,9 @@ impl Tables {
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
             cutouts: materials.iter().map(Material::is_cutout).collect(),
             with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
-            radiance_bound: radiance_bound(environment, &emission, materials),
+            radiance_bound: (delta_lights.is_empty())
+                .then(|| radiance_bound(environment, &emission, materials))
+                .flatten(),
             emission,
             lights,
             bodies,

@@ -30,12 +30,12 @@ pub(crate) fn choose_light_point(
         let environment = tables.environment_sampler.as_ref().expect("a share without a sampler");
         let (wi, pdf) = environment.sample(u)?;
         let radiance = scene.shading.environment.radiance(wi);
-        return Some((None, LightSample { target: wi, wi, pdf: pdf * share, radiance }));
+        return Some((None, LightSample { target: wi, wi, pdf: pdf * share, radiance, is_far: true }));
     }
     let u_light = || ((select() - share) / (1.0 - share)).clamp(0.0, 1.0f32.next_down());
     let mut sample = tables.lights.sample(&scene.shading.textures, techniques, position, normal, u_light, u)?;
     sample.pdf *= 1.0 - share;
-    Some((Some(sample.target), sample))
+    Some(((!sample.is_far).then_some(sample.target), sample))
 }
 
 /// Probability with which light sampling asks the environment rather than the finite lights.

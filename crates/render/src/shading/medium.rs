@@ -54,6 +54,11 @@ impl MediumSets {
         self.camera
     }
 
+    /// The set of these rows of [`crate::prepare::bodies::Bodies`], ascending.
+    pub fn within(&mut self, scene: &Prepared, rows: &[u32]) -> MediumId {
+        if rows.is_empty() { MediumId::OUTSIDE } else { self.id_of(scene, rows.into()) }
+    }
+
     /// Index of refraction.
     #[inline]
     pub fn ior(&self, id: MediumId) -> f32 {

@@ -100,7 +100,12 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
         let media = chunk.media(scene, paths);
         let mut throughput = Vector::gather(&paths.throughput, index);
         if scene.tables.features.media {
-            let distance = Float::gather(&hits.t, index);
+            let mut distance = Float::gather(&hits.t, index);
+            if n_vertices == 1 {
+                // From outside of the scene: `LightPath::is_far`.
+                let is_far = Float::gather(&paths.position[0], index).is_positive();
+                distance = select(is_far, distance.all(0.0), distance);
+            }
             throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
         }
         let (ratio, sampler) = (Float::gather(&paths.pdf, index), paths.sampler_lanes(index));

@@ -48,20 +48,22 @@ struct LightPath {
     /// To be hit first; no caster any more after that.
     aimed_at: u32,
     media: MediumId,
+    /// On its first segment only: the light is outside of the scene, see [`casters::LightLine::is_far`].
+    is_far: bool,
 }
 
 /// Light paths are kept like those from the camera, of which they need less: the density is the ratio, and the
-/// slot is what they are aimed at.
+/// slot is what they are aimed at. The place of the last vertex is that of the light at first: 1 for what is far away.
 impl From<LightPath> for Path {
-    fn from(LightPath { throughput, ratio, sampler, aimed_at, media }: LightPath) -> Self {
-        let (position, normal) = (Vec3::ZERO, Vec3::ZERO);
+    fn from(LightPath { throughput, ratio, sampler, aimed_at, media, is_far }: LightPath) -> Self {
+        let (position, normal) = (Vec3::splat(f32::from(is_far)), Vec3::ZERO);
         Self { throughput, pdf: ratio, position, normal, sampler, slot: aimed_at, media, track: MisState::default() }
     }
 }
 
 impl From<Path> for LightPath {
-    fn from(Path { throughput, pdf, sampler, slot, media, .. }: Path) -> Self {
-        Self { throughput, ratio: pdf, sampler, aimed_at: slot, media }
+    fn from(Path { throughput, pdf, sampler, slot, media, position, .. }: Path) -> Self {
+        Self { throughput, ratio: pdf, sampler, aimed_at: slot, media, is_far: position == Vec3::ONE }
     }
 }
 
@@ -98,7 +100,7 @@ impl LightWave {
     ) -> Option<(Vec<Splat>, RayCounts)> {
         let mut splats = Vec::new();
         let mut counts = RayCounts::default();
-        self.start(pass, first, n);
+        self.start(pass, first, n, false);
         let mut n_vertices = 0;
         while !self.paths.is_empty() {
             if stop() {
@@ -132,7 +134,7 @@ impl LightWave {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<Vec<Trace>> {
         let mut traces = Vec::new();
-        self.start(pass, first, n);
+        self.start(pass, first, n, true);
         let mut n_vertices = 0;
         while !self.paths.is_empty() {
             if stop() {
@@ -172,7 +174,8 @@ impl LightWave {
         Some(traces)
     }
 
-    fn start(&mut self, pass: &CausticPass, first: u64, n: u32) {
+    /// - `are_pilots`: they come from lights that camera paths can find.
+    fn start(&mut self, pass: &CausticPass, first: u64, n: u32, are_pilots: bool) {
         self.paths.start(n as usize, pass.scene.tables.features.glass, false);
         self.camera = self.sets.start(pass.scene, &pass.camera_media);
         let new_sampler = if pass.techniques.even_samples { Sampler::new } else { Sampler::independent };
@@ -186,11 +189,14 @@ impl LightWave {
                 continue;
             };
             let throughput = line.radiance / line.density;
-            if throughput == Vec3::ZERO {
+            if throughput == Vec3::ZERO || are_pilots && line.is_delta {
                 continue;
             }
-            let (ratio, media) = (line.density, MediumId::OUTSIDE);
-            let path = LightPath { throughput, ratio, sampler, aimed_at: line.caster, media };
+            let (mut ratio, mut media) = (line.density, MediumId::OUTSIDE);
+            if line.is_delta {
+                (ratio, media) = (f32::INFINITY, self.sets.within(pass.scene, pass.casters.media_of(line.light)));
+            }
+            let path = LightPath { throughput, ratio, sampler, aimed_at: line.caster, media, is_far: line.is_far };
             self.paths.push(&line.ray, &path.into());
         }
     }
@@ -241,7 +247,7 @@ impl LightWave {
         let scene = pass.scene;
         let mut path = LightPath::from(self.paths.get(i));
         let Some(hit) = self.hits.get(i) else { return };
-        if scene.tables.features.media {
+        if scene.tables.features.media && !(n_vertices == 1 && path.is_far) {
             path.throughput *= self.sets.transmittance(path.media, hit.t);
         }
         let found = surface_at(pass, &mut self.sets, &self.paths.rays.get(i), &hit, path.media);

@@ -238,11 +238,12 @@ impl PhongWave {
             dimension,
             |k, sample, is_point| {
                 let mut arriving = sample.radiance / sample.pdf;
-                if tables.features.media {
+                if tables.features.media && !sample.is_far {
                     arriving *= sets.transmittance(path.media, vertex.position.distance(sample.target));
                 }
+                let target = (!sample.is_far).then_some(sample.target);
                 ambient += finish.ambient * arriving * (AMBIENT_SHARE * FRAC_1_PI);
-                direct(k, arriving, sample.wi, Some(sample.target), (!is_point).then_some(sample.pdf));
+                direct(k, arriving, sample.wi, target, (!is_point).then_some(sample.pdf));
             },
         );
         if let Some(environment) = &tables.environment_sampler {

@@ -142,15 +142,17 @@ fn shade<S: Simd>(s: S, group: ClassicGroup) {
                 let mut arriving = light.radiance * (zero.all(1.0) / light.pdf);
                 if features.media {
                     let distance = (light.target - place.position).length();
-                    arriving = arriving.times(transmittance(s, sets, light.found, &media, distance));
+                    let passed = arriving.times(transmittance(s, sets, light.found & !light.is_far, &media, distance));
+                    arriving = select_vector(light.is_far, arriving, passed);
                 }
                 let share = arriving.mul_all(AMBIENT_SHARE * FRAC_1_PI);
                 ambient = ambient + select_vector(light.found, share, Vector::splat(s, Vec3::ZERO));
                 let pdf = select(is_point, zero, light.pdf);
                 let (found, seen) = reflect(&lit, &place, light.found, light.wi, pdf, arriving);
                 if found != 0 {
-                    let rays = [leaving, light.target - leaving];
-                    shadows.append(k, found, rays, zero.all(1.0), slot, seen, light.target, &media);
+                    let rays = [leaving, select_vector(light.is_far, light.wi, light.target - leaving)];
+                    let t_max = select(light.is_far, zero.all(f32::INFINITY), zero.all(1.0));
+                    shadows.append(k, found, rays, t_max, slot, seen, light.target, &media);
                 }
             }
             if tables.environment_sampler.is_some() {

@@ -3,6 +3,7 @@
 //! The formulas are those of [`crate::prepare::light::shape`] and [`crate::prepare::light::selection`]; there is where they are explained.
 
 use crate::core::material::ColorInput;
+use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::flat::{FlatPoint, QuadLight, TriangleLight, pdf_by_area};
 use crate::prepare::light::shape::{CLOSE, LightShape, cos_at_center, sample_sphere};
@@ -21,6 +22,7 @@ pub(crate) struct LightArrays {
     pub has_spheres: bool,
     pub has_quads: bool,
     pub has_triangles: bool,
+    pub has_deltas: bool,
     pub flags: Vec<u32>,
     /// Corner, centre or first vertex.
     pub origin: [Vec<f32>; 3],
@@ -43,6 +45,10 @@ pub(crate) const RECTANGLE: u32 = 2;
 pub(crate) const TRIANGLE: u32 = 4;
 /// With [`SPHERE`]: stands for a point light.
 pub(crate) const POINT: u32 = 8;
+/// Without size.
+pub(crate) const DELTA: u32 = 16;
+/// With [`DELTA`]: infinitely far away.
+pub(crate) const IS_FAR: u32 = 32;
 
 /// Points on lights as seen from sixteen places; see [`crate::prepare::light::emitter::LightSample`].
 #[derive(Clone, Copy)]
@@ -53,6 +59,8 @@ pub(crate) struct LightLanes<S: Simd> {
     pub wi: Vector<S>,
     pub pdf: Float<S>,
     pub radiance: Vector<S>,
+    /// See [`crate::prepare::light::emitter::LightSample::is_far`].
+    pub is_far: Mask,
 }
 
 impl LightArrays {
@@ -80,8 +88,14 @@ impl LightArrays {
                     let flag = if light.is_rectangle { RECTANGLE } else { 0 };
                     (flag, light.corner, u, v, light.normal, [length_u, length_v, 0.0, light.lift])
                 }
+                delta @ (LightShape::Point { .. } | LightShape::Directional { .. }) => {
+                    let source = delta.delta()?;
+                    let flag = if source.is_far { DELTA | IS_FAR } else { DELTA };
+                    let nowhere = Vec3::ZERO.into();
+                    (flag, source.origin, nowhere, nowhere, source.axis, [source.outer, source.slope, 0.0, 0.0])
+                }
             };
-            flags.push(if light.is_point { flag | POINT } else { flag });
+            flags.push(if light.is_point && flag & DELTA == 0 { flag | POINT } else { flag });
             let [length_u, length_v, radius, lift] = rest;
             let vectors = [origin, u, v, normal, radiance.into()].map(|v| Vec3::from(v).to_array());
             let values = vectors.as_flattened().iter().copied();
@@ -90,7 +104,8 @@ impl LightArrays {
         }
         let has_spheres = flags.iter().any(|&flag| flag & SPHERE != 0);
         let has_triangles = flags.contains(&TRIANGLE);
-        let has_quads = flags.iter().any(|&flag| flag & (SPHERE | TRIANGLE) == 0);
+        let has_deltas = flags.iter().any(|&flag| flag & DELTA != 0);
+        let has_quads = flags.iter().any(|&flag| flag & (SPHERE | TRIANGLE | DELTA) == 0);
         let [ox, oy, oz, ux, uy, uz, vx, vy, vz, nx, ny, nz, r, g, b, length_u, length_v, radius, area, lift] =
             rows.map(padded);
         Some(Self {
@@ -98,6 +113,7 @@ impl LightArrays {
             has_spheres,
             has_quads,
             has_triangles,
+            has_deltas,
             flags: padded(flags),
             origin: [ox, oy, oz],
             unit_u: [ux, uy, uz],
@@ -127,9 +143,57 @@ impl LightArrays {
         let lift = (n.dot(center.abs()) + around * radius) * gamma(6) + around * distance * gamma(16);
         let ratio = distance / radius;
         let target = offset_along(center - wi * radius, lift, -wi);
-        LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi }
+        LightLanes { found, target, wi, pdf: ratio * ratio * FRAC_1_PI, radiance: wi, is_far: 0 }
     }
 
+    /// Points on lights, and what these send out. The choice of the light is not in their densities.
+    #[inline(always)]
+    pub fn shining<S: Simd>(
+        &self,
+        by_angle: bool,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        u: [Float<S>; 2],
+    ) -> LightLanes<S> {
+        let mut lanes = self.points(by_angle, id, mask, position, u);
+        lanes.radiance = Vector::gather(&self.radiance, id);
+        if self.has_deltas { self.with_deltas(id, mask, position, lanes) } else { lanes }
+    }
+
+    /// Puts in what lights without size send.
+    #[inline(always)]
+    pub fn with_deltas<S: Simd>(
+        &self,
+        id: Bits<S>,
+        mask: Mask,
+        position: Vector<S>,
+        lanes: LightLanes<S>,
+    ) -> LightLanes<S> {
+        let flags = Bits::gather(&self.flags, id);
+        let deltas = mask & flags.has(DELTA);
+        if deltas == 0 {
+            return lanes;
+        }
+        let source = DeltaSource {
+            origin: Vector::gather(&self.origin, id),
+            axis: Vector::gather(&self.normal, id),
+            outer: Float::gather(&self.length_u, id),
+            slope: Float::gather(&self.length_v, id),
+            is_far: flags.has(IS_FAR),
+        };
+        let DeltaSample { found, target, wi, scale } = source.seen_from(deltas, position);
+        LightLanes {
+            found: lanes.found & !deltas | found,
+            target: select_vector(deltas, target, lanes.target),
+            wi: select_vector(deltas, wi, lanes.wi),
+            pdf: select(deltas, scale.all(SHARPNESS), lanes.pdf),
+            radiance: select_vector(deltas, lanes.radiance * scale, lanes.radiance),
+            is_far: found & source.is_far,
+        }
+    }
+
+    /// Of lights that have a size, without their radiance.
     #[inline(always)]
     pub fn points<S: Simd>(
         &self,
@@ -142,7 +206,8 @@ impl LightArrays {
         let flags = Bits::gather(&self.flags, id);
         let spheres = if self.has_spheres { mask & flags.has(SPHERE) } else { 0 };
         let triangles = if self.has_triangles { mask & flags.has(TRIANGLE) } else { 0 };
-        let quads = mask & !spheres & !triangles;
+        let deltas = if self.has_deltas { mask & flags.has(DELTA) } else { 0 };
+        let quads = mask & !spheres & !triangles & !deltas;
         let mut all = None;
         if spheres != 0 {
             all = Some(self.spheres(by_angle, id, spheres, position, u));
@@ -157,7 +222,8 @@ impl LightArrays {
         }
         let zero = u[0].all(0.0);
         let nowhere = Vector { x: zero, y: zero, z: zero };
-        all.unwrap_or(LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere })
+        let none = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: zero, radiance: nowhere, is_far: 0 };
+        all.unwrap_or(none)
     }
 
     /// See [`LightShape::pdf`].
@@ -275,7 +341,8 @@ impl LightArrays {
         let n = normal.abs();
         let around = n.x + n.y + n.z;
         let lift = (n.dot(size) + around * radius) * gamma(6) + around * distance * gamma(16);
-        let lanes = LightLanes { found, target: offset_along(point, lift, normal), wi, pdf, radiance: wi };
+        let target = offset_along(point, lift, normal);
+        let lanes = LightLanes { found, target, wi, pdf, radiance: wi, is_far: 0 };
         let close = found & distance2.lt(r2 * CLOSE);
         if by_angle && close != 0 { spheres_close_by(close, center, radius, position, u, lanes) } else { lanes }
     }
@@ -284,7 +351,7 @@ impl LightArrays {
 impl<S: Simd> LightLanes<S> {
     #[inline(always)]
     fn of(FlatPoint { found, target, wi, pdf, uv: _ }: FlatPoint<Float<S>>) -> Self {
-        Self { found, target, wi, pdf, radiance: wi }
+        Self { found, target, wi, pdf, radiance: wi, is_far: 0 }
     }
 
     /// These where the bit is set, else the others.
@@ -296,6 +363,7 @@ impl<S: Simd> LightLanes<S> {
             wi: select_vector(mask, self.wi, other.wi),
             pdf: select(mask, self.pdf, other.pdf),
             radiance: other.radiance,
+            is_far: self.is_far | other.is_far,
         }
     }
 }

@@ -1,20 +1,23 @@
 //! One light, and what it sends from a point.
 
+use crate::core::color::luminance;
+use crate::core::delta_light::DeltaLight;
 use crate::core::material::{ColorInput, ScalarInput};
 use crate::core::material_queries::Emission;
 use crate::core::techniques::Techniques;
 use crate::core::texture::{Texture, TexturePoint};
+use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
 use crate::prepare::light::shape::{LightPoint, LightShape, sphere_uv};
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-/// One emitter: a sphere, a quad or a triangle.
+/// One emitter: a sphere, a quad, a triangle, or a light without size.
 #[derive(Clone, Debug)]
 pub(crate) struct Light {
     pub shape: LightShape,
     pub emission: Emission,
     /// Mean over the surface, luminance.
     pub mean_radiance: f32,
-    /// Stands for a point light, see [`crate::core::snapshot::Object::is_point_light`].
+    /// Has no size, or stands for a light without one, see [`crate::core::snapshot::Object::is_point_light`].
     pub is_point: bool,
     /// See [`crate::core::snapshot::Object::turned`].
     pub turned: Option<Mat3>,
@@ -34,6 +37,8 @@ pub(crate) struct LightSample {
     pub pdf: f32,
     /// W·m⁻²·sr⁻¹, towards the shading point.
     pub radiance: Vec3,
+    /// From outside of the scene: shadow rays have no end, and the air absorbs nothing on the way.
+    pub is_far: bool,
 }
 
 impl Light {
@@ -46,6 +51,9 @@ impl Light {
         u: Vec2,
         pmf: f32,
     ) -> Option<LightSample> {
+        if let Some(source) = self.shape.delta() {
+            return self.delta_sample(&source, position, pmf);
+        }
         self.shape.sample(position, techniques.solid_angle, u).map(|point| self.shining(textures, &point, pmf))
     }
 
@@ -82,6 +90,37 @@ impl Light {
     #[inline]
     pub fn shining(&self, textures: &[Texture], point: &LightPoint, pmf: f32) -> LightSample {
         let radiance = self.radiance(textures, point.normal, point.uv);
-        LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance }
+        LightSample { target: point.target, wi: point.wi, pdf: pmf * point.pdf, radiance, is_far: false }
+    }
+
+    /// Of a light without size, whose emission is its intensity or its irradiance.
+    fn delta_sample(&self, source: &DeltaSource<f32>, position: Vec3, pmf: f32) -> Option<LightSample> {
+        let DeltaSample { found, target, wi, scale } = source.seen_from(true, position.into());
+        let radiance = self.strength() * scale;
+        let (pdf, is_far) = (pmf * SHARPNESS, source.is_far);
+        found.then(|| LightSample { target: target.into(), wi: wi.into(), pdf, radiance, is_far })
+    }
+
+    /// Of a light without size: radiant intensity on the axis, W·sr⁻¹, or irradiance, W·m⁻².
+    pub fn strength(&self) -> Vec3 {
+        match self.emission.radiance {
+            ColorInput::Constant(strength) => strength,
+            ColorInput::Texture(_) => Vec3::ZERO,
+        }
+    }
+
+    /// A light without size.
+    ///
+    /// - `reach`: radius of the scene, metres.
+    pub fn without_size(light: &DeltaLight, reach: f32) -> Self {
+        let shape = match *light {
+            DeltaLight::Point { position, .. } => LightShape::Point { position, cone: None },
+            DeltaLight::Spot { position, cone, .. } => LightShape::Point { position, cone: Some(cone) },
+            DeltaLight::Directional { direction, .. } => LightShape::Directional { to_light: -direction, reach },
+        };
+        let strength = light.strength();
+        let emission = Emission::even(strength);
+        let mean_radiance = luminance(strength);
+        Self { shape, emission, mean_radiance, is_point: true, turned: None, corners: None }
     }
 }

@@ -1,9 +1,10 @@
-//! Finite lights: what shines, which of them to ask at a point, and where on it.
+//! Lights that are chosen one by one: what shines, which of them to ask at a point, and where on it.
 //!
 //! [`LightTable::sample`] and [`LightTable::pdf`] are one family: the second gives the density with which the first
 //! would have found a point that a ray hit by itself, which is what multiple importance sampling needs.
 
 pub(crate) mod arrays;
+pub(crate) mod delta;
 pub(crate) mod emitter;
 pub(crate) mod flat;
 mod objects;
@@ -13,11 +14,13 @@ pub(crate) mod shape;
 mod tree;
 mod tree_simd;
 
+use crate::core::delta_light::DeltaLight;
 use crate::core::material_queries::Emission;
 use crate::core::snapshot::Geometry;
 use crate::core::techniques::Techniques;
 use crate::core::texture::Texture;
 use crate::prepare::light::arrays::LightArrays;
+use crate::prepare::light::delta::EVERYTHING;
 use crate::prepare::light::emitter::{Light, LightSample};
 use crate::prepare::light::objects::ObjectLights;
 use crate::prepare::light::selection::LightSelection;
@@ -28,7 +31,7 @@ use glam::{Vec2, Vec3};
 /// How many sample dimensions [`LightTable::sample_each`] uses.
 pub(crate) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
 
-/// All finite emitters of a scene.
+/// All finite emitters of a scene, and lights without size.
 #[derive(Debug, Default)]
 pub struct LightTable {
     pub(crate) lights: Vec<Light>,
@@ -39,8 +42,13 @@ pub struct LightTable {
 }
 
 impl LightTable {
-    /// Finds the emitters among the objects; `emission` of each material.
-    pub(crate) fn build(geometry: &Geometry, emission: &[Option<Emission>], textures: &[Texture]) -> Self {
+    /// Finds the emitters among the objects; `emission` of each material. Lights without size follow behind them.
+    pub(crate) fn build(
+        geometry: &Geometry,
+        emission: &[Option<Emission>],
+        textures: &[Texture],
+        delta_lights: &[DeltaLight],
+    ) -> Self {
         let mut lights = Vec::new();
         let by_object = geometry
             .objects
@@ -51,6 +59,9 @@ impl LightTable {
                 ObjectLights::add(&mut lights, object, shape, &emission, textures)
             })
             .collect();
+        let reach = (0.5 * geometry.tree.bounds().size().length()).clamp(1e-12, EVERYTHING);
+        let reach = if geometry.objects.is_empty() { 1.0 } else { reach };
+        lights.extend(delta_lights.iter().map(|light| Light::without_size(light, reach)));
         let selection = LightSelection::build(&lights);
         let lanes = LightArrays::build(&lights);
         Self { lights, by_object, selection, lanes }

@@ -2,7 +2,7 @@
 
 use crate::core::techniques::Techniques;
 use crate::prepare::light::LightTable;
-use crate::prepare::light::arrays::{LightArrays, LightLanes, POINT};
+use crate::prepare::light::arrays::{DELTA, LightArrays, LightLanes, POINT};
 use crate::prepare::light::selection::MAX_ESTIMATED;
 use crate::sampling::SamplerLanes;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select};
@@ -24,9 +24,8 @@ impl LightTable {
     ) -> Option<LightLanes<S>> {
         let wide = self.lanes.as_ref()?;
         let (id, pmf, mask) = self.select_lanes(wide, techniques, mask, [position, normal], u_select, &mut u[0]);
-        let mut sample = wide.points(techniques.solid_angle, id, mask, position, u);
+        let mut sample = wide.shining(techniques.solid_angle, id, mask, position, u);
         sample.pdf = sample.pdf * pmf;
-        sample.radiance = Vector::gather(&wide.radiance, id);
         Some(sample)
     }
 
@@ -62,18 +61,23 @@ impl LightTable {
             mask &= pmf.is_positive();
             dimension += 1;
         }
-        let as_point = mask & Bits::gather(&wide.flags, id).has(POINT);
+        let flags = Bits::gather(&wide.flags, id);
+        let as_point = mask & flags.has(POINT | DELTA);
         let by_area = mask & !as_point;
         let nowhere = Vector::splat(s, Vec3::ZERO);
-        let mut found = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: pmf, radiance: nowhere };
+        let mut found = LightLanes { found: 0, target: nowhere, wi: nowhere, pdf: pmf, radiance: nowhere, is_far: 0 };
         if by_area != 0 {
             found = wide.points(true, id, by_area, position, sampler.pair(dimension));
         }
-        if as_point != 0 {
-            found = wide.as_points(id, as_point, position).over(as_point, found);
+        let spheres = as_point & flags.has(POINT);
+        if spheres != 0 {
+            found = wide.as_points(id, spheres, position).over(spheres, found);
+        }
+        found.radiance = Vector::gather(&wide.radiance, id);
+        if wide.has_deltas {
+            found = wide.with_deltas(id, mask, position, found);
         }
         found.pdf = found.pdf * pmf;
-        found.radiance = Vector::gather(&wide.radiance, id);
         (found, as_point)
     }
 

@@ -1,6 +1,8 @@
 //! Which light to ask: a few lights by what each could send to the point, many by a tree over them.
 
+use crate::core::delta_light::Cone;
 use crate::core::techniques::Techniques;
+use crate::prepare::light::delta::{EVERYTHING, FAR};
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
 use crate::prepare::light::tree::LightTree;
@@ -31,6 +33,8 @@ pub(crate) struct LightBounds {
     normal: Vec3,
     /// Mean radiance times the area that can face a point.
     intensity: f32,
+    /// Of a spot.
+    cone: Option<Cone>,
 }
 
 impl LightSelection {
@@ -140,6 +144,7 @@ impl LightSelection {
 
 impl LightBounds {
     fn new(light: &Light) -> Self {
+        let mut cone = None;
         let (center, radius, normal, projected) = match light.shape {
             LightShape::Sphere { center, radius } => (center, radius, Vec3::ZERO, 0.25 * light.shape.area()),
             LightShape::Quad { corner, edge_u, edge_v, normal, area, .. } => {
@@ -151,8 +156,13 @@ impl LightBounds {
                 let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f32::max);
                 (center, radius, normal, area)
             }
+            LightShape::Point { position, cone: of_spot } => {
+                cone = of_spot;
+                (position, 0.0, Vec3::ZERO, 1.0)
+            }
+            LightShape::Directional { .. } => (light.shape.center(), EVERYTHING, Vec3::ZERO, FAR * FAR),
         };
-        Self { center, radius, normal, intensity: light.mean_radiance * projected }
+        Self { center, radius, normal, intensity: light.mean_radiance * projected, cone }
     }
 
     #[inline]
@@ -184,8 +194,15 @@ impl LightBounds {
         if self.normal != Vec3::ZERO {
             estimate = estimate * largest_cosine(-wi.dot(Vector3::in_all(one, self.normal)), cos_u, sin_u);
         }
+        if let Some(cone) = self.cone {
+            // A little wider, so that rounding hides nothing.
+            let way = wi + Vector3::in_all(one, cone.axis);
+            let t = (-(way.length_squared() * 0.5) + (cone.outer + 16.0 * f32::EPSILON)) * cone.slope;
+            let t = t.at_least(0.0).at_most(1.0);
+            estimate = estimate * (t * t);
+        }
         // Within the bounds of the light anything can happen.
-        let within = one.all(self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE));
+        let within = one.all((self.intensity / (0.25 * r2).max(f32::MIN_POSITIVE)).min(1e30));
         select(distance2.le(one.all(r2)), within, estimate / distance2)
     }
 }

@@ -1,12 +1,14 @@
 //! Points on spheres, quads and triangles as seen from a shading point, by solid angle where that is stable.
 
+use crate::core::delta_light::Cone;
+use crate::prepare::light::delta::{DeltaSource, FAR, NO_CONE};
 use crate::prepare::light::flat::{FlatPoint, QuadLight, TriangleLight, pdf_by_area};
 use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_triangle};
 use firstlight_kdtree::geometry::{Frame, robust};
 use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
-/// The surface of a light; all emit on their front alone.
+/// The surface of a light, which emits on its front alone, or where a light without size is.
 #[derive(Clone, Debug)]
 pub(crate) enum LightShape {
     Sphere {
@@ -28,6 +30,19 @@ pub(crate) enum LightShape {
         area: f32,
         /// As of a quad.
         light: TriangleLight<f32>,
+    },
+    /// Without size.
+    Point {
+        position: Vec3,
+        /// Of a spot.
+        cone: Option<Cone>,
+    },
+    /// Infinitely far away.
+    Directional {
+        /// Unit.
+        to_light: Vec3,
+        /// Radius of the scene, metres.
+        reach: f32,
     },
 }
 
@@ -89,20 +104,39 @@ impl LightShape {
         Self::Triangle { vertices, normal, area, light }
     }
 
-    /// Square metres, of the side that emits.
+    /// As the lights without size are sampled; `None` for all others.
+    #[inline]
+    pub fn delta(&self) -> Option<DeltaSource<f32>> {
+        let nowhere = Vec3::ZERO;
+        let (origin, (axis, (outer, slope)), is_far) = match *self {
+            Self::Sphere { .. } | Self::Quad { .. } | Self::Triangle { .. } => return None,
+            Self::Point { position, cone } => {
+                (position, cone.map_or((nowhere, NO_CONE), |cone| (cone.axis, (cone.outer, cone.slope))), false)
+            }
+            Self::Directional { to_light, .. } => (to_light, (nowhere, NO_CONE), true),
+        };
+        Some(DeltaSource { origin: origin.into(), axis: axis.into(), outer, slope, is_far })
+    }
+
+    /// Square metres, of the side that emits. For lights without size, what makes of their intensity the power of a
+    /// sphere: an irradiance is that of a point as far away as the scene is wide.
     pub fn area(&self) -> f32 {
         match self {
             Self::Sphere { radius, .. } => 4.0 * std::f32::consts::PI * radius * radius,
             Self::Quad { area, .. } | Self::Triangle { area, .. } => *area,
+            Self::Point { .. } => 4.0,
+            Self::Directional { reach, .. } => 4.0 * reach * reach,
         }
     }
 
-    /// The middle of a sphere or quad, some point inside of a triangle.
+    /// The middle of a sphere or quad, some point inside of a triangle; far away for directional light.
     pub fn center(&self) -> Vec3 {
         match self {
             Self::Sphere { center, .. } => *center,
             Self::Quad { corner, edge_u, edge_v, .. } => *corner + 0.5 * (*edge_u + *edge_v),
             Self::Triangle { vertices: [a, b, c], .. } => (*a + *b + *c) / 3.0,
+            Self::Point { position, .. } => *position,
+            Self::Directional { to_light, .. } => FAR * *to_light,
         }
     }
 
@@ -125,6 +159,9 @@ impl LightShape {
                     uv: weights,
                 }
             }
+            Self::Point { .. } | Self::Directional { .. } => {
+                SurfaceOfLight { position: self.center(), error: Vec3::ZERO, normal: Vec3::Z, uv: Vec2::ZERO }
+            }
         }
     }
 
@@ -141,7 +178,7 @@ impl LightShape {
         }
     }
 
-    /// A point of the front seen from `position`, or `None` when there is none.
+    /// A point of the front seen from `position`, or `None` when there is none; for lights with a size.
     ///
     /// - `by_angle`: evenly over the solid angle where that is stable, otherwise over the area.
     /// - `u`: two independent uniform numbers in `[0, 1)`.
@@ -156,6 +193,7 @@ impl LightShape {
             Self::Triangle { light, normal, .. } => {
                 LightPoint::of(light.sample(by_angle, true, position.into(), u.to_array()), normal)
             }
+            Self::Point { .. } | Self::Directional { .. } => None,
         }
     }
 
@@ -177,6 +215,7 @@ impl LightShape {
             }
             Self::Quad { light, .. } => light.pdf(by_angle, position.into(), wi.into(), distance),
             Self::Triangle { light, .. } => light.pdf(by_angle, position.into(), wi.into(), distance),
+            Self::Point { .. } | Self::Directional { .. } => 0.0,
         }
     }
 }
@@ -374,6 +413,7 @@ mod tests {
                     let (s, t) = (1.0 - a.sqrt(), b * a.sqrt());
                     (p + s * (q - p) + t * (r - p), normal.as_dvec3(), f64::from(area))
                 }
+                LightShape::Point { .. } | LightShape::Directional { .. } => unreachable!("they have no area"),
             };
             let distance = point.length();
             let cos_light = (-point.dot(normal) / distance).max(0.0);

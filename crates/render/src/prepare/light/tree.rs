@@ -6,6 +6,7 @@
 //! Lights with Adaptive Tree Splitting", without the splitting). The tree is built by their cost, surface area times
 //! orientation. The same walk down to a given light tells the probability of its choice, exactly.
 
+use crate::prepare::light::delta::{EVERYTHING, FAR};
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
 use firstlight_kdtree::geometry::Aabb;
@@ -49,6 +50,8 @@ struct LightItem {
     cone: Cone,
     power: f32,
     id: u32,
+    /// Of a directional light.
+    is_far: bool,
 }
 
 /// Directions within `spread` radians of a unit axis.
@@ -74,8 +77,11 @@ impl LightTree {
             self.ways[only.id as usize] = way;
             return;
         }
-        let middle = match (depth < MAX_UNEVEN_DEPTH).then(|| best_split(items)).flatten() {
+        let some_are_far = items.iter().any(|item| item.is_far) && !items.iter().all(|item| item.is_far);
+        let middle = match (depth < MAX_UNEVEN_DEPTH && !some_are_far).then(|| best_split(items)).flatten() {
             Some((axis, limit)) => partition(items, |item| item.middle()[axis] < limit),
+            // They would make a box of everything.
+            None if some_are_far => partition(items, |item| item.is_far),
             None => {
                 let all = Aabb::from_points(items.iter().map(LightItem::middle));
                 let axis = (all.max - all.min).max_position();
@@ -218,10 +224,21 @@ impl LightItem {
             LightShape::Triangle { vertices, normal, .. } => {
                 (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
             }
+            LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
+            // Of the rays that leave the axis by 90° at most, those near it are the brightest: as those of a flat light.
+            LightShape::Point { position, cone: Some(spot) } => {
+                (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
+            }
+            LightShape::Directional { .. } => {
+                let (center, size) = (light.shape.center(), Vec3::splat(EVERYTHING));
+                (Aabb { min: center - size, max: center + size }, everywhere, 0.0)
+            }
         };
         // A light that is black on the mean may still shine somewhere: it keeps a little.
-        let power = (light.mean_radiance * light.shape.area() * facing).max(f32::MIN_POSITIVE);
-        Self { bounds, cone, power, id }
+        let is_far = matches!(light.shape, LightShape::Directional { .. });
+        let power = if is_far { FAR * FAR } else { light.shape.area() * facing };
+        let power = (light.mean_radiance * power).max(f32::MIN_POSITIVE);
+        Self { bounds, cone, power, id, is_far }
     }
 
     fn middle(&self) -> Vec3 {
@@ -331,7 +348,6 @@ fn partition(items: &mut [LightItem], is_below: impl Fn(&LightItem) -> bool) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::material::ColorInput;
     use crate::core::material_queries::Emission;
     use crate::core::techniques::Techniques;
     use crate::prepare::light::tree_simd::LightTreeArrays;
@@ -347,18 +363,20 @@ mod tests {
                 let at = Vec3::new(8.0 * a.x - 4.0, 3.0 * a.y, 8.0 * b.x - 4.0);
                 let (size, turn) = (0.02 + 0.3 * b.y * b.y, 6.3 * c.x);
                 let (u, v) = (Vec3::new(turn.cos(), 0.2, turn.sin()) * size, Vec3::new(0.0, size, size * c.y));
-                let shape = match i % 3 {
-                    0 => LightShape::Sphere { center: at, radius: size },
-                    1 => LightShape::quad(at, u, v),
-                    _ => LightShape::triangle([at, at + u, at + v]),
-                };
                 let radiance = 0.1 + 20.0 * c.y.powi(4);
-                let emission = Emission {
-                    radiance: ColorInput::Constant(Vec3::splat(radiance)),
-                    scale: 1.0,
-                    two_sided: false,
-                    opacity: (crate::core::material::ScalarInput::Constant(1.0), None),
+                let shape = match i % 7 {
+                    0 => LightShape::Sphere { center: at, radius: size },
+                    1 | 5 => LightShape::quad(at, u, v),
+                    2 => LightShape::triangle([at, at + u, at + v]),
+                    3 => LightShape::Point { position: at, cone: None },
+                    4 => {
+                        let outer = 0.1 + 1.4 * f64::from(a.y);
+                        let cone = crate::core::delta_light::Cone::new(u.normalize(), outer * f64::from(b.x), outer);
+                        LightShape::Point { position: at, cone: Some(cone) }
+                    }
+                    _ => LightShape::Directional { to_light: (u + v).normalize(), reach: 8.0 },
                 };
+                let emission = Emission::even(Vec3::splat(radiance));
                 Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corners: None }
             })
             .collect()

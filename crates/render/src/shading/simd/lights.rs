@@ -52,8 +52,8 @@ fn light_points<S: Simd>(s: S, asked: &LightPoints<S>) -> FoundLights<S> {
             u_select = sampler.single(dimension + DIM_LIGHT);
         }
         let found = tables.lights.sample_lanes(techniques, mask, place.position, place.normal, u_select, u);
-        if let Some(LightLanes { found, target, wi, pdf, radiance }) = found {
-            return FoundLights { found, infinite: 0, target, wi, pdf, radiance };
+        if let Some(LightLanes { found, target, wi, pdf, radiance, is_far }) = found {
+            return FoundLights { found, infinite: is_far, target, wi, pdf, radiance };
         }
     }
     let (positions, normals) = (place.position.to_arrays(), place.normal.to_arrays());

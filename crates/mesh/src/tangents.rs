@@ -1,0 +1,182 @@
+//! Tangents from texture coordinates, as normal maps are made for.
+//!
+//! Source: Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited" (MikkTSpace), in the crate `bevy_mikktspace`.
+
+use super::Mesh;
+use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
+use glam::{Vec3, Vec4};
+use std::collections::HashMap;
+
+/// The mesh while the tangents of its corners are found.
+struct Corners<'a> {
+    mesh: &'a Mesh,
+    /// Three a triangle.
+    tangents: Vec<Vec4>,
+}
+
+impl Corners<'_> {
+    fn vertex(&self, face: usize, corner: usize) -> usize {
+        self.mesh.triangles[face][corner] as usize
+    }
+}
+
+impl Geometry for Corners<'_> {
+    fn num_faces(&self) -> usize {
+        self.mesh.triangles.len()
+    }
+
+    fn num_vertices_of_face(&self, _face: usize) -> usize {
+        3
+    }
+
+    fn position(&self, face: usize, corner: usize) -> [f32; 3] {
+        self.mesh.positions[self.vertex(face, corner)].to_array()
+    }
+
+    fn normal(&self, face: usize, corner: usize) -> [f32; 3] {
+        self.mesh.normals[self.vertex(face, corner)].to_array()
+    }
+
+    fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
+        self.mesh.uvs[self.vertex(face, corner)].to_array()
+    }
+
+    fn set_tangent(&mut self, tangent: Option<TangentSpace>, face: usize, corner: usize) {
+        let normal = self.mesh.normals[self.vertex(face, corner)];
+        let encoded = tangent.map_or(Vec4::ZERO, |tangent| Vec4::from(tangent.tangent_encoded()));
+        let sign = if encoded.w < 0.0 { -1.0 } else { 1.0 };
+        // Where the texture coordinates have no direction, any will do.
+        let direction = encoded.truncate().try_normalize().filter(|direction| direction.is_finite());
+        let direction = direction.unwrap_or_else(|| normal.any_orthonormal_vector());
+        self.tangents[3 * face + corner] = direction.extend(sign);
+    }
+}
+
+impl Mesh {
+    /// The mesh with tangents of its first texture coordinates; vertices whose corners differ in them are split.
+    ///
+    /// Without normals or texture coordinates it stays as it is.
+    pub fn with_tangents(mut self) -> Self {
+        if self.normals.len() != self.positions.len() || self.uvs.len() != self.positions.len() {
+            return self;
+        }
+        let along = |normal: &Vec3| normal.any_orthonormal_vector().extend(1.0);
+        let tangents = vec![Vec4::X; 3 * self.triangles.len()];
+        let mut corners = Corners { mesh: &self, tangents };
+        // It fails for no mesh that has passed `validate`; should it all the same, some tangent is better than none.
+        if generate_tangents(&mut corners).is_err() {
+            self.tangents = self.normals.iter().map(along).collect();
+            return self;
+        }
+        let corners = corners.tangents;
+        let n = self.positions.len();
+        let mut of_vertex: Vec<Option<Vec4>> = vec![None; n];
+        // By vertex and tangent: the copy that has it.
+        let mut copies: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
+        let mut sources: Vec<u32> = Vec::new();
+        for (triangle, tangents) in self.triangles.iter_mut().zip(corners.chunks_exact(3)) {
+            for (vertex, &tangent) in triangle.iter_mut().zip(tangents) {
+                match of_vertex[*vertex as usize] {
+                    None => of_vertex[*vertex as usize] = Some(tangent),
+                    Some(known) if known == tangent => {}
+                    Some(_) => {
+                        let key = (*vertex, tangent.to_array().map(f32::to_bits));
+                        let next = (n + sources.len()) as u32;
+                        let copy = *copies.entry(key).or_insert(next);
+                        if copy == next {
+                            sources.push(*vertex);
+                        }
+                        *vertex = copy;
+                    }
+                }
+            }
+        }
+        let mut tangents: Vec<Vec4> =
+            of_vertex.iter().zip(&self.normals).map(|(known, normal)| known.unwrap_or_else(|| along(normal))).collect();
+        tangents.resize(n + sources.len(), Vec4::X);
+        for ((_, bits), copy) in &copies {
+            tangents[*copy as usize] = Vec4::from(bits.map(f32::from_bits));
+        }
+        fn repeat<T: Copy>(list: &mut Vec<T>, sources: &[u32]) {
+            if !list.is_empty() {
+                list.reserve(sources.len());
+                for &source in sources {
+                    list.push(list[source as usize]);
+                }
+            }
+        }
+        repeat(&mut self.positions, &sources);
+        repeat(&mut self.normals, &sources);
+        repeat(&mut self.uvs, &sources);
+        repeat(&mut self.uvs2, &sources);
+        repeat(&mut self.colors, &sources);
+        self.tangents = tangents;
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, Vec2};
+
+    /// Two triangles of a square; `u` runs along `direction`, mirrored on the second one if asked.
+    fn square(angle: f32, mirrored: bool) -> Mesh {
+        let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let positions: Vec<DVec3> = points.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect();
+        let turn = glam::Mat2::from_angle(-angle);
+        let uv = |(i, &(x, y)): (usize, &(f64, f64))| {
+            let uv = turn * Vec2::new(x as f32, y as f32);
+            if mirrored && i >= 3 { Vec2::new(-uv.x, uv.y) } else { uv }
+        };
+        let mut mesh = Mesh::from_f64(&positions, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+        mesh.uvs = points.iter().enumerate().map(uv).collect();
+        mesh.normals = vec![Vec3::Z; 6];
+        mesh
+    }
+
+    #[test]
+    fn tangents_follow_the_first_texture_coordinate() {
+        for angle in [0.0, 0.7, 2.5] {
+            let mesh = square(angle, false).with_tangents();
+            mesh.validate().unwrap();
+            for tangent in &mesh.tangents {
+                let expected = Vec3::new(angle.cos(), angle.sin(), 0.0);
+                assert!(tangent.truncate().abs_diff_eq(expected, 1e-5) && tangent.w == 1.0, "{angle}: {tangent}");
+            }
+        }
+    }
+
+    #[test]
+    fn mirrored_coordinates_have_the_other_sign() {
+        let mesh = square(0.3, true).with_tangents();
+        mesh.validate().unwrap();
+        let of = |triangle: usize| mesh.triangles[triangle].map(|vertex| mesh.tangents[vertex as usize]);
+        let along = Vec3::new(0.3_f32.cos(), 0.3_f32.sin(), 0.0);
+        assert!(of(0).iter().all(|t| t.truncate().abs_diff_eq(along, 1e-5) && t.w == 1.0));
+        assert!(of(1).iter().all(|t| t.truncate().abs_diff_eq(-along, 1e-5) && t.w == -1.0));
+    }
+
+    #[test]
+    fn corners_that_share_a_vertex_are_split_where_their_tangents_differ() {
+        let mut mesh = square(0.0, true);
+        mesh.triangles[1] = [0, 2, 5];
+        mesh.uvs2 = mesh.uvs.clone();
+        let before = mesh.clone();
+        let mesh = mesh.with_tangents();
+        mesh.validate().unwrap();
+        for (triangle, old) in mesh.triangles.iter().zip(&before.triangles) {
+            for (&vertex, &old) in triangle.iter().zip(old) {
+                assert_eq!(mesh.positions[vertex as usize], before.positions[old as usize]);
+                assert_eq!(mesh.uvs2[vertex as usize], before.uvs2[old as usize]);
+            }
+        }
+        assert_eq!(before.clone().with_tangents(), mesh, "the same each time");
+    }
+
+    #[test]
+    fn without_normals_or_coordinates_nothing_happens() {
+        let bare = Mesh { normals: Vec::new(), ..square(0.0, false) };
+        assert!(bare.with_tangents().tangents.is_empty());
+    }
+}

@@ -1,0 +1,124 @@
+//! Lines from lights without size towards what is specular.
+//!
+//! From a point the direction is chosen evenly over the cone of the sphere around the caster, or over that of a spot where it
+//! is narrower; directional light evenly over the disc that the sphere is seen as. Densities are per steradian and per
+//! square metre: there is no line from the camera that they could be weighed against.
+
+use crate::prepare::light::emitter::Light;
+use crate::prepare::light::shape::LightShape;
+use crate::sampling::{cone_pdf, one_minus_cos_from_sin2, uniform_cone, uniform_disc};
+use firstlight_kdtree::geometry::{Frame, Ray, robust};
+use firstlight_kdtree::{SceneTree, Shape};
+use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+/// What directional light passes on its way to a caster.
+#[derive(Debug)]
+pub(crate) struct Outside {
+    /// A sphere around all that is finite.
+    center: Vec3,
+    radius: f32,
+    /// A point and the normal of each infinite plane.
+    planes: Vec<(Vec3, Vec3)>,
+}
+
+/// A line, and what it carries.
+pub(crate) struct DeltaLine {
+    pub ray: Ray,
+    /// Per steradian, or per square metre; without the choice of light and caster.
+    pub density: f32,
+    /// W·sr⁻¹, or W·m⁻².
+    pub strength: Vec3,
+    /// From outside of the scene.
+    pub is_far: bool,
+}
+
+/// - `center`, `radius`: of a sphere around the caster, metres, possibly without end;
+/// - `u`: two independent uniform numbers in `[0, 1)`.
+///
+/// `None` where the light sends nothing this way.
+pub(crate) fn sample(light: &Light, outside: &Outside, center: Vec3, radius: f32, u: Vec2) -> Option<DeltaLine> {
+    match light.shape {
+        LightShape::Point { position, cone } => {
+            let (mut axis, mut one_minus_cos_max) = (Vec3::Z, 2.0);
+            let to_center = center - position;
+            let distance2 = to_center.length_squared();
+            if distance2 > radius * radius {
+                axis = to_center / distance2.sqrt();
+                one_minus_cos_max = one_minus_cos_from_sin2(radius * radius / distance2);
+            }
+            if let Some(cone) = cone
+                && cone.outer < one_minus_cos_max
+            {
+                (axis, one_minus_cos_max) = (cone.axis, cone.outer);
+            }
+            let local = uniform_cone(u.to_array(), one_minus_cos_max).0.into();
+            let dir = Frame::around(axis).to_world(local).normalize();
+            let strength = cone.map_or(1.0, |cone| cone.falloff(dir)) * light.strength();
+            // Something may be in the very place of the light.
+            let origin = robust::offset_ray_origin(position, robust::gamma(6) * position.abs(), dir, dir);
+            let density = cone_pdf(one_minus_cos_max);
+            Some(DeltaLine { ray: Ray::new(origin, dir), density, strength, is_far: false })
+        }
+        LightShape::Directional { to_light, .. } if radius.is_finite() => {
+            let Vec2 { x, y } = radius * uniform_disc(u);
+            let way = outside.radius + outside.center.distance(center) + radius;
+            let origin = center + Frame::around(to_light).to_world(Vec3::new(x, y, way));
+            if outside.is_shaded(origin, to_light) {
+                return None;
+            }
+            let density = FRAC_1_PI / (radius * radius);
+            Some(DeltaLine { ray: Ray::new(origin, -to_light), density, strength: light.strength(), is_far: true })
+        }
+        _ => None,
+    }
+}
+
+/// An estimate of the flux over the strength of the light, zero only where nothing of it reaches the sphere; 0 for all
+/// lights with a size.
+pub(crate) fn coupling(shape: &LightShape, center: Vec3, radius: f32) -> f64 {
+    match shape {
+        LightShape::Point { position, cone } => {
+            let to_center = center - *position;
+            let distance = to_center.length();
+            let sin2 = (radius * radius / (distance * distance)).min(1.0);
+            let sphere = if radius < distance { PI * sin2 } else { 4.0 * PI };
+            let Some(cone) = cone else { return f64::from(sphere) };
+            let beside = match radius < distance {
+                // The angle from the axis to the rim of the sphere, a little less.
+                true => (cone.axis.angle_between(to_center) - sin2.sqrt().asin() - 1e-3).max(0.0),
+                false => 0.0,
+            };
+            let share = cone.falloff_at(2.0 * (0.5 * beside).sin().powi(2));
+            f64::from((TAU * cone.outer).min(sphere) * share)
+        }
+        LightShape::Directional { .. } if radius.is_finite() => f64::from(PI * radius * radius),
+        _ => 0.0,
+    }
+}
+
+impl Outside {
+    pub fn of(tree: &SceneTree) -> Self {
+        let bounds = tree.bounds();
+        let (center, radius) = (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).length());
+        let planes = tree.shapes().iter().filter_map(|shape| match shape {
+            Shape::Plane { point, normal } => Some((*point, *normal)),
+            _ => None,
+        });
+        let planes = planes.collect();
+        let is_finite = radius.is_finite() && center.is_finite();
+        Self {
+            center: if is_finite { center } else { Vec3::ZERO },
+            radius: if is_finite { radius } else { 0.0 },
+            planes,
+        }
+    }
+
+    /// Whether some plane is in the way of light to `position`, outside of all that is finite.
+    fn is_shaded(&self, position: Vec3, to_light: Vec3) -> bool {
+        self.planes.iter().any(|(point, normal)| {
+            let (height, climb) = ((*point - position).dot(*normal), to_light.dot(*normal));
+            height / climb > 0.0
+        })
+    }
+}

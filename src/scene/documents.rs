@@ -1,0 +1,121 @@
+//! The glTF files of a scene while it is loaded: each is read once, and each of its meshes made once.
+
+use super::gltf::{BuiltMesh, Document, GltfError, GltfProblem, Located, MeshKey, Posed, ReadOptions, Surfaces};
+use super::limits::Limits;
+use super::model::ModelNormals;
+use super::picture::{PictureError, picture_of_bytes};
+use super::stamp::{Stamp, stamp};
+use crate::render::ImageTexture;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Files that are open, by path.
+#[derive(Debug, Default)]
+pub(super) struct Documents {
+    options: ReadOptions,
+    open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
+    /// Vertices and indices that were made.
+    made: AtomicU64,
+}
+
+/// A file that is open.
+#[derive(Debug)]
+pub(super) struct Opened {
+    pub document: Document,
+    /// What was read for it, and what that was before.
+    pub files: Vec<(PathBuf, Stamp)>,
+    /// By the bits of the moment.
+    posed: Mutex<HashMap<Option<u64>, Arc<Posed>>>,
+    /// By what paths of the scene call the model.
+    surfaces: Mutex<HashMap<String, Arc<Surfaces>>>,
+    meshes: Mutex<HashMap<(MeshKey, Option<u64>), Arc<BuiltMesh>>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Documents {
+    pub(super) fn new(allow_outside: bool) -> Self {
+        Self { options: ReadOptions { allow_outside, ..ReadOptions::default() }, ..Self::default() }
+    }
+
+    /// The file at `path`, which is read when it is asked for first.
+    pub(super) fn open(&self, path: &Path) -> Result<Arc<Opened>, GltfError> {
+        let mut open = lock(&self.open);
+        if let Some(opened) = open.get(path) {
+            return Ok(opened.clone());
+        }
+        // Before it is read: what changes in the meantime is read again.
+        let before = stamp(path);
+        let document = Document::read(path, self.options)?;
+        let others = document.files()[1..].iter().map(|file| (file.clone(), stamp(file)));
+        let files = std::iter::once((path.to_owned(), before)).chain(others).collect();
+        let opened = Arc::new(Opened {
+            document,
+            files,
+            posed: Mutex::default(),
+            surfaces: Mutex::default(),
+            meshes: Mutex::default(),
+        });
+        open.insert(path.to_owned(), opened.clone());
+        Ok(opened)
+    }
+
+    /// A mesh as its file shades it.
+    pub(super) fn mesh(&self, opened: &Opened, key: MeshKey, at: Option<f64>) -> Result<Arc<BuiltMesh>, Located> {
+        let known = (key, at.map(f64::to_bits));
+        if let Some(mesh) = lock(&opened.meshes).get(&known) {
+            return Ok(mesh.clone());
+        }
+        let posed = opened.posed(at)?;
+        let mesh =
+            Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
+        // A few bytes could ask for the same vertices again and again.
+        const BYTES_A_NUMBER: u64 = 8;
+        let limit = Limits::of_this_process().model_bytes / BYTES_A_NUMBER;
+        let numbers = (mesh.mesh.positions.len() + 3 * mesh.mesh.triangles.len()) as u64;
+        if self.made.fetch_add(numbers, Ordering::Relaxed) + numbers > limit {
+            return Err((String::new(), GltfProblem::TooLarge { limit }));
+        }
+        Ok(lock(&opened.meshes).entry(known).or_insert(mesh).clone())
+    }
+
+    /// A picture that is part of the file at `model`.
+    pub(super) fn picture(&self, model: &Path, number: u32) -> Result<(ImageTexture, Option<String>), PictureError> {
+        let failed = |error: GltfError| PictureError::Model(error.to_string());
+        let opened = self.open(model).map_err(failed)?;
+        let bytes = opened.document.picture_bytes(number).map_err(|located| failed(opened.document.error(located)))?;
+        picture_of_bytes(&bytes)
+    }
+
+    /// Makes many meshes at once; what is wrong with one is told when it is asked for by itself.
+    pub(super) fn make(&self, wanted: &[(Arc<Opened>, MeshKey, Option<f64>)]) {
+        wanted.par_iter().for_each(|(opened, key, at)| {
+            let _ = self.mesh(opened, *key, *at);
+        });
+    }
+}
+
+impl Opened {
+    pub(super) fn posed(&self, at: Option<f64>) -> Result<Arc<Posed>, Located> {
+        let key = at.map(f64::to_bits);
+        if let Some(posed) = lock(&self.posed).get(&key) {
+            return Ok(posed.clone());
+        }
+        let posed = Arc::new(self.document.posed(at)?);
+        Ok(lock(&self.posed).entry(key).or_insert(posed).clone())
+    }
+
+    /// - `file`: what paths of the scene call the model.
+    pub(super) fn surfaces(&self, file: &str) -> Result<Arc<Surfaces>, Located> {
+        if let Some(surfaces) = lock(&self.surfaces).get(file) {
+            return Ok(surfaces.clone());
+        }
+        let surfaces = Arc::new(self.document.surfaces(file)?);
+        Ok(lock(&self.surfaces).entry(file.to_owned()).or_insert(surfaces).clone())
+    }
+}

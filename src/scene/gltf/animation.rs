@@ -1,0 +1,250 @@
+//! Animations at a moment: the transforms and the weights of nodes.
+//!
+//! All animations of a file are applied together; where two move the same property of a node, the first counts.
+//!
+//! Source: Khronos, "glTF 2.0 Specification", §3.11 and appendix C (animation sampler interpolation modes).
+
+use super::document::Document;
+use super::error::{GltfProblem, Located, place};
+use glam::{DQuat, DVec3};
+use std::collections::HashMap;
+
+/// What animations say of the transform of a node; `None` leaves what the file stores.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct NodePose {
+    pub translation: Option<DVec3>,
+    pub rotation: Option<DQuat>,
+    pub scale: Option<DVec3>,
+}
+
+/// What animations say of all nodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Pose {
+    nodes: HashMap<u32, NodePose>,
+    /// Of morph targets, by node.
+    weights: HashMap<u32, Vec<f64>>,
+}
+
+impl Pose {
+    pub(super) fn of(&self, node: u32) -> Option<&NodePose> {
+        self.nodes.get(&node)
+    }
+
+    pub(super) fn weights(&self, node: u32) -> Option<&[f64]> {
+        self.weights.get(&node).map(Vec::as_slice)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Interpolation {
+    Step,
+    Linear,
+    CubicSpline,
+}
+
+impl Document {
+    /// Seconds at which the last animation ends, if there is any.
+    pub(super) fn animation_length(&self) -> Option<f64> {
+        let inputs = self.root.animations.iter().flat_map(|animation| &animation.samplers);
+        let ends = inputs.filter_map(|sampler| self.floats::<1>(sampler.input).ok()?.last().copied());
+        ends.map(|[end]| f64::from(end)).reduce(f64::max)
+    }
+
+    /// The pose of all nodes; that which is stored when no time is given.
+    ///
+    /// - `at`: seconds; before the first key and after the last one, those count.
+    pub(super) fn pose(&self, at: Option<f64>) -> Result<Pose, Located> {
+        let mut pose = Pose::default();
+        let Some(at) = at else { return Ok(pose) };
+        for (i, animation) in self.root.animations.iter().enumerate() {
+            for (k, channel) in animation.channels.iter().enumerate() {
+                let Some(node) = channel.target.node else { continue };
+                let here = || format!("{}.{}", place("animations", i), place("channels", k));
+                let index = channel.sampler;
+                let count = animation.samplers.len();
+                let problem = GltfProblem::Index { list: "samplers", index, count };
+                let sampler = animation.samplers.get(index as usize).ok_or_else(|| (here(), problem))?;
+                self.node(node)?;
+                let posed = pose.nodes.entry(node).or_default();
+                let interpolation = match sampler.interpolation.as_deref() {
+                    None | Some("LINEAR") => Interpolation::Linear,
+                    Some("STEP") => Interpolation::Step,
+                    Some("CUBICSPLINE") => Interpolation::CubicSpline,
+                    Some(other) => {
+                        let expected = "STEP, LINEAR or CUBICSPLINE";
+                        let found = other.to_owned();
+                        return Err((here(), GltfProblem::Value { what: "interpolation", found, expected }));
+                    }
+                };
+                let times: Vec<f64> = self.floats::<1>(sampler.input)?.iter().map(|[t]| f64::from(*t)).collect();
+                if times.is_empty() {
+                    continue;
+                }
+                let output = sampler.output;
+                match channel.target.path.as_str() {
+                    "translation" if posed.translation.is_none() => {
+                        let value = self.three(output, &times, interpolation, at).map_err(|e| e.or(&here))?;
+                        posed.translation = Some(value);
+                    }
+                    "scale" if posed.scale.is_none() => {
+                        let value = self.three(output, &times, interpolation, at).map_err(|e| e.or(&here))?;
+                        posed.scale = Some(value);
+                    }
+                    "rotation" if posed.rotation.is_none() => {
+                        let values: Vec<[f64; 4]> = widened(&self.floats::<4>(output)?);
+                        let value = sampled(&times, &values, 1, interpolation, at, true).map_err(|e| e.or(&here))?;
+                        posed.rotation = value.first().map(|&v| DQuat::from_array(v));
+                    }
+                    "weights" if !pose.weights.contains_key(&node) => {
+                        let values: Vec<[f64; 1]> = widened(&self.floats::<1>(output)?);
+                        let keys = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+                        let group = values.len() / keys;
+                        let value = sampled(&times, &values, group, interpolation, at, false);
+                        let value = value.map_err(|e| e.or(&here))?;
+                        pose.weights.insert(node, value.into_iter().map(|[w]| w).collect());
+                    }
+                    // What comes later is another animation of the same property; other paths belong to extensions.
+                    _ => {}
+                }
+            }
+        }
+        Ok(pose)
+    }
+
+    fn three(&self, output: u32, times: &[f64], how: Interpolation, at: f64) -> Result<DVec3, Wrong> {
+        let values: Vec<[f64; 3]> = widened(&self.floats::<3>(output).map_err(Wrong::Located)?);
+        let value = sampled(times, &values, 1, how, at, false)?;
+        Ok(value.first().map_or(DVec3::ZERO, |&v| DVec3::from(v)))
+    }
+}
+
+/// What is wrong, with its place where that is known.
+enum Wrong {
+    Located(Located),
+    Length { found: usize, expected: usize },
+}
+
+impl Wrong {
+    fn or(self, place: &dyn Fn() -> String) -> Located {
+        match self {
+            Self::Located(located) => located,
+            Self::Length { found, expected } => {
+                let what = "the output of its sampler".to_owned();
+                (place(), GltfProblem::Length { what, found: found as u64, expected: expected as u64 })
+            }
+        }
+    }
+}
+
+fn widened<const N: usize>(values: &[[f32; N]]) -> Vec<[f64; N]> {
+    values.iter().map(|value| value.map(f64::from)).collect()
+}
+
+/// The values at a moment, `group` of them.
+fn sampled<const N: usize>(
+    times: &[f64],
+    values: &[[f64; N]],
+    group: usize,
+    how: Interpolation,
+    at: f64,
+    turns: bool,
+) -> Result<Vec<[f64; N]>, Wrong> {
+    let parts = if how == Interpolation::CubicSpline { 3 } else { 1 };
+    let expected = times.len() * group * parts;
+    if values.len() != expected || group == 0 {
+        return Err(Wrong::Length { found: values.len(), expected: expected.max(times.len() * parts) });
+    }
+    // Of a spline: 0 the incoming tangent, 1 the value, 2 the outgoing tangent.
+    let value = |key: usize, part: usize, i: usize| values[(key * parts + part) * group + i];
+    let middle = parts / 2;
+    let next = times.partition_point(|&t| t <= at);
+    if next == 0 || next == times.len() {
+        let key = next.saturating_sub(1);
+        return Ok((0..group).map(|i| value(key, middle, i)).collect());
+    }
+    let (a, b) = (next - 1, next);
+    let span = times[b] - times[a];
+    let t = if span > 0.0 { (at - times[a]) / span } else { 0.0 };
+    let mix = |i: usize| -> [f64; N] {
+        let (p, q) = (value(a, middle, i), value(b, middle, i));
+        match how {
+            Interpolation::Step => p,
+            Interpolation::Linear if turns && N == 4 => slerp(p, q, t),
+            Interpolation::Linear => std::array::from_fn(|k| p[k] + t * (q[k] - p[k])),
+            Interpolation::CubicSpline => {
+                let (out, into) = (value(a, 2, i), value(b, 0, i));
+                let (t2, t3) = (t * t, t * t * t);
+                std::array::from_fn(|k| {
+                    (2.0 * t3 - 3.0 * t2 + 1.0) * p[k]
+                        + span * (t3 - 2.0 * t2 + t) * out[k]
+                        + (3.0 * t2 - 2.0 * t3) * q[k]
+                        + span * (t3 - t2) * into[k]
+                })
+            }
+        }
+    };
+    Ok((0..group).map(mix).collect())
+}
+
+/// Between two turns on the shorter way; both are four numbers.
+fn slerp<const N: usize>(p: [f64; N], q: [f64; N], t: f64) -> [f64; N] {
+    let four = |v: [f64; N]| DQuat::from_xyzw(v[0], v[1], v[2], v[3]);
+    let (p, q) = (four(p), four(q));
+    let (from, to) = (p.length(), q.length());
+    if !(from > 0.0 && to > 0.0) {
+        let stays = p.to_array();
+        return std::array::from_fn(|k| stays[k]);
+    }
+    let (p, q) = (p / from, q / to);
+    let mut cos = p.dot(q);
+    let q = if cos < 0.0 { -q } else { q };
+    cos = cos.abs().min(1.0);
+    let angle = cos.acos();
+    let sin = angle.sin();
+    // Near each other the arc is a line.
+    let (a, b) = if sin < 1e-9 { (1.0 - t, t) } else { (((1.0 - t) * angle).sin() / sin, (t * angle).sin() / sin) };
+    let mixed = (p * a + q * b).to_array();
+    std::array::from_fn(|k| mixed[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(how: Interpolation, values: &[[f64; 1]], t: f64) -> f64 {
+        sampled(&[1.0, 3.0], values, 1, how, t, false).ok().unwrap()[0][0]
+    }
+
+    #[test]
+    fn keys_hold_before_and_after_and_are_mixed_between() {
+        let values = [[10.0], [20.0]];
+        for (t, linear, step) in
+            [(0.0, 10.0, 10.0), (1.0, 10.0, 10.0), (1.5, 12.5, 10.0), (3.0, 20.0, 20.0), (9.0, 20.0, 20.0)]
+        {
+            assert_eq!(at(Interpolation::Linear, &values, t), linear);
+            assert_eq!(at(Interpolation::Step, &values, t), step);
+        }
+        assert!(sampled(&[1.0, 3.0], &values[..1], 1, Interpolation::Step, 2.0, false).is_err());
+    }
+
+    #[test]
+    fn splines_follow_any_cubic() {
+        // f = t³ with its own derivatives at the keys 1 and 3.
+        let (f, d) = (|t: f64| t * t * t, |t: f64| 3.0 * t * t);
+        let values = [[d(1.0)], [f(1.0)], [d(1.0)], [d(3.0)], [f(3.0)], [d(3.0)]];
+        for t in [1.0, 1.2, 2.0, 2.9, 3.0] {
+            assert!((at(Interpolation::CubicSpline, &values, t) - f(t)).abs() < 1e-12, "{t}");
+        }
+    }
+
+    #[test]
+    fn turns_take_the_shorter_way_at_an_even_pace() {
+        let turn = |angle: f64| DQuat::from_rotation_y(angle);
+        let values = [turn(0.2).to_array(), (-turn(1.4)).to_array()];
+        for t in [0.0, 0.25, 0.7] {
+            let found = sampled(&[0.0, 1.0], &values, 1, Interpolation::Linear, t, true).ok().unwrap()[0];
+            let angle = DQuat::from_array(found).angle_between(turn(0.2 + 1.2 * t));
+            assert!(angle < 1e-6, "{t}: {angle}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The whole scene of a file as one mesh, for what takes a model as a mesh.
+
+use super::assembly::MeshKey;
+use super::document::{Document, ReadOptions};
+use super::error::{GltfError, GltfProblem, Located};
+use super::mesh::BuiltMesh;
+use crate::mesh::Mesh;
+use crate::scene::limits::Limits;
+use crate::scene::model::imported::{ImportedModel, ModelOptions};
+use crate::scene::obj::ImportedMaterial;
+use glam::{DMat3, DVec3, Vec3};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Vertices and indices that are held at once at most, for each byte that a model may have.
+const BYTES_A_NUMBER: u64 = 8;
+
+/// Everything that the scene of a file shows, as it stores it, in the coordinates of the world.
+///
+/// # Errors
+/// When the file cannot be read, or has nothing with area.
+pub(in crate::scene) fn load_gltf_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, GltfError> {
+    let read = ReadOptions { max_bytes: options.max_bytes, ..ReadOptions::default() };
+    let document = Document::read(path, read)?;
+    document.baked(options).map_err(|located| document.error(located))
+}
+
+impl Document {
+    /// See [`load_gltf_with`].
+    pub(in crate::scene) fn baked(&self, options: &ModelOptions) -> Result<ImportedModel, Located> {
+        let whole = |problem| (String::new(), problem);
+        let posed = self.posed(None)?;
+        let assembly = self.assembly(&posed)?;
+        let mut built: HashMap<MeshKey, Option<BuiltMesh>> = HashMap::new();
+        let (mut positions, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = (Vec::new(), Vec::new());
+        let mut joined = Mesh::default();
+        let mut materials: Vec<Option<u32>> = Vec::new();
+        let mut warnings = assembly.warnings.clone();
+        let mut normals_from_file = true;
+        let limit = Limits::of_this_process().model_bytes / BYTES_A_NUMBER;
+        for placed in &assembly.meshes {
+            if !built.contains_key(&placed.key) {
+                let node = placed.key.node.map(|node| (node, &posed.tree, &posed.pose));
+                let mesh = match self.built_mesh(placed.key.mesh, node, &options.normals) {
+                    Ok(mesh) => Some(mesh),
+                    // Points and lines.
+                    Err((place, problem @ GltfProblem::NoTriangles)) => {
+                        warnings.push(format!("{place}: {problem}, and is left out"));
+                        None
+                    }
+                    Err(error) => return Err(error),
+                };
+                warnings.extend(mesh.iter().flat_map(|mesh| mesh.warnings.iter().cloned()));
+                built.insert(placed.key, mesh);
+            }
+            let Some(Some(BuiltMesh { mesh, keys, .. })) = built.get(&placed.key) else { continue };
+            let first = positions.len();
+            let total = (first + mesh.positions.len() + 3 * (triangles.len() + mesh.triangles.len())) as u64;
+            if total > limit || u32::try_from(first + mesh.positions.len()).is_err() {
+                return Err(whole(GltfProblem::TooLarge { limit }));
+            }
+            let place = |p: &Vec3| placed.world.transform_point3(p.as_dvec3() + mesh.center);
+            positions.extend(mesh.positions.iter().map(place));
+            // Normals by the cofactors: the inverse transposed but for a factor.
+            let m = placed.world.matrix3;
+            let is_mirrored = m.determinant() < 0.0;
+            let sign = if is_mirrored { -1.0 } else { 1.0 };
+            let cofactors =
+                DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+            let turn = |n: &Vec3| (cofactors * n.as_dvec3() * sign).normalize_or(DVec3::Y).as_vec3();
+            normals_from_file &= !mesh.normals.is_empty();
+            joined.normals.extend(mesh.normals.iter().map(turn));
+            let whole_uvs = mesh.uvs.len() == mesh.positions.len();
+            joined.uvs.extend_from_slice(if whole_uvs { &mesh.uvs } else { &[] });
+            joined.uvs.resize(positions.len(), glam::Vec2::ZERO);
+            let mut slots = Vec::with_capacity(keys.len());
+            for key in keys {
+                let known = materials.iter().position(|material| *material == key.material);
+                let slot = known.unwrap_or_else(|| {
+                    materials.push(key.material);
+                    materials.len() - 1
+                });
+                slots.push(u16::try_from(slot).unwrap_or(u16::MAX));
+            }
+            let slot = |t: usize| slots[mesh.slots.get(t).map_or(0, |&slot| slot as usize)];
+            joined.slots.extend((0..mesh.triangles.len()).map(slot));
+            triangles.extend(mesh.triangles.iter().map(|corners| {
+                let [a, b, c] = corners.map(|corner| corner + first as u32);
+                if is_mirrored { [a, c, b] } else { [a, b, c] }
+            }));
+        }
+        if triangles.is_empty() {
+            return Err(whole(GltfProblem::NoTriangles));
+        }
+        let mut mesh = Mesh::from_f64(&positions, triangles).map_err(|error| whole(error.into()))?;
+        mesh.slots = if materials.len() > 1 { joined.slots } else { Vec::new() };
+        if joined.uvs.iter().any(|uv| *uv != glam::Vec2::ZERO) {
+            mesh.uvs = joined.uvs;
+        }
+        if normals_from_file {
+            mesh.normals = joined.normals;
+        }
+        mesh.validate().map_err(|error| whole(error.into()))?;
+        let surfaces = self.surfaces("")?;
+        let names = |material: &Option<u32>| -> Result<ImportedMaterial, Located> {
+            let [r, g, b, _] = self.material(*material)?.base_color;
+            let name = surfaces.materials[surfaces.index(*material)].name.clone();
+            Ok(ImportedMaterial { name, diffuse: Some(Vec3::new(r, g, b)), ..ImportedMaterial::default() })
+        };
+        Ok(ImportedModel {
+            mesh,
+            materials: materials.iter().map(names).collect::<Result<_, _>>()?,
+            libraries: self.files[1..].to_vec(),
+            normals_from_file,
+            polygons: 0,
+            warnings,
+            material_warnings: Vec::new(),
+        })
+    }
+}

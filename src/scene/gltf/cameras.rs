@@ -1,0 +1,66 @@
+//! The cameras of the scene, in the order of its nodes. They look along −z of their node.
+
+use super::document::Document;
+use super::error::{GltfProblem, Located, place};
+use super::nodes::Tree;
+use glam::DVec3;
+
+/// What of the world a camera sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// Vertical field of view, radians.
+    Perspective(f64),
+    /// Half of the height of the view, metres.
+    Orthographic(f64),
+}
+
+/// A camera of a glTF file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GltfCamera {
+    /// Of its node, else its own, else its number; no two have the same.
+    pub name: String,
+    /// Where it stands, metres.
+    pub eye: DVec3,
+    /// Unit vector.
+    pub forward: DVec3,
+    /// Unit vector.
+    pub up: DVec3,
+    /// What of the world it sees.
+    pub lens: Lens,
+}
+
+impl Document {
+    pub(super) fn cameras(&self, tree: &Tree) -> Result<Vec<GltfCamera>, Located> {
+        let mut cameras: Vec<GltfCamera> = Vec::new();
+        let mut names = super::names::Names::default();
+        for &node in &tree.scene {
+            let json = self.node(node)?;
+            let Some(index) = json.camera else { continue };
+            let count = self.root.cameras.len();
+            let problem = GltfProblem::Index { list: "cameras", index, count };
+            let camera = self.root.cameras.get(index as usize).ok_or((place("nodes", node), problem))?;
+            let here = |problem| (place("cameras", index), problem);
+            let lens = match (camera.kind.as_str(), camera.perspective, camera.orthographic) {
+                ("perspective", Some(perspective), _) => Lens::Perspective(perspective.yfov),
+                ("orthographic", _, Some(orthographic)) => Lens::Orthographic(orthographic.ymag.abs()),
+                (found, ..) => {
+                    let expected = "perspective or orthographic, with numbers of its own";
+                    return Err(here(GltfProblem::Value { what: "type", found: found.to_owned(), expected }));
+                }
+            };
+            let (Lens::Perspective(size) | Lens::Orthographic(size)) = lens;
+            if !(size > 0.0 && size.is_finite()) {
+                let (what, found) = ("yfov or ymag", size.to_string());
+                return Err(here(GltfProblem::Value { what, found, expected: "a positive number" }));
+            }
+            let world = tree.worlds[node as usize];
+            let forward = world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+            let up = world.transform_vector3(DVec3::Y);
+            let up = (up - up.dot(forward) * forward).normalize_or(forward.any_orthonormal_vector());
+            let own = [&json.name, &camera.name].into_iter().flatten().find(|name| !name.is_empty()).cloned();
+            let name = names.free(&own.unwrap_or_else(|| format!("camera {}", cameras.len() + 1)));
+            cameras.push(GltfCamera { name, eye: world.translation, forward, up, lens });
+        }
+        Ok(cameras)
+    }
+}

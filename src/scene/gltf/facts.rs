@@ -1,0 +1,80 @@
+//! What a glTF file has, in numbers and names, for those who ask.
+
+use super::assembly::Assembly;
+use super::document::{Document, SUPPORTED};
+use super::surfaces::Surfaces;
+use serde_json::Value;
+
+/// What a glTF file has.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GltfFacts {
+    /// Names of the cameras, in order.
+    pub cameras: Vec<String>,
+    /// Names and kinds of the lights, in order.
+    pub lights: Vec<String>,
+    /// Names of the variants of materials, in order.
+    pub variants: Vec<String>,
+    /// Names of the animations, in order.
+    pub animations: Vec<String>,
+    /// Seconds at which the last animation ends.
+    pub animation_length: Option<f64>,
+    /// Meshes in the file.
+    pub meshes: usize,
+    /// Meshes in the scene, each as often as it is placed.
+    pub instances: usize,
+    /// Extensions that the file uses, in order.
+    pub extensions: Vec<String>,
+    /// Those of them that nothing here knows.
+    pub unknown_extensions: Vec<String>,
+    /// What of its materials is not modelled: name of the material, and what.
+    pub notes: Vec<(String, String)>,
+}
+
+impl Document {
+    /// Names of the variants of materials.
+    pub(in crate::scene) fn variants(&self) -> Vec<String> {
+        let list = self.root.extensions.get("KHR_materials_variants").and_then(|extension| extension.get("variants"));
+        let named = |(i, variant): (usize, &Value)| {
+            let name = variant.get("name").and_then(Value::as_str).unwrap_or_default();
+            if name.is_empty() { format!("variant {i}") } else { name.to_owned() }
+        };
+        list.and_then(Value::as_array).into_iter().flatten().enumerate().map(named).collect()
+    }
+
+    pub(in crate::scene) fn facts(&self, assembly: &Assembly, surfaces: &Surfaces) -> GltfFacts {
+        let named = |(i, name): (usize, &Option<String>)| {
+            name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("animation {i}"))
+        };
+        let kind = |light: &super::assembly::PlacedLight| match light.light.kind {
+            super::lights::LightKind::Point => "point",
+            super::lights::LightKind::Spot { .. } => "spot",
+            super::lights::LightKind::Directional => "directional",
+        };
+        let occluded = surfaces.materials.iter().filter(|surface| surface.has_occlusion);
+        let occluded = occluded.map(|surface| {
+            (surface.name.clone(), "its occlusion map is not used: paths find what is occluded".to_owned())
+        });
+        let notes = surfaces
+            .materials
+            .iter()
+            .flat_map(|surface| surface.notes.iter().map(|note| (surface.name.clone(), note.clone())));
+        let is_unknown = |name: &&String| !SUPPORTED.contains(&name.as_str());
+        GltfFacts {
+            cameras: assembly.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            lights: (assembly.lights.iter().enumerate())
+                .map(|(i, light)| {
+                    let name = light.name.clone().unwrap_or_else(|| format!("light {}", i + 1));
+                    format!("{name} ({})", kind(light))
+                })
+                .collect(),
+            variants: self.variants(),
+            animations: self.root.animations.iter().map(|animation| &animation.name).enumerate().map(named).collect(),
+            animation_length: self.animation_length(),
+            meshes: self.root.meshes.len(),
+            instances: assembly.meshes.len(),
+            extensions: self.root.extensions_used.clone(),
+            unknown_extensions: self.root.extensions_used.iter().filter(is_unknown).cloned().collect(),
+            notes: notes.chain(occluded).collect(),
+        }
+    }
+}

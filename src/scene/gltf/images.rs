@@ -1,0 +1,47 @@
+//! Pictures that are part of a model: in a view of its bytes, or in a data URI.
+
+use super::document::{Document, ReadOptions};
+use super::error::{GltfError, GltfProblem, Located, place};
+use super::uri::{Uri, resolve};
+use std::path::{Path, PathBuf};
+
+/// The model and the number of the picture that a path means, as `model.glb#3`; `None` for other paths, and where there
+/// is a file of that very name.
+pub(in crate::scene) fn part_of_model(path: &Path) -> Option<(PathBuf, u32)> {
+    let text = path.to_str()?;
+    let (model, number) = text.rsplit_once('#')?;
+    let number: u32 = number.parse().ok()?;
+    let extension = Path::new(model).extension()?;
+    let is_model = extension.eq_ignore_ascii_case("glb") || extension.eq_ignore_ascii_case("gltf");
+    (is_model && !path.exists()).then(|| (PathBuf::from(model), number))
+}
+
+impl Document {
+    /// The bytes of a picture that is part of the file, as its format encodes them.
+    ///
+    /// # Errors
+    /// When there is none of this number, or it is a file of its own.
+    pub(in crate::scene) fn picture_bytes(&self, number: u32) -> Result<Vec<u8>, Located> {
+        let here = |problem| (place("images", number), problem);
+        let count = self.root.images.len();
+        let image = self.root.images.get(number as usize);
+        let image = image.ok_or_else(|| here(GltfProblem::Index { list: "images", index: number, count }))?;
+        if let Some(view) = image.buffer_view {
+            return self.view(view).map(|(bytes, _)| bytes.to_vec());
+        }
+        let uri = image.uri.as_deref().ok_or_else(|| here(GltfProblem::Missing("its uri or bufferView")))?;
+        match resolve(uri, self.folder(), self.options.allow_outside).map_err(here)? {
+            Uri::Data(bytes) => Ok(bytes),
+            Uri::File(_) => Err(here(GltfProblem::Missing("its picture: it is a file of its own, and"))),
+        }
+    }
+}
+
+/// The bytes of a picture of a model that is not open.
+///
+/// # Errors
+/// When the model cannot be read or has no such picture.
+pub(in crate::scene) fn picture_of(model: &Path, number: u32) -> Result<Vec<u8>, GltfError> {
+    let document = Document::read(model, ReadOptions::default())?;
+    document.picture_bytes(number).map_err(|located| document.error(located))
+}

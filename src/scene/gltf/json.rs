@@ -1,0 +1,258 @@
+//! The JSON of a glTF file as typed structs: the core of glTF 2.0, with extensions kept as they are written.
+//!
+//! Nothing is checked here but the types: indices may point anywhere, and whoever follows one checks it
+//! ([`super::document::Document`]). Members that are not named here are skipped, as the text of the format asks.
+//!
+//! Source: Khronos, "glTF 2.0 Specification", chapter 5 (properties reference).
+
+use serde::Deserialize;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+
+/// Extensions of an object, by name.
+pub(super) type Extensions = Map<String, Value>;
+
+/// The whole of it.
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Root {
+    pub asset: Asset,
+    pub scene: Option<u32>,
+    pub scenes: Vec<Scene>,
+    pub nodes: Vec<Node>,
+    pub meshes: Vec<Mesh>,
+    pub accessors: Vec<Accessor>,
+    pub buffer_views: Vec<BufferView>,
+    pub buffers: Vec<Buffer>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub images: Vec<Image>,
+    pub samplers: Vec<Sampler>,
+    pub cameras: Vec<Camera>,
+    pub skins: Vec<Skin>,
+    pub animations: Vec<Animation>,
+    pub extensions_used: Vec<String>,
+    pub extensions_required: Vec<String>,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Asset {
+    pub version: String,
+    pub min_version: Option<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Scene {
+    pub name: Option<String>,
+    pub nodes: Vec<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Node {
+    pub name: Option<String>,
+    pub children: Vec<u32>,
+    /// Column by column.
+    pub matrix: Option<[f64; 16]>,
+    pub translation: Option<[f64; 3]>,
+    /// x, y, z, w.
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+    pub mesh: Option<u32>,
+    pub skin: Option<u32>,
+    pub camera: Option<u32>,
+    pub weights: Option<Vec<f64>>,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Mesh {
+    pub name: Option<String>,
+    pub primitives: Vec<Primitive>,
+    pub weights: Vec<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Primitive {
+    pub attributes: BTreeMap<String, u32>,
+    pub indices: Option<u32>,
+    pub material: Option<u32>,
+    /// 0 points, 1 to 3 lines, 4 triangles, 5 strip, 6 fan; triangles when not given.
+    pub mode: Option<u32>,
+    pub targets: Vec<BTreeMap<String, u32>>,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Accessor {
+    pub buffer_view: Option<u32>,
+    pub byte_offset: u64,
+    pub component_type: u32,
+    pub normalized: bool,
+    pub count: u64,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub sparse: Option<Sparse>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Sparse {
+    pub count: u64,
+    pub indices: SparsePart,
+    pub values: SparsePart,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct SparsePart {
+    pub buffer_view: u32,
+    pub byte_offset: u64,
+    pub component_type: u32,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct BufferView {
+    pub buffer: u32,
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: Option<u64>,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Buffer {
+    pub uri: Option<String>,
+    pub byte_length: u64,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Material {
+    pub name: Option<String>,
+    pub pbr_metallic_roughness: Option<Pbr>,
+    pub normal_texture: Option<TextureRef>,
+    pub occlusion_texture: Option<TextureRef>,
+    pub emissive_texture: Option<TextureRef>,
+    pub emissive_factor: Option<[f64; 3]>,
+    pub alpha_mode: Option<String>,
+    pub alpha_cutoff: Option<f64>,
+    pub double_sided: bool,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Pbr {
+    pub base_color_factor: Option<[f64; 4]>,
+    pub base_color_texture: Option<TextureRef>,
+    pub metallic_factor: Option<f64>,
+    pub roughness_factor: Option<f64>,
+    pub metallic_roughness_texture: Option<TextureRef>,
+}
+
+/// The use of a texture: with `scale` for normals.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct TextureRef {
+    pub index: u32,
+    pub tex_coord: u32,
+    pub scale: Option<f64>,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Texture {
+    pub name: Option<String>,
+    pub sampler: Option<u32>,
+    pub source: Option<u32>,
+    pub extensions: Extensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Image {
+    pub name: Option<String>,
+    pub uri: Option<String>,
+    pub mime_type: Option<String>,
+    pub buffer_view: Option<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Sampler {
+    pub mag_filter: Option<u32>,
+    pub wrap_s: Option<u32>,
+    pub wrap_t: Option<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Camera {
+    pub name: Option<String>,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub perspective: Option<Perspective>,
+    pub orthographic: Option<Orthographic>,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Perspective {
+    /// Vertical field of view, radians.
+    pub yfov: f64,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Orthographic {
+    /// Half of the height of the view, metres.
+    pub ymag: f64,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Skin {
+    pub inverse_bind_matrices: Option<u32>,
+    pub joints: Vec<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Animation {
+    pub name: Option<String>,
+    pub channels: Vec<Channel>,
+    pub samplers: Vec<AnimationSampler>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Channel {
+    pub sampler: u32,
+    pub target: ChannelTarget,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct ChannelTarget {
+    pub node: Option<u32>,
+    pub path: String,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct AnimationSampler {
+    pub input: u32,
+    pub interpolation: Option<String>,
+    pub output: u32,
+}

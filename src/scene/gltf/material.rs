@@ -1,0 +1,278 @@
+//! Materials as plain numbers: the core of glTF and its ratified extensions, with the textures that they use.
+//!
+//! Source: Khronos, "glTF 2.0 Specification", §3.9, and the `KHR_materials_*` and `KHR_texture_transform` extensions.
+
+use super::document::Document;
+use super::error::{GltfProblem, Located, place};
+use super::json::{Extensions, TextureRef};
+use crate::render::Wrap;
+use glam::{DVec2, Vec3};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// The use of a picture. Coordinates are those of glTF, with v downwards.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TextureUse {
+    pub image: u32,
+    pub uv_set: u32,
+    pub offset: DVec2,
+    /// Radians.
+    pub rotation: f64,
+    pub scale: DVec2,
+    pub wrap: [Wrap; 2],
+    pub smooth: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Alpha {
+    #[default]
+    Opaque,
+    /// There where alpha is at least this.
+    Mask(f32),
+    Blend,
+}
+
+/// Everything that a file says of a material, with the defaults of the format.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct GltfMaterial {
+    pub name: Option<String>,
+    /// Linear RGBA.
+    pub base_color: [f32; 4],
+    pub base_color_texture: Option<TextureUse>,
+    pub metallic: f32,
+    pub roughness: f32,
+    /// Green roughness, blue metallic.
+    pub metallic_roughness_texture: Option<TextureUse>,
+    pub normal_texture: Option<TextureUse>,
+    pub normal_scale: f32,
+    pub has_occlusion: bool,
+    /// `emissiveFactor` times `emissiveStrength`.
+    pub emission: Vec3,
+    pub emissive_texture: Option<TextureUse>,
+    pub alpha: Alpha,
+    pub double_sided: bool,
+    pub unlit: bool,
+    pub ior: f32,
+    pub specular: f32,
+    pub specular_texture: Option<TextureUse>,
+    pub specular_color: Vec3,
+    pub specular_color_texture: Option<TextureUse>,
+    pub transmission: f32,
+    pub transmission_texture: Option<TextureUse>,
+    /// 0 is a thin wall.
+    pub thickness: f32,
+    pub attenuation_color: Vec3,
+    /// Metres.
+    pub attenuation_distance: f32,
+    pub clearcoat: f32,
+    pub clearcoat_texture: Option<TextureUse>,
+    pub clearcoat_roughness: f32,
+    pub clearcoat_roughness_texture: Option<TextureUse>,
+    pub clearcoat_normal_texture: Option<TextureUse>,
+    pub sheen_color: Vec3,
+    pub sheen_color_texture: Option<TextureUse>,
+    pub sheen_roughness: f32,
+    pub sheen_roughness_texture: Option<TextureUse>,
+    pub anisotropy: f32,
+    /// Radians.
+    pub anisotropy_rotation: f32,
+    pub anisotropy_texture: Option<TextureUse>,
+    /// What is not modelled, in words that follow the name of the material.
+    pub notes: Vec<String>,
+}
+
+/// Reads numbers out of an extension; what is not there or no number is the default.
+struct Fields<'a>(Option<&'a Value>);
+
+impl Fields<'_> {
+    fn number(&self, name: &str, default: f32) -> f32 {
+        let value = self.0.and_then(|object| object.get(name)).and_then(Value::as_f64).map(|value| value as f32);
+        value.filter(|value| value.is_finite()).unwrap_or(default)
+    }
+
+    fn color(&self, name: &str, default: Vec3) -> Vec3 {
+        let list = self.0.and_then(|object| object.get(name)).and_then(Value::as_array);
+        let numbers: Option<Vec<f32>> =
+            list.map(|list| list.iter().filter_map(Value::as_f64).map(|value| value as f32).collect());
+        match numbers.as_deref() {
+            Some(&[r, g, b]) if r.is_finite() && g.is_finite() && b.is_finite() => Vec3::new(r, g, b).max(Vec3::ZERO),
+            _ => default,
+        }
+    }
+
+    fn texture(&self, name: &str) -> Option<TextureRef> {
+        self.0.and_then(|object| object.get(name)).and_then(|value| TextureRef::deserialize(value).ok())
+    }
+}
+
+impl Document {
+    /// The material of this number; the format's default for `None`.
+    ///
+    /// # Errors
+    /// When it names a texture, picture or sampler that does not exist.
+    pub(super) fn material(&self, index: Option<u32>) -> Result<GltfMaterial, Located> {
+        let default = super::json::Material::default();
+        let json = match index {
+            None => &default,
+            Some(index) => {
+                let count = self.root.materials.len();
+                let problem = GltfProblem::Index { list: "materials", index, count };
+                self.root.materials.get(index as usize).ok_or((place("materials", index), problem))?
+            }
+        };
+        let here = || index.map_or_else(String::new, |index| place("materials", index));
+        let mut notes = Vec::new();
+        let mut texture = |reference: Option<&TextureRef>| match reference {
+            None => Ok(None),
+            Some(reference) => self
+                .texture_use(reference, &mut notes)
+                .map_err(|(at, problem)| (if at.is_empty() { here() } else { at }, problem)),
+        };
+        let extension = |name: &str| Fields(json.extensions.get(&format!("KHR_materials_{name}")));
+        let unit = |value: f32| value.clamp(0.0, 1.0);
+        let pbr = json.pbr_metallic_roughness.as_ref();
+        let base_color = pbr.and_then(|pbr| pbr.base_color_factor).unwrap_or([1.0; 4]).map(|c| unit(c as f32));
+        let emission = json.emissive_factor.unwrap_or([0.0; 3]).map(|c| (c as f32).max(0.0));
+        let strength = extension("emissive_strength").number("emissiveStrength", 1.0).max(0.0);
+        let (specular, transmission, volume) = (extension("specular"), extension("transmission"), extension("volume"));
+        let (clearcoat, sheen, anisotropy) = (extension("clearcoat"), extension("sheen"), extension("anisotropy"));
+        let mut material = GltfMaterial {
+            name: json.name.clone().filter(|name| !name.is_empty()),
+            base_color,
+            base_color_texture: texture(pbr.and_then(|pbr| pbr.base_color_texture.as_ref()))?,
+            metallic: unit(pbr.and_then(|pbr| pbr.metallic_factor).unwrap_or(1.0) as f32),
+            roughness: unit(pbr.and_then(|pbr| pbr.roughness_factor).unwrap_or(1.0) as f32),
+            metallic_roughness_texture: texture(pbr.and_then(|pbr| pbr.metallic_roughness_texture.as_ref()))?,
+            normal_texture: texture(json.normal_texture.as_ref())?,
+            normal_scale: json.normal_texture.as_ref().and_then(|normal| normal.scale).unwrap_or(1.0) as f32,
+            has_occlusion: json.occlusion_texture.is_some(),
+            emission: Vec3::from(emission) * strength,
+            emissive_texture: texture(json.emissive_texture.as_ref())?,
+            alpha: match json.alpha_mode.as_deref() {
+                Some("MASK") => Alpha::Mask(json.alpha_cutoff.unwrap_or(0.5) as f32),
+                Some("BLEND") => Alpha::Blend,
+                _ => Alpha::Opaque,
+            },
+            double_sided: json.double_sided,
+            unlit: json.extensions.contains_key("KHR_materials_unlit"),
+            // 0 stands for a surface that reflects everything, and is not modelled.
+            ior: Some(extension("ior").number("ior", 1.5)).filter(|ior| *ior >= 1.0).unwrap_or(1.5),
+            specular: unit(specular.number("specularFactor", 1.0)),
+            specular_texture: texture(specular.texture("specularTexture").as_ref())?,
+            specular_color: specular.color("specularColorFactor", Vec3::ONE),
+            specular_color_texture: texture(specular.texture("specularColorTexture").as_ref())?,
+            transmission: unit(transmission.number("transmissionFactor", 0.0)),
+            transmission_texture: texture(transmission.texture("transmissionTexture").as_ref())?,
+            thickness: volume.number("thicknessFactor", 0.0).max(0.0),
+            attenuation_color: volume.color("attenuationColor", Vec3::ONE).min(Vec3::ONE),
+            attenuation_distance: volume.number("attenuationDistance", f32::INFINITY),
+            clearcoat: unit(clearcoat.number("clearcoatFactor", 0.0)),
+            clearcoat_texture: texture(clearcoat.texture("clearcoatTexture").as_ref())?,
+            clearcoat_roughness: unit(clearcoat.number("clearcoatRoughnessFactor", 0.0)),
+            clearcoat_roughness_texture: texture(clearcoat.texture("clearcoatRoughnessTexture").as_ref())?,
+            clearcoat_normal_texture: texture(clearcoat.texture("clearcoatNormalTexture").as_ref())?,
+            sheen_color: sheen.color("sheenColorFactor", Vec3::ZERO).min(Vec3::ONE),
+            sheen_color_texture: texture(sheen.texture("sheenColorTexture").as_ref())?,
+            sheen_roughness: unit(sheen.number("sheenRoughnessFactor", 0.0)),
+            sheen_roughness_texture: texture(sheen.texture("sheenRoughnessTexture").as_ref())?,
+            anisotropy: unit(anisotropy.number("anisotropyStrength", 0.0)),
+            anisotropy_rotation: anisotropy.number("anisotropyRotation", 0.0),
+            anisotropy_texture: texture(anisotropy.texture("anisotropyTexture").as_ref())?,
+            notes: Vec::new(),
+        };
+        let with_volume = json.extensions.contains_key("KHR_materials_volume");
+        if with_volume && volume.texture("thicknessTexture").is_some() {
+            notes.push("its thickness texture is not used: light goes through the real thickness".to_owned());
+        }
+        let ior = extension("ior").number("ior", 1.5);
+        if !(ior >= 1.0) {
+            notes.push(format!("an index of refraction of {ior} is not modelled: 1.5 is used"));
+        }
+        for (name, value, what) in [
+            ("iridescence", "iridescenceFactor", "iridescence is not modelled"),
+            ("dispersion", "dispersion", "dispersion is not modelled"),
+        ] {
+            if extension(name).number(value, 0.0) > 0.0 {
+                notes.push(what.to_owned());
+            }
+        }
+        if clearcoat.texture("clearcoatNormalTexture").and_then(|normal| normal.scale).is_some_and(|s| s != 1.0) {
+            notes.push("the scale of its clear-coat normals is not used".to_owned());
+        }
+        notes.extend(unknown(&json.extensions));
+        material.notes = notes;
+        Ok(material)
+    }
+
+    /// `None` for a texture in a format that is not read; that is noted.
+    fn texture_use(&self, reference: &TextureRef, notes: &mut Vec<String>) -> Result<Option<TextureUse>, Located> {
+        let missing = |list, index, count| (String::new(), GltfProblem::Index { list, index, count });
+        let index = reference.index;
+        let texture = self.root.textures.get(index as usize);
+        let texture = texture.ok_or_else(|| missing("textures", index, self.root.textures.len()))?;
+        let webp = texture.extensions.get("EXT_texture_webp").and_then(|extension| extension.get("source"));
+        let webp = webp.and_then(Value::as_u64).and_then(|image| u32::try_from(image).ok());
+        let Some(image) = texture.source.or(webp) else {
+            notes.push(format!("textures[{index}] has no picture in a format that is read, and is left out"));
+            return Ok(None);
+        };
+        if self.root.images.get(image as usize).is_none() {
+            let (at, count) = (place("textures", index), self.root.images.len());
+            return Err((at, GltfProblem::Index { list: "images", index: image, count }));
+        }
+        let default = super::json::Sampler::default();
+        let sampler = match texture.sampler {
+            None => &default,
+            Some(sampler) => {
+                let (at, count) = (place("textures", index), self.root.samplers.len());
+                let problem = GltfProblem::Index { list: "samplers", index: sampler, count };
+                self.root.samplers.get(sampler as usize).ok_or((at, problem))?
+            }
+        };
+        let wrap = |number: Option<u32>| match number {
+            Some(33071) => Wrap::Clamp,
+            Some(33648) => Wrap::Mirror,
+            _ => Wrap::Repeat,
+        };
+        const NEAREST: u32 = 9728;
+        let transform = Fields(reference.extensions.get("KHR_texture_transform"));
+        let pair = |name: &str, default: f64| {
+            let list = transform.0.and_then(|object| object.get(name)).and_then(Value::as_array);
+            let number = |i: usize| list.and_then(|list| list.get(i)).and_then(Value::as_f64).unwrap_or(default);
+            DVec2::new(number(0), number(1))
+        };
+        let set = transform.0.and_then(|object| object.get("texCoord")).and_then(Value::as_u64);
+        let uv_set = set.and_then(|set| u32::try_from(set).ok()).unwrap_or(reference.tex_coord);
+        if uv_set > 1 {
+            notes.push(format!("textures[{index}] uses texture coordinates {uv_set}; only 0 and 1 are read"));
+            return Ok(None);
+        }
+        Ok(Some(TextureUse {
+            image,
+            uv_set,
+            offset: pair("offset", 0.0),
+            rotation: transform.0.and_then(|object| object.get("rotation")).and_then(Value::as_f64).unwrap_or(0.0),
+            scale: pair("scale", 1.0),
+            wrap: [wrap(sampler.wrap_s), wrap(sampler.wrap_t)],
+            smooth: sampler.mag_filter != Some(NEAREST),
+        }))
+    }
+
+    /// Whether the surface of a material turns with its tangents.
+    pub(super) fn needs_tangents(&self, index: Option<u32>) -> bool {
+        let json = index.and_then(|index| self.root.materials.get(index as usize));
+        json.is_some_and(|json| {
+            let coat = json.extensions.get("KHR_materials_clearcoat");
+            json.normal_texture.is_some()
+                || json.extensions.contains_key("KHR_materials_anisotropy")
+                || coat.is_some_and(|coat| coat.get("clearcoatNormalTexture").is_some())
+        })
+    }
+}
+
+/// Extensions of a material that nothing here knows.
+fn unknown(extensions: &Extensions) -> Vec<String> {
+    let known = |name: &str| super::document::SUPPORTED.contains(&name);
+    let unknown = extensions.keys().filter(|name| !known(name));
+    unknown.map(|name| format!("the extension `{}` is not modelled", crate::printable::name(name))).collect()
+}

@@ -1,0 +1,120 @@
+//! From the triangles of a file to a checked [`Mesh`], with tangents where a material needs them.
+
+use super::animation::Pose;
+use super::assembly::{MeshKey, Posed};
+use super::document::Document;
+use super::error::{GltfProblem, Located, place};
+use super::nodes::Tree;
+use super::primitives::{Deformation, SlotKey, Triangles};
+use crate::mesh::Mesh;
+use crate::scene::model::imported::ModelNormals;
+use glam::Vec4;
+
+/// A mesh of a file.
+#[derive(Debug)]
+pub(in crate::scene) struct BuiltMesh {
+    pub mesh: Mesh,
+    /// One a slot.
+    pub keys: Vec<SlotKey>,
+    /// What was left out or replaced, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl Document {
+    /// The mesh of this key, posed.
+    ///
+    /// # Errors
+    /// As [`Self::built_mesh`].
+    pub(in crate::scene) fn mesh_of(
+        &self,
+        key: MeshKey,
+        posed: &Posed,
+        normals: &ModelNormals,
+    ) -> Result<BuiltMesh, Located> {
+        self.built_mesh(key.mesh, key.node.map(|node| (node, &posed.tree, &posed.pose)), normals)
+    }
+
+    /// The mesh `index`, as the node has it that is posed: with its weights and its skin. Without a node, with the
+    /// weights of the mesh.
+    ///
+    /// # Errors
+    /// When it has no triangles, or something in it is wrong.
+    pub(super) fn built_mesh(
+        &self,
+        index: u32,
+        node: Option<(u32, &Tree, &Pose)>,
+        normals: &ModelNormals,
+    ) -> Result<BuiltMesh, Located> {
+        let json = self.mesh(index)?;
+        let mut deformation = Deformation { weights: &json.weights, joints: None };
+        if let Some((node, tree, pose)) = node {
+            let json = self.node(node)?;
+            if let Some(weights) = pose.weights(node).or(json.weights.as_deref()) {
+                deformation.weights = weights;
+            }
+            deformation.joints = json.skin.map(|skin| self.joints(skin, &tree.worlds)).transpose()?;
+        }
+        let mut triangles = self.triangles(index, &deformation)?;
+        let here = |problem| (place("meshes", index), problem);
+        let mut warnings = triangles.warnings(&place("meshes", index));
+        if triangles.triangles.is_empty() {
+            return Err(here(GltfProblem::NoTriangles));
+        }
+        let keys = std::mem::take(&mut triangles.keys);
+        let has_tangents = std::mem::take(&mut triangles.has_tangents);
+        let needs: Vec<bool> = keys
+            .iter()
+            .map(|key| {
+                self.needs_tangents(key.material) || key.variants.values().any(|&each| self.needs_tangents(Some(each)))
+            })
+            .collect();
+        let from_file = needs.iter().zip(&has_tangents).all(|(needs, has)| !needs || *has);
+        let wrong = |error: crate::mesh::MeshError| here(GltfProblem::Mesh(error));
+        let list = std::mem::take(&mut triangles.triangles);
+        let mut mesh = Mesh::from_f64(&triangles.positions, list).map_err(wrong)?;
+        mesh.uvs = triangles.uvs;
+        mesh.uvs2 = triangles.uvs2;
+        mesh.colors = triangles.colors.into_iter().map(Vec4::from).collect();
+        mesh.slots = if keys.len() > 1 { triangles.slots } else { Vec::new() };
+        match normals {
+            ModelNormals::FileOrComputed { .. } => mesh.normals = triangles.normals,
+            ModelNormals::OfPositions => {
+                let welding = crate::mesh::Welding::of_f64(&triangles.positions);
+                mesh = mesh.with_normals_of_vertices(|vertex| welding.place[vertex as usize]);
+            }
+            ModelNormals::Ignore => {}
+        }
+        if needs.contains(&true) && *normals != ModelNormals::Ignore && !mesh.normals.is_empty() {
+            let own = matches!(normals, ModelNormals::FileOrComputed { .. }) && from_file;
+            if own && triangles.tangents.len() == mesh.positions.len() {
+                // Vertices of other materials may have none, and nobody asks for them.
+                let unit = |(tangent, normal): (&Vec4, &glam::Vec3)| match tangent.truncate() {
+                    glam::Vec3::ZERO => normal.any_orthonormal_vector().extend(1.0),
+                    _ => *tangent,
+                };
+                mesh.tangents = triangles.tangents.iter().zip(&mesh.normals).map(unit).collect();
+            } else if mesh.uvs.is_empty() {
+                warnings.push(format!("{}: has no texture coordinates for its tangents", place("meshes", index)));
+            } else {
+                mesh = mesh.with_tangents();
+            }
+        }
+        mesh.validate().map_err(wrong)?;
+        Ok(BuiltMesh { mesh, keys, warnings })
+    }
+}
+
+impl Triangles {
+    fn warnings(&self, place: &str) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let mut add = |count: usize, what: &str| {
+            if count > 0 {
+                warnings.push(format!("{place}: {count} {what}"));
+            }
+        };
+        add(self.points_or_lines, "primitives of points or lines have no area and are left out");
+        add(self.degenerate, "triangles use a vertex twice and were removed");
+        add(self.not_finite, "normals, tangents or texture coordinates are no numbers and are 0");
+        warnings
+    }
+}

@@ -1,0 +1,391 @@
+//! What the materials of a glTF file become in a scene, and the textures that they use.
+//!
+//! Clear solid glass becomes `glass` or `rough_glass`, everything else `principled`. Factors become the tint of a
+//! texture; the transform of texture coordinates is written for a v that grows upwards.
+
+use super::document::Document;
+use super::error::Located;
+use super::material::{Alpha, GltfMaterial, TextureUse};
+use super::names::Names;
+use super::uri::{Uri, resolve};
+use crate::render::{Channel, Encoding, Material};
+use crate::scene::file::MaterialPart;
+use crate::scene::relative::path_to_text;
+use crate::scene::sources::TextureSource;
+use crate::scene::value::{ColorValue, Rgb, ScalarValue};
+use glam::{DVec2, Vec3};
+use std::collections::{HashMap, HashSet};
+
+/// The materials of a file, as a scene file writes them.
+#[derive(Debug, Default)]
+pub(in crate::scene) struct Surfaces {
+    /// One a material of the file, and the default material at the end; names are used once.
+    pub materials: Vec<Surface>,
+    /// By name; names are used once.
+    pub textures: Vec<(String, TextureSource)>,
+}
+
+/// A material of a file.
+#[derive(Clone, Debug)]
+pub(in crate::scene) struct Surface {
+    pub name: String,
+    pub part: MaterialPart,
+    /// What of it is not modelled.
+    pub notes: Vec<String>,
+    pub emits: bool,
+    /// It has a map of occlusion, which paths find themselves.
+    pub has_occlusion: bool,
+}
+
+impl Surfaces {
+    /// The number of a material here; `None` is the default one.
+    pub(in crate::scene) fn index(&self, material: Option<u32>) -> usize {
+        let default = self.materials.len().saturating_sub(1);
+        material.map_or(default, |material| (material as usize).min(default))
+    }
+}
+
+/// Makes textures as they are asked for, each once.
+struct Textures<'a> {
+    document: &'a Document,
+    /// What paths of the scene call the model.
+    file: &'a str,
+    names: Names,
+    list: Vec<(String, TextureSource)>,
+    known: HashMap<String, String>,
+}
+
+/// What a texture is looked up for.
+struct Role {
+    what: &'static str,
+    channel: Option<Channel>,
+    encoding: Encoding,
+    tint: Vec3,
+    vertex_colors: bool,
+}
+
+impl Textures<'_> {
+    fn add(&mut self, name: &str, source: TextureSource) -> String {
+        let key = format!("{source:?}");
+        if let Some(name) = self.known.get(&key) {
+            return name.clone();
+        }
+        let name = self.names.free(name);
+        self.list.push((name.clone(), source));
+        self.known.insert(key, name.clone());
+        name
+    }
+
+    fn of(&mut self, used: &TextureUse, role: Role) -> Result<String, Located> {
+        let (image, file) = self.document.image_file(used.image, self.file)?;
+        let mut source = TextureSource::image(file);
+        /// A picture that is stretched without end has one color, and is never quite that.
+        const LEAST: f64 = 1e-9;
+        let (sin, cos) = used.rotation.sin_cos();
+        let scaled = used.scale.y;
+        if let TextureSource::Image {
+            stretch,
+            repeat,
+            offset,
+            rotate,
+            wrap,
+            wrap_v,
+            smooth,
+            encoding,
+            channel,
+            tint,
+            uv_set,
+            vertex_colors,
+            ..
+        } = &mut source
+        {
+            // With v upwards: the turn stays, and the origin moves to the other end of v.
+            let size = |scale: f64| if scale.abs() < LEAST { LEAST } else { scale };
+            *stretch = DVec2::new(size(used.scale.x), size(used.scale.y));
+            *rotate = used.rotation.to_degrees();
+            *offset = DVec2::new(used.offset.x + sin * scaled, 1.0 - used.offset.y - cos * scaled);
+            if used.rotation == 0.0 && used.scale == DVec2::ONE && used.offset == DVec2::ZERO {
+                (*rotate, *offset) = (0.0, DVec2::ZERO);
+            }
+            // Without a turn both mean the same.
+            if used.rotation == 0.0 {
+                std::mem::swap(stretch, repeat);
+            }
+            *wrap = used.wrap[0];
+            *wrap_v = (used.wrap[1] != used.wrap[0]).then_some(used.wrap[1]);
+            *smooth = used.smooth;
+            *encoding = role.encoding;
+            *channel = role.channel;
+            *tint = Rgb(role.tint);
+            *uv_set = used.uv_set as u8;
+            *vertex_colors = role.vertex_colors;
+        }
+        Ok(self.add(&format!("{image} {}", role.what), source))
+    }
+
+    /// A number times a channel.
+    fn scalar(
+        &mut self,
+        factor: f32,
+        texture: Option<&TextureUse>,
+        channel: Channel,
+        what: &'static str,
+    ) -> Result<ScalarValue, Located> {
+        match texture {
+            Some(used) if factor != 0.0 => {
+                let (encoding, tint) = (Encoding::Linear, Vec3::splat(factor));
+                let role = Role { what, channel: Some(channel), encoding, tint, vertex_colors: false };
+                Ok(ScalarValue::Texture(self.of(used, role)?))
+            }
+            _ => Ok(ScalarValue::Number(factor)),
+        }
+    }
+
+    /// A colour times an sRGB picture.
+    fn color(&mut self, factor: Vec3, texture: Option<&TextureUse>, what: &'static str) -> Result<ColorValue, Located> {
+        match texture {
+            Some(used) if factor != Vec3::ZERO => {
+                let (channel, encoding) = (None, Encoding::Auto);
+                Ok(ColorValue::Texture(
+                    self.of(used, Role { what, channel, encoding, tint: factor, vertex_colors: false })?,
+                ))
+            }
+            _ => Ok(ColorValue::Rgb(factor)),
+        }
+    }
+
+    /// A map of directions; `None` where there is none.
+    fn map(&mut self, texture: Option<&TextureUse>, what: &'static str) -> Result<Option<ColorValue>, Located> {
+        let Some(used) = texture else { return Ok(None) };
+        let (channel, encoding) = (None, Encoding::Linear);
+        let role = Role { what, channel, encoding, tint: Vec3::ONE, vertex_colors: false };
+        Ok(Some(ColorValue::Texture(self.of(used, role)?)))
+    }
+
+    /// Base colour, and the share of the surface that is there.
+    fn base(&mut self, material: &GltfMaterial, vertex_colors: bool) -> Result<(ColorValue, ScalarValue), Located> {
+        let [r, g, b, alpha] = material.base_color;
+        let (rgb, tint) = (Vec3::new(r, g, b), Rgb(Vec3::splat(alpha)));
+        let is_cut = material.alpha != Alpha::Opaque;
+        Ok(match &material.base_color_texture {
+            Some(used) => {
+                let role = |what, channel, tint| Role { what, channel, encoding: Encoding::Auto, tint, vertex_colors };
+                let color = ColorValue::Texture(self.of(used, role("color", None, rgb))?);
+                let opacity = match is_cut {
+                    true => ScalarValue::Texture(self.of(used, role("alpha", Some(Channel::A), tint.0))?),
+                    false => ScalarValue::Number(1.0),
+                };
+                (color, opacity)
+            }
+            None if vertex_colors => {
+                let color = self.add("vertex colors", TextureSource::VertexColors { channel: None, tint: Rgb(rgb) });
+                let opacity = match is_cut {
+                    true => {
+                        let source = TextureSource::VertexColors { channel: Some(Channel::A), tint };
+                        ScalarValue::Texture(self.add("vertex alpha", source))
+                    }
+                    false => ScalarValue::Number(1.0),
+                };
+                (ColorValue::Texture(color), opacity)
+            }
+            None => (ColorValue::Rgb(rgb), ScalarValue::Number(if is_cut { alpha } else { 1.0 })),
+        })
+    }
+}
+
+impl Document {
+    /// All materials.
+    ///
+    /// - `file`: what paths of the scene call the model.
+    ///
+    /// # Errors
+    /// When a material names what does not exist, or a picture may not be read.
+    pub(in crate::scene) fn surfaces(&self, file: &str) -> Result<Surfaces, Located> {
+        let colored = self.materials_with_vertex_colors();
+        let mut textures =
+            Textures { document: self, file, names: Names::default(), list: Vec::new(), known: HashMap::new() };
+        let mut names = Names::default();
+        let mut materials = Vec::new();
+        let numbers = (0..self.root.materials.len() as u32).map(Some).chain([None]);
+        for number in numbers {
+            let material = self.material(number)?;
+            let wanted = material.name.clone().unwrap_or_else(|| match number {
+                Some(number) => format!("material {number}"),
+                None => "default material".to_owned(),
+            });
+            let mut notes = material.notes.clone();
+            let part = surface(&mut textures, &material, colored.contains(&number), &mut notes)?;
+            materials.push(Surface {
+                name: names.free(&wanted),
+                part,
+                notes,
+                emits: material.emission != Vec3::ZERO || material.unlit,
+                has_occlusion: material.has_occlusion,
+            });
+        }
+        Ok(Surfaces { materials, textures: textures.list })
+    }
+
+    fn materials_with_vertex_colors(&self) -> HashSet<Option<u32>> {
+        let mut colored = HashSet::new();
+        for primitive in self.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+            if primitive.attributes.contains_key("COLOR_0") {
+                colored.insert(primitive.material);
+                colored.extend(super::primitives::variants_of(primitive).into_values().map(Some));
+            }
+        }
+        colored
+    }
+
+    /// The name of a picture, and the path by which a scene names it: pictures within the model are `MODEL#NUMBER`.
+    pub(super) fn image_file(&self, image: u32, file: &str) -> Result<(String, String), Located> {
+        let json = &self.root.images[image as usize];
+        let named = json.name.clone().filter(|name| !name.is_empty());
+        if let Some(uri) = json.uri.as_deref().filter(|uri| !uri.starts_with("data:")) {
+            let found = resolve(uri, self.folder(), self.options.allow_outside);
+            let found = found.map_err(|problem| (super::error::place("images", image), problem))?;
+            if let Uri::File(path) = found {
+                let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+                // Paths count from the scene, which may lie elsewhere than the model.
+                let folder = std::path::Path::new(file).parent().unwrap_or(std::path::Path::new(""));
+                return Ok((named.or(stem).unwrap_or_default(), path_to_text(&folder.join(path))));
+            }
+        }
+        Ok((named.unwrap_or_else(|| format!("image {image}")), format!("{file}#{image}")))
+    }
+}
+
+fn surface(
+    textures: &mut Textures,
+    material: &GltfMaterial,
+    vertex_colors: bool,
+    notes: &mut Vec<String>,
+) -> Result<MaterialPart, Located> {
+    if let Some(glass) = clear_glass(material) {
+        return Ok(glass);
+    }
+    let (base, alpha) = textures.base(material, vertex_colors)?;
+    let usual = Material::principled(base.clone());
+    let Material::Principled { .. } = &usual else { return Ok(usual) };
+    let cutoff = match material.alpha {
+        Alpha::Mask(cutoff) => Some(cutoff.clamp(0.0, 1.0)),
+        Alpha::Opaque | Alpha::Blend => None,
+    };
+    let mut part = usual;
+    let Material::Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior,
+        specular,
+        specular_color,
+        transmission,
+        thin_walled,
+        absorption,
+        anisotropy,
+        anisotropy_rotation,
+        anisotropy_map,
+        sheen_color,
+        sheen_roughness,
+        clearcoat,
+        clearcoat_roughness,
+        clearcoat_normal_map,
+        emission,
+        opacity,
+        opacity_cutoff,
+        normal_map,
+        normal_scale,
+        two_sided,
+        ..
+    } = &mut part
+    else {
+        return Ok(part);
+    };
+    (*opacity, *opacity_cutoff) = (alpha, cutoff);
+    *two_sided = material.double_sided;
+    if material.unlit {
+        // It shows its colour and reflects nothing.
+        *base_color = ColorValue::grey(0.0);
+        *specular = ScalarValue::Number(0.0);
+        (*metallic, *roughness) = (ScalarValue::Number(0.0), ScalarValue::Number(1.0));
+        *emission = base;
+        notes.push("it is unlit: it shines with its own color, and lights its surroundings too".to_owned());
+        return Ok(part);
+    }
+    let metal_map = material.metallic_roughness_texture.as_ref();
+    *metallic = textures.scalar(material.metallic, metal_map, Channel::B, "metallic")?;
+    *roughness = textures.scalar(material.roughness, metal_map, Channel::G, "roughness")?;
+    *ior = material.ior;
+    *specular = textures.scalar(material.specular, material.specular_texture.as_ref(), Channel::A, "specular")?;
+    let specular_map = material.specular_color_texture.as_ref();
+    *specular_color = textures.color(material.specular_color, specular_map, "specular color")?;
+    let passes = material.transmission_texture.as_ref();
+    *transmission = textures.scalar(material.transmission, passes, Channel::R, "transmission")?;
+    *thin_walled = material.transmission > 0.0 && material.thickness == 0.0;
+    if material.transmission > 0.0 && material.thickness > 0.0 {
+        *absorption = Rgb(absorption_of(material));
+        // Light leaves a solid through the back of its surface.
+        *two_sided = true;
+    }
+    *anisotropy = ScalarValue::Number(material.anisotropy);
+    *anisotropy_rotation = material.anisotropy_rotation.to_degrees();
+    if let Some(map) = textures.map(material.anisotropy_texture.as_ref(), "anisotropy")? {
+        *anisotropy_map = map;
+    }
+    *sheen_color = textures.color(material.sheen_color, material.sheen_color_texture.as_ref(), "sheen color")?;
+    let sheen_map = material.sheen_roughness_texture.as_ref();
+    *sheen_roughness = textures.scalar(material.sheen_roughness, sheen_map, Channel::A, "sheen roughness")?;
+    *clearcoat = textures.scalar(material.clearcoat, material.clearcoat_texture.as_ref(), Channel::R, "coat")?;
+    let coat_map = material.clearcoat_roughness_texture.as_ref();
+    *clearcoat_roughness = textures.scalar(material.clearcoat_roughness, coat_map, Channel::G, "coat roughness")?;
+    if let Some(map) = textures.map(material.clearcoat_normal_texture.as_ref(), "coat normals")? {
+        *clearcoat_normal_map = map;
+    }
+    *emission = textures.color(material.emission, material.emissive_texture.as_ref(), "emission")?;
+    if let Some(map) = textures.map(material.normal_texture.as_ref(), "normals")? {
+        *normal_map = map;
+        *normal_scale = material.normal_scale;
+    }
+    Ok(part)
+}
+
+/// A solid that only refracts and reflects has surfaces of its own, which are exact.
+fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
+    let is_plain = material.base_color[..3] == [1.0; 3]
+        && material.base_color_texture.is_none()
+        && material.transmission == 1.0
+        && material.transmission_texture.is_none()
+        && material.thickness > 0.0
+        && material.metallic == 0.0
+        && material.metallic_roughness_texture.is_none()
+        && material.normal_texture.is_none()
+        && material.alpha == Alpha::Opaque
+        && material.specular == 1.0
+        && material.specular_texture.is_none()
+        && material.specular_color == Vec3::ONE
+        && material.specular_color_texture.is_none()
+        && material.clearcoat == 0.0
+        && material.sheen_color == Vec3::ZERO
+        && material.anisotropy == 0.0
+        && material.emission == Vec3::ZERO
+        && !material.unlit;
+    let (ior, absorption) = (material.ior, Rgb(absorption_of(material)));
+    is_plain.then(|| match material.roughness {
+        0.0 => MaterialPart::Glass { ior, absorption },
+        roughness => {
+            let alpha = ScalarValue::Number(roughness * roughness);
+            MaterialPart::RoughGlass { alpha, ior, absorption, compensate: true }
+        }
+    })
+}
+
+/// The coefficient that leaves `attenuationColor` after `attenuationDistance`, per metre.
+fn absorption_of(material: &GltfMaterial) -> Vec3 {
+    /// What is black after some distance is nearly so.
+    const LEAST: f32 = 1e-6;
+    let distance = material.attenuation_distance;
+    if !(distance > 0.0 && distance.is_finite()) {
+        return Vec3::ZERO;
+    }
+    material.attenuation_color.to_array().map(|c| (-c.clamp(LEAST, 1.0).ln() / distance).max(0.0)).into()
+}

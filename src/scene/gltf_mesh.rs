@@ -1,0 +1,107 @@
+//! A mesh of a glTF file for `mesh(source: gltf(…))`, with the materials that the file gives it.
+
+use super::documents::Documents;
+use super::file::MaterialPart;
+use super::gltf::{GltfError, Located, MeshKey, Surfaces};
+use super::model::{ModelNormals, ModelOptions};
+use super::own_materials::{rename_textures, texture_names};
+use super::relative::{path_to_text, text_to_path};
+use super::sources::{MeshShading, TextureSource};
+use super::stamp::Stamp;
+use crate::mesh::Mesh;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+/// A mesh before it is simplified and shaded, and the materials of its slots.
+#[derive(Default)]
+pub(super) struct GltfBase {
+    pub mesh: Mesh,
+    pub slots: Vec<(String, MaterialPart)>,
+    /// Textures that `slots` name, and where their pictures lie.
+    pub textures: Vec<(String, TextureSource, PathBuf)>,
+    pub warnings: Vec<String>,
+    /// About `slots`.
+    pub material_warnings: Vec<String>,
+    /// What was read for it, and what that was then.
+    pub files: Vec<(PathBuf, Stamp)>,
+}
+
+/// What is wanted of a file.
+pub(super) struct GltfMesh<'a> {
+    pub path: &'a Path,
+    /// All of its scene when not given.
+    pub key: Option<MeshKey>,
+    /// Seconds.
+    pub at: Option<f64>,
+    pub shading: MeshShading,
+    pub simplified: bool,
+}
+
+impl GltfMesh<'_> {
+    /// Reads it, or takes it from what was read.
+    pub(super) fn base(&self, documents: &Documents) -> Result<GltfBase, GltfError> {
+        let opened = documents.open(self.path)?;
+        let document = &opened.document;
+        let wrong = |located: Located| document.error(located);
+        // Own materials name their pictures as they are found from the folder that the program runs in.
+        let file = path_to_text(self.path);
+        let surfaces = opened.surfaces(&file).map_err(wrong)?;
+        let computed = ModelOptions::default().normals;
+        let normals = match self.shading {
+            MeshShading::Auto => computed,
+            MeshShading::Smooth if !self.simplified => ModelNormals::OfPositions,
+            MeshShading::Smooth | MeshShading::Flat => ModelNormals::Ignore,
+        };
+        let (mesh, slots, warnings) = match self.key {
+            Some(key) => {
+                let (mesh, keys, warnings) = if normals == computed {
+                    let built = documents.mesh(&opened, key, self.at).map_err(wrong)?;
+                    (built.mesh.clone(), built.keys.clone(), built.warnings.clone())
+                } else {
+                    let posed = opened.posed(self.at).map_err(wrong)?;
+                    let built = document.mesh_of(key, &posed, &normals).map_err(wrong)?;
+                    (built.mesh, built.keys, built.warnings)
+                };
+                let slots = keys.iter().map(|key| surfaces.index(key.material)).collect();
+                (mesh, slots, warnings)
+            }
+            None => {
+                let model = document.baked(&ModelOptions { normals, ..ModelOptions::default() }).map_err(wrong)?;
+                let index = |name: &String| surfaces.materials.iter().position(|surface| surface.name == *name);
+                let slots: Vec<usize> =
+                    model.materials.iter().map(|material| index(&material.name).unwrap_or(0)).collect();
+                (model.mesh, slots, model.warnings)
+            }
+        };
+        let told = |warning: &String| format!("{}: {warning}", self.path.display());
+        let warnings = warnings.iter().map(told).collect();
+        let mut base = GltfBase { mesh, warnings, files: opened.files.clone(), ..GltfBase::default() };
+        self.add_materials(&mut base, &surfaces, &slots, &file);
+        Ok(base)
+    }
+
+    /// Names of textures begin with that of the model: those of others may be the same.
+    fn add_materials(&self, base: &mut GltfBase, surfaces: &Surfaces, slots: &[usize], file: &str) {
+        let own = |name: &str| format!("{file}: {name}");
+        let mut known = HashSet::new();
+        for &slot in slots {
+            let Some(surface) = surfaces.materials.get(slot) else { continue };
+            let mut part = surface.part.clone();
+            let wanted: HashSet<String> = texture_names(&part).into_iter().collect();
+            for (name, source) in surfaces.textures.iter().filter(|(name, _)| wanted.contains(name)) {
+                let path = match source {
+                    TextureSource::Image { file, .. } => text_to_path(file),
+                    _ => PathBuf::new(),
+                };
+                if known.insert(name.clone()) {
+                    base.textures.push((own(name), source.clone(), path));
+                }
+            }
+            rename_textures(&mut part, own);
+            base.slots.push((surface.name.clone(), part));
+            let note =
+                |note: &String| format!("{}: `{}`: {note}", self.path.display(), crate::printable::name(&surface.name));
+            base.material_warnings.extend(surface.notes.iter().map(note));
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file says them.
+//!
+//! What the file lacks is added as around any other model ([`super::default_scene`]): a sky and a key light where it has no
+//! light at all, a camera where it has none, and a ground where it has neither.
+
+use super::choice::ModelChoice;
+use super::default_scene;
+use super::documents::{Documents, Opened};
+use super::error::{SceneError, suggestion};
+use super::file::{CameraPart, FilmPart, LightPart, Named, ObjectPart, SceneFile, TransformPart};
+use super::gltf::{Assembly, BuiltMesh, GltfCamera, GltfFacts, GltfProblem, Lens, LightKind, Located, PlacedLight};
+use super::own_materials::texture_names;
+use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
+use super::value::Rgb;
+use glam::{DAffine3, DVec3, Vec3};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A scene file that was made of a glTF file.
+pub(super) struct Generated {
+    pub file: SceneFile,
+    pub facts: GltfFacts,
+    pub warnings: Vec<String>,
+}
+
+/// How the scene is to be made.
+pub(super) struct Wish<'a> {
+    /// What paths of the scene call the model.
+    pub file: &'a str,
+    pub choice: &'a ModelChoice,
+    /// Width over height of the picture.
+    pub aspect: f64,
+    /// Whether an image takes the place of the environment.
+    pub is_lit: bool,
+}
+
+/// Makes the scene of the file at `path`.
+pub(super) fn generate(documents: &Documents, path: &Path, wish: &Wish) -> Result<Generated, SceneError> {
+    let opened = documents.open(path).map_err(|error| SceneError::new(error.to_string()))?;
+    Maker { documents, opened: &opened, wish, path }.scene()
+}
+
+struct Maker<'a> {
+    documents: &'a Documents,
+    opened: &'a Arc<Opened>,
+    wish: &'a Wish<'a>,
+    path: &'a Path,
+}
+
+impl Maker<'_> {
+    fn wrong(&self, located: Located) -> SceneError {
+        SceneError::new(self.opened.document.error(located).to_string())
+    }
+
+    fn scene(&self) -> Result<Generated, SceneError> {
+        let (choice, document) = (self.wish.choice, &self.opened.document);
+        let wrong = |located: Located| self.wrong(located);
+        let posed = self.opened.posed(choice.at).map_err(wrong)?;
+        let assembly = document.assembly(&posed).map_err(wrong)?;
+        let surfaces = self.opened.surfaces(self.wish.file).map_err(wrong)?;
+        let facts = document.facts(&assembly, &surfaces);
+        let variant = self.variant(&facts)?;
+        let mut warnings = assembly.warnings.clone();
+
+        let mut distinct = HashSet::new();
+        let wanted: Vec<_> = (assembly.meshes.iter())
+            .filter(|placed| distinct.insert(placed.key))
+            .map(|placed| (self.opened.clone(), placed.key, placed.key.node.and(choice.at)))
+            .collect();
+        self.documents.make(&wanted);
+
+        let (mut objects, mut used) = (Vec::new(), BTreeMap::new());
+        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut built: HashMap<_, Option<Arc<BuiltMesh>>> = HashMap::new();
+        for (i, placed) in assembly.meshes.iter().enumerate() {
+            let at = placed.key.node.and(choice.at);
+            if !built.contains_key(&placed.key) {
+                let mesh = match self.documents.mesh(self.opened, placed.key, at) {
+                    Ok(mesh) => {
+                        warnings.extend(mesh.warnings.iter().map(|warning| self.told(warning)));
+                        Some(mesh)
+                    }
+                    Err((place, problem @ GltfProblem::NoTriangles)) => {
+                        warnings.push(self.told(&format!("{place} {problem} and is left out")));
+                        None
+                    }
+                    Err(located) => return Err(self.wrong(located)),
+                };
+                built.insert(placed.key, mesh);
+            }
+            let Some(Some(mesh)) = built.get(&placed.key) else { continue };
+            let name = placed.name.clone().unwrap_or_else(|| format!("mesh {}", i + 1));
+            if !is_placement(&placed.world) {
+                let name = crate::printable::name(&name);
+                warnings.push(self.told(&format!("`{name}` is flattened or too far away, and is left out")));
+                continue;
+            }
+            extend(&mut bounds, mesh, &placed.world);
+            let names: Vec<String> = (mesh.keys.iter())
+                .map(|key| {
+                    let material = variant.and_then(|variant| key.variants.get(&variant).copied()).or(key.material);
+                    let index = surfaces.index(material);
+                    used.insert(index, ());
+                    surfaces.materials[index].name.clone()
+                })
+                .collect();
+            let is_one = names.iter().all(|name| *name == names[0]);
+            objects.push(ObjectPart::Mesh {
+                name: Some(name),
+                source: MeshSource::Gltf {
+                    file: self.wish.file.to_owned(),
+                    mesh: Some(placed.key.mesh),
+                    node: placed.key.node,
+                    at: at.map(Seconds),
+                },
+                shading: MeshShading::Auto,
+                simplify: None,
+                material: is_one.then(|| names[0].clone()),
+                materials: (!is_one).then_some(names),
+                transform: transform(&placed.world),
+            });
+        }
+        if objects.is_empty() {
+            return Err(self.wrong((String::new(), GltfProblem::NoTriangles)));
+        }
+        let materials: Vec<_> = used.keys().map(|&index| &surfaces.materials[index]).collect();
+        let emits = materials.iter().any(|surface| surface.emits);
+        let named: Named<_> =
+            Named(materials.iter().map(|surface| (surface.name.clone(), surface.part.clone())).collect());
+        let textures = textures_of(&named, &surfaces.textures);
+        warnings.extend(self.notes(&materials.iter().map(|s| (&*s.name, &*s.notes)).collect::<Vec<_>>()));
+        let unknown: Vec<_> = facts.unknown_extensions.iter().map(|name| format!("`{name}`")).collect();
+        if !unknown.is_empty() {
+            warnings.push(self.told(&format!("extensions that are not modelled: {}", unknown.join(", "))));
+        }
+
+        let center = 0.5 * (bounds.0 + bounds.1);
+        let cameras = self.cameras(&assembly, center, &mut warnings);
+        let chosen = self.chosen(&cameras)?;
+        let has_light = !assembly.lights.is_empty() || emits;
+        let mut file = SceneFile {
+            camera: chosen
+                .cloned()
+                .unwrap_or_else(|| default_scene::camera(bounds.0, bounds.1, DVec3::ONE, self.wish.aspect)),
+            cameras: Named(if cameras.len() > 1 { cameras.clone() } else { Vec::new() }),
+            film: FilmPart::default(),
+            integrator: crate::render::Integrator::default(),
+            max_depth: None,
+            display: super::file::DisplayPart::default(),
+            environment: EnvironmentSource::Black,
+            air: Rgb::default(),
+            textures,
+            materials: named,
+            objects,
+            lights: self.lights(&assembly.lights, &mut warnings),
+        };
+        if !has_light && !self.wish.is_lit {
+            warnings.push(self.told("has no light: a sky and a key light are added"));
+            default_scene::light(&mut file, bounds);
+        }
+        if !has_light && chosen.is_none() {
+            default_scene::stand_on_ground(&mut file, bounds);
+        }
+        file.check().map_err(|error| SceneError::in_file(self.path, error.to_string()))?;
+        Ok(Generated { file, facts, warnings })
+    }
+
+    fn told(&self, what: &str) -> String {
+        format!("{}: {what}", self.path.display())
+    }
+
+    /// What is not modelled, each thing once with the materials that ask for it.
+    fn notes(&self, materials: &[(&str, &[String])]) -> Vec<String> {
+        const TOLD: usize = 6;
+        let mut by_note: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for (name, notes) in materials {
+            for note in *notes {
+                by_note.entry(note).or_default().push(name);
+            }
+        }
+        let sentence = |(note, names): (&str, Vec<&str>)| {
+            let list: Vec<String> =
+                names.iter().take(TOLD).map(|name| format!("`{}`", crate::printable::name(name))).collect();
+            let more = if names.len() > TOLD { format!(" and {} more", names.len() - TOLD) } else { String::new() };
+            self.told(&format!("{}{more}: {note}", list.join(", ")))
+        };
+        by_note.into_iter().map(sentence).collect()
+    }
+
+    fn variant(&self, facts: &GltfFacts) -> Result<Option<u32>, SceneError> {
+        let Some(wanted) = &self.wish.choice.variant else { return Ok(None) };
+        match facts.variants.iter().position(|name| name == wanted) {
+            Some(number) => Ok(Some(number as u32)),
+            None => Err(self.missing("variant", wanted, &facts.variants)),
+        }
+    }
+
+    fn missing(&self, what: &str, wanted: &str, names: &[String]) -> SceneError {
+        let hint = match names {
+            [] => ": the file has none".to_owned(),
+            _ => suggestion(wanted, names.iter().map(String::as_str)),
+        };
+        let wanted = crate::printable::name(wanted);
+        SceneError::in_file(self.path, format!("there is no {what} `{wanted}`{hint}"))
+    }
+
+    fn chosen<'c>(&self, cameras: &'c [(String, CameraPart)]) -> Result<Option<&'c CameraPart>, SceneError> {
+        let Some(wanted) = &self.wish.choice.camera else { return Ok(cameras.first().map(|(_, part)| part)) };
+        match cameras.iter().find(|(name, _)| name == wanted) {
+            Some((_, part)) => Ok(Some(part)),
+            None => {
+                let names: Vec<String> = cameras.iter().map(|(name, _)| name.clone()).collect();
+                Err(self.missing("camera", wanted, &names))
+            }
+        }
+    }
+
+    fn cameras(&self, assembly: &Assembly, center: DVec3, warnings: &mut Vec<String>) -> Vec<(String, CameraPart)> {
+        assembly.cameras.iter().map(|camera| (camera.name.clone(), self.camera(camera, center, warnings))).collect()
+    }
+
+    fn camera(&self, camera: &GltfCamera, center: DVec3, warnings: &mut Vec<String>) -> CameraPart {
+        /// Degrees.
+        const WIDEST: f64 = 179.0;
+        const NARROWEST: f64 = 0.01;
+        let depth = (center - camera.eye).dot(camera.forward);
+        let vfov = match camera.lens {
+            Lens::Perspective(yfov) => yfov,
+            Lens::Orthographic(half) => {
+                let name = crate::printable::name(&camera.name);
+                warnings.push(self.told(&format!(
+                    "camera `{name}` is orthographic, which is not modelled: a perspective one takes its place"
+                )));
+                // As high as it is at the middle of the scene.
+                2.0 * (half / depth.max(half)).atan()
+            }
+        };
+        CameraPart {
+            look_at: None,
+            forward: Some(camera.forward),
+            pivot_distance: (depth > SceneFile::MIN_SIZE && depth < SceneFile::MAX_COORDINATE).then_some(depth),
+            up: camera.up,
+            vfov: vfov.to_degrees().clamp(NARROWEST, WIDEST),
+            ..CameraPart::looking_at(camera.eye, camera.eye + camera.forward)
+        }
+    }
+
+    fn lights(&self, lights: &[PlacedLight], warnings: &mut Vec<String>) -> Vec<LightPart> {
+        let mut parts = Vec::new();
+        for (i, placed) in lights.iter().enumerate() {
+            let name = Some(placed.name.clone().unwrap_or_else(|| format!("light {}", i + 1)));
+            let position = placed.world.translation;
+            let direction = placed.world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+            let intensity = Rgb(placed.light.intensity);
+            if placed.light.intensity == Vec3::ZERO {
+                continue;
+            }
+            if placed.light.has_range {
+                let name = crate::printable::name(name.as_deref().unwrap_or_default()).into_owned();
+                warnings.push(self.told(&format!("the range of light `{name}` is not used: light goes on for ever")));
+            }
+            parts.push(match placed.light.kind {
+                LightKind::Point => LightPart::Point { name, position, intensity, radius: 0.0 },
+                LightKind::Spot { inner, outer } => LightPart::Spot {
+                    name,
+                    position,
+                    direction,
+                    intensity,
+                    inner_angle: inner.to_degrees(),
+                    outer_angle: outer.to_degrees(),
+                    transform: TransformPart::default(),
+                },
+                LightKind::Directional => LightPart::Directional {
+                    name,
+                    direction,
+                    irradiance: intensity,
+                    transform: TransformPart::default(),
+                },
+            });
+        }
+        parts
+    }
+}
+
+/// Whether objects may stand like this.
+fn is_placement(world: &DAffine3) -> bool {
+    let determinant = world.matrix3.determinant().abs();
+    world.is_finite()
+        && world.translation.abs().max_element() <= SceneFile::MAX_COORDINATE
+        && (SceneFile::MIN_SIZE.powi(3)..f64::INFINITY).contains(&determinant)
+}
+
+fn transform(world: &DAffine3) -> TransformPart {
+    if *world == DAffine3::IDENTITY {
+        return TransformPart::default();
+    }
+    let (m, t) = (world.matrix3.transpose(), world.translation);
+    let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last];
+    let matrix = Some([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z)]);
+    TransformPart { matrix, ..TransformPart::default() }
+}
+
+/// By the corners of the mesh's box.
+fn extend(bounds: &mut (DVec3, DVec3), mesh: &BuiltMesh, world: &DAffine3) {
+    let around = mesh.mesh.bounds();
+    let (min, max) = (around.min.as_dvec3() + mesh.mesh.center, around.max.as_dvec3() + mesh.mesh.center);
+    for i in 0..8 {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        let corner = world.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
+        *bounds = (bounds.0.min(corner), bounds.1.max(corner));
+    }
+}
+
+/// Those that the materials name, in their order.
+fn textures_of(materials: &Named<super::file::MaterialPart>, all: &[(String, TextureSource)]) -> Named<TextureSource> {
+    let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
+    Named(all.iter().filter(|(name, _)| names.contains(name)).cloned().collect())
+}
