@@ -142,8 +142,7 @@ impl SceneArgs {
         let environment = self.how.env.as_deref();
         let choice = self.how.choice();
         let (progress, choice) = (Some(progress), Some(&choice));
-        let options =
-            LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
+        let options = LoadOptions { up: self.up(), aspect, environment, progress, choice, ..LoadOptions::default() };
         let scene = load(&source, &options).map_err(Failure::from)?;
         files.read_all(scene.files())?;
         for warning in &scene.warnings {

@@ -5,8 +5,8 @@ use super::film_file::check_film_source;
 use super::remake::{ForWhom, Remade, Remake};
 use crate::render::ImageTexture;
 use crate::scene::{
-    LoadOptions, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis, load,
-    read_picture,
+    LoadOptions, LoadedScene, MeshBase, ModelChoice, SceneError, SceneSource, Shape, TextureSource, Trees, UpAxis,
+    load, read_picture,
 };
 use bevy_ecs::prelude::{Entity, Resource};
 use std::path::PathBuf;

@@ -193,7 +193,7 @@ impl CommandParams<'_, '_> {
                 Ok(source) => {
                     let choice = ModelChoice::default();
                     self.beside.load(source, (self.up.0, None), choice, self.size.aspect(), self.renderer.0.pool());
-                },
+                }
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
             Command::SaveScene { path } => self.saving.requests.push(path),

@@ -23,8 +23,8 @@ use super::worker::{Waker, Worker};
 use super::{Command, LatencyHistogram, Target};
 use crate::render::{Film, Prepared, RenderSettings};
 use crate::scene::{
-    BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering, SceneInputs,
-    SceneSource, UpAxis, check_film_size,
+    BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering,
+    SceneInputs, SceneSource, UpAxis, check_film_size,
 };
 use bevy_ecs::prelude::{Entity, IntoScheduleConfigs, World};
 use bevy_ecs::schedule::{Schedule, ScheduleLabel, SystemSet};

@@ -91,10 +91,7 @@ pub fn around(loaded: &LoadedMesh, source: &MeshSource, up: Option<UpAxis>, aspe
         UpAxis::Z => TransformPart { rotate: Some(DVec3::new(-90.0, 0.0, 0.0)), ..TransformPart::default() },
     };
     let material = |albedo| MaterialPart::Diffuse { albedo };
-    let mut materials = vec![
-        (GROUND.to_owned(), ground_material()),
-        (KEY_LIGHT.to_owned(), key_material()),
-    ];
+    let mut materials = vec![(GROUND.to_owned(), ground_material()), (KEY_LIGHT.to_owned(), key_material())];
     if loaded.slots.is_empty() {
         materials.push((CLAY.to_owned(), material(ColorValue::rgb(0.72, 0.56, 0.45))));
     }

@@ -276,7 +276,8 @@ impl<'a> Writer<'a> {
         if let TextureSource::Image { file, .. } = &mut part {
             let from_mesh = self.loaded.and_then(|loaded| {
                 let textures = loaded.meshes.iter().flatten().flat_map(|mesh| &mesh.textures);
-                let names_it = |source: &TextureSource| matches!(source, TextureSource::Image { file: of, .. } if of == file);
+                let names_it =
+                    |source: &TextureSource| matches!(source, TextureSource::Image { file: of, .. } if of == file);
                 textures.clone().find(|(_, source, _)| names_it(source)).map(|(.., path)| path.clone())
             });
             if let Some(path) = from_mesh.and_then(|path| std::path::absolute(path).ok()) {

@@ -72,7 +72,8 @@ impl Documents {
             return Ok(mesh.clone());
         }
         let posed = opened.posed(at)?;
-        let mesh = Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
+        let mesh =
+            Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
         // A few bytes could ask for the same vertices again and again.
         const BYTES_A_NUMBER: u64 = 8;
         let limit = Limits::of_this_process().model_bytes / BYTES_A_NUMBER;
@@ -84,11 +85,7 @@ impl Documents {
     }
 
     /// A picture that is part of the file at `model`.
-    pub(super) fn picture(
-        &self,
-        model: &Path,
-        number: u32,
-    ) -> Result<(ImageTexture, Option<String>), PictureError> {
+    pub(super) fn picture(&self, model: &Path, number: u32) -> Result<(ImageTexture, Option<String>), PictureError> {
         let failed = |error: GltfError| PictureError::Model(error.to_string());
         let opened = self.open(model).map_err(failed)?;
         let bytes = opened.document.picture_bytes(number).map_err(|located| failed(opened.document.error(located)))?;

@@ -99,9 +99,8 @@ impl GltfMesh<'_> {
             }
             rename_textures(&mut part, own);
             base.slots.push((surface.name.clone(), part));
-            let note = |note: &String| {
-                format!("{}: `{}`: {note}", self.path.display(), crate::printable::name(&surface.name))
-            };
+            let note =
+                |note: &String| format!("{}: `{}`: {note}", self.path.display(), crate::printable::name(&surface.name));
             base.material_warnings.extend(surface.notes.iter().map(note));
         }
     }

@@ -140,9 +140,9 @@ impl Maker<'_> {
         let chosen = self.chosen(&cameras)?;
         let has_light = !assembly.lights.is_empty() || emits;
         let mut file = SceneFile {
-            camera: chosen.cloned().unwrap_or_else(|| {
-                default_scene::camera(bounds.0, bounds.1, DVec3::ONE, self.wish.aspect)
-            }),
+            camera: chosen
+                .cloned()
+                .unwrap_or_else(|| default_scene::camera(bounds.0, bounds.1, DVec3::ONE, self.wish.aspect)),
             cameras: Named(if cameras.len() > 1 { cameras.clone() } else { Vec::new() }),
             film: FilmPart::default(),
             integrator: crate::render::Integrator::default(),
@@ -216,12 +216,7 @@ impl Maker<'_> {
         }
     }
 
-    fn cameras(
-        &self,
-        assembly: &Assembly,
-        center: DVec3,
-        warnings: &mut Vec<String>,
-    ) -> Vec<(String, CameraPart)> {
+    fn cameras(&self, assembly: &Assembly, center: DVec3, warnings: &mut Vec<String>) -> Vec<(String, CameraPart)> {
         assembly.cameras.iter().map(|camera| (camera.name.clone(), self.camera(camera, center, warnings))).collect()
     }
 
@@ -318,10 +313,7 @@ fn extend(bounds: &mut (DVec3, DVec3), mesh: &BuiltMesh, world: &DAffine3) {
 }
 
 /// Those that the materials name, in their order.
-fn textures_of(
-    materials: &Named<super::file::MaterialPart>,
-    all: &[(String, TextureSource)],
-) -> Named<TextureSource> {
+fn textures_of(materials: &Named<super::file::MaterialPart>, all: &[(String, TextureSource)]) -> Named<TextureSource> {
     let names: HashSet<String> = materials.iter().flat_map(|(_, part)| texture_names(part)).collect();
     Named(all.iter().filter(|(name, _)| names.contains(name)).cloned().collect())
 }

@@ -1,8 +1,8 @@
 //! From a name or a path to everything a scene needs: text, meshes, pictures, trees. Runs on any thread.
 
 use super::builtin::{BUILTIN_SCENES, builtin_text};
-use super::components::{Balls, Shape};
 use super::choice::ModelChoice;
+use super::components::{Balls, Shape};
 use super::default_scene;
 use super::documents::Documents;
 use super::error::{Problem, SceneError, suggestion};
@@ -101,7 +101,8 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
             let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
             let mesh_source = MeshSource::of_file(file);
             let kept = options.known.filter(|known| known.source == *source).and_then(LoadedScene::fresh_model);
-            let mesh = kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder, &documents), Ok)?;
+            let mesh =
+                kept.map_or_else(|| load_mesh(&mesh_source, MeshShading::Auto, None, &folder, &documents), Ok)?;
             let mut file = default_scene::around(&mesh, &mesh_source, options.up, options.aspect.unwrap_or(16.0 / 9.0));
             if options.environment.is_some() {
                 // The image has lights of its own.
@@ -204,7 +205,8 @@ fn resolve(
                 let read = || {
                     options.say(&format!("loading {}", source.name()));
                     let kept = before.as_ref().and_then(|before| before.fresh_mesh(&scene.folder, object));
-                    let loaded = kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder, documents), Ok);
+                    let loaded =
+                        kept.map_or_else(|| load_mesh(source, *shading, *simplify, &scene.folder, documents), Ok);
                     let warnings = loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);
                     scene.warnings.extend_from_slice(warnings);
                     loaded

@@ -101,8 +101,12 @@ impl MetadataDraft {
             let opened = self.loaded.as_ref().map(LoadedScene::content_fingerprint);
             // What was opened has an environment that its file does not name, or was itself written into a picture.
             // Nor does its file say which moment or variant of a model is shown.
-            let is_own =
-                |it: &LoadedScene| it.environment.is_some() || it.choice.at.is_some() || it.choice.variant.is_some() || it.shot.as_ref().is_some_and(|shot| shot.text.is_some());
+            let is_own = |it: &LoadedScene| {
+                it.environment.is_some()
+                    || it.choice.at.is_some()
+                    || it.choice.variant.is_some()
+                    || it.shot.as_ref().is_some_and(|shot| shot.text.is_some())
+            };
             let is_another = opened != Some(content) || self.loaded.as_ref().is_some_and(is_own);
             Prints { content, has_changed: is_another && self.description.loose_meshes.is_empty() }
         })

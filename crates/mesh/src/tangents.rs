@@ -99,7 +99,6 @@ impl Mesh {
         }
         fn repeat<T: Copy>(list: &mut Vec<T>, sources: &[u32]) {
             if !list.is_empty() {
-                
                 list.reserve(sources.len());
                 for &source in sources {
                     list.push(list[source as usize]);

@@ -231,8 +231,7 @@ impl Document {
     ) -> Result<Elements<'_>, (Option<String>, GltfProblem)> {
         let size = component.bytes();
         let column = if columns > 1 { (rows * size).next_multiple_of(4) } else { rows * size };
-        let offsets: Vec<usize> =
-            (0..columns).flat_map(|c| (0..rows).map(move |r| c * column + r * size)).collect();
+        let offsets: Vec<usize> = (0..columns).flat_map(|c| (0..rows).map(move |r| c * column + r * size)).collect();
         let length = column * (columns - 1) + rows * size;
         let Some(view) = view else {
             if count > self.most_elements() {
@@ -283,7 +282,10 @@ impl Document {
                 }
                 None => {
                     let (what, found) = ("componentType", sparse.indices.component_type.to_string());
-                    return Err((inside("indices"), GltfProblem::Value { what, found, expected: "5121, 5123 or 5125" }));
+                    return Err((
+                        inside("indices"),
+                        GltfProblem::Value { what, found, expected: "5121, 5123 or 5125" },
+                    ));
                 }
             }
         }

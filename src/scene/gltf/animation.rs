@@ -218,7 +218,9 @@ mod tests {
     #[test]
     fn keys_hold_before_and_after_and_are_mixed_between() {
         let values = [[10.0], [20.0]];
-        for (t, linear, step) in [(0.0, 10.0, 10.0), (1.0, 10.0, 10.0), (1.5, 12.5, 10.0), (3.0, 20.0, 20.0), (9.0, 20.0, 20.0)] {
+        for (t, linear, step) in
+            [(0.0, 10.0, 10.0), (1.0, 10.0, 10.0), (1.5, 12.5, 10.0), (3.0, 20.0, 20.0), (9.0, 20.0, 20.0)]
+        {
             assert_eq!(at(Interpolation::Linear, &values, t), linear);
             assert_eq!(at(Interpolation::Step, &values, t), step);
         }

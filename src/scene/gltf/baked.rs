@@ -65,11 +65,8 @@ impl Document {
             let m = placed.world.matrix3;
             let is_mirrored = m.determinant() < 0.0;
             let sign = if is_mirrored { -1.0 } else { 1.0 };
-            let cofactors = DMat3::from_cols(
-                m.y_axis.cross(m.z_axis),
-                m.z_axis.cross(m.x_axis),
-                m.x_axis.cross(m.y_axis),
-            );
+            let cofactors =
+                DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
             let turn = |n: &Vec3| (cofactors * n.as_dvec3() * sign).normalize_or(DVec3::Y).as_vec3();
             normals_from_file &= !mesh.normals.is_empty();
             joined.normals.extend(mesh.normals.iter().map(turn));

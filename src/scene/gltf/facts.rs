@@ -54,9 +54,10 @@ impl Document {
         let occluded = occluded.map(|surface| {
             (surface.name.clone(), "its occlusion map is not used: paths find what is occluded".to_owned())
         });
-        let notes = surfaces.materials.iter().flat_map(|surface| {
-            surface.notes.iter().map(|note| (surface.name.clone(), note.clone()))
-        });
+        let notes = surfaces
+            .materials
+            .iter()
+            .flat_map(|surface| surface.notes.iter().map(|note| (surface.name.clone(), note.clone())));
         let is_unknown = |name: &&String| !SUPPORTED.contains(&name.as_str());
         GltfFacts {
             cameras: assembly.cameras.iter().map(|camera| camera.name.clone()).collect(),

@@ -13,7 +13,8 @@ impl Document {
         let json = self.node(node)?;
         let Some(extension) = json.extensions.get(NAME) else { return Ok(vec![DAffine3::IDENTITY]) };
         let accessor = |name: &str| {
-            let number = extension.get("attributes").and_then(|attributes| attributes.get(name)).and_then(Value::as_u64);
+            let number =
+                extension.get("attributes").and_then(|attributes| attributes.get(name)).and_then(Value::as_u64);
             number.map(|number| u32::try_from(number).unwrap_or(u32::MAX))
         };
         let [moves, turns, scales] = ["TRANSLATION", "ROTATION", "SCALE"].map(accessor);

@@ -13,7 +13,10 @@ const NAME: &str = "KHR_lights_punctual";
 pub(in crate::scene) enum LightKind {
     Point,
     /// Angles from the axis, radians.
-    Spot { inner: f64, outer: f64 },
+    Spot {
+        inner: f64,
+        outer: f64,
+    },
     Directional,
 }
 
@@ -39,8 +42,7 @@ impl Document {
         let list = list.and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let index = number.as_u64().and_then(|number| u32::try_from(number).ok()).unwrap_or(u32::MAX);
         let light = list.get(index as usize);
-        let light =
-            light.ok_or_else(|| here(GltfProblem::Index { list: "lights", index, count: list.len() }))?;
+        let light = light.ok_or_else(|| here(GltfProblem::Index { list: "lights", index, count: list.len() }))?;
         let at = || format!("extensions.{NAME}.lights[{index}]");
         let number = |object: &Value, name: &str, default: f64| {
             object.get(name).and_then(Value::as_f64).filter(|value| value.is_finite()).unwrap_or(default)

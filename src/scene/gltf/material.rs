@@ -124,9 +124,9 @@ impl Document {
         let mut notes = Vec::new();
         let mut texture = |reference: Option<&TextureRef>| match reference {
             None => Ok(None),
-            Some(reference) => self.texture_use(reference, &mut notes).map_err(|(at, problem)| {
-                (if at.is_empty() { here() } else { at }, problem)
-            }),
+            Some(reference) => self
+                .texture_use(reference, &mut notes)
+                .map_err(|(at, problem)| (if at.is_empty() { here() } else { at }, problem)),
         };
         let extension = |name: &str| Fields(json.extensions.get(&format!("KHR_materials_{name}")));
         let unit = |value: f32| value.clamp(0.0, 1.0);

@@ -386,8 +386,7 @@ mod tests {
         data.extend([0xff, 14, 13, 4]);
         data.extend([0; 16]);
         let decoded = decode(&view("TRIANGLES", None, 9, 4), &data).unwrap();
-        let list: Vec<u32> =
-            decoded.chunks(4).map(|four| u32::from_le_bytes(four.try_into().unwrap())).collect();
+        let list: Vec<u32> = decoded.chunks(4).map(|four| u32::from_le_bytes(four.try_into().unwrap())).collect();
         assert_eq!(list, [0, 1, 2, 2, 1, 3, 7, 0, 2]);
         assert!(decode(&view("TRIANGLES", None, 8, 4), &data).is_err());
         assert!(decode(&view("TRIANGLES", None, 12, 4), &data).is_err());

@@ -69,8 +69,10 @@ impl Document {
         let mut worlds = vec![DAffine3::IDENTITY; count];
         // Every node has one parent at most: what is not below a root is on a circle.
         let mut seen = vec![false; count];
-        let mut todo: Vec<(u32, DAffine3)> =
-            (0..count as u32).filter(|&node| parents[node as usize].is_none()).map(|n| (n, DAffine3::IDENTITY)).collect();
+        let mut todo: Vec<(u32, DAffine3)> = (0..count as u32)
+            .filter(|&node| parents[node as usize].is_none())
+            .map(|n| (n, DAffine3::IDENTITY))
+            .collect();
         while let Some((index, above)) = todo.pop() {
             let world = above * self.local(index, pose)?;
             if !world.is_finite() {
@@ -103,7 +105,8 @@ impl Document {
     /// From the node's coordinates to its parent's.
     fn local(&self, index: u32, pose: &Pose) -> Result<DAffine3, Located> {
         let node = self.node(index)?;
-        let here = |what, found: String, expected| (place("nodes", index), GltfProblem::Value { what, found, expected });
+        let here =
+            |what, found: String, expected| (place("nodes", index), GltfProblem::Value { what, found, expected });
         let posed = pose.of(index);
         if let Some(matrix) = node.matrix.filter(|_| posed.is_none()) {
             let matrix = DMat4::from_cols_array(&matrix);

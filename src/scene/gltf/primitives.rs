@@ -263,8 +263,7 @@ impl Document {
             sets.push((names, weights));
         }
         for i in 0..count {
-            let influences =
-                sets.iter().flat_map(|(names, weights)| names[i].into_iter().zip(weights[i]));
+            let influences = sets.iter().flat_map(|(names, weights)| names[i].into_iter().zip(weights[i]));
             let Some(map) = joints.mixed(influences) else {
                 let problem = GltfProblem::Value {
                     what: "a number in JOINTS_0",
@@ -367,8 +366,7 @@ impl Triangles {
             return;
         }
         let bare = |normals: &[Vec3], triangle: &[u32; 3]| triangle.iter().any(|&v| normals[v as usize] == Vec3::ZERO);
-        let flat: Vec<usize> =
-            (0..self.triangles.len()).filter(|&t| bare(&self.normals, &self.triangles[t])).collect();
+        let flat: Vec<usize> = (0..self.triangles.len()).filter(|&t| bare(&self.normals, &self.triangles[t])).collect();
         if flat.is_empty() {
             return;
         }

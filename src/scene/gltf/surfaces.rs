@@ -142,16 +142,13 @@ impl Textures<'_> {
     }
 
     /// A colour times an sRGB picture.
-    fn color(
-        &mut self,
-        factor: Vec3,
-        texture: Option<&TextureUse>,
-        what: &'static str,
-    ) -> Result<ColorValue, Located> {
+    fn color(&mut self, factor: Vec3, texture: Option<&TextureUse>, what: &'static str) -> Result<ColorValue, Located> {
         match texture {
             Some(used) if factor != Vec3::ZERO => {
                 let (channel, encoding) = (None, Encoding::Auto);
-                Ok(ColorValue::Texture(self.of(used, Role { what, channel, encoding, tint: factor, vertex_colors: false })?))
+                Ok(ColorValue::Texture(
+                    self.of(used, Role { what, channel, encoding, tint: factor, vertex_colors: false })?,
+                ))
             }
             _ => Ok(ColorValue::Rgb(factor)),
         }

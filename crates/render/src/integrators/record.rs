@@ -154,8 +154,8 @@ impl Record {
                 (LightSource::Delta(light), Place::Light { position: ray.at(ray.t_max), light })
             } else {
                 // It ends a hair in front of the emitter and met nothing, so whatever comes next is the emitter.
-                let emitter = scene.geometry.tree.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
-                let emitter = emitter.filter(|hit| scene.tables.lights.light_of(hit.object, hit.prim).is_some());
+                let emitter = scene.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
+                let emitter = emitter.filter(|hit| scene.tables.lights.shines(hit.object, hit.prim));
                 let object = emitter.map_or(HitBatch::MISS, |hit| hit.object);
                 let source = emitter.map_or(LightSource::Rim, |hit| LightSource::Object(hit.object));
                 (source, Place::Surface { position: ray.at(ray.t_max), object })
