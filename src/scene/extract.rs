@@ -344,7 +344,7 @@ fn material_of(
     // What blends itself, or too much, is grey.
     let is_unfit = matches!(material, Material::Blend { .. }) && !is_fit(material, by_entity);
     let material = if is_unfit { &GREY } else { material };
-    material.map(&mut WorldToSnapshot { materials: table, textures })
+    material.map(&mut WorldToSnapshot { materials: table, textures }).simplified()
 }
 
 /// The tables of a snapshot, which get what a material refers to.
@@ -384,12 +384,24 @@ fn is_fit(blend: &Material, by_entity: &HashMap<Entity, &Material>) -> bool {
                 textured |= matches!(weight, ScalarParam::Texture(_));
                 open.extend([by_entity.get(a).copied(), by_entity.get(b).copied()]);
             }
-            Some(Some(Material::Emissive { .. })) => (lobes, glowing) = (lobes + 1, glowing + 1),
-            Some(plain) => lobes += plain.map_or(1, Material::n_lobes),
+            Some(Some(plain)) => {
+                lobes += plain.n_lobes();
+                glowing += u32::from(shines(plain));
+            }
+            Some(None) => lobes += 1,
             None => break,
         }
     }
     open.is_empty() && lobes <= MAX_LOBES && (glowing == 0 || glowing == 1 && !textured)
+}
+
+/// Whether a plain material adds light of its own.
+fn shines(material: &Material) -> bool {
+    match material {
+        Material::Emissive { .. } => true,
+        Material::Principled { emission, .. } => *emission != ColorParam::Rgb(Vec3::ZERO),
+        _ => false,
+    }
 }
 
 /// Each texture once, however many materials use it.

@@ -158,7 +158,7 @@ impl Maker<'_> {
             lights: self.lights(&assembly.lights, &mut warnings),
         };
         if !has_light && !self.wish.is_lit {
-            warnings.push(self.told("has no light: a sky and a key light are added"));
+            warnings.push(self.told("has no light: an environment and a key light are added"));
             default_scene::light(&mut file, bounds);
         }
         if !has_light && chosen.is_none() {

@@ -6,12 +6,13 @@ use super::file::MaterialPart;
 use super::gltf::MeshKey;
 use super::gltf_mesh::GltfMesh;
 use super::model::{ImportedModel, ModelFormat, ModelNormals, ModelOptions, load_model};
-use super::obj::ImportedMaterial;
+use super::obj::{ImportedMaterial, PbrMaterial};
 use super::relative::text_to_path;
 use super::sources::{MeshShading, MeshSource, TextureSource};
 use super::stamp::{Stamp, stamp};
 use super::value::{ColorValue, Rgb, ScalarValue};
 use crate::mesh::{Mesh, NormalWeight, procedural, simplify};
+use crate::render::Encoding;
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -272,6 +273,9 @@ impl LoadedMesh {
     /// diffuse, and all others have a highlight if the file gives it a strength.
     fn material(&mut self, material: &ImportedMaterial) -> MaterialPart {
         let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
+        if let Some(pbr) = &material.pbr {
+            return self.pbr_material(material, pbr);
+        }
         let glows = material.emission.is_some_and(|emission| emission.max_element() > 0.0);
         if glows || material.emission_texture.is_some() {
             let radiance = material.emission.unwrap_or(Vec3::ONE).max(Vec3::ZERO);
@@ -301,6 +305,68 @@ impl LoadedMesh {
                 }
             }
         }
+    }
+
+    /// A material of MTL's PBR extension.
+    fn pbr_material(&mut self, material: &ImportedMaterial, pbr: &PbrMaterial) -> MaterialPart {
+        let share = |color: Vec3| ColorValue::Rgb(color.clamp(Vec3::ZERO, Vec3::ONE));
+        let color = share(material.diffuse.unwrap_or(Vec3::splat(0.8)));
+        let color = self.texture(material.diffuse_texture.as_ref()).unwrap_or(color);
+        let mut layers = MaterialPart::principled(color);
+        let MaterialPart::Principled {
+            metallic,
+            roughness,
+            ior,
+            transmission,
+            anisotropy,
+            anisotropy_rotation,
+            sheen_color,
+            clearcoat,
+            clearcoat_roughness,
+            emission,
+            opacity,
+            normal_map,
+            normal_scale,
+            ..
+        } = &mut layers
+        else {
+            unreachable!("a principled material is one")
+        };
+        let number = |number: Option<f32>, usual: f32| ScalarValue::Number(number.unwrap_or(usual));
+        *roughness = self.data(pbr.roughness_texture.as_ref()).map_or(number(pbr.roughness, 0.5), ScalarValue::Texture);
+        *metallic = self.data(pbr.metallic_texture.as_ref()).map_or(number(pbr.metallic, 0.0), ScalarValue::Texture);
+        *ior = material.ior.filter(|ior| *ior > 0.0).unwrap_or(1.5);
+        if matches!(material.illumination_model, Some(4 | 6 | 7 | 9)) {
+            *transmission = ScalarValue::Number(1.0);
+        } else {
+            *opacity = self
+                .data(material.opacity_texture.as_ref())
+                .map_or(number(material.opacity, 1.0), ScalarValue::Texture);
+        }
+        *anisotropy = number(pbr.anisotropy, 0.0);
+        *anisotropy_rotation = 360.0 * pbr.anisotropy_rotation.unwrap_or(0.0);
+        *sheen_color = ColorValue::grey(pbr.sheen.unwrap_or(0.0));
+        *clearcoat = number(pbr.clearcoat.map(|strength| strength.min(1.0)), 0.0);
+        *clearcoat_roughness = number(pbr.clearcoat_roughness, 0.0);
+        let glow = ColorValue::Rgb(material.emission.unwrap_or(Vec3::ZERO));
+        *emission = self.texture(material.emission_texture.as_ref()).unwrap_or(glow);
+        if let Some(name) = self.data(pbr.normal_texture.as_ref()) {
+            (*normal_map, *normal_scale) = (ColorValue::Texture(name), pbr.normal_scale.unwrap_or(1.0));
+        }
+        layers
+    }
+
+    /// A texture of numbers in place of colours, by its name.
+    fn data(&mut self, file: Option<&PathBuf>) -> Option<String> {
+        let file = file?;
+        let path = file.display().to_string();
+        let name = format!("{path} (data)");
+        let mut part = TextureSource::image(path);
+        if let TextureSource::Image { encoding, .. } = &mut part {
+            *encoding = Encoding::Linear;
+        }
+        self.textures.push((name.clone(), part, file.clone()));
+        Some(name)
     }
 
     fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorValue> {

@@ -533,6 +533,7 @@ fn files_that_lie_are_refused_with_what_and_where() {
     let broken = |change: &dyn Fn(&mut Value)| {
         let mut writer = Writer::default();
         quad(&mut writer);
+        writer.json = writer.document();
         change(&mut writer.json);
         refusal(&writer.glb())
     };

@@ -10,6 +10,7 @@ mod filters;
 mod lanes;
 mod light_transport;
 mod phong;
+mod principled;
 mod region;
 mod rough_glass;
 mod stability;

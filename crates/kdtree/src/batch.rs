@@ -170,6 +170,13 @@ impl HitBatch {
         (object != Self::MISS).then_some(hit)
     }
 
+    /// Another answer for ray `i`.
+    pub fn set(&mut self, i: usize, hit: Option<Hit>) {
+        let miss = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: Self::MISS, object: Self::MISS };
+        let hit = hit.unwrap_or(miss);
+        (self.t[i], self.u[i], self.v[i], self.prim[i], self.object[i]) = (hit.t, hit.u, hit.v, hit.prim, hit.object);
+    }
+
     /// Makes room for `n` answers, which may still be those of an older batch.
     pub(super) fn resize(&mut self, n: usize) {
         self.t.resize(n, f32::INFINITY);

@@ -43,6 +43,34 @@ pub enum Property {
     Transparency,
     /// Of the second part of a blend.
     Weight,
+    /// Of a principled material: share of the base that is metal, 0..1.
+    Metallic,
+    /// Of a principled material: root of the width of its microfacets, 0..1.
+    Roughness,
+    /// Of a principled material: share that lets light through, 0..1.
+    Transmission,
+    /// Of a principled material: whether light passes as through a pane; 0 is no.
+    ThinWalled,
+    /// Of a principled material: how much wider highlights are in one direction, 0..1.
+    Anisotropy,
+    /// Of a principled material: that direction, degrees from the tangent.
+    AnisotropyRotation,
+    /// Of a principled material: colour of the sheen.
+    SheenColor,
+    /// Of a principled material: root of the width of the sheen, 0..1.
+    SheenRoughness,
+    /// Of a principled material: share that has a coat, 0..1.
+    Clearcoat,
+    /// Of a principled material: root of the width of the coat's microfacets, 0..1.
+    ClearcoatRoughness,
+    /// Of a principled material: radiance that it adds.
+    Emission,
+    /// Of a principled material: share of the surface that is there, 0..1.
+    Opacity,
+    /// Of a principled material: factor of the slope of its normal map.
+    NormalScale,
+    /// Of a principled material: whether its back is a surface; 0 is no.
+    TwoSided,
     /// Radiance of an even sky.
     Sky,
     /// Radiance of a gradient from straight above.
@@ -61,7 +89,7 @@ impl Property {
     /// What sets a parameter of a material, by the parameter's name in a scene file.
     pub fn of_param(name: &str) -> Option<Self> {
         Some(match name {
-            "albedo" | "reflectance" | "diffuse" | "radiance" => Self::Color,
+            "albedo" | "reflectance" | "diffuse" | "radiance" | "base_color" => Self::Color,
             "alpha" => Self::Alpha,
             "ior" => Self::Ior,
             "absorption" => Self::Absorption,
@@ -70,6 +98,20 @@ impl Property {
             "shininess" => Self::Shininess,
             "transparency" => Self::Transparency,
             "weight" => Self::Weight,
+            "metallic" => Self::Metallic,
+            "roughness" => Self::Roughness,
+            "transmission" => Self::Transmission,
+            "thin_walled" => Self::ThinWalled,
+            "anisotropy" => Self::Anisotropy,
+            "anisotropy_rotation" => Self::AnisotropyRotation,
+            "sheen_color" => Self::SheenColor,
+            "sheen_roughness" => Self::SheenRoughness,
+            "clearcoat" => Self::Clearcoat,
+            "clearcoat_roughness" => Self::ClearcoatRoughness,
+            "emission" => Self::Emission,
+            "opacity" => Self::Opacity,
+            "normal_scale" => Self::NormalScale,
+            "two_sided" => Self::TwoSided,
             _ => return None,
         })
     }

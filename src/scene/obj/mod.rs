@@ -6,12 +6,13 @@
 //! the way back.
 
 mod error;
+mod lines;
 mod mtl;
 mod parse;
 mod write;
 
 pub use error::{LineProblem, ObjError};
-pub use mtl::ImportedMaterial;
+pub use mtl::{ImportedMaterial, PbrMaterial};
 pub(super) use write::{NewObj, save_new_obj};
 pub use write::{ObjExtras, save_obj};
 

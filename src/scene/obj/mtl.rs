@@ -29,6 +29,37 @@ pub struct ImportedMaterial {
     pub diffuse_texture: Option<PathBuf>,
     /// `map_Ke`, resolved likewise.
     pub emission_texture: Option<PathBuf>,
+    /// `map_d`, resolved likewise.
+    pub opacity_texture: Option<PathBuf>,
+    /// What only materials of the PBR extension state; `None` for all others.
+    pub pbr: Option<PbrMaterial>,
+}
+
+/// The PBR extension of MTL (Clara.io 2013): `Pr`, `Pm`, `Ps`, `Pc`, `Pcr`, `aniso`, `anisor`, `norm` and their maps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PbrMaterial {
+    /// `Pr`, 0..1.
+    pub roughness: Option<f32>,
+    /// `Pm`, 0..1.
+    pub metallic: Option<f32>,
+    /// `Ps`, 0..1.
+    pub sheen: Option<f32>,
+    /// `Pc`, strength of the coat, 0 or more: some programs write four times the share.
+    pub clearcoat: Option<f32>,
+    /// `Pcr`, 0..1.
+    pub clearcoat_roughness: Option<f32>,
+    /// `aniso`, 0..1.
+    pub anisotropy: Option<f32>,
+    /// `anisor`, turns.
+    pub anisotropy_rotation: Option<f32>,
+    /// `map_Pr`, resolved against the folder of the MTL file.
+    pub roughness_texture: Option<PathBuf>,
+    /// `map_Pm`, resolved likewise.
+    pub metallic_texture: Option<PathBuf>,
+    /// `norm`, or `map_Bump` in its place, resolved likewise.
+    pub normal_texture: Option<PathBuf>,
+    /// `-bm` of that map.
+    pub normal_scale: Option<f32>,
 }
 
 /// Reads one library; what cannot be used becomes a warning, and every other line still counts.
@@ -80,7 +111,14 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
             },
             "Ns" | "Ni" | "d" | "Tr" => numbers().first().map(|number| format!("{keyword} {number}")),
             "illum" => value.split_whitespace().next().and_then(|v| v.parse::<u8>().ok()).map(|v| format!("illum {v}")),
-            "map_Kd" | "map_Ke" => (!value.is_empty()).then(|| line.to_owned()),
+            "Pr" | "Pm" | "Ps" | "Pc" | "Pcr" | "aniso" | "anisor" => {
+                numbers().first().map(|number| format!("{keyword} {number}"))
+            }
+            "map_Kd" | "map_Ke" | "map_d" | "map_Pr" | "map_Pm" | "norm" | "map_Bump" | "map_bump" | "bump" => {
+                let keyword =
+                    if keyword.eq_ignore_ascii_case("map_bump") || keyword == "bump" { "map_Bump" } else { keyword };
+                (!value.is_empty()).then(|| format!("{keyword} {value}"))
+            }
             _ => continue,
         };
         match rewritten {
@@ -117,6 +155,38 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
         }
         range.contains(&value).then_some(value)
     };
+    let stated = |keyword: &str| material.unknown_param.get(keyword).map(String::as_str);
+    let path = |keyword: &str| {
+        // tobj knows some maps by itself.
+        let known = match keyword {
+            "map_d" => material.dissolve_texture.as_deref(),
+            "map_Bump" | "norm" => material.normal_texture.as_deref().filter(|_| keyword == "map_Bump"),
+            _ => None,
+        };
+        stated(keyword).or(known).and_then(|value| texture_path(value, folder))
+    };
+    let mut share =
+        |keyword: &str, most: f32| number(keyword, stated(keyword).and_then(|value| value.parse().ok()), 0.0..=most);
+    let pbr = PbrMaterial {
+        roughness: share("Pr", 1.0),
+        metallic: share("Pm", 1.0),
+        sheen: share("Ps", 1.0),
+        clearcoat: share("Pc", 1e3),
+        clearcoat_roughness: share("Pcr", 1.0),
+        anisotropy: share("aniso", 1.0),
+        anisotropy_rotation: share("anisor", 1e3),
+        roughness_texture: path("map_Pr"),
+        metallic_texture: path("map_Pm"),
+        normal_texture: path("norm"),
+        normal_scale: None,
+    };
+    // Bump maps are heights, but programs that write this extension write normals there.
+    let pbr = (pbr != PbrMaterial::default()).then(|| PbrMaterial {
+        normal_scale: stated("map_Bump").or(material.normal_texture.as_deref()).and_then(bump_scale),
+        normal_texture: pbr.normal_texture.clone().or_else(|| path("map_Bump")),
+        ..pbr
+    });
+    let opacity_texture = path("map_d");
     let transparency = material.unknown_param.get("Tr").and_then(|v| v.parse::<f32>().ok());
     ImportedMaterial {
         name: name.clone(),
@@ -130,7 +200,15 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
         illumination_model: material.illumination_model,
         diffuse_texture: material.diffuse_texture.as_deref().and_then(|value| texture_path(value, folder)),
         emission_texture: material.unknown_param.get("map_Ke").and_then(|value| texture_path(value, folder)),
+        opacity_texture,
+        pbr,
     }
+}
+
+/// What stands after `-bm` in the options of a map.
+fn bump_scale(value: &str) -> Option<f32> {
+    let mut words = value.split_whitespace().skip_while(|word| *word != "-bm").skip(1);
+    words.next()?.parse().ok().filter(|scale: &f32| scale.is_finite())
 }
 
 /// The file name after the options of a `map_` line; `\` in it counts as `/`.
@@ -197,9 +275,38 @@ mod tests {
             illumination_model: Some(7),
             diffuse_texture: Some(folder.join("tex/my wood.png")),
             emission_texture: Some(folder.join("glow.png")),
+            ..ImportedMaterial::default()
         };
         assert_eq!(materials[0], expected);
         assert_eq!(materials[1], ImportedMaterial { name: "b".into(), opacity: Some(0.5), ..Default::default() });
+    }
+
+    #[test]
+    fn the_pbr_extension_is_read_with_folders_of_any_name() {
+        let (materials, warnings) = parse(
+            "newmtl a\nPr 0.25\nPm 1\nPs 0.5\nPc 4.0\nPcr 0.03\naniso 0.7\nanisor 0.1\nmap_Pr größe 纹理/rauh.png\n\
+             map_Pm m.png\nmap_d d.png\nmap_Bump -bm 0.5 my normals.png\nnewmtl b\nPr 0.5\nnorm n.png\nmap_Bump h.png\n\
+             newmtl c\nKd 1 1 1\nmap_Bump h.png\nnewmtl d\nPr 7\n",
+        );
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        let folder = std::env::temp_dir();
+        let expected = PbrMaterial {
+            roughness: Some(0.25),
+            metallic: Some(1.0),
+            sheen: Some(0.5),
+            clearcoat: Some(4.0),
+            clearcoat_roughness: Some(0.03),
+            anisotropy: Some(0.7),
+            anisotropy_rotation: Some(0.1),
+            roughness_texture: Some(folder.join("größe 纹理/rauh.png")),
+            metallic_texture: Some(folder.join("m.png")),
+            normal_texture: Some(folder.join("my normals.png")),
+            normal_scale: Some(0.5),
+        };
+        assert_eq!(materials[0].pbr, Some(expected));
+        assert_eq!(materials[0].opacity_texture, Some(folder.join("d.png")));
+        assert_eq!(materials[1].pbr.as_ref().unwrap().normal_texture, Some(folder.join("n.png")));
+        assert_eq!((&materials[2].pbr, &materials[3].pbr), (&None, &None), "heights alone, and nothing usable");
     }
 
     #[test]

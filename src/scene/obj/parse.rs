@@ -1,9 +1,10 @@
 //! The lines of an OBJ file as numbers, in `f64`, each checked where its line is still known.
 
 use super::error::LineProblem;
+use super::lines::{first_word, line_ends, lines, pieces, rest, rest_bytes, text_of, words};
 use crate::scene::relative::bytes_to_text;
 use glam::{DVec2, DVec3};
-use std::borrow::Cow;
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// What a file says.
@@ -33,39 +34,38 @@ pub(super) type Corner = [u32; 3];
 pub(super) type Located = (usize, LineProblem);
 
 /// Reads all lines. Those of an unknown kind are passed over, and so are numbers beyond those that count.
+///
+/// Pieces of a long file are read side by side; what comes of them is the same as of one piece.
 pub(super) fn parse(bytes: &[u8]) -> Result<ParsedObj, Located> {
-    let mut parsed = ParsedObj::default();
-    let mut furthest = [(0_i64, 0_usize); 3];
-    // The name that faces now belong to, and its number once a face has used it.
-    let (mut name, mut material) = (String::new(), None);
-    let mut known: HashMap<String, u32> = HashMap::new();
-    for (number, line) in lines(bytes) {
-        let located = |problem| (number, problem);
-        match first_word(&line) {
-            b"v" => parsed.positions.push(DVec3::from_array(numbers(&line).map_err(located)?)),
-            b"vn" => parsed.normals.push(DVec3::from_array(numbers(&line).map_err(located)?)),
-            b"vt" => parsed.uvs.push(texture_coordinate(&line).map_err(located)?),
-            b"f" => {
-                let largest = parsed.push_face(&line).map_err(located)?;
-                for (furthest, index) in furthest.iter_mut().zip(largest) {
-                    if index > furthest.0 {
-                        *furthest = (index, number);
-                    }
-                }
-                let current = *material.get_or_insert_with(|| {
-                    *known.entry(name.clone()).or_insert_with(|| {
-                        parsed.materials.push(name.clone());
-                        parsed.materials.len() as u32 - 1
-                    })
-                });
-                parsed.face_materials.push(current);
-            }
-            b"l" | b"p" => parsed.lines_and_points += 1,
-            b"usemtl" => (name, material) = (rest(&line), None),
-            b"mtllib" => parsed.libraries.push(bytes_to_text(rest_bytes(&line))),
-            _ => {}
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    parse_in(bytes, (bytes.len() / LEAST_PIECE).clamp(1, 8 * rayon::current_num_threads()))
+}
+
+/// Bytes; less is not worth a thread.
+const LEAST_PIECE: usize = 1 << 18;
+
+fn parse_in(bytes: &[u8], n_pieces: usize) -> Result<ParsedObj, Located> {
+    let pieces = pieces(bytes, n_pieces);
+    // What stands before each piece: faces may count back from it.
+    let mut starts = vec![Start::default()];
+    if pieces.len() > 1 {
+        let sizes: Vec<Start> = pieces.par_iter().map(|piece| Start::of(piece)).collect();
+        for size in sizes {
+            starts.push(starts[starts.len() - 1].and(size));
         }
     }
+    let read: Vec<Result<Piece, Located>> =
+        pieces.par_iter().zip(&starts).map(|(piece, start)| Piece::read(piece, *start)).collect();
+    let read = read.into_iter().collect::<Result<Vec<Piece>, Located>>()?;
+    let mut furthest = [(0_i64, 0_usize); 3];
+    for piece in &read {
+        for (furthest, of_piece) in furthest.iter_mut().zip(piece.furthest) {
+            if of_piece.0 > furthest.0 {
+                *furthest = of_piece;
+            }
+        }
+    }
+    let parsed = joined(read);
     // A positive index may point forwards, so only now is it known whether it points at anything.
     let counts = parsed.counts();
     for (kind, (index, number)) in furthest.into_iter().enumerate() {
@@ -76,6 +76,126 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ParsedObj, Located> {
     Ok(parsed)
 }
 
+/// What a file has before some place.
+#[derive(Clone, Copy, Default)]
+struct Start {
+    /// Line ends.
+    lines: usize,
+    /// Positions, texture coordinates, normals.
+    counts: [usize; 3],
+}
+
+impl Start {
+    /// What a piece has, if all of it can be read.
+    fn of(piece: &[u8]) -> Self {
+        let mut start = Self { lines: line_ends(piece), ..Self::default() };
+        for (_, line) in lines(piece) {
+            match first_word(&line) {
+                b"v" => start.counts[0] += 1,
+                b"vt" => start.counts[1] += 1,
+                b"vn" => start.counts[2] += 1,
+                _ => {}
+            }
+        }
+        start
+    }
+
+    fn and(self, other: Self) -> Self {
+        let counts = std::array::from_fn(|k| self.counts[k] + other.counts[k]);
+        Self { lines: self.lines + other.lines, counts }
+    }
+}
+
+/// What one piece of a file says.
+#[derive(Default)]
+struct Piece {
+    parsed: ParsedObj,
+    before: [usize; 3],
+    /// Where `usemtl` stands: behind how many faces, and the name.
+    materials: Vec<(usize, String)>,
+    /// The largest index of each kind, and its line.
+    furthest: [(i64, usize); 3],
+}
+
+impl Piece {
+    fn read(bytes: &[u8], start: Start) -> Result<Self, Located> {
+        let mut piece = Self { before: start.counts, ..Self::default() };
+        for (number, line) in lines(bytes) {
+            let number = start.lines + number;
+            piece.read_line(number, &line).map_err(|problem| (number, problem))?;
+        }
+        Ok(piece)
+    }
+
+    fn read_line(&mut self, number: usize, line: &[u8]) -> Result<(), LineProblem> {
+        let parsed = &mut self.parsed;
+        match first_word(line) {
+            b"v" => parsed.positions.push(DVec3::from_array(numbers(line)?)),
+            b"vn" => parsed.normals.push(DVec3::from_array(numbers(line)?)),
+            b"vt" => parsed.uvs.push(texture_coordinate(line)?),
+            b"f" => {
+                let counts = parsed.counts();
+                let largest = parsed.push_face(line, std::array::from_fn(|k| self.before[k] + counts[k]))?;
+                for (furthest, index) in self.furthest.iter_mut().zip(largest) {
+                    if index > furthest.0 {
+                        *furthest = (index, number);
+                    }
+                }
+            }
+            b"l" | b"p" => parsed.lines_and_points += 1,
+            b"usemtl" => self.materials.push((parsed.arities.len(), rest(line))),
+            b"mtllib" => parsed.libraries.push(bytes_to_text(rest_bytes(line))),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// One after the other.
+fn joined(pieces: Vec<Piece>) -> ParsedObj {
+    let mut all = ParsedObj::default();
+    let total = |len: fn(&ParsedObj) -> usize| pieces.iter().map(|piece| len(&piece.parsed)).sum::<usize>();
+    all.positions.reserve_exact(total(|p| p.positions.len()));
+    all.uvs.reserve_exact(total(|p| p.uvs.len()));
+    all.normals.reserve_exact(total(|p| p.normals.len()));
+    all.corners.reserve_exact(total(|p| p.corners.len()));
+    all.arities.reserve_exact(total(|p| p.arities.len()));
+    all.face_materials.reserve_exact(total(|p| p.arities.len()));
+    // The name that faces now belong to, and its number once a face has used it.
+    let (mut name, mut material) = (String::new(), None);
+    let mut known: HashMap<String, u32> = HashMap::new();
+    for Piece { parsed, materials, .. } in pieces {
+        let mut from = 0;
+        let ends = materials.iter().map(|(face, _)| *face).skip(1).chain([parsed.arities.len()]);
+        let first = materials.first().map_or(parsed.arities.len(), |(face, _)| *face);
+        let mut add = |name: &String, material: &mut Option<u32>, to: usize| {
+            if to > from {
+                let number = *material.get_or_insert_with(|| {
+                    *known.entry(name.clone()).or_insert_with(|| {
+                        all.materials.push(name.clone());
+                        all.materials.len() as u32 - 1
+                    })
+                });
+                all.face_materials.resize(all.face_materials.len() + (to - from), number);
+                from = to;
+            }
+        };
+        add(&name, &mut material, first);
+        for ((_, next), end) in materials.iter().zip(ends) {
+            (name, material) = (next.clone(), None);
+            add(&name, &mut material, end);
+        }
+        all.positions.extend(parsed.positions);
+        all.uvs.extend(parsed.uvs);
+        all.normals.extend(parsed.normals);
+        all.corners.extend(parsed.corners);
+        all.arities.extend(parsed.arities);
+        all.libraries.extend(parsed.libraries);
+        all.lines_and_points += parsed.lines_and_points;
+    }
+    all
+}
+
 const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 impl ParsedObj {
@@ -84,8 +204,9 @@ impl ParsedObj {
     }
 
     /// Adds a face; returns the largest index of each kind.
-    fn push_face(&mut self, line: &[u8]) -> Result<[i64; 3], LineProblem> {
-        let counts = self.counts();
+    ///
+    /// - `counts`: what the file has so far.
+    fn push_face(&mut self, line: &[u8], counts: [usize; 3]) -> Result<[i64; 3], LineProblem> {
         let (mut largest, mut n_corners) = ([0; 3], 0);
         for word in words(line).skip(1).take_while(|word| word[0] != b'#') {
             let indices = parse_corner(word, counts)?;
@@ -170,62 +291,6 @@ fn finite(word: &[u8]) -> Result<f64, LineProblem> {
     number.ok_or_else(|| LineProblem::NotFinite { text: text_of(word).into_owned() })
 }
 
-/// Logical lines with the number (from 1) of their first physical line: `\` at an end joins the next line on, and
-/// all three kinds of line ends are known.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)> {
-    let mut left = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut number = 0;
-    let mut physical = move || -> Option<(usize, &[u8])> {
-        if left.is_empty() {
-            return None;
-        }
-        number += 1;
-        let end = left.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(left.len());
-        let (line, after) = left.split_at(end);
-        left = after.strip_prefix(b"\r\n").or_else(|| after.get(1..)).unwrap_or_default();
-        Some((number, line))
-    };
-    std::iter::from_fn(move || {
-        let (number, line) = physical()?;
-        let Some(start) = line.strip_suffix(b"\\") else { return Some((number, Cow::Borrowed(line))) };
-        let mut joined = start.to_vec();
-        while let Some((_, next)) = physical() {
-            joined.push(b' ');
-            match next.strip_suffix(b"\\") {
-                Some(more) => joined.extend(more),
-                None => {
-                    joined.extend(next);
-                    break;
-                }
-            }
-        }
-        Some((number, Cow::Owned(joined)))
-    })
-}
-
-fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
-}
-
-fn first_word(line: &[u8]) -> &[u8] {
-    words(line).next().unwrap_or_default()
-}
-
-/// What follows the first word, without the white space around it.
-fn rest(line: &[u8]) -> String {
-    text_of(rest_bytes(line)).into_owned()
-}
-
-fn rest_bytes(line: &[u8]) -> &[u8] {
-    let line = line.trim_ascii_start();
-    let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
-    line[end..].trim_ascii()
-}
-
-fn text_of(bytes: &[u8]) -> Cow<'_, str> {
-    String::from_utf8_lossy(bytes)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,5 +350,29 @@ mod tests {
         assert_eq!(parsed.materials, ["", "Mat #1", "\u{fffd}"]);
         assert_eq!(parsed.face_materials, [0, 1, 2, 1]);
         assert_eq!(parsed.lines_and_points, 1);
+    }
+
+    /// Whatever a file says, pieces of it say the same, and the first problem is that of the whole.
+    #[test]
+    fn pieces_say_what_the_whole_says() {
+        let mut text = String::from("mtllib a.mtl\n");
+        for k in 0..60 {
+            text += &format!("v {k} 0 1.5\nvt 0.{k} 1\nvn 0 0 1\n");
+            match k % 7 {
+                3 => text += &format!("usemtl m{}\n", k % 4),
+                5 => text += "f -1/-1/-1 -2//-2 \\\n -3/-3\n",
+                6 => text += "f 1 2 3 4\r\nl 1 2\n",
+                _ => {}
+            }
+        }
+        let whole = parse_in(text.as_bytes(), 1).unwrap();
+        assert!(whole.materials.len() > 3 && whole.corners.len() > 40);
+        let broken = text.clone() + "f 1 2\nf 0 0 0\n";
+        for n in 2..40 {
+            assert_eq!(format!("{:?}", parse_in(text.as_bytes(), n).unwrap()), format!("{whole:?}"), "{n} pieces");
+            assert_eq!(parse_in(broken.as_bytes(), n).unwrap_err(), parse_in(broken.as_bytes(), 1).unwrap_err());
+            let far = text.replacen("f 1 2 3 4", "f 1 2 3 9999", 1);
+            assert_eq!(parse_in(far.as_bytes(), n).unwrap_err(), parse_in(far.as_bytes(), 1).unwrap_err());
+        }
     }
 }

@@ -126,6 +126,16 @@ impl Scale {
             Property::Shininess => ("shininess", "Phong exponent", 1.0..=10_000.0),
             Property::Transparency => ("transparency", "transmittance", 0.0..=1.0),
             Property::Weight => ("weight", "0: only the first, 1: only the second", 0.0..=1.0),
+            Property::Metallic => ("metallic", "0: dielectric, 1: metal", 0.0..=1.0),
+            Property::Roughness => ("roughness", "0: mirror, 1: rough", 0.0..=1.0),
+            Property::Transmission => ("transmission", "0: opaque, 1: glass", 0.0..=1.0),
+            Property::Anisotropy => ("anisotropy", "how much wider highlights are in one direction", 0.0..=1.0),
+            Property::AnisotropyRotation => ("anisotropy angle", "degrees from the tangent", -180.0..=180.0),
+            Property::SheenRoughness => ("sheen roughness", "0: sharp at the rim, 1: wide", 0.0..=1.0),
+            Property::Clearcoat => ("clearcoat", "strength of the coat", 0.0..=1.0),
+            Property::ClearcoatRoughness => ("coat roughness", "0: mirror, 1: rough", 0.0..=1.0),
+            Property::Opacity => ("opacity", "share of the surface that is there", 0.0..=1.0),
+            Property::NormalScale => ("normal scale", "strength of the normal map", -2.0..=2.0),
             _ => return None,
         };
         Some(Self { name, hint, property, range })
@@ -145,6 +155,16 @@ impl Scale {
     }
 }
 
+/// What is on or off: its property, its label and its meaning.
+fn switch(name: &str) -> Option<(Property, &'static str, &'static str)> {
+    let property = Property::of_param(name)?;
+    Some(match property {
+        Property::ThinWalled => (property, "thin walled", "light passes straight, as through a pane"),
+        Property::TwoSided => (property, "two-sided", "off: the back is not there"),
+        _ => return None,
+    })
+}
+
 fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, asked: &mut Asked) {
     if let Material::Blend { a, b, .. } = material {
         let name = |part: &Entity| inventory.material(*part).map_or("?", |entry| entry.label.as_str());
@@ -156,6 +176,7 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
     for (name, param) in material.params() {
         let value = match param {
             Param::Share(ScalarParam::Number(value))
+            | Param::Number(value)
             | Param::ConstantShare(value)
             | Param::Ior(value)
             | Param::Exponent(value) => *value,
@@ -163,6 +184,27 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
                 row_with_hint(ui, "absorption", "red, green and blue, per metre (Beer–Lambert)", |ui| {
                     if let Some(value) = vector(ui, absorption.as_dvec3(), 0.02) {
                         asked.edit(Edit::Set { id, property: Property::Absorption, value });
+                    }
+                });
+                continue;
+            }
+            Param::Flag(flag) => {
+                let Some((property, label, hint)) = switch(name) else { continue };
+                row(ui, label, |ui| {
+                    let mut on = *flag;
+                    if ui.checkbox(&mut on, "").on_hover_text(hint).changed() {
+                        let value = DVec3::splat(f64::from(u8::from(on)));
+                        asked.edit(Edit::Set { id, property, value });
+                    }
+                });
+                continue;
+            }
+            Param::Reflectance(ColorParam::Rgb(rgb)) | Param::Radiance(ColorParam::Rgb(rgb)) => {
+                let property = Property::of_param(name);
+                let (Some(property), false) = (property, property == Some(Property::Color)) else { continue };
+                row(ui, &name.replace('_', " "), |ui| {
+                    if let Some(value) = color(ui, *rgb, property == Property::Emission) {
+                        asked.edit(Edit::Set { id, property, value });
                     }
                 });
                 continue;

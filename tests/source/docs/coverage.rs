@@ -5,11 +5,12 @@ use super::page::{expect_none, files, read};
 use std::collections::BTreeSet;
 
 /// The types that a scene file is read into; of the files without a list, all.
-const GRAMMAR: [(&str, &[&str]); 7] = [
+const GRAMMAR: [(&str, &[&str]); 8] = [
     ("src/scene/file/parts.rs", &[]),
     ("src/scene/sources.rs", &[]),
     ("crates/render/src/core/material.rs", &["Material", "Fresnel"]),
-    ("crates/render/src/core/texture.rs", &["Wrap"]),
+    ("crates/render/src/core/texture.rs", &["Wrap", "Channel"]),
+    ("crates/render/src/core/image_texture.rs", &["Encoding"]),
     ("crates/render/src/core/filter.rs", &["PixelFilter"]),
     ("crates/render/src/core/settings.rs", &["Integrator"]),
     ("crates/render/src/film/develop/curve.rs", &["ToneCurve"]),
@@ -58,8 +59,9 @@ fn snake_case(name: &str) -> String {
 
 #[test]
 fn every_word_of_the_scene_file_is_described() {
-    let book: String =
-        ["scene-file", "scene-materials", "scene-objects"].map(|name| read(&format!("docs/{name}.md")).text).concat();
+    let book: String = ["scene-file", "scene-textures", "scene-materials", "scene-principled", "scene-objects"]
+        .map(|name| read(&format!("docs/{name}.md")).text)
+        .concat();
     let words = grammar_words();
     assert!(words.len() > 80 && words.contains("pivot_distance") && words.contains("ball_grid"), "{words:?}");
     // In code, alone or with its value: `name`, `name(…)`.

@@ -9,8 +9,7 @@ use super::material_defaults::{
     along_tangent, black, dull, flat, glass_ior, half, is_along_tangent, is_black, is_default, is_flat, is_half,
     is_one, is_one_number, is_white, is_yes, is_zero, light_grey, one, one_scalar, white, yes, zero,
 };
-pub use super::material_kind::{MaterialKind, Param, ParamMut, ParamRef};
-pub use super::material_queries::Emission;
+use super::material_kind::{MaterialKind, Param};
 use crate::core::texture::TextureId;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -260,6 +259,28 @@ pub enum Material<P: Params = InSnapshot> {
     },
 }
 
+/// To be read.
+pub type ParamRef<'a, P> = Param<
+    &'a <P as Params>::Color,
+    &'a <P as Params>::Scalar,
+    &'a f32,
+    &'a bool,
+    &'a Option<f32>,
+    &'a <P as Params>::Rgb,
+    &'a <P as Params>::Material,
+>;
+
+/// To be changed.
+pub type ParamMut<'a, P> = Param<
+    &'a mut <P as Params>::Color,
+    &'a mut <P as Params>::Scalar,
+    &'a mut f32,
+    &'a mut bool,
+    &'a mut Option<f32>,
+    &'a mut <P as Params>::Rgb,
+    &'a mut <P as Params>::Material,
+>;
+
 /// Names as in a scene file; of a reference to a material, or of a mutable one.
 macro_rules! params_of {
     ($material:expr) => {
@@ -483,6 +504,7 @@ impl<P: Params> Material<P> {
     pub fn n_lobes(&self) -> usize {
         match self {
             Self::Phong { .. } => 3,
+            Self::Principled { .. } => 2,
             _ => 1,
         }
     }

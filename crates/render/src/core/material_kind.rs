@@ -1,6 +1,5 @@
 //! The kinds of materials, and what their parameters may be.
 
-use super::material::Params;
 use serde::{Deserialize, Serialize};
 
 /// The kinds of [`Material`].
@@ -87,25 +86,3 @@ pub enum Param<Color, Scalar, Number, Flag, Cutoff, Rgb, Part> {
     /// Another material, of which a blend consists.
     Part(Part),
 }
-
-/// To be read.
-pub type ParamRef<'a, P> = Param<
-    &'a <P as Params>::Color,
-    &'a <P as Params>::Scalar,
-    &'a f32,
-    &'a bool,
-    &'a Option<f32>,
-    &'a <P as Params>::Rgb,
-    &'a <P as Params>::Material,
->;
-
-/// To be changed.
-pub type ParamMut<'a, P> = Param<
-    &'a mut <P as Params>::Color,
-    &'a mut <P as Params>::Scalar,
-    &'a mut f32,
-    &'a mut bool,
-    &'a mut Option<f32>,
-    &'a mut <P as Params>::Rgb,
-    &'a mut <P as Params>::Material,
->;

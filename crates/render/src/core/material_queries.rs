@@ -1,6 +1,7 @@
 //! What the renderer asks of the materials of a snapshot: what lets light through, what is specular, what shines.
 
-use super::material::{ColorInput, Material, MaterialId, Param, SMALLEST_ALPHA, ScalarInput};
+use super::material::{ColorInput, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use super::material_kind::Param;
 use crate::core::texture::{Texture, TextureId};
 use glam::Vec3;
 
@@ -54,6 +55,48 @@ impl Material {
         }
     }
 
+    /// Whether rays may pass its surfaces as if they were not there.
+    pub(crate) fn is_cutout(&self) -> bool {
+        match self {
+            Self::Principled { two_sided, opacity, opacity_cutoff, .. } => {
+                let is_whole = match opacity {
+                    ScalarInput::Constant(opacity) => *opacity >= opacity_cutoff.unwrap_or(1.0),
+                    ScalarInput::Texture(_) => false,
+                };
+                !is_whole || (!two_sided && !self.is_clear())
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether it spreads light that passes, and so asks for light on both sides.
+    pub(crate) fn scatters_through(&self) -> bool {
+        match self {
+            Self::RoughGlass { .. } => true,
+            Self::Principled { transmission, .. } => can_be_above_zero(transmission),
+            _ => false,
+        }
+    }
+
+    /// Whether light that passes it takes one of several ways, so that only sampling finds it.
+    pub(crate) fn is_blended(&self) -> bool {
+        matches!(self, Self::Blend { .. } | Self::Principled { .. })
+    }
+
+    /// Whether it looks up normals or turns its highlights, and so asks for tangents.
+    pub(crate) fn asks_for_tangents(&self) -> bool {
+        let Self::Principled { normal_map, clearcoat_normal_map, anisotropy, .. } = self else { return false };
+        normal_map.is_normal_map() || clearcoat_normal_map.is_normal_map() || can_be_above_zero(anisotropy)
+    }
+
+    /// The same of it or of a part of it.
+    pub(crate) fn has_tangents(&self, materials: &[Self]) -> bool {
+        match self {
+            Self::Blend { a, b, .. } => [a, b].into_iter().any(|&id| materials[id as usize].has_tangents(materials)),
+            _ => self.asks_for_tangents(),
+        }
+    }
+
     /// Whether it, or a part of it, looks up a texture.
     pub(crate) fn is_textured(&self, materials: &[Self]) -> bool {
         self.any_texture(materials, &mut |_| true)
@@ -77,6 +120,13 @@ impl Material {
     }
 }
 
+impl ColorInput {
+    /// Whether normals of this map differ from those of the surface.
+    pub(crate) fn is_normal_map(&self) -> bool {
+        !matches!(self, Self::Constant(color) if *color == Vec3::new(0.5, 0.5, 1.0))
+    }
+}
+
 /// Whether a parameter is more than 0 somewhere, as far as one can tell without looking it up.
 fn can_be_above_zero(scalar: &ScalarInput) -> bool {
     !matches!(scalar, ScalarInput::Constant(value) if *value <= 0.0)
@@ -91,18 +141,32 @@ pub struct Emission {
     pub scale: f32,
     /// Whether the back shines as well.
     pub two_sided: bool,
+    /// Share of the surface that is there, and from which share on it is there as a whole.
+    pub opacity: (ScalarInput, Option<f32>),
 }
 
 impl Emission {
+    const WHOLE: (ScalarInput, Option<f32>) = (ScalarInput::Constant(1.0), None);
+
+    /// Of a front that shines alike everywhere, W·m⁻²·sr⁻¹.
+    pub(crate) fn even(radiance: Vec3) -> Self {
+        Self { radiance: ColorInput::Constant(radiance), scale: 1.0, two_sided: false, opacity: Self::WHOLE }
+    }
+
     /// The emission of a material, looked for in blends; `None` for one that does not shine.
     pub fn of(materials: &[Material], id: MaterialId) -> Option<Self> {
         match &materials[id as usize] {
             Material::Emissive { radiance: ColorInput::Constant(Vec3::ZERO) } => None,
-            Material::Emissive { radiance } => Some(Self { radiance: *radiance, scale: 1.0, two_sided: false }),
-            Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. } => None,
-            Material::Principled { emission, two_sided, .. } => {
-                Some(Self { radiance: *emission, scale: 1.0, two_sided: *two_sided })
+            Material::Emissive { radiance } => {
+                Some(Self { radiance: *radiance, scale: 1.0, two_sided: false, opacity: Self::WHOLE })
             }
+            Material::Principled { emission: ColorInput::Constant(Vec3::ZERO), .. } => None,
+            Material::Principled { emission, two_sided, opacity, opacity_cutoff, .. } => Some(Self {
+                radiance: *emission,
+                scale: 1.0,
+                two_sided: *two_sided,
+                opacity: (*opacity, *opacity_cutoff),
+            }),
             Material::Blend { weight: ScalarInput::Constant(weight), a, b } => {
                 let part = |id, share: f32| {
                     let emission = Self::of(materials, id)?;

@@ -98,6 +98,15 @@ impl From<Vec2> for TexturePoint {
     }
 }
 
+impl TexturePoint {
+    /// Between three corners: `first + x (second − first) + y (third − first)`.
+    pub(crate) fn between([a, b, c]: &[Self; 3], Vec2 { x, y }: Vec2) -> Self {
+        let w = 1.0 - x - y;
+        let uv = std::array::from_fn(|k| w * a.uv[k] + x * b.uv[k] + y * c.uv[k]);
+        Self { uv, color: w * a.color + x * b.color + y * c.color }
+    }
+}
+
 impl Texture {
     /// A pattern in surface coordinates as they are, with its colours as they are.
     pub fn new(pattern: TexturePattern) -> Self {

@@ -10,7 +10,7 @@ use crate::driver::renderer::mean_bounces;
 use crate::film::develop::encode_srgb;
 use crate::film::tiles::Film;
 use crate::prepare::prepared::Prepared;
-use crate::shading::surface::{Vertex, material_of};
+use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
 use glam::{UVec2, Vec2, Vec3};
@@ -226,7 +226,7 @@ fn hits_by_row<T: Send>(
             }
             rays.clear();
             (0..size.x).for_each(|x| rays.push(&middle_ray(snapshot, x, y, size)));
-            snapshot.geometry.tree.closest_hits(rays, RayClass::Coherent, hits);
+            snapshot.closest_hits(rays, RayClass::Coherent, hits);
             Some((0..rays.len()).map(|i| see(&rays.get(i), hits.get(i))).collect())
         })
         .collect();

@@ -20,7 +20,6 @@ use crate::integrators::simd::{emitters, misses, shade};
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
-use crate::shading::bsdf::Scatter;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension};
 use crate::shading::guided::Guided;
 use crate::shading::interface::MediumId;
@@ -28,7 +27,11 @@ use crate::shading::lights::{choose_light_point, emitter_weight, environment_lig
 use crate::shading::medium::MediumSets;
 use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch, ShadowBatch};
-use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at};
+use crate::shading::principled::at::principled_at;
+use crate::shading::scatter::Scatter;
+use crate::shading::sides::Sides;
+use crate::shading::surface::{blend_at, lobe_at};
+use crate::shading::vertex::Vertex;
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::Vec3;
@@ -100,7 +103,6 @@ impl PathWave {
         start(&mut self.paths);
         self.paths.begin_in(self.camera);
         let mut counts = RayCounts { camera: self.paths.len() as u64, ..RayCounts::default() };
-        let tree = &scene.geometry.tree;
         for depth in 1..=settings.max_depth {
             if self.paths.is_empty() {
                 break;
@@ -111,7 +113,7 @@ impl PathWave {
             self.depth = depth;
             // Camera rays run side by side, and so do the shadow rays of what they hit.
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
-            tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
             if let Some(record) = &mut self.record {
                 record.see_hits(&self.paths, &self.hits);
@@ -120,7 +122,7 @@ impl PathWave {
             if let Some(record) = &mut self.record {
                 record.see_shaded(&self.paths, radiance);
             }
-            self.shadows.settle(radiance, |rays, occluded| tree.any_hits(rays, class, occluded));
+            self.shadows.settle(radiance, |rays, occluded| scene.any_hits(rays, class, occluded));
             if let Some(record) = &mut self.record {
                 record.see_settled(scene, &self.shadows, radiance);
             }
@@ -229,10 +231,10 @@ impl PathWave {
         let material = self.sorted.materials[i];
         let vertex = Vertex::new(scene, &ray, &hit, material);
         if let Some(emission) = scene.tables.emission[material as usize]
-            && vertex.front
+            && (vertex.front || emission.two_sided)
         {
             let with_light_paths = caustics.and_then(|pass| pass.camera_weight(&path.track, path.media, &hit, &vertex));
-            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, ray.dir));
+            let weight = with_light_paths.unwrap_or_else(|| emitter_weight(scene, techniques, &path, &hit, &vertex));
             radiance[path.slot as usize] += path.throughput * weight * vertex.emitted(scene, &emission);
         }
         if depth == settings.max_depth {
@@ -251,9 +253,12 @@ impl PathWave {
         };
         let mut sides = (scene.tables.features.glass)
             .then(|| Sides::new(scene, &mut self.sets, path.media, &ray, &hit, material, vertex.front));
-        if let Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. } =
-            &scene.shading.materials[material as usize]
-        {
+        let of_vertex = &scene.shading.materials[material as usize];
+        if let Material::Principled { .. } = of_vertex {
+            if let Some(layers) = principled_at(scene, material, &vertex, &mut sides.as_mut(), 0, true) {
+                self.scatter_told(step, &layers);
+            }
+        } else if let Material::Blend { .. } | Material::Phong { .. } = of_vertex {
             if let Some(blend) = blend_at(scene, material, &vertex, sides.as_mut()) {
                 self.scatter_told(step, &blend);
             }
@@ -341,7 +346,7 @@ impl PathWave {
                 wi: sample.wi,
                 pdf: sample.pdf,
                 through: sample.through,
-                blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+                blended: scene.shading.materials[material as usize].is_blended(),
                 before: step.path.media,
                 after: path.media,
             };

@@ -246,7 +246,8 @@ fn leaves_of(materials: &[Material], id: MaterialId) -> Vec<(f32, Vec3)> {
         material if !material.is_clear() => Vec::new(),
         Material::Glass { ior, absorption }
         | Material::RoughGlass { ior, absorption, .. }
-        | Material::Phong { ior, absorption, .. } => vec![(*ior, *absorption)],
+        | Material::Phong { ior, absorption, .. }
+        | Material::Principled { ior, absorption, .. } => vec![(*ior, *absorption)],
         _ => Vec::new(),
     }
 }

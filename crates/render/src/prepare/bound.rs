@@ -6,7 +6,8 @@
 
 use crate::core::color::luminance;
 use crate::core::environment::Environment;
-use crate::core::material::{ColorInput, Emission, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material_queries::Emission;
 use glam::Vec3;
 
 /// Largest channel of any sample, outside of all glass, before roulette of endless paths; `None` where there is no bound.

@@ -143,7 +143,9 @@ fn kind_of(touched: &ContactScene, hit: &Hit) -> ContactKind {
     match &touched.materials[touched.geometry.material_of(hit) as usize] {
         Material::Glass { .. } => ContactKind::Glass,
         Material::RoughGlass { .. } => ContactKind::RoughGlass,
-        Material::Blend { .. } | Material::Phong { .. } if touched.bodies.is_transparent(hit.object) => {
+        Material::Blend { .. } | Material::Phong { .. } | Material::Principled { .. }
+            if touched.bodies.is_transparent(hit.object) =>
+        {
             ContactKind::PartlyClear
         }
         _ => ContactKind::Opaque,

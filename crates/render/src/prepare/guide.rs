@@ -277,8 +277,9 @@ fn exit_pdf<R: Real>(way: Vector3<R>, radius2: R, wi: Vector3<R>) -> R {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
-    use crate::shading::bsdf::{Lobe, Scatter};
+    use crate::shading::bsdf::Lobe;
     use crate::shading::guided::Guided;
+    use crate::shading::scatter::Scatter;
     use crate::test_statistics::ChiSquared;
     use firstlight_simd::{InstructionSet, dispatch};
 

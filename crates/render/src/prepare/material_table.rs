@@ -1,6 +1,7 @@
 //! What shading looks up by material, as arrays that sixteen lanes read at once.
 
-use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, MaterialKind, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material::{ColorInput, Fresnel, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
+use crate::core::material_kind::MaterialKind;
 use crate::core::snapshot::Geometry;
 use crate::core::texture::Texture;
 use crate::prepare::arrays::push;
@@ -108,7 +109,7 @@ impl MaterialTable {
             parts: table.parts.map(padded),
             weights: table.weights.map(padded),
             textured_emission: materials.iter().any(is_textured_emitter),
-            two_sided: materials.iter().any(|material| matches!(material, Material::RoughGlass { .. })),
+            two_sided: materials.iter().any(Material::scatters_through),
             of_object: padded(of_object),
         }
     }

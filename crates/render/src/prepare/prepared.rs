@@ -2,7 +2,8 @@
 
 use crate::core::camera::Camera;
 use crate::core::environment::{Environment, EnvironmentSampler};
-use crate::core::material::{Emission, Material};
+use crate::core::material::Material;
+use crate::core::material_queries::Emission;
 use crate::core::snapshot::{Geometry, Shading, Snapshot};
 use crate::prepare::ambient::AmbientLight;
 use crate::prepare::bodies::{Bodies, Boundary};
@@ -43,6 +44,10 @@ pub(crate) struct Tables {
     pub(crate) ambient: AmbientLight,
     /// Whether each material looks up a texture, and so needs surface coordinates.
     pub(crate) textured: Vec<bool>,
+    /// Whether surfaces of each material may not be there, see [`Material::is_cutout`].
+    pub(crate) cutouts: Vec<bool>,
+    /// Whether each material asks for tangents.
+    pub(crate) with_tangents: Vec<bool>,
     /// What each material adds itself.
     pub(crate) emission: Vec<Option<Emission>>,
     pub(crate) lights: LightTable,
@@ -71,6 +76,8 @@ pub struct Features {
     pub environment: bool,
     /// Some material looks up a texture.
     pub textures: bool,
+    /// Some surfaces have holes or no back.
+    pub cutouts: bool,
     /// Something specular gathers the light of some emitter, so paths are traced from lights as well.
     pub caustics: bool,
 }
@@ -172,10 +179,13 @@ impl Tables {
             environment: !matches!(environment, Environment::Black),
             textures: materials.iter().any(|material| material.is_textured(materials)),
             caustics: casters.is_some(),
+            cutouts: materials.iter().any(Material::is_cutout),
         };
         Self {
             ambient: AmbientLight::of(environment),
             textured: materials.iter().map(|material| material.is_textured(materials)).collect(),
+            cutouts: materials.iter().map(Material::is_cutout).collect(),
+            with_tangents: materials.iter().map(|material| material.has_tangents(materials)).collect(),
             radiance_bound: (delta_lights.is_empty())
                 .then(|| radiance_bound(environment, &emission, materials))
                 .flatten(),

@@ -1,17 +1,14 @@
-//! Scattering at a point: one lobe, or several blended by weight.
-//!
-//! [`Scatter::eval`] and [`Scatter::sample`] are one family. Directions are unit, in world space, leaving
-//! the surface; `normal` is the shading normal on the side of `wo`. Perfectly specular lobes have no `eval`: only
-//! sampling finds them.
+//! Scattering at a point by one lobe.
 
 use crate::core::color::luminance;
-use crate::core::material::{Fresnel, MAX_LOBES, SMALLEST_ALPHA};
+use crate::core::material::{Fresnel, SMALLEST_ALPHA};
 use crate::sampling::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
 use crate::shading::ggx;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::metal::{Metal, schlick};
 use crate::shading::rough_glass::{RoughGlass, RoughGlassSample};
+use crate::shading::scatter::{BsdfSample, Scatter};
 use firstlight_kdtree::geometry::Frame;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
@@ -45,128 +42,9 @@ impl Lobe {
     pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, squeeze: 1.0, beyond: MediumId::OUTSIDE });
 }
 
-/// What the integrator asks of a surface, be it one lobe or a blend.
-pub(crate) trait Scatter {
-    /// Whether light sampling can find anything: some lobe is not perfectly specular.
-    fn has_non_specular(&self) -> bool;
-
-    /// f · |cos| of all lobes that are not specular, and the density of sampling `wi` through one of them; zero for `wi`
-    /// behind `normal` but for what [`Self::through`] tells.
-    ///
-    /// Where light passes through, `wo` and `wi` may change sides: the surface is then seen from behind `normal`.
-    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
-
-    /// What light from behind `normal` passes through, where [`Self::eval`] knows of such light. In blends only sampling
-    /// finds it, as if it were specular: each part leads into a medium of its own.
-    fn through(&self) -> Option<Interface>;
-
-    /// - `u_lobe`: chooses the lobe, and between reflection and refraction; asked for only where there is a choice;
-    /// - `u`: the direction.
-    ///
-    /// `None` when the sample carries no light.
-    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample>;
-}
-
-/// Lobes with weights that sum to at most 1.
-#[derive(Clone, Debug)]
-pub(crate) struct Blend {
-    lobes: [WeightedLobe; MAX_LOBES],
-    n: usize,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct WeightedLobe {
-    lobe: Lobe,
-    weight: f32,
-    /// Of being sampled.
-    pmf: f32,
-}
-
-/// A sampled direction.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BsdfSample {
-    pub wi: Vec3,
-    /// f · |cos| / pdf.
-    pub weight: Vec3,
-    /// Per steradian; infinite for a perfectly specular lobe.
-    pub pdf: f32,
-    /// What was passed through, where `wi` lies beyond the surface.
-    pub through: Option<Interface>,
-}
-
-impl Blend {
-    /// From lobes and their weights; at most [`MAX_LOBES`], at least one.
-    pub fn new(parts: &[(Lobe, f32)]) -> Self {
-        let nothing = WeightedLobe { lobe: parts[0].0, weight: 0.0, pmf: 0.0 };
-        let mut blend = Self { lobes: [nothing; MAX_LOBES], n: parts.len() };
-        // Chosen by what they reflect; an even share where all is black.
-        let strength = |(lobe, weight): &(Lobe, f32)| weight * lobe.albedo_estimate();
-        let sum: f32 = parts.iter().map(strength).sum();
-        for (slot, part) in blend.lobes.iter_mut().zip(parts) {
-            let pmf = if sum > 0.0 { strength(part) / sum } else { 1.0 / parts.len() as f32 };
-            *slot = WeightedLobe { lobe: part.0, weight: part.1, pmf };
-        }
-        blend
-    }
-
-    fn lobes(&self) -> &[WeightedLobe] {
-        &self.lobes[..self.n]
-    }
-}
-
-impl Scatter for Blend {
-    fn has_non_specular(&self) -> bool {
-        self.lobes().iter().any(|l| l.lobe.has_non_specular())
-    }
-
-    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
-        let mut sum = (Vec3::ZERO, 0.0);
-        for l in self.lobes().iter().filter(|l| l.lobe.has_non_specular()) {
-            if l.lobe.through().is_some() && (normal.dot(wi) <= 0.0 || normal.dot(wo) <= 0.0) {
-                continue;
-            }
-            let (value, pdf) = l.lobe.eval(wo, wi, normal);
-            sum.0 += l.weight * value;
-            sum.1 += l.pmf * pdf;
-        }
-        sum
-    }
-
-    fn through(&self) -> Option<Interface> {
-        None
-    }
-
-    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
-        let mut rest = u_lobe();
-        let lobes = self.lobes();
-        let chosen = lobes
-            .iter()
-            .position(|l| {
-                let here = rest < l.pmf;
-                if !here {
-                    rest -= l.pmf;
-                }
-                here
-            })
-            .or_else(|| lobes.iter().rposition(|l| l.pmf > 0.0))?;
-        let l = &lobes[chosen];
-        let fresh = (rest / l.pmf).clamp(0.0, 1.0f32.next_down());
-        let mut sample = l.lobe.sample(wo, normal, || fresh, u)?;
-        if l.lobe.has_non_specular() && sample.through.is_none() {
-            // All lobes that are not specular could have found this direction: the one-sample estimate over their mixture.
-            let (value, pdf) = self.eval(wo, sample.wi, normal);
-            sample.weight = value / pdf;
-            sample.pdf = pdf;
-        } else {
-            sample.weight *= l.weight / l.pmf;
-            sample.pdf = f32::INFINITY;
-        }
-        Some(sample)
-    }
-}
-
 impl Lobe {
-    fn albedo_estimate(&self) -> f32 {
+    /// Share of light that it returns, about.
+    pub fn albedo_estimate(&self) -> f32 {
         match self {
             Self::Diffuse { albedo } => luminance(*albedo),
             Self::Mirror { reflectance } | Self::Metal { reflectance, .. } => luminance(*reflectance),
@@ -307,6 +185,7 @@ fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
+    use crate::shading::blend::{Blend, Part};
 
     fn metal(alpha: f32, compensate: bool) -> Lobe {
         Lobe::Metal { alpha, reflectance: Vec3::ONE, fresnel: Fresnel::Constant, compensate }
@@ -357,8 +236,9 @@ mod tests {
         let coat = [(Lobe::Diffuse { albedo: Vec3::new(0.8, 0.4, 0.1) }, 0.7), (metal(0.2, false), 0.3)];
         same_mean(0, &Lobe::Diffuse { albedo: Vec3::splat(0.6) });
         same_mean(1, &metal(0.4, false));
-        same_mean(2, &Blend::new(&coat));
-        same_mean(3, &Blend::new(&coat[..1]));
+        let coat = coat.map(|(lobe, weight)| (Part::Lobe(lobe), weight));
+        same_mean(2, &Blend::new(&coat, Vec::new()));
+        same_mean(3, &Blend::new(&coat[..1], Vec::new()));
     }
 
     fn same_mean(case: u32, bsdf: &impl Scatter) {

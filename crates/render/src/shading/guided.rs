@@ -1,8 +1,8 @@
 //! Surfaces whose directions are partly chosen by hints, one at a time.
 
 use crate::prepare::guide::{Hints, SHARE};
-use crate::shading::bsdf::{BsdfSample, Scatter};
 use crate::shading::interface::Interface;
+use crate::shading::scatter::{BsdfSample, Scatter};
 use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 

@@ -6,6 +6,7 @@ use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
 use crate::shading::dimensions::{DIM_LIGHT, DIM_LIGHT_POINT};
 use crate::shading::paths::Path;
+use crate::shading::vertex::Vertex;
 use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, select};
 use glam::Vec3;
@@ -64,14 +65,20 @@ pub(crate) fn environment_light(scene: &Prepared, techniques: &Techniques, path:
 
 /// The same for an emitter that a path hits.
 #[inline]
-pub(crate) fn emitter_weight(scene: &Prepared, techniques: &Techniques, path: &Path, hit: &Hit, dir: Vec3) -> f32 {
+pub(crate) fn emitter_weight(
+    scene: &Prepared,
+    techniques: &Techniques,
+    path: &Path,
+    hit: &Hit,
+    vertex: &Vertex,
+) -> f32 {
     let lights = &scene.tables.lights;
     if path.pdf.is_infinite() {
         return 1.0;
     }
-    match lights.light_of(hit.object, hit.prim) {
+    match lights.light_of(hit.object, hit.prim, vertex.front) {
         Some(id) => {
-            let pdf = lights.pdf(techniques, id, path.position, path.normal, dir, hit.t);
+            let pdf = lights.pdf(techniques, id, path.position, path.normal, -vertex.wo, hit.t);
             bounce_weight(techniques, path.pdf, (1.0 - environment_share(scene)) * pdf)
         }
         None => 1.0,

@@ -1,17 +1,26 @@
 //! What light does at a surface and between surfaces: one hit at a time here, sixteen in [`simd`].
 
+pub(crate) mod blend;
 pub(crate) mod bsdf;
+pub(crate) mod cutouts;
 pub(crate) mod dielectric;
 pub(crate) mod dimensions;
 pub(crate) mod ggx;
 pub(crate) mod glass_loss;
 pub(crate) mod guided;
 pub(crate) mod interface;
+pub(crate) mod layer_albedo;
 pub(crate) mod lights;
 pub(crate) mod medium;
 pub(crate) mod metal;
 pub(crate) mod mis_state;
 pub(crate) mod paths;
+pub(crate) mod principled;
 pub(crate) mod rough_glass;
+pub(crate) mod scatter;
+pub(crate) mod sheen;
+pub(crate) mod sides;
 pub(crate) mod simd;
 pub(crate) mod surface;
+pub(crate) mod tangent;
+pub(crate) mod vertex;

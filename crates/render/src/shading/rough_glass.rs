@@ -235,8 +235,9 @@ impl RoughGlass {
 mod tests {
     use super::*;
     use crate::sampling::Sampler;
-    use crate::shading::bsdf::{Lobe, Scatter};
+    use crate::shading::bsdf::Lobe;
     use crate::shading::interface::MediumId;
+    use crate::shading::scatter::Scatter;
     use crate::test_statistics::ChiSquared;
     use glam::DVec3;
     use proptest::prelude::*;

@@ -1,265 +1,15 @@
-//! From a hit to everything that shading needs to know of the place.
+//! How the material at a vertex scatters: one lobe, or a blend.
 
-use crate::core::material::{ColorInput, Emission, MAX_LOBES, Material, MaterialId, ScalarInput};
-use crate::core::texture::TexturePoint;
-use crate::prepare::bodies::Boundary;
-use crate::prepare::light::shape::sphere_uv;
+use crate::core::material::{MAX_LOBES, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
-use crate::shading::bsdf::{Blend, Lobe};
-use crate::shading::dielectric::reflect;
-use crate::shading::interface::{Interface, MediumId};
-use crate::shading::medium::MediumSets;
+use crate::shading::blend::{Blend, Part};
+use crate::shading::bsdf::Lobe;
+use crate::shading::principled::Principled;
+use crate::shading::principled::at::principled_at;
 use crate::shading::rough_glass;
-use firstlight_kdtree::geometry::{Frame, Ray, robust};
-use firstlight_kdtree::{Hit, Shape};
-use firstlight_simd::{Real, Vector3, three};
-use glam::{Vec2, Vec3, Vec4};
-use std::ops::{Add, Mul};
-
-/// A point on a surface, seen along a ray.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Vertex {
-    pub position: Vec3,
-    /// Bound on the absolute error of `position`, metres per axis.
-    pub error: Vec3,
-    /// Unit, on the side that the ray came from.
-    pub geometric_normal: Vec3,
-    /// Unit, and never facing away from the ray.
-    pub normal: Vec3,
-    /// The same whoever looks from this side, even where it faces away.
-    pub smooth_normal: Vec3,
-    /// What textures ask for; on spheres only for materials that look something up.
-    pub texture_point: TexturePoint,
-    /// Whether the ray met the front: the outside of a closed surface.
-    pub front: bool,
-    /// Unit, back along the ray.
-    pub wo: Vec3,
-    /// From `position` towards the smooth surface that the interpolated normals tell of, metres; zero where they agree
-    /// with the true surface or bend inwards.
-    pub lift: Vec3,
-}
-
-impl Vertex {
-    /// `material`: that of the hit, see [`material_of`].
-    #[inline]
-    pub fn new(scene: &Prepared, ray: &Ray, hit: &Hit, material: MaterialId) -> Self {
-        let geometry = &*scene.geometry;
-        let point = geometry.tree.surface_point(ray, hit);
-        let wo = -ray.dir;
-        let front = wo.dot(point.geometric_normal) >= 0.0;
-        let side = if front { 1.0 } else { -1.0 };
-        let geometric_normal = side * point.geometric_normal;
-        let mut smooth_normal = geometric_normal;
-        let mut uv = Vec2::new(hit.u, hit.v);
-        let mut uv2 = None;
-        let mut color = Vec4::ONE;
-        let mut lift = Vec3::ZERO;
-        match &geometry.tree.shapes()[hit.object as usize] {
-            Shape::Mesh { world_from_object, .. } => {
-                let mesh = geometry.objects[hit.object as usize].mesh.as_ref().expect("a mesh shape has a mesh");
-                let [a, b, c] = mesh.triangles[hit.prim as usize].map(|i| i as usize);
-                let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-                if !mesh.normals.is_empty() {
-                    let object =
-                        weights.x * mesh.normals[a] + weights.y * mesh.normals[b] + weights.z * mesh.normals[c];
-                    // Normals move with the inverse transpose: the cofactors, without the division.
-                    let m = world_from_object.matrix3;
-                    let (x, y, z) = (Vec3::from(m.x_axis), Vec3::from(m.y_axis), Vec3::from(m.z_axis));
-                    let cofactors = object.x * y.cross(z) + object.y * z.cross(x) + object.z * x.cross(y);
-                    let mirrored = x.dot(y.cross(z)) < 0.0;
-                    let smooth = if mirrored { -cofactors } else { cofactors }.normalize_or(point.geometric_normal);
-                    // A normal that the viewer sees from behind would reflect light into the surface.
-                    let turn = if smooth.dot(geometric_normal) < 0.0 { -1.0 } else { 1.0 };
-                    smooth_normal = turn * smooth;
-                    let corners = [a, b, c].map(|i| mesh.positions[i].into());
-                    let normals = [a, b, c].map(|i| (turn * mesh.normals[i]).into());
-                    lift = world_from_object.transform_vector3(lift_of(&corners, &normals, &weights.to_array()).into());
-                }
-                if !mesh.uvs.is_empty() {
-                    uv = interpolated(&mesh.uvs, [a, b, c], weights);
-                }
-                if !mesh.uvs2.is_empty() {
-                    uv2 = Some(interpolated(&mesh.uvs2, [a, b, c], weights));
-                }
-                if !mesh.colors.is_empty() {
-                    color = interpolated(&mesh.colors, [a, b, c], weights);
-                }
-            }
-            Shape::Plane { point: origin, normal } => {
-                let frame = Frame::around(*normal);
-                let local = point.position - *origin;
-                uv = Vec2::new(local.dot(frame.x), local.dot(frame.y));
-            }
-            // Longitude and latitude cost as much as all the rest.
-            Shape::Sphere { .. } | Shape::Spheres { .. } if !scene.tables.textured[material as usize] => {}
-            Shape::Sphere { .. } => {
-                uv = sphere_uv(match &geometry.objects[hit.object as usize].turned {
-                    Some(object_from_world) => *object_from_world * point.geometric_normal,
-                    None => point.geometric_normal,
-                });
-            }
-            Shape::Spheres { world_from_object, .. } => {
-                // Spheres scale evenly, so the transpose is the inverse but for that factor.
-                let m = world_from_object.matrix3;
-                uv = sphere_uv((m.transpose() * point.geometric_normal).normalize());
-            }
-            Shape::Quad { .. } | Shape::Triangle { .. } => {}
-        }
-        let (position, error) = (point.position, point.error);
-        let normal = geometric_normal;
-        let texture_point = TexturePoint { uv: [uv, uv2.unwrap_or(uv)], color };
-        let vertex = Self { position, error, geometric_normal, normal, smooth_normal, texture_point, front, wo, lift };
-        vertex.seen_along(wo)
-    }
-
-    /// What a surface of this emission sends out here, W·m⁻²·sr⁻¹. Colours of vertices do not tint light.
-    #[inline]
-    pub fn emitted(&self, scene: &Prepared, emission: &Emission) -> Vec3 {
-        emission.scale * emission.radiance.eval(scene, TexturePoint { color: Vec4::ONE, ..self.texture_point })
-    }
-
-    /// The same point as seen from elsewhere on the same side.
-    ///
-    /// - `wo`: unit, towards the viewer.
-    #[inline]
-    pub fn seen_along(&self, wo: Vec3) -> Self {
-        let faces_away = self.smooth_normal.dot(wo) <= 0.0;
-        Self { wo, normal: if faces_away { self.geometric_normal } else { self.smooth_normal }, ..*self }
-    }
-
-    /// The same point as seen through the surface from its other side.
-    ///
-    /// - `wo`: unit, towards the viewer there.
-    #[inline]
-    pub fn seen_through(&self, wo: Vec3) -> Self {
-        let (geometric_normal, smooth_normal) = (-self.geometric_normal, -self.smooth_normal);
-        Self { geometric_normal, smooth_normal, front: !self.front, lift: Vec3::ZERO, ..*self }.seen_along(wo)
-    }
-
-    /// The shading normal that counts for a viewer at `wo`, on the other side; on this side. A surface that is asked with it how
-    /// it scatters between the two does so as seen from there.
-    #[inline]
-    pub fn normal_from_behind(&self, wo: Vec3) -> Vec3 {
-        -self.seen_through(wo).normal
-    }
-
-    /// `wo` mirrored by the shading normal, unit.
-    #[inline]
-    pub fn mirrored(&self) -> Vec3 {
-        reflect(self.wo.into(), self.normal.into()).into()
-    }
-
-    /// Whether light from `wi` can meet the side that `wo` sees.
-    ///
-    /// The true surface decides, unless a smooth one is to be seen in its place.
-    #[inline]
-    pub fn is_reached_from(&self, wi: Vec3) -> bool {
-        let normal = if self.lift == Vec3::ZERO { self.geometric_normal } else { self.normal };
-        wi.dot(normal) > 0.0
-    }
-
-    /// Where a ray starts that stays on the side of `wo`.
-    ///
-    /// On the smooth surface where there is one, so that the flat faces in its place cast no shadow on themselves.
-    #[inline]
-    pub fn leaving(&self, dir: Vec3) -> Vec3 {
-        if self.lift == Vec3::ZERO {
-            return self.passing(dir);
-        }
-        robust::offset_ray_origin(self.position + self.lift, self.error, self.geometric_normal, self.geometric_normal)
-    }
-
-    /// Where a ray starts that goes to the side where `dir` points.
-    #[inline]
-    pub fn passing(&self, dir: Vec3) -> Vec3 {
-        robust::offset_ray_origin(self.position, self.error, self.geometric_normal, dir)
-    }
-}
-
-/// From a point of a triangle to the smooth surface above it, in the triangle's space.
-///
-/// - `corners`: positions; `normals`: unit, on the side from which the point is seen; `weights`: barycentric.
-///
-/// The point is projected onto the tangent plane of each corner that it lies below, and the results are weighted
-/// (Hanika 2021, "Hacking the Shadow Terminator"). Zero where it lies below none: where the surface is flat or bends
-/// the other way.
-#[inline(always)]
-pub(crate) fn lift_of<R: Real>(corners: &[Vector3<R>; 3], normals: &[Vector3<R>; 3], weights: &[R; 3]) -> Vector3<R> {
-    let [a, b, c] = *corners;
-    let point = a * weights[0] + b * weights[1] + c * weights[2];
-    // The weighted corners give the point itself: what is left are the projections.
-    let lifts = three!(|k| normals[k] * (-weights[k] * (point - corners[k]).dot(normals[k]).at_most(0.0)));
-    lifts[0] + lifts[1] + lifts[2]
-}
-
-/// An attribute of a mesh at a point of a triangle.
-#[inline]
-fn interpolated<T: Copy + Add<Output = T>>(attribute: &[T], corners: [usize; 3], weights: Vec3) -> T
-where
-    f32: Mul<T, Output = T>,
-{
-    let [a, b, c] = corners.map(|corner| attribute[corner]);
-    weights.x * a + weights.y * b + weights.z * c
-}
-
-/// The material of a hit.
-#[inline]
-pub(crate) fn material_of(scene: &Prepared, hit: &Hit) -> MaterialId {
-    scene.geometry.objects[hit.object as usize].material_of(hit.prim)
-}
-
-impl ColorInput {
-    #[inline]
-    pub(crate) fn eval(self, scene: &Prepared, point: impl Into<TexturePoint>) -> Vec3 {
-        match self {
-            Self::Constant(color) => color,
-            Self::Texture(id) => scene.shading.textures[id as usize].eval(point),
-        }
-    }
-}
-
-impl ScalarInput {
-    #[inline]
-    pub(crate) fn eval(self, scene: &Prepared, point: impl Into<TexturePoint>) -> f32 {
-        match self {
-            Self::Constant(value) => value,
-            Self::Texture(id) => scene.shading.textures[id as usize].eval(point).x,
-        }
-    }
-}
-
-/// The media on the two sides of a surface that a path meets.
-pub(crate) struct Sides<'a> {
-    pub sets: &'a mut MediumSets,
-    /// On the side of the path.
-    pub here: MediumId,
-    pub boundary: Boundary,
-    /// In the same place, see [`crate::shading::medium`].
-    others: Vec<Boundary>,
-}
-
-impl<'a> Sides<'a> {
-    #[inline]
-    pub fn new(
-        scene: &Prepared,
-        sets: &'a mut MediumSets,
-        here: MediumId,
-        ray: &Ray,
-        hit: &Hit,
-        id: MaterialId,
-        front: bool,
-    ) -> Self {
-        let bodies = &scene.tables.bodies;
-        let others = scene.along_with(hit, || *ray);
-        Self { sets, here, boundary: bodies.boundary(hit.object, hit.prim, id, front), others }
-    }
-
-    /// The way through a transparent part of the material; see [`MediumSets::interface`].
-    #[inline]
-    pub fn interface(&mut self, scene: &Prepared, leaf: u32) -> Interface {
-        self.sets.interface(scene, self.here, self.boundary, leaf, &self.others)
-    }
-}
+use crate::shading::sides::Sides;
+use crate::shading::vertex::Vertex;
+use glam::{Vec2, Vec3};
 
 /// The lobes of a blend at a vertex; `None` where all of it is black.
 ///
@@ -270,13 +20,32 @@ pub(crate) fn blend_at(
     vertex: &Vertex,
     mut sides: Option<&mut Sides>,
 ) -> Option<Blend> {
-    let mut parts = [(Lobe::CLEAR, 0.0); MAX_LOBES];
-    let (mut n, mut n_leaves) = (0, 0);
-    collect(scene, id, vertex, &mut sides, &mut n_leaves, 1.0, &mut |lobe, weight| {
-        parts[n] = (lobe, weight);
-        n += 1;
-    });
-    (n > 0).then(|| Blend::new(&parts[..n]))
+    let mut parts = Parts { parts: [(Part::Lobe(Lobe::CLEAR), 0.0); MAX_LOBES], n: 0, layers: Vec::new() };
+    collect(scene, id, vertex, &mut sides, &mut 0, 1.0, &mut parts);
+    (parts.n > 0).then(|| Blend::new(&parts.parts[..parts.n], parts.layers))
+}
+
+/// The parts of a blend so far, with their weights.
+struct Parts {
+    parts: [(Part, f32); MAX_LOBES],
+    n: usize,
+    layers: Vec<Principled>,
+}
+
+impl Parts {
+    fn push(&mut self, lobe: Lobe, weight: f32) {
+        self.push_part(Part::Lobe(lobe), weight);
+    }
+
+    fn push_layers(&mut self, layers: Principled, weight: f32) {
+        self.push_part(Part::Layers(self.layers.len() as u8), weight);
+        self.layers.push(layers);
+    }
+
+    fn push_part(&mut self, part: Part, weight: f32) {
+        self.parts[self.n] = (part, weight);
+        self.n += 1;
+    }
 }
 
 /// - `n_leaves`: transparent parts so far, of whatever weight: they are counted as [`crate::prepare::bodies::Bodies`] does.
@@ -287,7 +56,7 @@ fn collect(
     sides: &mut Option<&mut Sides>,
     n_leaves: &mut u32,
     weight: f32,
-    push: &mut impl FnMut(Lobe, f32),
+    parts: &mut Parts,
 ) {
     let material = &scene.shading.materials[id as usize];
     let leaf = *n_leaves;
@@ -295,49 +64,41 @@ fn collect(
     match material {
         Material::Blend { weight: share, a, b } => {
             let share = share.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
-            collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), push);
-            collect(scene, *b, vertex, sides, n_leaves, weight * share, push);
+            collect(scene, *a, vertex, sides, n_leaves, weight * (1.0 - share), parts);
+            collect(scene, *b, vertex, sides, n_leaves, weight * share, parts);
         }
         _ if weight == 0.0 => {}
         Material::Phong { diffuse, specular, transparency, .. } => {
             let specular = specular.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
             let opaque = weight * (1.0 - transparency);
             if opaque * (1.0 - specular) > 0.0 {
-                push(Lobe::Diffuse { albedo: diffuse.eval(scene, vertex.texture_point) }, opaque * (1.0 - specular));
+                parts.push(
+                    Lobe::Diffuse { albedo: diffuse.eval(scene, vertex.texture_point) },
+                    opaque * (1.0 - specular),
+                );
             }
             if opaque * specular > 0.0 {
-                push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
+                parts.push(Lobe::Mirror { reflectance: Vec3::ONE }, opaque * specular);
             }
             if *transparency > 0.0 {
-                push(clear_lobe(scene, sides, leaf), weight * transparency);
+                parts.push(clear_lobe(scene, sides, leaf), weight * transparency);
             }
         }
-        Material::Principled { base_color, metallic, roughness, transmission, .. } => {
-            let [metallic, roughness, transmission] =
-                [metallic, roughness, transmission].map(|s| s.eval(scene, vertex.texture_point).clamp(0.0, 1.0));
-            let (color, alpha) = (base_color.eval(scene, vertex.texture_point), roughness * roughness);
-            let parts = [(1.0 - metallic) * (1.0 - transmission), (1.0 - metallic) * transmission, metallic];
-            if parts[0] > 0.0 {
-                push(Lobe::Diffuse { albedo: color }, weight * parts[0]);
-            }
-            if parts[1] > 0.0 {
-                push(rough_lobe(clear_lobe(scene, sides, leaf), alpha, true), weight * parts[1]);
-            }
-            if parts[2] > 0.0 {
-                let fresnel = crate::core::material::Fresnel::Schlick;
-                push(Lobe::Metal { alpha, reflectance: color, fresnel, compensate: true }, weight * parts[2]);
+        Material::Principled { .. } => {
+            if let Some(layers) = principled_at(scene, id, vertex, sides, leaf, false) {
+                parts.push_layers(layers, weight);
             }
         }
-        Material::Glass { .. } => push(clear_lobe(scene, sides, leaf), weight),
+        Material::Glass { .. } => parts.push(clear_lobe(scene, sides, leaf), weight),
         Material::RoughGlass { alpha, compensate, .. } => {
-            push(
+            parts.push(
                 rough_lobe(clear_lobe(scene, sides, leaf), alpha.eval(scene, vertex.texture_point), *compensate),
                 weight,
             );
         }
         _ => {
             if let Some(lobe) = lobe_at(scene, id, vertex, None) {
-                push(lobe, weight);
+                parts.push(lobe, weight);
             }
         }
     }
@@ -394,105 +155,6 @@ pub(crate) fn lobe_at(
         }
         Material::Emissive { .. } | Material::Phong { .. } | Material::Principled { .. } | Material::Blend { .. } => {
             None
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::core::environment::Environment;
-    use crate::core::snapshot::Object;
-    use crate::test_scene::prepared;
-    use firstlight_kdtree::{BuildPreset, MeshTree};
-    use firstlight_mesh::{Mesh, procedural};
-    use glam::Affine3A;
-    use std::sync::Arc;
-
-    fn scene_of(mesh: Mesh, world_from_object: Affine3A) -> Prepared {
-        let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Best));
-        let object = Object { mesh: Some(Arc::new(mesh)), ..Object::plain(0) };
-        let grey = Material::Diffuse { albedo: ColorInput::Constant(Vec3::splat(0.5)) };
-        prepared(vec![Shape::Mesh { tree, world_from_object }], vec![object], vec![grey], Environment::Black)
-    }
-
-    /// Rays from outside towards a unit sphere, side by side.
-    fn rays() -> impl Iterator<Item = Ray> {
-        let n = 160;
-        (0..n * n).map(move |i| {
-            let (x, y) = (2.0 * (i % n) as f32 / n as f32 - 1.0, 2.0 * (i / n) as f32 / n as f32 - 1.0);
-            Ray::new(Vec3::new(0.97 * x + 1e-3, 0.97 * y + 2e-3, 4.0), Vec3::NEG_Z)
-        })
-    }
-
-    /// Root mean square error of the light that a coarse sphere of radius `size` gets from one side, against the true
-    /// sphere: by the lifted origin, and by the plain one.
-    fn light_errors(frequency: u32, map: Affine3A) -> (f64, f64) {
-        let light = Vec3::new(0.96, 0.28, 0.0);
-        let scene = scene_of(procedural::icosphere(frequency).with_vertex_normals(), map);
-        let tree = &scene.geometry.tree;
-        let (mut n, mut lifted, mut plain) = (0, 0.0, 0.0);
-        let to_world =
-            |ray: Ray| Ray::new(map.transform_point3(ray.origin), map.transform_vector3(ray.dir).normalize());
-        for ray in rays() {
-            let (d, b) = (ray.dir, ray.origin.dot(ray.dir));
-            let disc = b * b - ray.origin.length_squared() + 1.0;
-            let ray = to_world(ray);
-            let Some(hit) = tree.closest_hit(&ray) else { continue };
-            if disc <= 0.0 {
-                continue;
-            }
-            let (outwards, vertex) = (ray_point(&ray, &map, d, b, disc), Vertex::new(&scene, &ray, &hit, 0));
-            let wi = map.transform_vector3(light).normalize();
-            let truth = outwards.dot(light).max(0.0);
-            let arriving = |vertex: &Vertex| {
-                let cos = vertex.normal.dot(wi).max(0.0);
-                let open = cos > 0.0
-                    && vertex.is_reached_from(wi)
-                    && tree.closest_hit(&Ray::new(vertex.leaving(wi), wi)).is_none();
-                if open { cos } else { 0.0 }
-            };
-            let flat = Vertex { lift: Vec3::ZERO, ..vertex };
-            n += 1;
-            lifted += f64::from(arriving(&vertex) - truth).powi(2);
-            plain += f64::from(arriving(&flat) - truth).powi(2);
-        }
-        ((lifted / f64::from(n)).sqrt(), (plain / f64::from(n)).sqrt())
-    }
-
-    /// The true normal, in the sphere's own space, where the ray meets it.
-    fn ray_point(ray: &Ray, map: &Affine3A, dir: Vec3, b: f32, disc: f32) -> Vec3 {
-        let origin = map.inverse().transform_point3(ray.origin);
-        (origin + (-b - disc.sqrt()) * dir).normalize()
-    }
-
-    #[test]
-    fn a_coarse_ball_is_lit_like_the_true_one() {
-        for frequency in [2, 4, 8] {
-            let (lifted, plain) = light_errors(frequency, Affine3A::IDENTITY);
-            println!("icosphere {}: rms {lifted:.4}, without {plain:.4}", 20 * frequency * frequency);
-            assert!(lifted < 0.9 * plain, "{frequency}: {lifted} against {plain}");
-        }
-        // Neither size nor mirroring makes a difference.
-        let (plain, _) = light_errors(4, Affine3A::IDENTITY);
-        for scale in [Vec3::splat(1e-3), Vec3::splat(500.0), Vec3::new(-1.0, 1.0, 1.0)] {
-            let (scaled, _) = light_errors(4, Affine3A::from_scale(scale));
-            assert!((scaled - plain).abs() < 0.05 * plain, "{scale}: {scaled} for {plain}");
-        }
-    }
-
-    #[test]
-    fn surfaces_that_are_flat_or_bend_inwards_are_not_lifted() {
-        let flat = scene_of(procedural::icosphere(3).flat(), Affine3A::IDENTITY);
-        let smooth = scene_of(procedural::icosphere(3).with_vertex_normals(), Affine3A::IDENTITY);
-        for ray in rays() {
-            let within = Ray::new(Vec3::new(0.1, 0.2, 0.05), (ray.origin - Vec3::Z * 3.5).normalize());
-            for (scene, ray, size) in [(&flat, &ray, 1e-6), (&smooth, &within, 1e-6), (&smooth, &ray, 0.1)] {
-                if let Some(hit) = scene.geometry.tree.closest_hit(ray) {
-                    let lift = Vertex::new(scene, ray, &hit, 0).lift.length();
-                    assert!(lift <= size, "{lift}");
-                }
-            }
         }
     }
 }

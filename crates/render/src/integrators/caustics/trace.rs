@@ -19,13 +19,17 @@ use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
 use crate::prepare::guide::Trace;
 use crate::sampling::{Sampler, hash_u32};
-use crate::shading::bsdf::{Blend, BsdfSample, Lobe, Scatter};
+use crate::shading::blend::Blend;
+use crate::shading::bsdf::Lobe;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE};
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::medium::MediumSets;
 use crate::shading::mis_state::MisState;
 use crate::shading::paths::{Path, PathBatch};
-use crate::shading::surface::{Sides, Vertex, blend_at, lobe_at, material_of};
+use crate::shading::scatter::{BsdfSample, Scatter};
+use crate::shading::sides::Sides;
+use crate::shading::surface::{blend_at, lobe_at};
+use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, InstructionSet, RayClass};
 use glam::{Vec2, Vec3};
@@ -49,7 +53,7 @@ struct LightPath {
 }
 
 /// Light paths are kept like those from the camera, of which they need less: the density is the ratio, and the
-/// slot is what they are aimed at. The place of the last vertex is that of the light at first: 1 for what is far away.
+/// slot is what they are aimed at. The place of the last vertex says at first whether the light is far away.
 impl From<LightPath> for Path {
     fn from(LightPath { throughput, ratio, sampler, aimed_at, media, is_far }: LightPath) -> Self {
         let (position, normal) = (Vec3::splat(f32::from(is_far)), Vec3::ZERO);
@@ -104,12 +108,11 @@ impl LightWave {
             }
             n_vertices += 1;
             counts.bounce += self.paths.len() as u64;
-            let tree = &pass.scene.geometry.tree;
-            tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             pass.scene.settle(&self.paths.rays, &mut self.hits);
             self.scatter(pass, n_vertices);
             let arrivals = &mut self.arrivals;
-            tree.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
+            pass.scene.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
             counts.shadow += arrivals.rays.len() as u64;
             for i in 0..arrivals.rays.len() {
                 if !arrivals.occluded[i] {
@@ -138,7 +141,7 @@ impl LightWave {
                 return None;
             }
             n_vertices += 1;
-            pass.scene.geometry.tree.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
+            pass.scene.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             pass.scene.settle(&self.paths.rays, &mut self.hits);
             self.next.start(self.paths.len(), pass.scene.tables.features.glass, false);
             for i in 0..self.paths.len() {
@@ -404,7 +407,7 @@ impl LightPathStep<'_> {
             wi: sample.wi,
             pdf: sample.pdf,
             through: sample.through,
-            blended: matches!(scene.shading.materials[material as usize], Material::Blend { .. }),
+            blended: scene.shading.materials[material as usize].is_blended(),
             before,
             after: path.media,
         };

@@ -21,7 +21,7 @@ use crate::prepare::casters::NO_CASTER;
 use crate::shading::interface::{Interface, MediumId};
 use crate::shading::lights::power_weight;
 use crate::shading::mis_state::MisState;
-use crate::shading::surface::Vertex;
+use crate::shading::vertex::Vertex;
 use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
@@ -97,7 +97,7 @@ impl CausticPass<'_> {
         if track.caster == NO_CASTER || track.ratio.is_nan() || media != MediumId::OUTSIDE {
             return None;
         }
-        let light = self.scene.tables.lights.light_of(hit.object, hit.prim)?;
+        let light = self.scene.tables.lights.light_of(hit.object, hit.prim, vertex.front)?;
         let cos = vertex.wo.dot(vertex.geometric_normal);
         let density = self.casters.density(&self.scene.tables.lights, light, track.caster, vertex.position, cos);
         Some(self.weight_against(track.ratio * density))

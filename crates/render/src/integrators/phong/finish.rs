@@ -1,12 +1,13 @@
 //! What the classic model makes of a material: a diffuse part, highlights, mirrors and panes.
 
-use crate::core::material::{MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA};
+use crate::core::material::{Fresnel, MAX_LOBES, Material, MaterialId, SMALLEST_ALPHA, ScalarInput};
 use crate::integrators::phong::lobe::lobe_pdf;
 use crate::prepare::prepared::Prepared;
 use crate::shading::dielectric::fresnel;
 use crate::shading::interface::Interface;
 use crate::shading::lights::power_heuristic;
-use crate::shading::surface::{Sides, Vertex};
+use crate::shading::sides::Sides;
+use crate::shading::vertex::Vertex;
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -104,6 +105,39 @@ impl Finish {
                     self.push(pane(weight * transparency));
                 }
             }
+            Material::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+                transmission,
+                thin_walled,
+                ..
+            } => {
+                let share = |input: &ScalarInput| input.eval(scene, uv).clamp(0.0, 1.0);
+                let (metallic, transmission) = (share(metallic), share(transmission));
+                let (color, alpha) = (base_color.eval(scene, uv), share(roughness).powi(2));
+                let at_normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
+                let cos = vertex.normal.dot(vertex.wo);
+                let facing = at_normal * specular_color.eval(scene, uv) * share(specular);
+                let opaque = (1.0 - metallic) * (1.0 - transmission);
+                let tint: Vec3 = opaque * Fresnel::Schlick.reflectance(facing, cos)
+                    + metallic * Fresnel::Schlick.reflectance(color, cos);
+                let tint = weight * tint;
+                self.push(if alpha < SMALLEST_ALPHA {
+                    Shiny::Mirror { tint }
+                } else {
+                    Shiny::Gloss { tint, exponent: (0.5 / (alpha * alpha) - 0.5).max(0.0), rough: true }
+                });
+                let diffuse = weight * opaque * (Vec3::ONE - facing) * color;
+                self.diffuse += diffuse;
+                self.ambient += diffuse;
+                if transmission > 0.0 && !thin_walled {
+                    self.push(pane(weight * (1.0 - metallic) * transmission));
+                }
+            }
             // What has no look of its own in the classic model is diffuse in its colour.
             other => {
                 let albedo = weight * other.color().map_or(Vec3::ONE, |color| color.eval(scene, uv));
@@ -185,6 +219,13 @@ impl Passage {
             _ if weight == 0.0 => return,
             Material::Glass { .. } | Material::RoughGlass { .. } => weight,
             Material::Phong { transparency, .. } if *transparency > 0.0 => weight * transparency,
+            Material::Principled { metallic, transmission, thin_walled: false, .. } => {
+                let share = |input: &ScalarInput| input.eval(scene, vertex.texture_point).clamp(0.0, 1.0);
+                match (1.0 - share(metallic)) * share(transmission) {
+                    0.0 => return,
+                    clear => weight * clear,
+                }
+            }
             _ => return,
         };
         let interface = sides.interface(scene, leaf);

@@ -31,7 +31,8 @@ use crate::shading::interface::Interface;
 use crate::shading::lights::power_heuristic;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{Path, PathBatch};
-use crate::shading::surface::{Sides, Vertex, material_of};
+use crate::shading::sides::Sides;
+use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{HitBatch, RayClass};
 use glam::Vec3;
@@ -90,7 +91,7 @@ impl PhongWave {
                 return None;
             }
             let class = if depth == 1 { RayClass::Coherent } else { RayClass::Incoherent };
-            scene.geometry.tree.closest_hits(&self.paths.rays, class, &mut self.hits);
+            scene.closest_hits(&self.paths.rays, class, &mut self.hits);
             scene.settle(&self.paths.rays, &mut self.hits);
             self.shade(scene, depth, settings, radiance);
             counts.shadow += self.shadows.cast(scene, &mut self.sets, class, radiance);
@@ -183,9 +184,9 @@ impl PhongWave {
         let material = material_of(scene, &hit);
         let vertex = Vertex::new(scene, &ray, &hit, material);
         if let Some(emission) = tables.emission[material as usize]
-            && vertex.front
+            && (vertex.front || emission.two_sided)
         {
-            let share = match tables.lights.light_of(hit.object, hit.prim) {
+            let share = match tables.lights.light_of(hit.object, hit.prim, vertex.front) {
                 None => 1.0,
                 // A point shows to the camera alone: in a mirror its sphere would be a speck that few samples meet.
                 Some(id) if depth > 1 && tables.lights.is_point(id) => 0.0,

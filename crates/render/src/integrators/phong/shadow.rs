@@ -9,8 +9,9 @@ use crate::prepare::prepared::Prepared;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use crate::shading::paths::{Path, ShadowBatch};
+use crate::shading::sides::Sides;
 use crate::shading::simd::lanes::lanes_of;
-use crate::shading::surface::{Sides, Vertex, material_of};
+use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::{Ray, robust};
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass, append};
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector};
@@ -123,7 +124,7 @@ impl Shadows {
             let batch = &mut self.asked[k].batch;
             if !batch.rays.is_empty() {
                 n_rays += batch.rays.len() as u64;
-                batch.settle(radiance, |rays, occluded| scene.geometry.tree.any_hits(rays, class, occluded));
+                batch.settle(radiance, |rays, occluded| scene.any_hits(rays, class, occluded));
             }
         }
         n_rays
@@ -154,7 +155,7 @@ impl Shadows {
                 break;
             }
             n_rays += self.rays.len() as u64;
-            scene.geometry.tree.closest_hits(&self.rays, class, &mut self.hits);
+            scene.closest_hits(&self.rays, class, &mut self.hits);
             scene.settle(&self.rays, &mut self.hits);
             self.next_rays.clear();
             self.next_lights.clear();
@@ -207,8 +208,7 @@ fn shadow_ray(origin: Vec3, wi: Vec3, target: Option<Vec3>) -> Ray {
 fn may_be_clear(scene: &Prepared, id: MaterialId) -> bool {
     match &scene.shading.materials[id as usize] {
         Material::Glass { .. } | Material::RoughGlass { .. } | Material::Blend { .. } => true,
-        Material::Phong { transparency, .. } => *transparency > 0.0,
-        _ => false,
+        material => material.is_clear(),
     }
 }
 
@@ -217,7 +217,8 @@ fn inside(scene: &Prepared, id: MaterialId, distance: f32) -> Vec3 {
     match &scene.shading.materials[id as usize] {
         Material::Glass { absorption, .. }
         | Material::RoughGlass { absorption, .. }
-        | Material::Phong { absorption, .. } => (-*absorption * distance).exp(),
+        | Material::Phong { absorption, .. }
+        | Material::Principled { absorption, .. } => (-*absorption * distance).exp(),
         _ => Vec3::ONE,
     }
 }

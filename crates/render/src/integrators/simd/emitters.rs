@@ -37,7 +37,7 @@ fn shade_emissive<S: Simd>(s: S, group: KindHits, radiance: &mut [Vec3]) {
             let mut known = 0;
             for lane in lanes_of(rivals) {
                 let i = indices[lane] as usize;
-                if let Some(light) = tables.lights.light_of(hits.object[i], hits.prim[i]) {
+                if let Some(light) = tables.lights.light_of(hits.object[i], hits.prim[i], true) {
                     id[lane] = light;
                     known |= 1 << lane;
                 }
@@ -74,7 +74,7 @@ fn with_two_sided<S: Simd>(pdf: Float<S>, group: &KindHits, indices: &[u32; LANE
         let i = indices[lane] as usize;
         let path = paths.get(i);
         if path.normal == Vec3::ZERO
-            && let Some(id) = scene.tables.lights.light_of(hits.object[i], hits.prim[i])
+            && let Some(id) = scene.tables.lights.light_of(hits.object[i], hits.prim[i], true)
         {
             let (dir, distance) = (paths.rays.get(i).dir, hits.t[i]);
             pdfs[lane] = scene.tables.lights.pdf(techniques, id, path.position, path.normal, dir, distance);

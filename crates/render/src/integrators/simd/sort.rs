@@ -1,9 +1,10 @@
 //! Hits by kind of material, so that the processor finds those that follow each other all alike.
 
-use crate::core::material::{MaterialId, MaterialKind};
+use crate::core::material::MaterialId;
+use crate::core::material_kind::MaterialKind;
 use crate::prepare::material_table::{Kinds, SEVERAL};
 use crate::prepare::prepared::Prepared;
-use crate::shading::surface::material_of;
+use crate::shading::vertex::material_of;
 use firstlight_kdtree::HitBatch;
 use firstlight_simd::{Bits, InstructionSet, LANES, Mask, Simd, dispatch};
 

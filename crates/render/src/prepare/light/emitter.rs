@@ -2,12 +2,13 @@
 
 use crate::core::color::luminance;
 use crate::core::delta_light::DeltaLight;
-use crate::core::material::{ColorInput, Emission};
+use crate::core::material::{ColorInput, ScalarInput};
+use crate::core::material_queries::Emission;
 use crate::core::techniques::Techniques;
-use crate::core::texture::Texture;
+use crate::core::texture::{Texture, TexturePoint};
 use crate::prepare::light::delta::{DeltaSample, DeltaSource, SHARPNESS};
 use crate::prepare::light::shape::{LightPoint, LightShape, sphere_uv};
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3, Vec4};
 
 /// One emitter: a sphere, a quad, a triangle, or a light without size.
 #[derive(Clone, Debug)]
@@ -20,8 +21,9 @@ pub(crate) struct Light {
     pub is_point: bool,
     /// See [`crate::core::snapshot::Object::turned`].
     pub turned: Option<Mat3>,
-    /// Surface coordinates at the vertices of a triangle of a mesh, where its emission is textured.
-    pub corner_uvs: Option<[Vec2; 3]>,
+    /// What textures are asked with at the vertices of a triangle, where its emission is textured; of a quad at the corner and at
+    /// the ends of its edges, where that is not told by its own coordinates.
+    pub corners: Option<Box<[TexturePoint; 3]>>,
 }
 
 /// A point on a light as seen from a shading point.
@@ -58,21 +60,31 @@ impl Light {
     /// What the point with this normal and these surface coordinates sends out, W·m⁻²·sr⁻¹.
     #[inline]
     pub fn radiance(&self, textures: &[Texture], normal: Vec3, uv: Vec2) -> Vec3 {
+        let point = || match (&self.shape, &self.turned) {
+            (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * normal).into(),
+            (LightShape::Sphere { .. }, None) => sphere_uv(normal).into(),
+            _ => match self.corners.as_deref() {
+                Some(corners) => TexturePoint::between(corners, uv),
+                None => uv.into(),
+            },
+        };
         let radiance = match self.emission.radiance {
             ColorInput::Constant(radiance) => radiance,
             ColorInput::Texture(texture) => {
-                let uv = match (&self.shape, &self.turned) {
-                    (LightShape::Sphere { .. }, Some(turn)) => sphere_uv(*turn * normal),
-                    (LightShape::Sphere { .. }, None) => sphere_uv(normal),
-                    _ => match self.corner_uvs {
-                        Some([a, b, c]) => a + uv.x * (b - a) + uv.y * (c - a),
-                        None => uv,
-                    },
-                };
-                textures[texture as usize].eval(uv)
+                textures[texture as usize].eval(TexturePoint { color: Vec4::ONE, ..point() })
             }
         };
-        self.emission.scale * radiance
+        let there = match self.emission.opacity {
+            (ScalarInput::Constant(opacity), None) => opacity.clamp(0.0, 1.0),
+            (opacity, cutoff) => {
+                let opacity = match opacity {
+                    ScalarInput::Constant(opacity) => opacity,
+                    ScalarInput::Texture(texture) => textures[texture as usize].eval(point()).x,
+                };
+                cutoff.map_or(opacity.clamp(0.0, 1.0), |cutoff| f32::from(opacity >= cutoff))
+            }
+        };
+        self.emission.scale * there * radiance
     }
 
     #[inline]
@@ -107,8 +119,8 @@ impl Light {
             DeltaLight::Directional { direction, .. } => LightShape::Directional { to_light: -direction, reach },
         };
         let strength = light.strength();
-        let emission = Emission { radiance: ColorInput::Constant(strength), scale: 1.0, two_sided: false };
+        let emission = Emission::even(strength);
         let mean_radiance = luminance(strength);
-        Self { shape, emission, mean_radiance, is_point: true, turned: None, corner_uvs: None }
+        Self { shape, emission, mean_radiance, is_point: true, turned: None, corners: None }
     }
 }

@@ -7,27 +7,26 @@ pub(crate) mod arrays;
 pub(crate) mod delta;
 pub(crate) mod emitter;
 pub(crate) mod flat;
+mod objects;
 mod sample_simd;
 mod selection;
 pub(crate) mod shape;
 mod tree;
 mod tree_simd;
 
-use crate::core::color::luminance;
 use crate::core::delta_light::DeltaLight;
-use crate::core::material::{ColorInput, Emission};
+use crate::core::material_queries::Emission;
 use crate::core::snapshot::Geometry;
 use crate::core::techniques::Techniques;
 use crate::core::texture::Texture;
 use crate::prepare::light::arrays::LightArrays;
 use crate::prepare::light::delta::EVERYTHING;
 use crate::prepare::light::emitter::{Light, LightSample};
+use crate::prepare::light::objects::ObjectLights;
 use crate::prepare::light::selection::LightSelection;
 use crate::prepare::light::shape::{LightShape, sphere_as_point};
 use crate::sampling::Sampler;
-use firstlight_kdtree::Shape;
 use glam::{Vec2, Vec3};
-use std::cell::OnceCell;
 
 /// How many sample dimensions [`LightTable::sample_each`] uses.
 pub(crate) const EACH_DIMENSIONS: u32 = selection::MAX_ESTIMATED as u32;
@@ -42,16 +41,6 @@ pub struct LightTable {
     pub(crate) lanes: Option<LightArrays>,
 }
 
-/// Which lights the primitives of an object are.
-#[derive(Clone, Debug)]
-enum ObjectLights {
-    None,
-    /// Primitive `i` is light `first + i`.
-    All(u32),
-    /// One entry a primitive; `u32::MAX` for those that do not shine.
-    Some(Vec<u32>),
-}
-
 impl LightTable {
     /// Finds the emitters among the objects; `emission` of each material. Lights without size follow behind them.
     pub(crate) fn build(
@@ -61,85 +50,13 @@ impl LightTable {
         delta_lights: &[DeltaLight],
     ) -> Self {
         let mut lights = Vec::new();
-        // A picture is gone through once, however many triangles show it.
-        let means: Vec<OnceCell<f32>> = textures.iter().map(|_| OnceCell::new()).collect();
-        let mean_of = |id: u32| *means[id as usize].get_or_init(|| luminance(textures[id as usize].mean()));
         let by_object = geometry
             .objects
             .iter()
             .zip(geometry.tree.shapes())
             .map(|(object, shape)| {
                 let emission: Vec<_> = object.materials.iter().map(|&m| emission[m as usize]).collect();
-                if emission.iter().all(Option::is_none) {
-                    return ObjectLights::None;
-                }
-                let mean = |emission: Emission| {
-                    emission.scale
-                        * match emission.radiance {
-                            ColorInput::Constant(radiance) => luminance(radiance),
-                            ColorInput::Texture(id) => mean_of(id),
-                        }
-                };
-                let first = lights.len() as u32;
-                let mut push_with = |emission: Emission, shape: LightShape, corner_uvs: Option<[Vec2; 3]>| {
-                    let (is_point, turned, mean_radiance) = (object.is_point_light, object.turned, mean(emission));
-                    lights.push(Light { shape, emission, mean_radiance, is_point, turned, corner_uvs });
-                    lights.len() as u32 - 1
-                };
-                let mut push = |emission, shape| push_with(emission, shape, None);
-                let only = emission[0].filter(|_| emission.len() == 1);
-                match (shape, only) {
-                    (Shape::Mesh { tree: _, world_from_object }, _) => {
-                        let mesh = object.mesh.as_ref().expect("a mesh shape brings its mesh");
-                        let corner = |i: u32| world_from_object.transform_point3(mesh.positions[i as usize]);
-                        // The front stays outside under mirroring.
-                        let order = if world_from_object.matrix3.determinant() < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
-                        let ids: Vec<u32> = (0..mesh.triangles.len())
-                            .map(|t| {
-                                let slot = mesh.slots.get(t).map_or(0, |&s| usize::from(s));
-                                let Some(emission) = emission.get(slot).copied().flatten() else { return u32::MAX };
-                                let triangle = mesh.triangles[t];
-                                let uv = |k: usize, set: u8| {
-                                    let second = mesh.uvs2.get(triangle[k] as usize).filter(|_| set > 0);
-                                    match second.or(mesh.uvs.get(triangle[k] as usize)) {
-                                        Some(uv) => *uv,
-                                        None => [Vec2::ZERO, Vec2::X, Vec2::Y][k],
-                                    }
-                                };
-                                let corner_uvs = match emission.radiance {
-                                    ColorInput::Constant(_) => None,
-                                    ColorInput::Texture(id) => Some(order.map(|k| uv(k, textures[id as usize].uv_set))),
-                                };
-                                let vertices = order.map(|k| corner(triangle[k]));
-                                push_with(emission, LightShape::triangle(vertices), corner_uvs)
-                            })
-                            .collect();
-                        if only.is_some() { ObjectLights::All(first) } else { ObjectLights::Some(ids) }
-                    }
-                    (Shape::Spheres { tree, world_from_object }, Some(emission)) => {
-                        let scale = world_from_object.matrix3.x_axis.length();
-                        for i in 0..tree.len() as u32 {
-                            let (center, radius) = tree.sphere(i);
-                            let center = world_from_object.transform_point3(center);
-                            push(emission, LightShape::Sphere { center, radius: radius * scale });
-                        }
-                        ObjectLights::All(first)
-                    }
-                    (Shape::Sphere { center, radius }, Some(emission)) => {
-                        push(emission, LightShape::Sphere { center: *center, radius: *radius });
-                        ObjectLights::All(first)
-                    }
-                    (Shape::Quad { corner, edge_u, edge_v }, Some(emission)) => {
-                        push(emission, LightShape::quad(*corner, *edge_u, *edge_v));
-                        ObjectLights::All(first)
-                    }
-                    (Shape::Triangle { vertices }, Some(emission)) => {
-                        push(emission, LightShape::triangle(*vertices));
-                        ObjectLights::All(first)
-                    }
-                    // An infinite plane shines, but has no area to choose from: rays find it by themselves.
-                    _ => ObjectLights::None,
-                }
+                ObjectLights::add(&mut lights, object, shape, &emission, textures)
             })
             .collect();
         let reach = (0.5 * geometry.tree.bounds().size().length()).clamp(1e-12, EVERYTHING);
@@ -165,14 +82,15 @@ impl LightTable {
         &self.lights[id as usize]
     }
 
-    /// The light that a primitive is, if it is one.
+    /// The light that a side of a primitive is, if it is one.
     #[inline]
-    pub(crate) fn light_of(&self, object: u32, prim: u32) -> Option<u32> {
-        match &self.by_object[object as usize] {
-            ObjectLights::None => None,
-            ObjectLights::All(first) => Some(first + prim),
-            ObjectLights::Some(ids) => Some(ids[prim as usize]).filter(|&id| id != u32::MAX),
-        }
+    pub(crate) fn light_of(&self, object: u32, prim: u32, front: bool) -> Option<u32> {
+        self.by_object[object as usize].of(prim, front)
+    }
+
+    /// Whether a side of a primitive is a light.
+    pub(crate) fn shines(&self, object: u32, prim: u32) -> bool {
+        [true, false].into_iter().any(|front| self.light_of(object, prim, front).is_some())
     }
 
     /// A point on some light, or `None` when the choice fell on one that cannot be seen from `position`.

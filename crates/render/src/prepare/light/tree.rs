@@ -225,7 +225,7 @@ impl LightItem {
                 (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
             }
             LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
-            // Of the rays that leave the axis by 90° at most, those near it are the brightest: as those of a flat light.
+            // Its rays leave the axis by 90° at most, and those near it are the brightest: as those of a flat light.
             LightShape::Point { position, cone: Some(spot) } => {
                 (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
             }
@@ -348,7 +348,7 @@ fn partition(items: &mut [LightItem], is_below: impl Fn(&LightItem) -> bool) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::material::{ColorInput, Emission};
+    use crate::core::material_queries::Emission;
     use crate::core::techniques::Techniques;
     use crate::prepare::light::tree_simd::LightTreeArrays;
     use crate::sampling::Sampler;
@@ -376,9 +376,8 @@ mod tests {
                     }
                     _ => LightShape::Directional { to_light: (u + v).normalize(), reach: 8.0 },
                 };
-                let emission =
-                    Emission { radiance: ColorInput::Constant(Vec3::splat(radiance)), scale: 1.0, two_sided: false };
-                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corner_uvs: None }
+                let emission = Emission::even(Vec3::splat(radiance));
+                Light { shape, emission, mean_radiance: radiance, is_point: false, turned: None, corners: None }
             })
             .collect()
     }

@@ -1,6 +1,6 @@
 //! Two parts in one surface, sixteen at a time: diffuse under a rough or mirroring coat, as blends and classic materials have it.
 //!
-//! The formulas are those of [`crate::shading::bsdf::Blend`]: light sampling asks both parts, a bounce is chosen from one
+//! The formulas are those of [`crate::shading::blend::Blend`]: light sampling asks both parts, a bounce is chosen from one
 //! and weighted over both.
 
 use crate::core::color::luminance_of;

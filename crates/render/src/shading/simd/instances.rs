@@ -1,13 +1,13 @@
 //! Hits on meshes and clouds of spheres, which have spaces of their own, sixteen at a time.
 //!
-//! The formulas are those of `kdtree/surface.rs` and [`crate::shading::surface::Vertex`], operation by operation; there is where
+//! The formulas are those of `kdtree/surface.rs` and [`crate::shading::vertex::Vertex`], operation by operation; there is where
 //! they are explained. What is looked up by object comes from an [`InstanceTable`], what is looked up by triangle or
 //! sphere is loaded lane by lane.
 
 use crate::prepare::instance_table::{Columns, InstanceTable};
 use crate::shading::simd::lanes::lanes_of;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes, ball_points};
-use crate::shading::surface::lift_of;
+use crate::shading::vertex::lift_of;
 use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, gamma};
 use firstlight_kdtree::{F64_ERROR, INSET, Shape};
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};

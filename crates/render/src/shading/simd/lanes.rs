@@ -1,6 +1,6 @@
 //! What the files on sixteen hits share.
 
-use crate::core::material::MaterialKind;
+use crate::core::material_kind::MaterialKind;
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
 use firstlight_simd::{Float, LANES, Mask, Simd, Vector};

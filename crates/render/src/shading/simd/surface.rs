@@ -1,10 +1,11 @@
-//! From sixteen hits to what shading needs to know of the places; see [`crate::shading::surface::Vertex`].
+//! From sixteen hits to what shading needs to know of the places; see [`crate::shading::vertex::Vertex`].
 
 use crate::prepare::material_table::TEXTURED;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::surface_table::{BALL, CLOUD, FLAT, MESH, OTHER, PLANE, SurfaceTable};
 use crate::shading::paths::PathBatch;
-use crate::shading::surface::Vertex;
+use crate::shading::tangent::Tangent;
+use crate::shading::vertex::Vertex;
 use firstlight_kdtree::geometry::robust::{UNIT_ROUNDOFF, offset_along};
 use firstlight_kdtree::{F64_ERROR, HitBatch};
 use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
@@ -216,7 +217,7 @@ impl<S: Simd> SurfaceLanes<S> {
                 continue;
             }
             let vertex = vertex_at(at.scene, at.paths, at.hits, at.materials, i as usize);
-            let reach = if vertex.lift == Vec3::ZERO { vertex.geometric_normal } else { vertex.normal };
+            let reach = vertex.reach_normal();
             let values =
                 [vertex.position, vertex.geometric_normal, vertex.normal, reach, vertex.position + vertex.lift];
             for (arrays, value) in vectors.iter_mut().zip(values) {
@@ -283,6 +284,8 @@ impl StoredPlaces {
             geometric_normal: at(&self.geometric_normal),
             normal: at(&self.normal),
             smooth_normal: at(&self.normal),
+            interpolated: at(&self.normal),
+            tangent: Tangent::default(),
             texture_point: Vec2::new(self.uv[0][lane], self.uv[1][lane]).into(),
             front: self.front >> lane & 1 != 0,
             wo: at(&self.wo),

@@ -1,0 +1,144 @@
+//! Scattering by several parts at once, each with its share.
+
+use crate::core::material::MAX_LOBES;
+use crate::shading::bsdf::Lobe;
+use crate::shading::interface::Interface;
+use crate::shading::principled::Principled;
+use crate::shading::scatter::{BsdfSample, Scatter};
+use glam::{Vec2, Vec3};
+
+/// Parts with weights that sum to at most 1.
+#[derive(Clone, Debug)]
+pub(crate) struct Blend {
+    parts: [WeightedPart; MAX_LOBES],
+    n: usize,
+    layers: Vec<Principled>,
+}
+
+/// What scatters by itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Part {
+    Lobe(Lobe),
+    /// A layered surface, by its number among those of the blend.
+    Layers(u8),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct WeightedPart {
+    part: Part,
+    weight: f32,
+    /// Of being sampled.
+    pmf: f32,
+}
+
+impl Blend {
+    /// From parts and their weights; at most [`MAX_LOBES`], at least one.
+    ///
+    /// - `layers`: what [`Part::Layers`] counts.
+    pub fn new(parts: &[(Part, f32)], layers: Vec<Principled>) -> Self {
+        let nothing = WeightedPart { part: parts[0].0, weight: 0.0, pmf: 0.0 };
+        let mut blend = Self { parts: [nothing; MAX_LOBES], n: parts.len(), layers };
+        // Chosen by what they reflect; an even share where all is black.
+        let strength = |(part, weight): &(Part, f32)| {
+            weight
+                * match part {
+                    Part::Lobe(lobe) => lobe.albedo_estimate(),
+                    Part::Layers(k) => blend.layers[usize::from(*k)].albedo_estimate(),
+                }
+        };
+        let sum: f32 = parts.iter().map(strength).sum();
+        let pmfs: [f32; MAX_LOBES] = std::array::from_fn(|k| match parts.get(k) {
+            Some(part) if sum > 0.0 => strength(part) / sum,
+            _ => 1.0 / parts.len() as f32,
+        });
+        for ((slot, &(part, weight)), pmf) in blend.parts.iter_mut().zip(parts).zip(pmfs) {
+            *slot = WeightedPart { part, weight, pmf };
+        }
+        blend
+    }
+
+    fn parts(&self) -> &[WeightedPart] {
+        &self.parts[..self.n]
+    }
+}
+
+impl Part {
+    fn has_non_specular(self, layers: &[Principled]) -> bool {
+        match self {
+            Self::Lobe(lobe) => lobe.has_non_specular(),
+            Self::Layers(k) => layers[usize::from(k)].has_non_specular(),
+        }
+    }
+
+    fn through(self, layers: &[Principled]) -> Option<Interface> {
+        match self {
+            Self::Lobe(lobe) => lobe.through(),
+            Self::Layers(k) => layers[usize::from(k)].through(),
+        }
+    }
+
+    fn eval(self, layers: &[Principled], wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        match self {
+            Self::Lobe(lobe) => lobe.eval(wo, wi, normal),
+            Self::Layers(k) => layers[usize::from(k)].eval(wo, wi, normal),
+        }
+    }
+
+    fn sample(self, layers: &[Principled], wo: Vec3, normal: Vec3, fresh: f32, u: Vec2) -> Option<BsdfSample> {
+        match self {
+            Self::Lobe(lobe) => lobe.sample(wo, normal, || fresh, u),
+            Self::Layers(k) => layers[usize::from(k)].sample(wo, normal, || fresh, u),
+        }
+    }
+}
+
+impl Scatter for Blend {
+    fn has_non_specular(&self) -> bool {
+        self.parts().iter().any(|p| p.part.has_non_specular(&self.layers))
+    }
+
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        let mut sum = (Vec3::ZERO, 0.0);
+        for p in self.parts().iter().filter(|p| p.part.has_non_specular(&self.layers)) {
+            if p.part.through(&self.layers).is_some() && (normal.dot(wi) <= 0.0 || normal.dot(wo) <= 0.0) {
+                continue;
+            }
+            let (value, pdf) = p.part.eval(&self.layers, wo, wi, normal);
+            sum.0 += p.weight * value;
+            sum.1 += p.pmf * pdf;
+        }
+        sum
+    }
+
+    fn through(&self) -> Option<Interface> {
+        None
+    }
+
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        let mut rest = u_lobe();
+        let parts = self.parts();
+        let chosen = parts
+            .iter()
+            .position(|p| {
+                let here = rest < p.pmf;
+                if !here {
+                    rest -= p.pmf;
+                }
+                here
+            })
+            .or_else(|| parts.iter().rposition(|p| p.pmf > 0.0))?;
+        let p = &parts[chosen];
+        let fresh = (rest / p.pmf).clamp(0.0, 1.0f32.next_down());
+        let mut sample = p.part.sample(&self.layers, wo, normal, fresh, u)?;
+        if sample.pdf.is_finite() && sample.through.is_none() {
+            // All parts that are not specular could have found this direction: the one-sample estimate over their mixture.
+            let (value, pdf) = self.eval(wo, sample.wi, normal);
+            sample.weight = value / pdf;
+            sample.pdf = pdf;
+        } else {
+            sample.weight *= p.weight / p.pmf;
+            sample.pdf = f32::INFINITY;
+        }
+        Some(sample)
+    }
+}

@@ -1,0 +1,134 @@
+//! Rays through what is not there: surfaces with holes, and the backs of surfaces that have only a front.
+//!
+//! A ray that meets such a place goes on behind it, in the same direction and at the same depth of its path. Where a surface
+//! is there in part, chance decides: a hash of the ray and of what it met, so that a ray has one answer wherever it is asked,
+//! and light that comes along it is that of the share that is not there. Scenes without such surfaces pay nothing.
+
+use crate::core::material::{Material, MaterialId};
+use crate::prepare::prepared::Prepared;
+use crate::sampling::{hash_combine, hash_u32};
+use crate::shading::vertex::{Vertex, material_of};
+use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
+
+/// Surfaces that a ray may pass before it is stopped: a bound on the work, far above what scenes have.
+const MOST_PASSED: usize = 10_000;
+
+impl Prepared {
+    /// The nearest hits that are there; see [`firstlight_kdtree::SceneTree::closest_hits`].
+    ///
+    /// `t` counts from where the ray began.
+    pub(crate) fn closest_hits(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
+        self.geometry.tree.closest_hits(rays, class, hits);
+        if self.tables.features.cutouts {
+            self.pass_cutouts(rays, hits);
+        }
+    }
+
+    /// Whether anything is in the way; see [`firstlight_kdtree::SceneTree::any_hits`].
+    pub(crate) fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
+        self.geometry.tree.any_hits(rays, class, occluded);
+        if !self.tables.features.cutouts {
+            return;
+        }
+        let in_doubt: Vec<usize> = (0..rays.len()).filter(|&i| occluded[i]).collect();
+        let mut asked = RayBatch::default();
+        in_doubt.iter().for_each(|&i| asked.push(&rays.get(i)));
+        let mut hits = HitBatch::default();
+        self.closest_hits(&asked, class, &mut hits);
+        for (k, i) in in_doubt.into_iter().enumerate() {
+            occluded[i] = hits.get(k).is_some();
+        }
+    }
+
+    /// The same for one ray.
+    pub(crate) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        if !self.tables.features.cutouts {
+            return self.geometry.tree.closest_hit(ray);
+        }
+        let mut rays = RayBatch::default();
+        rays.push(ray);
+        let mut hits = HitBatch::default();
+        self.closest_hits(&rays, RayClass::Incoherent, &mut hits);
+        hits.get(0)
+    }
+
+    #[cold]
+    fn pass_cutouts(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        let mut open: Vec<(usize, Ray)> = Vec::new();
+        for i in 0..rays.len() {
+            let ray = rays.get(i);
+            if let Some(onwards) = hits.get(i).and_then(|hit| self.onwards(&ray, &hit)) {
+                open.push((i, onwards));
+            }
+        }
+        let (mut batch, mut found) = (RayBatch::default(), HitBatch::default());
+        for _ in 0..MOST_PASSED {
+            if open.is_empty() {
+                return;
+            }
+            batch.clear();
+            open.iter().for_each(|(_, ray)| batch.push(ray));
+            self.geometry.tree.closest_hits(&batch, RayClass::Incoherent, &mut found);
+            let mut k = 0;
+            open.retain_mut(|(i, ray)| {
+                let hit = found.get(k);
+                k += 1;
+                if let Some(onwards) = hit.and_then(|hit| self.onwards(ray, &hit)) {
+                    *ray = onwards;
+                    return true;
+                }
+                let first = rays.get(*i);
+                hits.set(*i, hit.map(|hit| Hit { t: along(&first, ray.at(hit.t)), ..hit }));
+                false
+            });
+        }
+    }
+
+    /// The ray behind what it met, if that is not there.
+    fn onwards(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
+        let id = material_of(self, hit);
+        if !self.tables.cutouts[id as usize] {
+            return None;
+        }
+        let length = ray.dir.length();
+        let unit = Ray { dir: ray.dir / length, ..*ray };
+        let vertex = Vertex::new(self, &unit, &Hit { t: hit.t * length, ..*hit }, id);
+        if self.is_there(id, &vertex, || chance(ray, hit)) {
+            return None;
+        }
+        let origin = vertex.passing(ray.dir);
+        Some(if ray.t_max.is_finite() {
+            // To the very end of the first ray, wherever it starts.
+            Ray { origin, dir: ray.at(ray.t_max) - origin, t_max: 1.0 }
+        } else {
+            Ray { origin, ..*ray }
+        })
+    }
+
+    /// - `u`: uniform in `[0, 1)`, asked for where chance decides.
+    fn is_there(&self, id: MaterialId, vertex: &Vertex, u: impl FnOnce() -> f32) -> bool {
+        let material = &self.shading.materials[id as usize];
+        let Material::Principled { two_sided, opacity, opacity_cutoff, .. } = material else { return true };
+        if !two_sided && !vertex.front && !material.is_clear() {
+            return false;
+        }
+        let opacity = opacity.eval(self, vertex.texture_point);
+        match opacity_cutoff {
+            Some(cutoff) => opacity >= *cutoff,
+            None => opacity >= 1.0 || u() < opacity,
+        }
+    }
+}
+
+/// How far along a ray a point is, lengths of its direction.
+fn along(ray: &Ray, point: glam::Vec3) -> f32 {
+    (point - ray.origin).dot(ray.dir) / ray.dir.length_squared()
+}
+
+/// Uniform in `[0, 1)` over rays and what they meet.
+fn chance(ray: &Ray, hit: &Hit) -> f32 {
+    let of_ray = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).map(f32::to_bits);
+    let bits = of_ray.chain([hit.object, hit.prim]).fold(0x51ed_270b, hash_combine);
+    (hash_u32(bits) >> 8) as f32 * (1.0 / (1 << 24) as f32)
+}

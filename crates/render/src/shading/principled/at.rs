@@ -1,0 +1,92 @@
+//! The parameters of a layered material at a point of a surface.
+
+use super::{Inside, Principled, Transmission};
+use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
+use crate::prepare::prepared::Prepared;
+use crate::shading::interface::{Interface, MediumId};
+use crate::shading::sheen;
+use crate::shading::sides::Sides;
+use crate::shading::vertex::Vertex;
+use glam::{Vec2, Vec3};
+
+/// - `sides`: asked for by what lets light through; without them it may be told apart from the rest, but not sampled.
+/// - `leaf`: the number of its transparent part in the material that it belongs to.
+/// - `is_lit`: whether light from beyond is asked for, or only found by sampling.
+pub(crate) fn principled_at(
+    scene: &Prepared,
+    id: MaterialId,
+    vertex: &Vertex,
+    sides: &mut Option<&mut Sides>,
+    leaf: u32,
+    is_lit: bool,
+) -> Option<Principled> {
+    let Material::Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior,
+        specular,
+        specular_color,
+        transmission,
+        thin_walled,
+        anisotropy,
+        anisotropy_rotation,
+        anisotropy_map,
+        sheen_color,
+        sheen_roughness,
+        clearcoat,
+        clearcoat_roughness,
+        clearcoat_normal_map,
+        ..
+    } = &scene.shading.materials[id as usize]
+    else {
+        return None;
+    };
+    let point = vertex.texture_point;
+    let share = |input: &ScalarInput| input.eval(scene, point).clamp(0.0, 1.0);
+    let color = |input: &ColorInput| input.eval(scene, point).clamp(Vec3::ZERO, Vec3::ONE);
+    let (base, metallic, transmitting) = (color(base_color), share(metallic), share(transmission));
+    let alpha = share(roughness).powi(2);
+    let specular = share(specular);
+    let at_normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
+    let facing = (at_normal * specular_color.eval(scene, point).max(Vec3::ZERO)).min(Vec3::ONE) * specular;
+    let opaque = (1.0 - metallic) * (1.0 - transmitting);
+    let anisotropy = share(anisotropy);
+    let (mut widths, mut direction) = ([alpha; 2], None);
+    if anisotropy > 0.0 {
+        let map = color(anisotropy_map);
+        let strength = anisotropy * map.z;
+        // Along the direction of anisotropy the lobe is wider (`KHR_materials_anisotropy`).
+        widths[0] = alpha + (1.0 - alpha) * strength * strength;
+        let across = Vec2::from_angle(anisotropy_rotation.to_radians()).rotate(2.0 * Vec2::new(map.x, map.y) - 1.0);
+        direction = Some(across.normalize_or(Vec2::X));
+    }
+    let transmission = (transmitting > 0.0 && metallic < 1.0).then(|| {
+        let inside = if *thin_walled {
+            Inside::Thin(sides.as_ref().map_or(MediumId::OUTSIDE, |sides| sides.here))
+        } else {
+            Inside::Solid(match sides {
+                Some(sides) => sides.interface(scene, leaf),
+                None => Interface { eta: 1.0 / ior, squeeze: 1.0, beyond: MediumId::OUTSIDE },
+            })
+        };
+        Transmission { share: (1.0 - metallic) * transmitting, tint: base, inside, is_lit }
+    });
+    let coat = share(clearcoat);
+    Some(Principled {
+        dielectric: if *thin_walled { 1.0 - metallic } else { opaque },
+        facing,
+        grazing: Vec3::splat(specular),
+        diffuse: opaque * base,
+        metallic,
+        metal: base,
+        alpha: widths,
+        tangent: direction.map(|direction| vertex.tangent.along(direction, vertex.normal)),
+        transmission,
+        sheen: color(sheen_color),
+        sheen_alpha: sheen::alpha_of(share(sheen_roughness)),
+        coat,
+        coat_alpha: share(clearcoat_roughness).powi(2),
+        coat_normal: if coat > 0.0 { vertex.mapped_normal(scene, *clearcoat_normal_map) } else { vertex.normal },
+    })
+}

@@ -1,0 +1,401 @@
+//! Layered surfaces by the parameters of glTF 2.0 (appendix B and `KHR_materials_*`), made to conserve energy.
+//!
+//! From above: a clear coat, a sheen, and a base that is metal, or a dielectric over what scatters or lets light through.
+//!
+//! - A dielectric reflects by GGX and Schlick; what it does not reflect reaches the diffuse layer below, and what that returns
+//!   must come out again: f = albedo/π · (1 − E(θₒ)) (1 − E(θᵢ)) / (1 − Ē), E being the albedo of all layers above (Kelemen
+//!   and Szirmay-Kalos 2001). It is the same both ways, and a white base returns all light.
+//! - Coat and sheen let 1 − E through to the metal, the reflection and the glass below: of both directions, the lesser counts.
+//! - Light that a rough metal or rough glass loses between microfacets is given back, as by [`crate::shading::metal`] and
+//!   [`crate::shading::rough_glass`].
+//!
+//! Start reading at [`Principled`]; [`seen`] has what follows from the direction of the viewer.
+
+pub(crate) mod at;
+mod seen;
+
+use crate::core::color::luminance;
+use crate::core::material::SMALLEST_ALPHA;
+use crate::shading::interface::{Interface, MediumId};
+use crate::shading::layer_albedo::SchlickAlbedo;
+use crate::shading::scatter::{BsdfSample, Scatter};
+use glam::{Vec2, Vec3};
+use seen::Seen;
+
+/// Reflectance of the coat at normal incidence, for an index of 1.5.
+pub(crate) const COAT_FACING: f32 = 0.04;
+
+/// All parameters at one point of a surface.
+#[derive(Clone, Debug)]
+pub(crate) struct Principled {
+    /// Share of the dielectric that reflects, 0..1.
+    pub dielectric: f32,
+    /// Reflectance of the dielectric at normal incidence and at grazing angles.
+    pub facing: Vec3,
+    pub grazing: Vec3,
+    /// Albedo of what scatters below the dielectric, times its share.
+    pub diffuse: Vec3,
+    /// Share that is metal, 0..1, and its reflectance at normal incidence.
+    pub metallic: f32,
+    pub metal: Vec3,
+    /// Widths of the microfacets along `tangent` and across.
+    pub alpha: [f32; 2],
+    /// Unit, roughly in the surface; `None` for any.
+    pub tangent: Option<Vec3>,
+    pub transmission: Option<Transmission>,
+    /// Strength of the sheen and its width.
+    pub sheen: Vec3,
+    pub sheen_alpha: f32,
+    pub coat: f32,
+    pub coat_alpha: f32,
+    /// Unit, on the side that the surface was met from.
+    pub coat_normal: Vec3,
+}
+
+/// What lets light through.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Transmission {
+    /// Share, 0..1.
+    pub share: f32,
+    /// Of light that passes.
+    pub tint: Vec3,
+    pub inside: Inside,
+    /// Whether light from beyond is asked for, or only found by sampling.
+    pub is_lit: bool,
+}
+
+/// What is behind a surface that lets light through.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Inside {
+    /// Another medium.
+    Solid(Interface),
+    /// A pane without thickness in this medium.
+    Thin(MediumId),
+}
+
+impl Transmission {
+    pub fn interface(&self) -> Interface {
+        match self.inside {
+            Inside::Solid(interface) => interface,
+            Inside::Thin(here) => Interface { eta: 1.0, squeeze: 1.0, beyond: here },
+        }
+    }
+}
+
+impl Principled {
+    /// Width of the base for tables, which know round lobes alone.
+    fn mean_alpha(&self) -> f32 {
+        if self.alpha[0] == self.alpha[1] { self.alpha[0] } else { (self.alpha[0] * self.alpha[1]).sqrt() }
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.alpha[0].min(self.alpha[1]) < SMALLEST_ALPHA
+    }
+
+    fn reflects(&self) -> bool {
+        self.metallic > 0.0 || (self.dielectric > 0.0 && self.grazing.max(self.facing) != Vec3::ZERO)
+    }
+
+    fn has_coat(&self) -> bool {
+        self.coat > 0.0
+    }
+
+    fn is_coat_smooth(&self) -> bool {
+        self.coat_alpha < SMALLEST_ALPHA
+    }
+
+    /// Share of light that it returns or lets through, about.
+    pub fn albedo_estimate(&self) -> f32 {
+        let transmitted = self.transmission.map_or(0.0, |transmission| transmission.share);
+        let reflected = self.dielectric * self.facing + self.metallic * self.metal;
+        luminance(self.diffuse + reflected + self.sheen) + transmitted + COAT_FACING * self.coat
+    }
+
+    /// Of the dielectric's reflection, per channel.
+    fn dielectric_albedo(&self, albedo: SchlickAlbedo) -> Vec3 {
+        self.facing * albedo.facing + self.grazing * albedo.grazing
+    }
+
+    /// Whether transmitted light is spread.
+    fn is_transmission_rough(&self) -> bool {
+        match self.transmission {
+            Some(Transmission { inside: Inside::Solid(interface), .. }) => {
+                !crate::shading::rough_glass::is_smooth(self.mean_alpha(), interface.eta)
+            }
+            Some(Transmission { inside: Inside::Thin(_), .. }) => !self.is_smooth(),
+            None => false,
+        }
+    }
+}
+
+impl Scatter for Principled {
+    fn has_non_specular(&self) -> bool {
+        self.diffuse != Vec3::ZERO
+            || self.sheen != Vec3::ZERO
+            || (self.reflects() && !self.is_smooth())
+            || (self.has_coat() && !self.is_coat_smooth())
+            || self.is_transmission_rough()
+    }
+
+    fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32) {
+        Seen::new(self, wo, normal).map_or((Vec3::ZERO, 0.0), |seen| seen.eval(wi))
+    }
+
+    fn through(&self) -> Option<Interface> {
+        let transmission = self.transmission.filter(|transmission| transmission.is_lit)?;
+        self.is_transmission_rough().then(|| transmission.interface())
+    }
+
+    fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample> {
+        Seen::new(self, wo, normal)?.sample(u_lobe(), u)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+    use crate::shading::sheen;
+    use crate::test_statistics::ChiSquared;
+    use std::f64::consts::{PI, TAU};
+
+    const RINGS: usize = 12;
+    const SECTORS: usize = 24;
+
+    fn plain() -> Principled {
+        Principled {
+            dielectric: 1.0,
+            facing: Vec3::splat(0.04),
+            grazing: Vec3::ONE,
+            diffuse: Vec3::ONE,
+            metallic: 0.0,
+            metal: Vec3::ONE,
+            alpha: [0.25; 2],
+            tangent: None,
+            transmission: None,
+            sheen: Vec3::ZERO,
+            sheen_alpha: 0.25,
+            coat: 0.0,
+            coat_alpha: 0.0,
+            coat_normal: Vec3::Z,
+        }
+    }
+
+    fn direction(cos: f32) -> Vec3 {
+        Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)
+    }
+
+    fn transmission(share: f32, inside: Inside) -> Option<Transmission> {
+        Some(Transmission { share, tint: Vec3::ONE, inside, is_lit: true })
+    }
+
+    fn solid(eta: f32) -> Inside {
+        Inside::Solid(Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE })
+    }
+
+    /// Surfaces of every layer, alone and together, with a name.
+    fn surfaces() -> Vec<(&'static str, Principled)> {
+        let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() };
+        let color = Vec3::new(0.8, 0.4, 0.1);
+        let half = Principled { dielectric: 0.5, diffuse: 0.5 * color, metallic: 0.5, metal: color, ..plain() };
+        let velvet = Principled { sheen: Vec3::new(0.9, 0.5, 0.7), sheen_alpha: 0.09, ..plain() };
+        let thin = Principled { diffuse: Vec3::ZERO, ..plain() };
+        let glass = Principled { dielectric: 0.4, diffuse: 0.4 * color, ..plain() };
+        vec![
+            ("dielectric", plain()),
+            ("glossy dielectric", Principled { alpha: [0.06; 2], ..plain() }),
+            ("rough dielectric", Principled { alpha: [1.0; 2], ..plain() }),
+            ("metal", metal.clone()),
+            (
+                "brushed metal",
+                Principled { alpha: [0.6, 0.1], tangent: Some(Vec3::new(0.6, 0.8, 0.0)), ..metal.clone() },
+            ),
+            ("half metal", half.clone()),
+            ("velvet", velvet.clone()),
+            ("coated", Principled { coat: 1.0, coat_alpha: 0.04, ..half }),
+            ("all layers", Principled { coat: 0.7, coat_alpha: 0.3, metallic: 0.2, dielectric: 0.8, ..velvet }),
+            ("thin", Principled { transmission: transmission(1.0, Inside::Thin(MediumId::OUTSIDE)), ..thin }),
+            ("part glass", Principled { transmission: transmission(0.6, solid(1.0 / 1.5)), ..glass.clone() }),
+            ("part glass from within", Principled { transmission: transmission(0.6, solid(1.5)), ..glass }),
+        ]
+    }
+
+    /// Every direction has a bin: its height, and its angle about the normal.
+    fn bin(wi: Vec3) -> usize {
+        let ring = ((wi.z + 1.0) * 0.5 * (2 * RINGS) as f32) as usize;
+        let sector = ((wi.y.atan2(wi.x) / std::f32::consts::TAU + 0.5) * SECTORS as f32) as usize;
+        ring.min(2 * RINGS - 1) * SECTORS + sector.min(SECTORS - 1)
+    }
+
+    /// ∫ f over each bin, by the midpoint rule.
+    fn integrals(fine: usize, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; 2 * RINGS * SECTORS];
+        let (n_z, n_phi) = (2 * RINGS * fine, SECTORS * fine);
+        for i in 0..n_z {
+            let z = (i as f64 + 0.5) / n_z as f64 * 2.0 - 1.0;
+            let r = (1.0 - z * z).sqrt();
+            for k in 0..n_phi {
+                let phi = ((k as f64 + 0.5) / n_phi as f64 - 0.5) * TAU;
+                let wi = glam::DVec3::new(r * phi.cos(), r * phi.sin(), z).as_vec3();
+                sums[i / fine * SECTORS + k / fine] += f(wi);
+            }
+        }
+        let area = 4.0 * PI / (n_z * n_phi) as f64;
+        sums.into_iter().map(|sum| sum * area).collect()
+    }
+
+    #[test]
+    fn sampled_directions_follow_their_pdf_and_carry_f_over_it() {
+        // 1 % over all thirty-six cases (Šidák: 3.5 σ).
+        for (case, (name, surface)) in (0..).zip(surfaces()) {
+            for (view, cos) in (0..).zip([0.9, 0.4, 0.08]) {
+                let wo = direction(cos);
+                let n = 100_000;
+                let mut counts = vec![0.0; 2 * RINGS * SECTORS + 1];
+                for i in 0..n {
+                    let sampler = Sampler::new(i, case, view, 0);
+                    let Some(sample) = surface.sample(wo, Vec3::Z, || sampler.single(5), sampler.pair(3)) else {
+                        *counts.last_mut().unwrap() += 1.0;
+                        continue;
+                    };
+                    counts[bin(sample.wi)] += 1.0;
+                    assert_eq!(sample.through.is_some(), sample.wi.z < 0.0, "{name}");
+                    let (value, pdf) = surface.eval(wo, sample.wi, Vec3::Z);
+                    assert!((pdf - sample.pdf).abs() <= 2e-3 * pdf, "{name}, cos {cos}: {pdf} for {}", sample.pdf);
+                    assert!(
+                        (value / pdf - sample.weight).length() <= 4e-3 * sample.weight.length(),
+                        "{name}, cos {cos}"
+                    );
+                }
+                // A narrow lobe is not integrated well bin by bin.
+                let is_narrow = surface.alpha[0].min(surface.alpha[1]) < 0.05
+                    || (surface.coat > 0.0 && surface.coat_alpha < 0.05)
+                    || cos < 0.1;
+                let mut expected: Vec<f64> =
+                    integrals(if is_narrow { 48 } else { 16 }, |wi| f64::from(surface.eval(wo, wi, Vec3::Z).1))
+                        .into_iter()
+                        .map(|share| share * f64::from(n))
+                        .collect();
+                let found: f64 = expected.iter().sum();
+                assert!(
+                    found < 1.005 * f64::from(n),
+                    "{name}, cos {cos}: the pdf integrates to {}",
+                    found / f64::from(n)
+                );
+                expected.push((f64::from(n) - found).max(0.0));
+                if is_narrow {
+                    let mut of_rings = [vec![0.0; 5], vec![0.0; 5]];
+                    for (sums, bins) in of_rings.iter_mut().zip([&counts, &expected]) {
+                        for (k, count) in bins.iter().enumerate() {
+                            sums[k / (2 * RINGS * SECTORS / 4)] += count;
+                        }
+                    }
+                    for (count, expected) in of_rings[0].iter().zip(&of_rings[1]) {
+                        assert!((count - expected).abs() < 0.02 * f64::from(n), "{name}, cos {cos}: {of_rings:?}");
+                    }
+                } else {
+                    ChiSquared::of(&counts, &expected, 1e-3).assert_below(3.5, &format!("{name}, cos {cos}"));
+                }
+            }
+        }
+    }
+
+    /// Share of light that comes back or through when all around is as bright.
+    fn furnace(surface: &Principled, cos: f32, n: u32) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for i in 0..n {
+            let sampler = Sampler::new(7, 0, 0, i);
+            if let Some(sample) = surface.sample(direction(cos), Vec3::Z, || sampler.single(2), sampler.pair(0)) {
+                let squeeze = sample.through.map_or(1.0, |interface| interface.squeeze * interface.squeeze);
+                sum += sample.weight / squeeze;
+            }
+        }
+        sum / n as f32
+    }
+
+    #[test]
+    fn a_white_base_returns_all_light_and_nothing_returns_more() {
+        for roughness in [0.0f32, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0] {
+            for cos in [1.0, 0.7, 0.4, 0.15, 0.05, 0.01] {
+                let alpha = [roughness * roughness; 2];
+                let white = [
+                    ("dielectric", Principled { alpha, ..plain() }),
+                    ("tinted reflection", Principled { alpha, facing: Vec3::new(0.3, 0.1, 0.0), ..plain() }),
+                    ("metal", Principled { alpha, dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() }),
+                    ("coat", Principled { alpha: [0.09; 2], coat: 1.0, coat_alpha: alpha[0], ..plain() }),
+                    ("sheen", Principled { sheen: Vec3::ONE, sheen_alpha: sheen::alpha_of(roughness), ..plain() }),
+                ];
+                for (name, surface) in white {
+                    let found = furnace(&surface, cos, 1 << 15);
+                    let name = format!("{name}, roughness {roughness}, cos {cos}: {found}");
+                    assert!(found.max_element() <= 1.008, "{name}");
+                    // The coat hides some of the reflection of what is below it, and grazing light of tables without end is hard.
+                    let is_whole = !name.starts_with("coat") && !name.starts_with("sheen") && cos > 0.02;
+                    let least = if is_whole { 0.994 } else { 0.9 };
+                    assert!(found.min_element() >= least, "{name}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scattering_is_the_same_both_ways() {
+        for (name, surface) in surfaces() {
+            // What a metal loses between microfacets is given back by the viewer's angle alone (Turquin 2019).
+            let surface = if surface.metallic > 0.0 { Principled { metallic: 0.0, ..surface } } else { surface };
+            for i in 0..200 {
+                let sampler = Sampler::new(1, 2, 0, i);
+                let [a, b] = [0, 1].map(|k| crate::sampling::cosine_hemisphere(sampler.pair(k)));
+                if a.z < 0.05 || b.z < 0.05 {
+                    continue;
+                }
+                let forth = surface.eval(a, b, Vec3::Z).0 / b.z;
+                let back = surface.eval(b, a, Vec3::Z).0 / a.z;
+                assert!((forth - back).length() <= 2e-3 * (forth.length() + 1e-3), "{name}: {forth} {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_parameters_give_what_is_no_number() {
+        for i in 0..200_000 {
+            let sampler = Sampler::new(9, 1, 0, i);
+            let pick = |k: u32| sampler.single(k);
+            let ends = |k: u32| match pick(k) {
+                x if x < 0.2 => 0.0,
+                x if x > 0.8 => 1.0,
+                x => (x - 0.2) / 0.6,
+            };
+            let normal = Vec3::new(pick(1) - 0.5, pick(2) - 0.5, pick(3) + 0.02).normalize();
+            let surface = Principled {
+                dielectric: ends(4),
+                facing: Vec3::new(ends(5), ends(6), ends(7)),
+                grazing: Vec3::splat(ends(8)),
+                diffuse: Vec3::splat(ends(9)) * (1.0 - ends(10)),
+                metallic: ends(10),
+                metal: Vec3::new(ends(11), ends(12), ends(13)),
+                alpha: [ends(14).powi(2), if pick(15) < 0.5 { ends(14).powi(2) } else { ends(15).powi(2) }],
+                tangent: (pick(16) < 0.5).then_some(Vec3::X),
+                transmission: (pick(17) < 0.5).then(|| Transmission {
+                    share: ends(18),
+                    tint: Vec3::splat(ends(19)),
+                    inside: if pick(20) < 0.5 { Inside::Thin(MediumId::OUTSIDE) } else { solid(0.4 + 2.0 * pick(21)) },
+                    is_lit: pick(22) < 0.5,
+                }),
+                sheen: Vec3::splat(ends(23)),
+                sheen_alpha: sheen::alpha_of(ends(24)),
+                coat: ends(25),
+                coat_alpha: ends(26).powi(2),
+                coat_normal: if pick(27) < 0.5 { normal } else { Vec3::Z },
+            };
+            let wo = direction((pick(28).powi(4)).max(1e-7));
+            let wi = Vec3::new(pick(29) - 0.5, pick(30) - 0.5, pick(31) - 0.5).normalize_or(Vec3::Z);
+            let (value, pdf) = surface.eval(wo, wi, Vec3::Z);
+            assert!(value.is_finite() && value.min_element() >= 0.0 && pdf >= 0.0 && !pdf.is_nan(), "{i}: {surface:?}");
+            if let Some(sample) = surface.sample(wo, Vec3::Z, || pick(32), Vec2::new(pick(33), pick(34))) {
+                assert!(sample.weight.is_finite() && sample.weight.min_element() >= 0.0, "{i}: {sample:?} {surface:?}");
+                assert!(sample.pdf > 0.0 && sample.wi.is_normalized(), "{i}: {sample:?} {surface:?}");
+            }
+        }
+    }
+}

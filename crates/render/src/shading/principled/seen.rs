@@ -1,0 +1,379 @@
+//! A layered surface as seen along one direction.
+
+use super::{COAT_FACING, Inside, Principled, Transmission};
+use crate::core::color::luminance;
+use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
+use crate::shading::dielectric::{fresnel, reflect, refract};
+use crate::shading::ggx::{self, anisotropic_distribution, anisotropic_lambda, sample_anisotropic_normal};
+use crate::shading::interface::Interface;
+use crate::shading::layer_albedo::{SchlickAlbedo, cosine_mean, sheen_albedo};
+use crate::shading::rough_glass::RoughGlass;
+use crate::shading::scatter::BsdfSample;
+use crate::shading::sheen;
+use firstlight_kdtree::geometry::Frame;
+use glam::{Vec2, Vec3};
+
+/// Cosines with the normal count for at least this: nothing is seen at a smaller angle.
+const SMALLEST_COS: f32 = 1e-6;
+
+/// What a direction is sampled by.
+#[derive(Clone, Copy, PartialEq)]
+enum Technique {
+    /// For the diffuse layer and the sheen.
+    Cosine,
+    /// Visible normals of the base.
+    Reflection,
+    /// Visible normals of the coat.
+    Coat,
+    Transmission,
+}
+
+const TECHNIQUES: [Technique; 4] = [Technique::Cosine, Technique::Reflection, Technique::Coat, Technique::Transmission];
+
+/// What follows from the direction of the viewer.
+pub(super) struct Seen<'a> {
+    of: &'a Principled,
+    /// Along the tangent, across, and along the normal on the side of the viewer.
+    frame: Frame,
+    /// In the frame.
+    wo: Vec3,
+    /// Of the coat; around its own normal.
+    coat: Option<CoatSeen>,
+    /// What the sheen lets pass.
+    past_sheen: f32,
+    /// What of the light towards the viewer comes from below all layers.
+    past_all: Vec3,
+    /// The same of all directions.
+    mean_past_all: Vec3,
+    /// What a metal loses at one bounce over what it returns.
+    lost: f32,
+    /// What a rough pane lets through over what it does by single scattering.
+    passed_again: Vec3,
+    pmf: [f32; 4],
+}
+
+struct CoatSeen {
+    frame: Frame,
+    wo: Vec3,
+    /// What it lets pass.
+    past: f32,
+}
+
+/// GGX microfacets seen along a direction above them, both in the frame.
+fn reflection(wo: Vec3, wi: Vec3, alpha: [f32; 2]) -> (Vec3, f32, f32) {
+    let half = (wo + wi).normalize();
+    let masking = 1.0 + anisotropic_lambda(wo.into(), alpha);
+    let both = masking + anisotropic_lambda(wi.into(), alpha);
+    let per_area = anisotropic_distribution(half.into(), alpha) / (4.0 * wo.z);
+    (half, per_area / both, per_area / masking)
+}
+
+fn schlick(facing: Vec3, grazing: Vec3, cos: f32) -> Vec3 {
+    facing.lerp(grazing, (1.0 - cos).clamp(0.0, 1.0).powi(5))
+}
+
+fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
+    reflect(wo.into(), normal.into()).into()
+}
+
+impl<'a> Seen<'a> {
+    /// - `normal`: unit; `wo`: unit, on its side, or beyond it where light passes. `None` for what is seen from inside of a
+    ///   surface that lets nothing through.
+    pub fn new(of: &'a Principled, wo: Vec3, normal: Vec3) -> Option<Self> {
+        if normal.dot(wo) <= 0.0 {
+            return None;
+        }
+        let tangent = of.tangent.map(|t| t - normal.dot(t) * normal).and_then(Vec3::try_normalize);
+        let frame = match tangent {
+            Some(x) => Frame { x, y: normal.cross(x), z: normal },
+            None => Frame::around(normal),
+        };
+        let mut local = frame.to_local(wo);
+        local.z = local.z.max(SMALLEST_COS);
+        let alpha = of.mean_alpha();
+        let coat = of.has_coat().then(|| {
+            // A coat that faces away is seen as the base is.
+            let normal = if of.coat_normal.dot(wo) > 0.0 { of.coat_normal } else { normal };
+            let frame = Frame::around(normal);
+            let mut wo = frame.to_local(wo);
+            wo.z = wo.z.max(SMALLEST_COS);
+            CoatSeen { frame, wo, past: past_coat(of, wo.z) }
+        });
+        let past_coat = coat.as_ref().map_or(1.0, |coat| coat.past);
+        let past_sheen = past_sheen(of, local.z);
+        let base = SchlickAlbedo::new(local.z, alpha);
+        let reflected = of.dielectric_albedo(base);
+        let past_all = past_coat * past_sheen * (Vec3::ONE - reflected).max(Vec3::ZERO);
+        let is_diffuse = of.diffuse != Vec3::ZERO;
+        let mean_past_all = if is_diffuse { mean_past_all(of, alpha) } else { Vec3::ONE };
+        let lost = if of.metallic > 0.0 { ggx::lost_over_returned(local.z, alpha) } else { 0.0 };
+        let upper = past_coat * past_sheen;
+        let metal = (of.metal * base.facing + Vec3::splat(base.grazing)) * (Vec3::ONE + of.metal * lost);
+        let transmitted = of.transmission.map_or(0.0, |transmission| match transmission.inside {
+            Inside::Solid(_) => transmission.share,
+            Inside::Thin(_) => transmission.share * luminance(transmission.tint * (Vec3::ONE - reflected)),
+        });
+        // All that is not reflected passes (as Turquin 2019 for metals).
+        let once = Vec3::splat(base.facing + base.grazing) - reflected;
+        let passed_again = (Vec3::ONE - reflected) / once.max(Vec3::splat(1e-3));
+        let sheen = luminance(of.sheen);
+        let strength = [
+            luminance(of.diffuse * past_all)
+                + if sheen > 0.0 { past_coat * sheen * sheen_albedo(local.z, of.sheen_alpha) } else { 0.0 },
+            upper * luminance(of.dielectric * reflected + of.metallic * metal),
+            1.0 - past_coat,
+            upper * transmitted,
+        ];
+        let sum: f32 = strength.iter().sum();
+        if sum.is_nan() || sum <= 0.0 {
+            return None;
+        }
+        let pmf = strength.map(|one| one / sum);
+        Some(Self { of, frame, wo: local, coat, past_sheen, past_all, mean_past_all, lost, passed_again, pmf })
+    }
+
+    /// What reaches the layers below the coat, of light from one direction to the viewer.
+    fn below_coat(&self, wi: Vec3) -> f32 {
+        let Some(coat) = &self.coat else { return 1.0 };
+        coat.past.min(past_coat(self.of, coat.frame.z.dot(wi).abs()))
+    }
+
+    /// f · |cos| and density of all that is not specular. `wi`: unit, in the world.
+    pub fn eval(&self, wi: Vec3) -> (Vec3, f32) {
+        let of = self.of;
+        let local = self.frame.to_local(wi);
+        if local.z < 0.0 {
+            return match of.transmission.filter(|t| t.is_lit && of.is_transmission_rough()) {
+                Some(transmission) => self.eval_through(&transmission, wi, local),
+                None => (Vec3::ZERO, 0.0),
+            };
+        }
+        if local.z == 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let below_coat = self.below_coat(wi);
+        let past_sheen_i = past_sheen(of, local.z);
+        let below = below_coat * self.past_sheen.min(past_sheen_i);
+        let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
+        if self.pmf[0] > 0.0 {
+            let cosine = cosine_hemisphere_pdf(local.z);
+            pdf += self.pmf[0] * cosine;
+            if of.diffuse != Vec3::ZERO {
+                let reflected = of.dielectric_albedo(SchlickAlbedo::new(local.z, of.mean_alpha()));
+                let coat = self.coat.as_ref().map_or(1.0, |coat| past_coat(of, coat.frame.z.dot(wi).abs()));
+                let past_all_i = coat * past_sheen_i * (Vec3::ONE - reflected).max(Vec3::ZERO);
+                value += of.diffuse * cosine * self.past_all * past_all_i / self.mean_past_all;
+            }
+            if of.sheen != Vec3::ZERO {
+                let half = (self.wo + local).normalize();
+                // Narrow sheens would return more than all light at grazing angles: what is too much is left out both ways.
+                let most =
+                    [self.wo.z, local.z].map(|cos| sheen_albedo(cos, of.sheen_alpha)).into_iter().fold(1.0, f32::max);
+                let sheen = sheen::value(self.wo.z, local.z, half.z, of.sheen_alpha) / most;
+                value += of.sheen * (below_coat * sheen * local.z);
+            }
+        }
+        if self.pmf[1] > 0.0 && !of.is_smooth() {
+            let (half, f, density) = reflection(self.wo, local, of.alpha);
+            value += self.tint(self.wo.dot(half)) * (below * f);
+            pdf += self.pmf[1] * density;
+        }
+        if let Some(coat) = self.coat.as_ref().filter(|_| !of.is_coat_smooth()) {
+            let local = coat.frame.to_local(wi);
+            if local.z > 0.0 {
+                let (half, f, density) = reflection(coat.wo, local, [of.coat_alpha; 2]);
+                let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.dot(half));
+                value += tint * (of.coat * f);
+                pdf += self.pmf[2] * density;
+            }
+        }
+        if let Some(transmission) = of.transmission.filter(|_| self.pmf[3] > 0.0 && of.is_transmission_rough())
+            && let Inside::Solid(interface) = transmission.inside
+        {
+            let (f, density) = self.rough_glass(interface).eval(wi);
+            value += Vec3::splat(transmission.share * below * f);
+            pdf += self.pmf[3] * density;
+        }
+        (value, pdf)
+    }
+
+    fn rough_glass(&self, interface: Interface) -> RoughGlass {
+        let wo = self.frame.to_world(self.wo).normalize();
+        RoughGlass::new(self.frame.z, wo, self.of.mean_alpha().min(1.0), interface, true)
+    }
+
+    /// Light from beyond, where that is spread.
+    fn eval_through(&self, transmission: &Transmission, wi: Vec3, local: Vec3) -> (Vec3, f32) {
+        let above = Vec3::new(local.x, local.y, -local.z);
+        let below = self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, above.z));
+        let (f, density) = match transmission.inside {
+            Inside::Solid(interface) => {
+                let (f, density) = self.rough_glass(interface).eval(wi);
+                (Vec3::splat(f), density)
+            }
+            // The reflected lobe on the other side.
+            Inside::Thin(_) => {
+                let (half, f, density) = reflection(self.wo, above, self.of.alpha);
+                (f * self.passed(self.wo.dot(half)) * self.passed_again, density)
+            }
+        };
+        (transmission.tint * (transmission.share * below) * f, self.pmf[3] * density)
+    }
+
+    /// Reflectance of the base under an angle with its microfacets.
+    fn tint(&self, cos: f32) -> Vec3 {
+        let of = self.of;
+        let dielectric = of.dielectric * schlick(of.facing, of.grazing, cos);
+        if of.metallic == 0.0 {
+            return dielectric;
+        }
+        let metal = schlick(of.metal, Vec3::ONE, cos) * (Vec3::ONE + of.metal * self.lost);
+        dielectric + of.metallic * metal
+    }
+
+    /// What a pane without thickness lets through under an angle.
+    fn passed(&self, cos: f32) -> Vec3 {
+        (Vec3::ONE - schlick(self.of.facing, self.of.grazing, cos)).max(Vec3::ZERO)
+    }
+
+    /// - `u_lobe`: chooses the layer; `u`: the direction.
+    pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let mut rest = u_lobe;
+        let chosen = (0..4)
+            .find(|&k| {
+                let here = rest < self.pmf[k];
+                if !here {
+                    rest -= self.pmf[k];
+                }
+                here
+            })
+            .or_else(|| (0..4).rev().find(|&k| self.pmf[k] > 0.0))?;
+        let pmf = self.pmf[chosen];
+        let fresh = (rest / pmf).clamp(0.0, 1.0f32.next_down());
+        match TECHNIQUES[chosen] {
+            Technique::Cosine => {
+                let local: Vec3 = cosine_hemisphere(u.to_array()).into();
+                self.reflected(local, &self.frame)
+            }
+            Technique::Reflection => self.sample_reflection(u, pmf),
+            Technique::Coat => self.sample_coat(u, pmf),
+            Technique::Transmission => self.sample_transmission(fresh, u, pmf),
+        }
+    }
+
+    /// All layers that are not specular could have found this direction: the one-sample estimate over their mixture.
+    fn reflected(&self, local: Vec3, frame: &Frame) -> Option<BsdfSample> {
+        if local.z <= 0.0 {
+            return None;
+        }
+        let wi = frame.to_world(local).normalize();
+        let (value, pdf) = self.eval(wi);
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, through: None })
+    }
+
+    fn sample_reflection(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
+        if self.of.is_smooth() {
+            let wi = self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize();
+            let below = self.below_coat(wi) * self.past_sheen;
+            let weight = self.tint(self.wo.z) * (below / pmf);
+            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, through: None });
+        }
+        let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
+        self.reflected(mirrored(self.wo, half), &self.frame)
+    }
+
+    fn sample_coat(&self, u: Vec2, pmf: f32) -> Option<BsdfSample> {
+        let coat = self.coat.as_ref()?;
+        if self.of.is_coat_smooth() {
+            let wi = coat.frame.to_world(mirrored(coat.wo, Vec3::Z)).normalize();
+            let tint = schlick(Vec3::splat(COAT_FACING), Vec3::ONE, coat.wo.z);
+            let weight = tint * (self.of.coat / pmf);
+            return Some(BsdfSample { wi, weight, pdf: f32::INFINITY, through: None });
+        }
+        let half: Vec3 = sample_anisotropic_normal(coat.wo.into(), [self.of.coat_alpha; 2], u.to_array()).into();
+        let local = mirrored(coat.wo, half);
+        if local.z <= 0.0 || self.frame.z.dot(coat.frame.to_world(local)) <= 0.0 {
+            return None;
+        }
+        self.reflected(local, &coat.frame)
+    }
+
+    fn sample_transmission(&self, u_choice: f32, u: Vec2, pmf: f32) -> Option<BsdfSample> {
+        let transmission = self.of.transmission?;
+        let share = transmission.share / pmf;
+        let below = |wi: Vec3| {
+            let cos = self.frame.z.dot(wi).abs();
+            self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, cos))
+        };
+        let specular = |wi: Vec3, weight: Vec3, passes: bool| {
+            let through = passes.then(|| transmission.interface());
+            Some(BsdfSample { wi, weight: weight * (share * below(wi)), pdf: f32::INFINITY, through })
+        };
+        let wo = self.frame.to_world(self.wo).normalize();
+        match transmission.inside {
+            Inside::Solid(interface) if self.of.is_transmission_rough() => {
+                let found = self.rough_glass(interface).sample(u_choice, u)?;
+                if !found.passes {
+                    let (value, pdf) = self.eval(found.wi);
+                    return (pdf > 0.0).then(|| BsdfSample { wi: found.wi, weight: value / pdf, pdf, through: None });
+                }
+                let weight = transmission.tint * (found.weight * share * below(found.wi));
+                let pdf = if transmission.is_lit { found.pdf * pmf } else { f32::INFINITY };
+                Some(BsdfSample { wi: found.wi, weight, pdf, through: Some(interface) })
+            }
+            Inside::Solid(interface) => {
+                let (reflectance, cos_t) = fresnel(self.wo.z.min(1.0), interface.eta);
+                if u_choice < reflectance {
+                    specular(self.frame.to_world(mirrored(self.wo, Vec3::Z)).normalize(), Vec3::ONE, false)
+                } else {
+                    let wi = refract(wo.into(), self.frame.z.into(), interface.eta, cos_t).into();
+                    specular(wi, transmission.tint * interface.squeeze * interface.squeeze, true)
+                }
+            }
+            Inside::Thin(_) if self.of.is_smooth() => specular(-wo, transmission.tint * self.passed(self.wo.z), true),
+            Inside::Thin(_) => {
+                let half: Vec3 = sample_anisotropic_normal(self.wo.into(), self.of.alpha, u.to_array()).into();
+                let above = mirrored(self.wo, half);
+                if above.z <= 0.0 {
+                    return None;
+                }
+                let local = Vec3::new(above.x, above.y, -above.z);
+                let wi = self.frame.to_world(local).normalize();
+                let (value, pdf) = self.eval_through(&transmission, wi, local);
+                let stated = if transmission.is_lit { pdf } else { f32::INFINITY };
+                let through = Some(transmission.interface());
+                (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf: stated, through })
+            }
+        }
+    }
+}
+
+/// What the coat lets pass under an angle.
+fn past_coat(of: &Principled, cos: f32) -> f32 {
+    let albedo = SchlickAlbedo::new(cos, of.coat_alpha);
+    1.0 - of.coat * (COAT_FACING * albedo.facing + albedo.grazing)
+}
+
+/// What the sheen lets pass under an angle.
+fn past_sheen(of: &Principled, cos: f32) -> f32 {
+    if of.sheen == Vec3::ZERO {
+        return 1.0;
+    }
+    (1.0 - of.sheen.max_element() * sheen_albedo(cos, of.sheen_alpha)).max(0.0)
+}
+
+/// Mean over all directions of what comes from below all layers; not 0.
+fn mean_past_all(of: &Principled, alpha: f32) -> Vec3 {
+    let least = Vec3::splat(1e-6);
+    if !of.has_coat() && of.sheen == Vec3::ZERO {
+        return (Vec3::ONE - of.dielectric_albedo(SchlickAlbedo::mean(alpha))).max(least);
+    }
+    let reflected = |cos: f32| of.dielectric_albedo(SchlickAlbedo::new(cos, alpha));
+    let channel = |k: usize| {
+        cosine_mean(|cos| {
+            let coat = if of.has_coat() { past_coat(of, cos) } else { 1.0 };
+            coat * past_sheen(of, cos) * (1.0 - reflected(cos)[k]).max(0.0)
+        })
+    };
+    Vec3::new(channel(0), channel(1), channel(2)).max(least)
+}

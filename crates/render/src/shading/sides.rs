@@ -1,0 +1,42 @@
+//! What lies on the two sides of a surface that a path meets.
+
+use crate::core::material::MaterialId;
+use crate::prepare::bodies::Boundary;
+use crate::prepare::prepared::Prepared;
+use crate::shading::interface::{Interface, MediumId};
+use crate::shading::medium::MediumSets;
+use firstlight_kdtree::Hit;
+use firstlight_kdtree::geometry::Ray;
+
+/// The media on the two sides of a surface that a path meets.
+pub(crate) struct Sides<'a> {
+    pub sets: &'a mut MediumSets,
+    /// On the side of the path.
+    pub here: MediumId,
+    pub boundary: Boundary,
+    /// In the same place, see [`crate::shading::medium`].
+    others: Vec<Boundary>,
+}
+
+impl<'a> Sides<'a> {
+    #[inline]
+    pub fn new(
+        scene: &Prepared,
+        sets: &'a mut MediumSets,
+        here: MediumId,
+        ray: &Ray,
+        hit: &Hit,
+        id: MaterialId,
+        front: bool,
+    ) -> Self {
+        let bodies = &scene.tables.bodies;
+        let others = scene.along_with(hit, || *ray);
+        Self { sets, here, boundary: bodies.boundary(hit.object, hit.prim, id, front), others }
+    }
+
+    /// The way through a transparent part of the material; see [`MediumSets::interface`].
+    #[inline]
+    pub fn interface(&mut self, scene: &Prepared, leaf: u32) -> Interface {
+        self.sets.interface(scene, self.here, self.boundary, leaf, &self.others)
+    }
+}

@@ -1,0 +1,114 @@
+//! Normals from pictures, and the tangents that these count from.
+//!
+//! A mapped normal may reflect the viewer's ray into the surface, which leaves black fringes. It is bent until the mirrored ray
+//! lies in the surface (Keller et al. 2017, "The Iray Light Transport Simulation and Rendering System", appendix A.3). What
+//! goes below the true surface is lost, so no energy is gained.
+
+use firstlight_mesh::Mesh;
+use glam::{Affine3A, Vec2, Vec3};
+
+/// The directions in which the first surface coordinates grow, unit where there are such.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tangent {
+    /// Roughly in the surface, metres; zero where nobody asks for it.
+    pub along_u: Vec3,
+    /// 1 where `normal × along_u` is the direction of v for the normal of the front, otherwise -1.
+    pub handedness: f32,
+}
+
+impl Tangent {
+    pub fn new(along_u: Vec3, handedness: f32) -> Self {
+        Self { along_u, handedness }
+    }
+
+    /// Of a triangle of a mesh: that of its vertices, or what its texture coordinates tell.
+    ///
+    /// - `weights`: barycentric; `normal`: of the front, unit.
+    pub fn of_mesh(mesh: &Mesh, triangle: [usize; 3], weights: Vec3, map: &Affine3A, normal: Vec3) -> Self {
+        let mirrored = if map.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+        if !mesh.tangents.is_empty() {
+            let [a, b, c] = triangle.map(|i| mesh.tangents[i]);
+            let along = weights.x * a.truncate() + weights.y * b.truncate() + weights.z * c.truncate();
+            return Self::new(map.transform_vector3(along), mirrored * a.w);
+        }
+        let uv = |k: usize| mesh.uvs.get(triangle[k]).copied().unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y][k]);
+        let [p, q] = [1, 2].map(|k| map.transform_vector3(mesh.positions[triangle[k]] - mesh.positions[triangle[0]]));
+        let [a, b] = [1, 2].map(|k| uv(k) - uv(0));
+        let area = a.perp_dot(b);
+        if area == 0.0 || !area.is_finite() {
+            return Self::new(p, 1.0);
+        }
+        // Derivatives of the position by u and by v, up to a positive factor.
+        let along_u = (b.y * p - a.y * q) * area.signum();
+        let along_v = (a.x * q - b.x * p) * area.signum();
+        Self::new(along_u, if normal.cross(along_u).dot(along_v) < 0.0 { -1.0 } else { 1.0 })
+    }
+
+    /// A direction in the surface, unit.
+    ///
+    /// - `direction`: along u and v; `normal`: unit.
+    pub fn along(&self, direction: Vec2, normal: Vec3) -> Vec3 {
+        let [x, y] = self.axes(normal);
+        direction.x * x + direction.y * y
+    }
+
+    /// Along u and v, both unit and in the surface of a normal of the front.
+    fn axes(&self, normal: Vec3) -> [Vec3; 2] {
+        let x = (self.along_u - normal.dot(self.along_u) * normal).normalize_or(normal.any_orthonormal_vector());
+        [x, normal.cross(x) * if self.handedness < 0.0 { -1.0 } else { 1.0 }]
+    }
+}
+
+/// The normal that a picture tells of.
+///
+/// - `coded`: 0..1 for −1..1 along tangent, bitangent and normal; `scale`: factor of the first two; `front`: the normal of the
+///   front without the picture, unit.
+pub(crate) fn normal_of_map(coded: Vec3, scale: f32, tangent: &Tangent, front: Vec3) -> Vec3 {
+    let [x, y] = tangent.axes(front);
+    let local = (2.0 * coded - 1.0) * Vec3::new(scale, scale, 1.0);
+    (local.x * x + local.y * y + local.z * front).normalize_or(front)
+}
+
+/// The normal nearest to `normal` in the plane of it and `wo` by which `wo` is mirrored to the side of `surface` at least.
+///
+/// - All unit; `surface` faces `wo`.
+pub(crate) fn bent(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
+    let mirrored = 2.0 * normal.dot(wo) * normal - wo;
+    let below = mirrored.dot(surface);
+    if below >= 0.0 && normal.dot(wo) > 0.0 {
+        return normal;
+    }
+    // Along the normal up to the surface; a normal that looks away from it has no such way.
+    let rise = normal.dot(surface).max(1e-3);
+    let lifted = (mirrored - normal * (below / rise)).normalize_or(surface);
+    let between = (wo + lifted).normalize_or(surface);
+    if between.dot(wo) > 0.0 { between } else { surface }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Sampler, cosine_hemisphere};
+
+    /// Whatever the normal and the viewer, the mirrored ray leaves the surface, and normals that need not be bent are not.
+    #[test]
+    fn bent_normals_reflect_to_the_side_of_the_surface() {
+        let (mut kept, mut turned) = (0, 0);
+        for i in 0..10_000 {
+            let sampler = Sampler::new(3, 0, 0, i);
+            let wo = (cosine_hemisphere(sampler.pair(0)) + Vec3::new(0.0, 0.0, 1e-4)).normalize();
+            let normal = (cosine_hemisphere(sampler.pair(2)) + Vec3::new(0.0, 0.0, 0.05)).normalize();
+            let found = bent(normal, Vec3::Z, wo);
+            assert!(found.is_normalized() && found.dot(wo) > 0.0, "{found} {wo}");
+            let mirrored = 2.0 * found.dot(wo) * found - wo;
+            assert!(mirrored.z > -1e-5, "{normal} seen along {wo}: {mirrored}");
+            if (2.0 * normal.dot(wo) * normal - wo).z >= 0.0 && normal.dot(wo) > 0.0 {
+                assert_eq!(found, normal);
+                kept += 1;
+            } else {
+                turned += 1;
+            }
+        }
+        assert!(kept > 1000 && turned > 1000, "{kept} {turned}");
+    }
+}
