@@ -123,6 +123,9 @@ pub fn load(source: &SceneSource, options: &LoadOptions) -> Result<LoadedScene, 
         }
         SceneSource::Picture(_) => unreachable!("pictures were resolved above"),
     };
+    if scene.facts.is_none() {
+        scene.choose(options.choice())?;
+    }
     scene.load_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     scene.build_trees(options)?;
@@ -165,6 +168,9 @@ fn load_picture(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Scene
         scene.warnings.push(format!("{picture}: {title} has changed since the picture was rendered"));
     }
     shot.apply(&mut scene.file);
+    if scene.facts.is_none() {
+        scene.choose(options.choice())?;
+    }
     scene.shot = Some(shot);
     Ok(scene)
 }
@@ -265,6 +271,21 @@ fn resolve(
 }
 
 impl LoadedScene {
+    /// Looks through the camera that was asked for; what only glTF models have is told.
+    fn choose(&mut self, choice: &ModelChoice) -> Result<(), SceneError> {
+        if choice.at.is_some() || choice.variant.is_some() {
+            self.warnings.push(format!("{}: only glTF models have moments and variants", self.source.title()));
+        }
+        let Some(wanted) = &choice.camera else { return Ok(()) };
+        let Some((_, camera)) = self.file.cameras.iter().find(|(name, _)| name == wanted) else {
+            let hint = suggestion(wanted, self.file.cameras.names());
+            let wanted = crate::printable::name(wanted);
+            return Err(SceneError::in_file(self.source.title(), format!("there is no camera `{wanted}`{hint}")));
+        };
+        self.file.camera = camera.clone();
+        Ok(())
+    }
+
     /// Makes an image the environment, whatever the scene itself has.
     fn light_by(&mut self, path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
         // The paths of a scene count from its folder; those of a scene without one, from the current folder.

@@ -27,6 +27,12 @@ fn open(path: &Path, choice: &ModelChoice) -> Result<LoadedScene, String> {
     load(&SceneSource::Model(path.to_owned()), &options).map_err(|error| error.to_string())
 }
 
+fn open_scene(path: &Path, camera: &str) -> Result<LoadedScene, String> {
+    let choice = ModelChoice { camera: Some(camera.to_owned()), ..ModelChoice::default() };
+    let options = LoadOptions { choice: Some(&choice), ..LoadOptions::default() };
+    load(&SceneSource::Scene(path.to_owned()), &options).map_err(|error| error.to_string())
+}
+
 fn opened(bytes: &[u8]) -> LoadedScene {
     open(&keep("a.glb", bytes).1, &ModelChoice::default()).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -385,6 +391,10 @@ fn cameras_are_chosen_by_name() {
     // As high at the square as the parallel one.
     assert!(((0.5 * second.file.camera.vfov.to_radians()).tan() * 2.0 - 1.0).abs() < 1e-12);
     assert!(second.warnings.iter().any(|warning| warning.contains("`near 2` is orthographic")));
+    // A saved scene keeps them.
+    let saved = kept.0.path().join("b.ron");
+    std::fs::write(&saved, first.to_ron()).unwrap();
+    assert_eq!(open_scene(&saved, "near 2").unwrap().file.camera, second.file.camera);
     let error = named(Some("nera")).err().unwrap();
     assert!(error.contains("there is no camera `nera`") && error.contains("`near`"), "{error}");
     assert!(
@@ -482,7 +492,9 @@ fn a_saved_scene_and_its_model_say_the_same() {
     scene.spawn(&mut world);
     let file = kept.0.path().join("b.ron");
     save_scene(&mut world, Some(&scene), &file).unwrap();
-    let again = load(&SceneSource::Scene(file), &LoadOptions::default()).unwrap();
+    let again = load(&SceneSource::Scene(file.clone()), &LoadOptions::default()).unwrap();
+    let none = open_scene(&file, "none");
+    assert!(none.unwrap_err().contains("there is no camera `none`"));
     assert_eq!(again.content_fingerprint(), scene.content_fingerprint());
     assert_eq!(corners(&again), corners(&scene));
 }

@@ -80,8 +80,9 @@ impl Document {
             }
             let Some(mesh) = json.mesh else { continue };
             let name = named(&json.name).or_else(|| self.root.meshes.get(mesh as usize).and_then(|m| named(&m.name)));
-            self.mesh(mesh)?;
-            let moves = json.skin.is_some() || json.weights.is_some() || posed.pose.weights(node).is_some();
+            let has_targets = self.mesh(mesh)?.primitives.iter().any(|primitive| !primitive.targets.is_empty());
+            let is_weighed = json.weights.is_some() || posed.pose.weights(node).is_some();
+            let moves = json.skin.is_some() || (has_targets && is_weighed);
             let key = MeshKey { mesh, node: moves.then_some(node) };
             // Joints lead a skinned mesh to the world.
             let world = if json.skin.is_some() { DAffine3::IDENTITY } else { world };
