@@ -1,6 +1,6 @@
 //! The parameters of a layered material at a point of a surface.
 
-use super::{Inside, Principled, Transmission};
+use super::layers::{Inside, Principled, Transmission};
 use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
