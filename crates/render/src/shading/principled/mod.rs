@@ -12,6 +12,7 @@
 //! Start reading at [`layers::Principled`]; [`seen`] has what follows from the direction of the viewer.
 
 pub(crate) mod at;
+mod iridescence;
 pub(crate) mod layers;
 mod seen;
 
