@@ -10,8 +10,8 @@ use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, Prepared, Rende
 use firstlight::scene::file::{ObjectPart, SceneFile};
 use firstlight::scene::model::{ModelFormat, ModelNormals, ModelOptions, load_model};
 use firstlight::scene::{
-    Extraction, ImageMetadata, ImageScene, Limits, LoadOptions, MeshSource, Rendering, SceneInputs, SceneSource, load,
-    read_picture_within,
+    Extraction, ImageMetadata, ImageScene, Limits, LoadOptions, MeshSource, ModelChoice, Rendering, SceneInputs,
+    SceneSource, load, read_picture_within,
 };
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -69,6 +69,21 @@ pub fn ply(bytes: &[u8]) {
 
 pub fn stl(bytes: &[u8]) {
     read_model(&write("fuzz.stl", bytes), ModelFormat::Stl);
+}
+
+/// As one mesh, and as the scene that is made of it.
+pub fn gltf(bytes: &[u8]) {
+    let path = write(if bytes.starts_with(b"glTF") { "fuzz.glb" } else { "fuzz.gltf" }, bytes);
+    read_model(&path, ModelFormat::Gltf);
+    let choice = ModelChoice { at: Some(0.4), ..ModelChoice::default() };
+    let options = LoadOptions { choice: Some(&choice), hasty: true, ..LoadOptions::default() };
+    match load(&SceneSource::Model(path), &options) {
+        Ok(scene) => {
+            scene.file.check().expect("a scene that was made is sound");
+            scene.spawn(&mut World::new());
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
 }
 
 pub fn mtl(bytes: &[u8]) {

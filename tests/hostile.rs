@@ -169,6 +169,11 @@ fn stl_models() {
 }
 
 #[test]
+fn gltf_models() {
+    assault("gltf", drive::gltf, 2500, 64 * MIB, 512);
+}
+
+#[test]
 fn material_libraries() {
     assault("mtl", drive::mtl, 2000, MIB, 64);
 }

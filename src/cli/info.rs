@@ -9,6 +9,7 @@ use firstlight::frame::{f_number, f_stop};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::render::{Environment, Film};
+use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
     self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
 };
@@ -91,7 +92,9 @@ impl Told<'_> {
         }
         let shading = &extraction.prepared.shading;
         row("materials", counts(self.materials()));
-        row("textures", shading.textures.len().to_string());
+        let pictures = scene.picture_bytes() as f64 / f64::from(1 << 20);
+        let pictures = if pictures > 0.0 { format!(", images {pictures:.1} MiB") } else { String::new() };
+        row("textures", format!("{}{pictures}", shading.textures.len()));
         let emitters = counted(self.emitters(), "emissive object", "emissive objects");
         let [points, spots, directional] = self.lights();
         let mut lights = format!("{emitters}, {}", counted(points, "point light", "point lights"));
@@ -107,6 +110,9 @@ impl Told<'_> {
         let lens = self.lens();
         row("camera", if lens.enabled { self.aperture() } else { "pinhole".to_owned() });
         row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
+        if let Some(facts) = &scene.facts {
+            facts_rows(facts, &mut row);
+        }
         let mib = |bytes: usize| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
         let [meshes, trees, film] = self.bytes().map(mib);
         row("memory", format!("meshes {meshes}, kd-trees {trees}, film {film}"));
@@ -158,6 +164,7 @@ impl Told<'_> {
             "uses": self.features(true),
             "not_used": self.features(false),
             "not_modelled": NOT_MODELLED,
+            "model": scene.facts.as_ref().map(facts_json),
             "warnings": scene.warnings,
             "problems": extraction.problems,
         })
@@ -232,6 +239,37 @@ impl Told<'_> {
         let has = features(self.extraction, &self.lens());
         FEATURES.into_iter().zip(has).filter(|(_, has)| *has == used).map(|(name, _)| name).collect()
     }
+}
+
+/// What a glTF file has, for people.
+fn facts_rows(facts: &GltfFacts, row: &mut impl FnMut(&str, String)) {
+    let names = |names: &[String]| {
+        let shown: Vec<_> = names.iter().map(|name| printable::name(name)).collect();
+        if shown.is_empty() { "none".to_owned() } else { shown.join(", ") }
+    };
+    row("model", format!("{} × mesh in the file, {} × placed", facts.meshes, facts.instances));
+    row("cameras", names(&facts.cameras));
+    row("model lights", names(&facts.lights));
+    row("variants", names(&facts.variants));
+    let animations = match facts.animation_length {
+        Some(seconds) => format!("{}, {} s", names(&facts.animations), two_digits(seconds)),
+        None => "none".to_owned(),
+    };
+    row("animations", animations);
+    row("extensions", names(&facts.extensions));
+    for (material, note) in &facts.notes {
+        row("", format!("{}: {note}", printable::name(material)));
+    }
+}
+
+/// The same for machines.
+fn facts_json(facts: &GltfFacts) -> serde_json::Value {
+    let notes: Vec<_> = facts.notes.iter().map(|(material, note)| serde_json::json!([material, note])).collect();
+    serde_json::json!({
+        "meshes": facts.meshes, "instances": facts.instances, "cameras": facts.cameras, "lights": facts.lights,
+        "variants": facts.variants, "animations": facts.animations, "animation_s": facts.animation_length,
+        "extensions": facts.extensions, "unknown_extensions": facts.unknown_extensions, "not_modelled": notes,
+    })
 }
 
 fn kind_of_shape(shape: &Shape) -> &'static str {

@@ -118,10 +118,12 @@ fn parts(by_bounces: &[DVec3]) -> [DVec3; 3] {
 pub struct SnapshotNames {
     origin: DVec3,
     names: Vec<String>,
+    /// Of lights without size.
+    lights: Vec<String>,
 }
 
 impl SnapshotNames {
-    /// The names of the objects of an extraction, looked up in the inputs that it was made from.
+    /// The names of the objects and lights of an extraction, looked up in the inputs that it was made from.
     pub fn of(extraction: &Extraction, inputs: &SceneInputs) -> Self {
         let objects: BTreeMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
         let lights: BTreeMap<_, _> = inputs.lights.iter().map(|light| (light.entity, light)).collect();
@@ -130,15 +132,24 @@ impl SnapshotNames {
             (_, Some(light)) => light.name.clone().unwrap_or_else(|| format!("{} {i}", light.light.name())),
             _ => format!("object {i}"),
         };
-        Self { origin: extraction.origin, names: extraction.entities.iter().enumerate().map(name).collect() }
+        let names = extraction.entities.iter().enumerate().map(name).collect();
+        let n_objects = extraction.entities.len();
+        let lights =
+            extraction.delta_lights.iter().enumerate().map(|(i, entity)| name((n_objects + i, entity))).collect();
+        Self { origin: extraction.origin, names, lights }
     }
 
     fn object(&self, object: u32) -> String {
         self.names.get(object as usize).cloned().unwrap_or_else(|| "edge of a light".to_owned())
     }
 
+    fn light(&self, light: u32) -> String {
+        self.lights.get(light as usize).cloned().unwrap_or_else(|| "light".to_owned())
+    }
+
     fn source(&self, source: LightSource) -> String {
         match source {
+            LightSource::Delta(light) => self.light(light),
             LightSource::Object(object) => self.object(object),
             LightSource::Sky => "sky".to_owned(),
             LightSource::Rim => self.object(u32::MAX),
@@ -149,6 +160,9 @@ impl SnapshotNames {
         match place {
             Place::Surface { position, object } => {
                 End::At { point: self.origin + position.as_dvec3(), what: self.object(object) }
+            }
+            Place::Light { position, light } => {
+                End::At { point: self.origin + position.as_dvec3(), what: self.light(light) }
             }
             Place::Sky { direction } => End::Sky { direction: direction.as_dvec3() },
         }

@@ -5,8 +5,8 @@
 //! | exposure, tone curve | [`Level::Redraw`] | all samples |
 //! | target, threads, pause | [`Level::Reschedule`] | all samples |
 //! | camera, lens, light model, depth, seed | [`Level::Restart`] | trees, lights, textures |
-//! | material, texture, environment, light power, a light that no ray can hit moved | [`Level::Shading`] | all trees |
-//! | object or other light moved, any added, removed, given another material | [`Level::TopTree`] | every mesh's own tree |
+//! | material, texture, environment, light power, a light without size moved | [`Level::Shading`] | all trees |
+//! | object or other light moved, given other materials, any added, removed | [`Level::TopTree`] | every mesh's own tree |
 //! | a mesh or a cloud of spheres | [`Level::MeshTree`] | other trees |
 //! | picture size | [`Level::Resize`] | the scene side |
 

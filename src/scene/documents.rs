@@ -1,7 +1,6 @@
 //! The glTF files of a scene while it is loaded: each is read once, and each of its meshes made once.
 
 use super::gltf::{BuiltMesh, Document, GltfError, GltfProblem, Located, MeshKey, Posed, ReadOptions, Surfaces};
-use super::limits::Limits;
 use super::model::ModelNormals;
 use super::picture::{PictureError, picture_of_bytes};
 use super::stamp::{Stamp, stamp};
@@ -74,9 +73,7 @@ impl Documents {
         let posed = opened.posed(at)?;
         let mesh =
             Arc::new(opened.document.mesh_of(key, &posed, &ModelNormals::FileOrComputed { crease_angle: 0.0 })?);
-        // A few bytes could ask for the same vertices again and again.
-        const BYTES_A_NUMBER: u64 = 8;
-        let limit = Limits::of_this_process().model_bytes / BYTES_A_NUMBER;
+        let limit = opened.document.most_numbers();
         let numbers = (mesh.mesh.positions.len() + 3 * mesh.mesh.triangles.len()) as u64;
         if self.made.fetch_add(numbers, Ordering::Relaxed) + numbers > limit {
             return Err((String::new(), GltfProblem::TooLarge { limit }));

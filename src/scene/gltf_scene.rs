@@ -1,7 +1,8 @@
-//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file says them.
+//! The scene of a glTF file that is opened by itself: its meshes, materials, lights and cameras as a scene file says
+//! them.
 //!
-//! What the file lacks is added as around any other model ([`super::default_scene`]): a sky and a key light where it has no
-//! light at all, a camera where it has none, and a ground where it has neither.
+//! What the file lacks is added as around any other model ([`super::default_scene`]): a sky and a key light where it
+//! has no light at all, a camera where it has none, and a ground where it has neither.
 
 use super::choice::ModelChoice;
 use super::default_scene;
@@ -13,6 +14,7 @@ use super::own_materials::texture_names;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 use super::value::Rgb;
 use glam::{DAffine3, DVec3, Vec3};
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
@@ -75,7 +77,7 @@ impl Maker<'_> {
         let mut built: HashMap<_, Option<Arc<BuiltMesh>>> = HashMap::new();
         for (i, placed) in assembly.meshes.iter().enumerate() {
             let at = placed.key.node.and(choice.at);
-            if !built.contains_key(&placed.key) {
+            if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let mesh = match self.documents.mesh(self.opened, placed.key, at) {
                     Ok(mesh) => {
                         warnings.extend(mesh.warnings.iter().map(|warning| self.told(warning)));
@@ -87,7 +89,7 @@ impl Maker<'_> {
                     }
                     Err(located) => return Err(self.wrong(located)),
                 };
-                built.insert(placed.key, mesh);
+                entry.insert(mesh);
             }
             let Some(Some(mesh)) = built.get(&placed.key) else { continue };
             let name = placed.name.clone().unwrap_or_else(|| format!("mesh {}", i + 1));
@@ -156,7 +158,7 @@ impl Maker<'_> {
             lights: self.lights(&assembly.lights, &mut warnings),
         };
         if !has_light && !self.wish.is_lit {
-            warnings.push(self.told("has no light: a sky and a key light are added"));
+            warnings.push(self.told("has no light: an environment and a key light are added"));
             default_scene::light(&mut file, bounds);
         }
         if !has_light && chosen.is_none() {

@@ -73,6 +73,11 @@ impl LoadedScene {
         }
     }
 
+    /// Memory of the pictures of its textures and environment, bytes.
+    pub fn picture_bytes(&self) -> usize {
+        self.pictures.values().map(|picture| picture.bytes()).sum()
+    }
+
     /// Meshes of objects that say nothing of materials and so take those of the mesh's file.
     pub(super) fn meshes_with_own_materials(&self) -> impl Iterator<Item = &LoadedMesh> {
         let objects = self.file.objects.iter().zip(&self.meshes);

@@ -401,7 +401,7 @@ mod tests {
     fn every_builtin_mesh_can_be_had() {
         for name in BUILTIN_NAMES {
             let source = MeshSource::Builtin((*name).to_owned());
-            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new(""), &Documents::new(false)).unwrap();
+            let loaded = load_mesh(&source, MeshShading::Flat, None, Path::new(""), &Documents::default()).unwrap();
             loaded.mesh.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         }
         assert!(BUILTIN_NAMES.is_sorted());

@@ -4,7 +4,7 @@ use crate::common::*;
 use assert_cmd::Command;
 use firstlight::frame::{Command as Ask, Explaining, Session, SessionOptions, Target};
 use firstlight::render::{
-    Environment, Film, FoundBy, Integrator, LightSource, Place, Prepared, RenderSettings, advance, explain,
+    DeltaLight, Environment, Film, FoundBy, Integrator, LightSource, Place, Prepared, RenderSettings, advance, explain,
     light_traced, replay_sample,
 };
 use firstlight::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
@@ -120,6 +120,38 @@ fn lights_are_told_apart_and_one_behind_a_wall_brings_nothing() {
             let on_ball = ((position - Vec3::new(1.5, 3.0, 0.0)).length() - 0.3).abs() < 1e-4;
             let on_quad = (position.y - 3.0).abs() < 1e-4 && (-2.0..=-1.0).contains(&position.x);
             assert_eq!((on_ball, on_quad), (object == 2, object == 1), "{asked:?}");
+        }
+    }
+}
+
+#[test]
+fn lights_without_size_are_told_apart() {
+    let camera = camera(Vec3::new(0.0, 1.0, 5.0), Vec3::ZERO, 30.0);
+    let (at, direction) = (Vec3::new(1.0, 2.0, 0.5), Vec3::new(0.3, -1.0, 0.2).normalize());
+    let (intensity, irradiance) = (Vec3::splat(4.0), Vec3::ONE);
+    let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (sphere(Vec3::new(-1.0, 2.0, 0.0), 0.2), 1)];
+    let room = scene(shapes, vec![diffuse(0.5), emissive(9.0)], Environment::Black, camera);
+    let beside = DeltaLight::Point { position: at + Vec3::X, intensity };
+    let lights =
+        [beside, DeltaLight::Point { position: at, intensity }, DeltaLight::Directional { direction, irradiance }];
+    let room = with_lights(&room, lights.to_vec());
+    let settings = RenderSettings { max_depth: 2, ..RenderSettings::default() };
+    let told = explain(&room, &settings, UVec2::splat(16), UVec2::new(8, 10), 0..256).unwrap();
+    let sources: std::collections::BTreeSet<LightSource> =
+        told.contributions().iter().map(|part| part.source).collect();
+    assert_eq!(
+        sources,
+        [LightSource::Object(1), LightSource::Delta(0), LightSource::Delta(1), LightSource::Delta(2)].into()
+    );
+    for asked in told.paths.iter().flat_map(|path| &path.vertices).filter_map(|vertex| vertex.asked) {
+        match asked.source {
+            LightSource::Delta(2) => assert_eq!(asked.place, Place::Sky { direction: -direction }),
+            LightSource::Delta(i) => {
+                let Place::Light { position, light } = asked.place else { panic!("{asked:?}") };
+                let expected = if i == 0 { at + Vec3::X } else { at };
+                assert!(light == i && (position - expected).length() < 1e-4, "{asked:?}");
+            }
+            _ => assert_eq!(asked.source, LightSource::Object(1)),
         }
     }
 }

@@ -2,6 +2,8 @@
 
 mod bad_input;
 mod bad_values;
+mod gltf;
+mod gltf_writer;
 mod input_files;
 mod neutral;
 mod obj;

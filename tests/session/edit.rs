@@ -8,8 +8,8 @@ use firstlight::frame::{
 };
 use firstlight::render::{Inspection, MaterialKind};
 use firstlight::scene::{
-    ColorParam, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight, Rgb, SceneSource,
-    Shape, SurfaceMaterial, TextureSource,
+    ColorParam, DirectionalLight, Material, MaterialSlots, MeshOrigin, MeshShading, MeshSource, Placement, PointLight,
+    Rgb, SceneSource, Shape, SpotLight, SurfaceMaterial, TextureSource,
 };
 use glam::{DVec2, DVec3, Vec3};
 use std::time::{Duration, Instant};
@@ -183,6 +183,27 @@ fn new_things_stand_in_sight_and_copies_share_until_they_get_their_own() {
     let id = driver.named("point light").to_bits();
     driver.edit([Edit::Set { id, property: Property::Intensity, value: DVec3::new(3.0, 2.0, 1.0) }]);
     assert_eq!(driver.get::<PointLight>("point light").intensity, Vec3::new(3.0, 2.0, 1.0));
+    driver.edit([Edit::Set { id, property: Property::Radius, value: DVec3::ZERO }]);
+    assert_eq!(driver.get::<PointLight>("point light").radius, 0.0, "a point");
+    driver.edit([Edit::Add(NewThing::SpotLight)]);
+    let id = driver.named("spot light").to_bits();
+    for (property, x) in [(Property::InnerAngle, 28.0), (Property::OuterAngle, 25.0), (Property::Intensity, 7.0)] {
+        driver.edit([Edit::Set { id, property, value: DVec3::splat(x) }]);
+    }
+    driver.edit([Edit::Set { id, property: Property::Direction, value: DVec3::X }]);
+    let spot: SpotLight = driver.get("spot light");
+    assert_eq!((spot.inner_angle_deg, spot.outer_angle_deg), (25.0, 25.0), "the inner cone stays within the outer");
+    assert_eq!((spot.intensity, spot.direction), (Vec3::splat(7.0), DVec3::X));
+    driver.edit([Edit::Duplicate, Edit::Delete, Edit::Undo]);
+    assert_eq!(driver.get::<SpotLight>("spot light 2"), spot);
+    driver.edit([Edit::Add(NewThing::DirectionalLight)]);
+    let id = driver.named("directional light").to_bits();
+    driver.edit([Edit::Set { id, property: Property::Irradiance, value: DVec3::splat(2.0) }]);
+    driver.edit([Edit::Set { id, property: Property::Direction, value: DVec3::ZERO }]);
+    let sun: DirectionalLight = driver.get("directional light");
+    assert!(sun.irradiance == Vec3::splat(2.0) && sun.direction != DVec3::ZERO, "{sun:?}");
+    driver.edit([Edit::Delete, Edit::Undo]);
+    assert_eq!(driver.get::<DirectionalLight>("directional light"), sun);
     // Nonsense is refused, and nothing changes.
     let (material, id): (SurfaceMaterial, u64) = (driver.get("red"), driver.named("red").to_bits());
     for (property, value) in

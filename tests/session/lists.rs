@@ -25,7 +25,7 @@ const SCENE: &str = r#"(
         quad(name: "panel", corner: (-1, 3, -1), edge_u: (2, 0, 0), edge_v: (0, 0, 2), material: "lamp"),
         sphere(center: (2, 0.5, 0), radius: 0.5, material: "glow"),
     ],
-    lights: [point(name: "bulb", position: (0, 2, 2), intensity: 3, radius: 0.05)],
+    lights: [point(name: "bulb", position: (0, 2, 2), intensity: 3, radius: 0.05), directional(direction: (0, -1, 0), irradiance: 1)],
 )"#;
 
 struct Driver {
@@ -90,7 +90,12 @@ fn materials_are_listed_with_all_that_use_them() {
         (inventory.lights.iter()).map(|entry| (entry.label.as_str(), entry.kind, entry.material.is_some())).collect();
     assert_eq!(
         lights,
-        [("panel", "area light", true), ("sphere 4", "sphere light", true), ("bulb", "point light", false)]
+        [
+            ("panel", "area light", true),
+            ("sphere 4", "sphere light", true),
+            ("bulb", "point light", false),
+            ("directional light 1", "directional light", false)
+        ]
     );
 }
 

@@ -109,29 +109,30 @@ impl Check<'_> {
     }
 
     fn texture(&mut self, path: &str, texture: &TextureSource) {
-        let (size, offset, rotate) = match texture {
+        let (sizes, offset, rotate) = match texture {
             TextureSource::Checker { a, b, squares, offset, rotate } => {
                 self.light(&format!("{path}/a"), *a);
                 self.light(&format!("{path}/b"), *b);
-                (("squares", *squares), *offset, *rotate)
+                (vec![("squares", *squares)], *offset, *rotate)
             }
-            TextureSource::Image { repeat, offset, rotate, tint, uv_set, .. } => {
+            TextureSource::Image { stretch, repeat, offset, rotate, tint, uv_set, .. } => {
                 self.light(&format!("{path}/tint"), *tint);
                 if *uv_set > 1 {
                     let message = format!("`uv_set` is {uv_set}, but must be 0 or 1");
                     self.wrong(&format!("{path}/uv_set"), message);
                 }
-                (("repeat", *repeat), *offset, *rotate)
+                (vec![("stretch", *stretch), ("repeat", *repeat)], *offset, *rotate)
             }
             TextureSource::VertexColors { tint, .. } => return self.light(&format!("{path}/tint"), *tint),
         };
-        let (field, DVec2 { x, y }) = size;
         // Beyond these, single precision has no such number.
         let (least, most) = (SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
-        if ![x, y].iter().all(|size| (least..=most).contains(&size.abs())) {
-            let allowed = format!("two finite numbers other than 0, from {least:e} to {most:e} either way");
-            let message = format!("`{field}` is ({}, {}), but must be {allowed}", number(x), number(y));
-            self.wrong(&format!("{path}/{field}"), message);
+        for (field, DVec2 { x, y }) in sizes {
+            if ![x, y].iter().all(|size| (least..=most).contains(&size.abs())) {
+                let allowed = format!("two finite numbers other than 0, from {least:e} to {most:e} either way");
+                let message = format!("`{field}` is ({}, {}), but must be {allowed}", number(x), number(y));
+                self.wrong(&format!("{path}/{field}"), message);
+            }
         }
         if !(offset.abs().max_element() <= most && offset.is_finite()) {
             let (x, y) = (number(offset.x), number(offset.y));

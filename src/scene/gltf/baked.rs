@@ -5,24 +5,21 @@ use super::document::{Document, ReadOptions};
 use super::error::{GltfError, GltfProblem, Located};
 use super::mesh::BuiltMesh;
 use crate::mesh::Mesh;
-use crate::scene::limits::Limits;
 use crate::scene::model::imported::{ImportedModel, ModelOptions};
 use crate::scene::obj::ImportedMaterial;
 use glam::{DMat3, DVec3, Vec3};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::Path;
-
-/// Vertices and indices that are held at once at most, for each byte that a model may have.
-const BYTES_A_NUMBER: u64 = 8;
 
 /// Everything that the scene of a file shows, as it stores it, in the coordinates of the world.
 ///
 /// # Errors
 /// When the file cannot be read, or has nothing with area.
-pub(in crate::scene) fn load_gltf_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, GltfError> {
+pub(in crate::scene) fn load_gltf_with(path: &Path, options: &ModelOptions) -> Result<ImportedModel, Box<GltfError>> {
     let read = ReadOptions { max_bytes: options.max_bytes, ..ReadOptions::default() };
-    let document = Document::read(path, read)?;
-    document.baked(options).map_err(|located| document.error(located))
+    let document = Document::read(path, read).map_err(Box::new)?;
+    document.baked(options).map_err(|located| Box::new(document.error(located)))
 }
 
 impl Document {
@@ -37,9 +34,9 @@ impl Document {
         let mut materials: Vec<Option<u32>> = Vec::new();
         let mut warnings = assembly.warnings.clone();
         let mut normals_from_file = true;
-        let limit = Limits::of_this_process().model_bytes / BYTES_A_NUMBER;
+        let limit = self.most_numbers();
         for placed in &assembly.meshes {
-            if !built.contains_key(&placed.key) {
+            if let Entry::Vacant(entry) = built.entry(placed.key) {
                 let node = placed.key.node.map(|node| (node, &posed.tree, &posed.pose));
                 let mesh = match self.built_mesh(placed.key.mesh, node, &options.normals) {
                     Ok(mesh) => Some(mesh),
@@ -51,7 +48,7 @@ impl Document {
                     Err(error) => return Err(error),
                 };
                 warnings.extend(mesh.iter().flat_map(|mesh| mesh.warnings.iter().cloned()));
-                built.insert(placed.key, mesh);
+                entry.insert(mesh);
             }
             let Some(Some(BuiltMesh { mesh, keys, .. })) = built.get(&placed.key) else { continue };
             let first = positions.len();

@@ -146,7 +146,13 @@ impl Document {
     pub(super) fn most_elements(&self) -> u64 {
         const ALWAYS: u64 = 1 << 20;
         let decoded: u64 = self.decoded.values().map(|bytes| bytes.len() as u64).sum();
-        (self.n_bytes + decoded).max(ALWAYS)
+        (self.n_bytes + decoded).max(ALWAYS.min(self.most_numbers()))
+    }
+
+    /// Vertices and indices of all meshes together at most: a few bytes could ask for the same ones again and again.
+    pub(in crate::scene) fn most_numbers(&self) -> u64 {
+        const BYTES_A_NUMBER: u64 = 8;
+        self.options.max_bytes / BYTES_A_NUMBER
     }
 
     fn read_buffers(&mut self, binary: Option<Bytes>) -> Result<(), Located> {

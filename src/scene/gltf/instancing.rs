@@ -8,7 +8,8 @@ use serde_json::Value;
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
 impl Document {
-    /// From the coordinates of the mesh to those of the node, once for each copy; the mesh itself without the extension.
+    /// From the coordinates of the mesh to those of the node, once for each copy; the mesh itself without the
+    /// extension.
     pub(super) fn instances(&self, node: u32) -> Result<Vec<DAffine3>, Located> {
         let json = self.node(node)?;
         let Some(extension) = json.extensions.get(NAME) else { return Ok(vec![DAffine3::IDENTITY]) };

@@ -1,6 +1,7 @@
 //! The tree of nodes, flattened: every node of the scene with its placement in the world.
 //!
-//! Trees may be of any depth, so they are walked with a list of what is still to do. Transforms are multiplied in `f64`.
+//! Trees may be of any depth, so they are walked with a list of what is still to do. Transforms are multiplied in
+//! `f64`.
 
 use super::animation::Pose;
 use super::document::Document;

@@ -1,7 +1,7 @@
 //! Skins: vertices that follow joints.
 //!
-//! Source: Khronos, "glTF 2.0 Specification", §3.7.3 (skins). The node that has a skinned mesh does not place it: joints
-//! lead to the world.
+//! Source: Khronos, "glTF 2.0 Specification", §3.7.3 (skins). The node that has a skinned mesh does not place it:
+//! joints lead to the world.
 
 use super::document::Document;
 use super::error::{GltfProblem, Located, place};

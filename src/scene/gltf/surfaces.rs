@@ -309,7 +309,7 @@ fn surface(
         *specular = ScalarValue::Number(0.0);
         (*metallic, *roughness) = (ScalarValue::Number(0.0), ScalarValue::Number(1.0));
         *emission = base;
-        notes.push("it is unlit: it shines with its own color, and lights its surroundings too".to_owned());
+        notes.push("it is unlit: it emits its own color, and is a light as well".to_owned());
         return Ok(part);
     }
     let metal_map = material.metallic_roughness_texture.as_ref();

@@ -17,7 +17,7 @@ pub enum ModelError {
     Obj(#[from] ObjError),
     /// A glTF file.
     #[error(transparent)]
-    Gltf(#[from] GltfError),
+    Gltf(#[from] Box<GltfError>),
     /// A PLY or STL file.
     #[error("{}{place}: {problem}", path.display())]
     File {

@@ -91,6 +91,7 @@ impl Explanation {
             for (vertex, bounces) in path.vertices.iter().zip(0..) {
                 let source = match vertex.place {
                     Place::Surface { object, .. } => LightSource::Object(object),
+                    Place::Light { light, .. } => LightSource::Delta(light),
                     Place::Sky { .. } => LightSource::Sky,
                 };
                 *sums.entry((source, bounces, FoundBy::Itself)).or_default() += vertex.radiance;

@@ -4,10 +4,12 @@
 //! emitter, and where a shadow ray gets through. With one path a slot, what a slot gained between two looks is the light
 //! of one such moment. Differences of `f32` sums are exact in `f64`, so all parts add up to the sample.
 
+use crate::core::delta_light::DeltaLight;
 use crate::prepare::prepared::Prepared;
 use crate::shading::paths::{PathBatch, ShadowBatch};
 use firstlight_kdtree::HitBatch;
 use firstlight_kdtree::geometry::Ray;
+use firstlight_kdtree::geometry::robust::gamma;
 use glam::{DVec3, Vec3};
 
 /// Where light came from.
@@ -15,6 +17,8 @@ use glam::{DVec3, Vec3};
 pub enum LightSource {
     /// An object of the snapshot.
     Object(u32),
+    /// A light without size, by its place in [`crate::core::snapshot::Shading::delta_lights`].
+    Delta(u32),
     /// What is around the scene.
     Sky,
     /// A point on the very rim of an emitter, where a ray towards it passes by: whose it is cannot be told.
@@ -39,6 +43,13 @@ pub enum Place {
         position: Vec3,
         /// Index of the object in the snapshot; `u32::MAX` at the rim of a light, where it is not known.
         object: u32,
+    },
+    /// At a light without size, in the frame of the snapshot, metres.
+    Light {
+        /// The point, metres.
+        position: Vec3,
+        /// As of [`LightSource::Delta`].
+        light: u32,
     },
     /// Outside of the scene, in this direction (unit).
     Sky {
@@ -136,8 +147,11 @@ impl Record {
                 continue;
             }
             let ray = shadows.rays.get(i);
+            let delta = delta_light_of(scene, &ray);
             let (source, place) = if ray.t_max == f32::INFINITY {
-                (LightSource::Sky, Place::Sky { direction: ray.dir.normalize() })
+                (delta.map_or(LightSource::Sky, LightSource::Delta), Place::Sky { direction: ray.dir.normalize() })
+            } else if let Some(light) = delta {
+                (LightSource::Delta(light), Place::Light { position: ray.at(ray.t_max), light })
             } else {
                 // It ends a hair in front of the emitter and met nothing, so whatever comes next is the emitter.
                 let emitter = scene.closest_hit(&Ray { t_max: f32::INFINITY, ..ray });
@@ -163,4 +177,18 @@ impl Record {
         let before = std::mem::replace(&mut self.before[slot], radiance[slot]);
         radiance[slot].as_dvec3() - before.as_dvec3()
     }
+}
+
+/// The light without size that a shadow ray leads to; the first of several in one place.
+fn delta_light_of(scene: &Prepared, ray: &Ray) -> Option<u32> {
+    let end = ray.at(ray.t_max);
+    let is_its = |light: &DeltaLight| match *light {
+        // Shadow rays end in front of a point by a few roundings.
+        DeltaLight::Point { position, .. } | DeltaLight::Spot { position, .. } => {
+            let size = position.length() + ray.origin.length() + ray.dir.length();
+            ray.t_max.is_finite() && end.distance(position) <= gamma(64) * size
+        }
+        DeltaLight::Directional { direction, .. } => ray.t_max.is_infinite() && ray.dir == -direction,
+    };
+    scene.shading.delta_lights.iter().position(is_its).map(|light| light as u32)
 }

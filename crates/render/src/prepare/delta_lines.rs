@@ -1,8 +1,8 @@
 //! Lines from lights without size towards what is specular.
 //!
-//! From a point the direction is chosen evenly over the cone of the sphere around the caster, or over that of a spot where it
-//! is narrower; directional light evenly over the disc that the sphere is seen as. Densities are per steradian and per
-//! square metre: there is no line from the camera that they could be weighed against.
+//! From a point the direction is chosen evenly over the cone of the sphere around the caster, or over that of a spot
+//! where it is narrower; directional light evenly over the disc that the sphere is seen as. Densities are per steradian
+//! and per square metre: there is no line from the camera that they could be weighed against.
 
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;

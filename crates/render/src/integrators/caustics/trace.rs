@@ -53,7 +53,7 @@ struct LightPath {
 }
 
 /// Light paths are kept like those from the camera, of which they need less: the density is the ratio, and the
-/// slot is what they are aimed at. The place of the last vertex is that of the light at first: 1 for what is far away.
+/// slot is what they are aimed at. The place of the last vertex says at first whether the light is far away.
 impl From<LightPath> for Path {
     fn from(LightPath { throughput, ratio, sampler, aimed_at, media, is_far }: LightPath) -> Self {
         let (position, normal) = (Vec3::splat(f32::from(is_far)), Vec3::ZERO);

@@ -1,8 +1,8 @@
 //! Lights without size, as seen from one point or from sixteen.
 //!
-//! They are sampled as if they filled a solid angle of 1 / [`SHARPNESS`]: the density is that much larger, and so is the
-//! radiance. What a sample brings is the quotient, which is exact, and next to any bounce's density theirs is so large
-//! that the weight against bounces, which cannot find them, is 1 to the last bit.
+//! They are sampled as if they filled a solid angle of 1 / [`SHARPNESS`]: the density is that much larger, and so is
+//! the radiance. What a sample brings is the quotient, which is exact, and next to any bounce's density theirs is so
+//! large that the weight against bounces, which cannot find them, is 1 to the last bit.
 
 use firstlight_kdtree::geometry::robust::{gamma, offset_along};
 use firstlight_simd::{Real, Vector3, select, select_vector};
@@ -10,8 +10,8 @@ use firstlight_simd::{Real, Vector3, select, select_vector};
 /// Density of the direction to a light without size, per steradian: a power of two, far above that of any bounce.
 pub(crate) const SHARPNESS: f32 = (1u64 << 50) as f32;
 
-/// Metres: as far away as directional lights are taken to be where they are weighed against others. Everything that can be
-/// is a thousand times as near.
+/// Metres: as far away as directional lights are taken to be where they are weighed against others. Everything that can
+/// be is hundreds of times as near.
 pub(crate) const FAR: f32 = 1e15;
 
 /// Metres: how far from the origin of a scene something can be.
@@ -33,8 +33,8 @@ pub(crate) struct DeltaSource<R: Real> {
 /// What a point sees of it.
 pub(crate) struct DeltaSample<R: Real> {
     pub found: R::Mask,
-    /// Where a shadow ray ends: in front of the point by what the kernel may lose, for something may be there. Where the
-    /// light is far away, its direction.
+    /// Where a shadow ray ends: in front of the point by what the kernel may lose, for something may be there. Where
+    /// the light is far away, its direction.
     pub target: Vector3<R>,
     /// Unit.
     pub wi: Vector3<R>,

@@ -10,6 +10,7 @@ use crate::prepare::light::shape::LightShape;
 use firstlight_kdtree::Shape;
 use firstlight_mesh::Mesh;
 use glam::{Vec2, Vec4};
+use rustc_hash::FxHashMap;
 
 /// The lights of an object by primitive: those of its front, and those of its back.
 #[derive(Clone, Debug, Default)]
@@ -59,7 +60,7 @@ impl ObjectLights {
         if emission.iter().all(Option::is_none) {
             return Self::default();
         }
-        let mut adder = Adder { lights, object, textures };
+        let mut adder = Adder { lights, object, textures, means: FxHashMap::default() };
         let only = emission[0].filter(|_| emission.len() == 1);
         let first = adder.lights.len() as u32;
         match (shape, only) {
@@ -132,6 +133,8 @@ struct Adder<'a> {
     lights: &'a mut Vec<Light>,
     object: &'a Object,
     textures: &'a [Texture],
+    /// Luminance of the mean of a texture: a picture is gone through once, however many triangles show it.
+    means: FxHashMap<u32, f32>,
 }
 
 impl Adder<'_> {
@@ -155,7 +158,9 @@ impl Adder<'_> {
         let mean_radiance = emission.scale
             * match emission.radiance {
                 ColorInput::Constant(radiance) => luminance(radiance),
-                ColorInput::Texture(id) => luminance(self.textures[id as usize].mean()),
+                ColorInput::Texture(id) => {
+                    *self.means.entry(id).or_insert_with(|| luminance(self.textures[id as usize].mean()))
+                }
             };
         let (is_point, turned) = (self.object.is_point_light, self.object.turned);
         self.lights.push(Light { shape, emission, mean_radiance, is_point, turned, corners });

@@ -25,6 +25,8 @@ pub(crate) struct LightTree {
     pub(crate) nodes: Vec<LightNode>,
     /// For each light the way to it from the root: bit k says which child on level k.
     pub(crate) ways: Vec<u64>,
+    /// There are spots among the lights.
+    pub(crate) has_spots: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +39,8 @@ pub(crate) struct LightNode {
     pub widening: f32,
     /// Luminance of the radiance, times area that can face a point.
     pub power: f32,
+    /// Where all are spots, the cosine of the widest cone: no light goes beyond. Else −1.
+    pub least_cos: f32,
     /// First of the two children, or `LEAF` plus a light.
     pub link: u32,
 }
@@ -49,6 +53,7 @@ struct LightItem {
     bounds: Aabb,
     cone: Cone,
     power: f32,
+    least_cos: f32,
     id: u32,
     /// Of a directional light.
     is_far: bool,
@@ -65,7 +70,9 @@ impl LightTree {
     /// At least two lights.
     pub fn build(lights: &[Light]) -> Self {
         let mut items: Vec<LightItem> = (0..).zip(lights).map(|(id, light)| LightItem::new(id, light)).collect();
-        let mut tree = Self { nodes: Vec::with_capacity(2 * lights.len()), ways: vec![0; lights.len()] };
+        let has_spots = items.iter().any(|item| item.least_cos >= 0.0);
+        let (nodes, ways) = (Vec::with_capacity(2 * lights.len()), vec![0; lights.len()]);
+        let mut tree = Self { nodes, ways, has_spots };
         tree.nodes.push(LightNode::new(&items));
         tree.split(0, &mut items, 0, 0);
         tree
@@ -102,7 +109,7 @@ impl LightTree {
         let (mut node, mut pmf) = (self.nodes[0], 1.0);
         while node.link < LEAF {
             let children = &self.nodes[node.link as usize..][..2];
-            let bounds = [children[0].bound(position, normal), children[1].bound(position, normal)];
+            let bounds = [self.bound(&children[0], position, normal), self.bound(&children[1], position, normal)];
             let sum = bounds[0] + bounds[1];
             if sum == 0.0 {
                 return None;
@@ -119,7 +126,7 @@ impl LightTree {
         let (mut node, mut pmf, mut way) = (self.nodes[0], 1.0, self.ways[id as usize]);
         while node.link < LEAF {
             let children = &self.nodes[node.link as usize..][..2];
-            let bounds = [children[0].bound(position, normal), children[1].bound(position, normal)];
+            let bounds = [self.bound(&children[0], position, normal), self.bound(&children[1], position, normal)];
             let sum = bounds[0] + bounds[1];
             if sum == 0.0 {
                 return 0.0;
@@ -131,6 +138,17 @@ impl LightTree {
             way >>= 1;
         }
         pmf
+    }
+}
+
+impl LightTree {
+    /// See [`NodeBound::irradiance`].
+    #[inline]
+    fn bound(&self, node: &LightNode, position: Vec3, normal: Vec3) -> f32 {
+        let LightNode { center, radius, axis, widening, power, least_cos, .. } = *node;
+        let (offset, least_cos) = ((center - position).into(), self.has_spots.then_some(least_cos));
+        let bound = NodeBound { offset, radius, axis: axis.into(), widening, power, least_cos };
+        bound.irradiance((normal != Vec3::ZERO).then(|| normal.into()))
     }
 }
 
@@ -147,16 +165,9 @@ impl LightNode {
             axis: cone.axis,
             widening: 2.0 * (0.5 * cone.spread).sin() + 1e-5,
             power: items.iter().map(|item| item.power).sum(),
+            least_cos: items.iter().map(|item| item.least_cos).fold(1.0, f32::min),
             link: 0,
         }
-    }
-
-    /// See [`NodeBound::irradiance`].
-    #[inline]
-    fn bound(&self, position: Vec3, normal: Vec3) -> f32 {
-        let Self { center, radius, axis, widening, power, .. } = *self;
-        let bound = NodeBound { offset: (center - position).into(), radius, axis: axis.into(), widening, power };
-        bound.irradiance((normal != Vec3::ZERO).then(|| normal.into()))
     }
 }
 
@@ -168,6 +179,8 @@ pub(crate) struct NodeBound<R> {
     pub axis: Vector3<R>,
     pub widening: R,
     pub power: R,
+    /// In trees with spots.
+    pub least_cos: Option<R>,
 }
 
 impl<R: Real> NodeBound<R> {
@@ -179,7 +192,7 @@ impl<R: Real> NodeBound<R> {
     /// - `normal`: unit, of the surface, if it has one side.
     #[inline(always)]
     pub fn irradiance(self, normal: Option<Vector3<R>>) -> R {
-        let Self { offset, radius, axis, widening, power } = self;
+        let Self { offset, radius, axis, widening, power, least_cos } = self;
         let (distance2, r2) = (offset.length_squared(), radius * radius);
         let inv_distance = radius.all(1.0) / distance2.sqrt();
         // A little more, so that rounding hides nothing.
@@ -190,7 +203,12 @@ impl<R: Real> NodeBound<R> {
         };
         let emitter = (radius - offset.dot(axis)) * inv_distance + widening + slack;
         let receiver = receiver.at_least(0.0).at_most(1.0);
-        let emitter = emitter.at_least(0.0).at_most(1.0);
+        let mut emitter = emitter.at_least(0.0).at_most(1.0);
+        if let Some(least_cos) = least_cos {
+            // From any place in the sphere the cosine differs by a chord: √2 times radius over distance at most.
+            let most_cos = (radius * 1.4143 - offset.dot(axis)) * inv_distance + widening + slack;
+            emitter = select(most_cos.lt(least_cos), emitter.all(0.0), emitter);
+        }
         let outside = power * receiver * emitter * (inv_distance * inv_distance);
         // Within the sphere anything can happen; on average the lights are about a radius away.
         select(distance2.le(r2), power / r2.at_least(f32::MIN_POSITIVE), outside)
@@ -225,7 +243,7 @@ impl LightItem {
                 (Aabb::from_points(vertices), Cone { axis: normal, spread: 0.0 }, 1.0)
             }
             LightShape::Point { position, cone: None } => (Aabb::from_points([position]), everywhere, 0.25),
-            // Of the rays that leave the axis by 90° at most, those near it are the brightest: as those of a flat light.
+            // Its rays leave the axis by 90° at most, and those near it are the brightest: as those of a flat light.
             LightShape::Point { position, cone: Some(spot) } => {
                 (Aabb::from_points([position]), Cone { axis: spot.axis, spread: 0.0 }, 0.25)
             }
@@ -236,9 +254,13 @@ impl LightItem {
         };
         // A light that is black on the mean may still shine somewhere: it keeps a little.
         let is_far = matches!(light.shape, LightShape::Directional { .. });
+        let least_cos = match light.shape {
+            LightShape::Point { cone: Some(spot), .. } => 1.0 - spot.outer,
+            _ => -1.0,
+        };
         let power = if is_far { FAR * FAR } else { light.shape.area() * facing };
         let power = (light.mean_radiance * power).max(f32::MIN_POSITIVE);
-        Self { bounds, cone, power, id, is_far }
+        Self { bounds, cone, power, least_cos, id, is_far }
     }
 
     fn middle(&self) -> Vec3 {
@@ -507,6 +529,20 @@ mod tests {
             }
         }
         assert!(n_reaching > 1000, "the test must see something: {n_reaching}");
+    }
+
+    #[test]
+    fn spots_that_shine_elsewhere_are_left_out() {
+        // A ceiling of them, each with a circle of its own on the floor.
+        let cone = crate::core::delta_light::Cone::new(Vec3::NEG_Y, 0.1, 0.17);
+        let at = |i: u32| Vec3::new((i % 16) as f32, 3.0, (i / 16) as f32);
+        let light = lights(1, 5).remove(0);
+        let spot = |i| Light { shape: LightShape::Point { position: at(i), cone: Some(cone) }, ..light.clone() };
+        let tree = LightTree::build(&(0..256).map(spot).collect::<Vec<_>>());
+        let floor = |i| at(i) * Vec3::new(1.0, 0.0, 1.0) + Vec3::new(0.2, 0.0, 0.1);
+        let pmfs: Vec<f32> = (0..256).map(|i| tree.pmf(i, floor(i), Vec3::Y)).collect();
+        let mean = pmfs.iter().sum::<f32>() / 256.0;
+        assert!(mean > 0.04 && pmfs.iter().all(|&pmf| pmf > 0.01), "{mean}: {pmfs:?}");
     }
 
     #[test]

@@ -13,6 +13,7 @@ pub(crate) struct LightTreeArrays {
     top: Rows,
     /// The way to each light, lower and upper half.
     ways: [Vec<u32>; 2],
+    has_spots: bool,
 }
 
 /// How many nodes are looked up in registers.
@@ -26,6 +27,7 @@ struct Rows {
     axis: [Vec<f32>; 3],
     widening: Vec<f32>,
     power: Vec<f32>,
+    least_cos: Vec<f32>,
     link: Vec<u32>,
 }
 
@@ -49,11 +51,13 @@ impl LightTreeArrays {
             all.radius.push(node.radius);
             all.widening.push(node.widening);
             all.power.push(node.power);
+            all.least_cos.push(node.least_cos);
             all.link.push(link);
             next += 1;
         }
         let half = |shift: u32| padded(tree.ways.iter().map(|way| (way >> shift) as u32).collect());
-        Self { top: all.map(first_of, first_of), all: all.map(padded, padded), ways: [half(0), half(32)] }
+        let (top, ways) = (all.map(first_of, first_of), [half(0), half(32)]);
+        Self { top, all: all.map(padded, padded), ways, has_spots: tree.has_spots }
     }
 
     /// See [`LightTree::sample`]: lights, their probabilities, and the lanes that some light can reach.
@@ -70,8 +74,8 @@ impl LightTreeArrays {
         let (mut found, mut open) = (mask, mask & !node.has(LEAF));
         while open != 0 {
             let rows = self.rows(open, node);
-            let first = rows.bounds(node, position, normal);
-            let second = rows.bounds(node + 1, position, normal);
+            let first = rows.bounds(self.has_spots, node, position, normal);
+            let second = rows.bounds(self.has_spots, node + 1, position, normal);
             let none = open & (first + second).is_zero();
             found &= !none;
             open &= !none;
@@ -98,8 +102,8 @@ impl LightTreeArrays {
                 way = Bits::gather(&self.ways[1], id);
             }
             let rows = self.rows(open, node);
-            let first = rows.bounds(node, position, normal);
-            let second = rows.bounds(node + 1, position, normal);
+            let first = rows.bounds(self.has_spots, node, position, normal);
+            let second = rows.bounds(self.has_spots, node + 1, position, normal);
             let sum = first + second;
             let take = way.has(1);
             let none = open & sum.is_zero();
@@ -137,19 +141,21 @@ impl Rows {
             axis: self.axis.clone().map(floats),
             widening: floats(self.widening.clone()),
             power: floats(self.power.clone()),
+            least_cos: floats(self.least_cos.clone()),
             link: links(self.link.clone()),
         }
     }
 
     /// See [`NodeBound::irradiance`].
     #[inline(always)]
-    fn bounds<S: Simd>(&self, node: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
+    fn bounds<S: Simd>(&self, has_spots: bool, node: Bits<S>, position: Vector<S>, normal: Vector<S>) -> Float<S> {
         let bound = NodeBound {
             offset: Vector::gather(&self.center, node) - position,
             radius: Float::gather(&self.radius, node),
             axis: Vector::gather(&self.axis, node),
             widening: Float::gather(&self.widening, node),
             power: Float::gather(&self.power, node),
+            least_cos: has_spots.then(|| Float::gather(&self.least_cos, node)),
         };
         bound.irradiance(Some(normal))
     }
