@@ -13,6 +13,7 @@ use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
     self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
 };
+use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
@@ -179,7 +180,11 @@ impl Told<'_> {
     }
 
     fn emitters(&self) -> usize {
-        let emits = |material: &&MaterialInput| matches!(material.material, scene::Material::Emissive { .. });
+        let emits = |material: &&MaterialInput| match &material.material {
+            scene::Material::Emissive { .. } => true,
+            scene::Material::Principled { emission, .. } => *emission != scene::ColorParam::Rgb(Vec3::ZERO),
+            _ => false,
+        };
         let glowing: HashSet<_> = self.inputs.materials.iter().filter(emits).map(|material| material.entity).collect();
         let glows = |object: &&ObjectInput| object.slots.iter().any(|slot| glowing.contains(slot));
         self.inputs.objects.iter().filter(glows).count()

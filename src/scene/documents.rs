@@ -1,8 +1,9 @@
 //! The glTF files of a scene while it is loaded: each is read once, and each of its meshes made once.
 
+use super::gltf::images::part_of_model;
 use super::gltf::{BuiltMesh, Document, GltfError, GltfProblem, Located, MeshKey, Posed, ReadOptions, Surfaces};
 use super::model::ModelNormals;
-use super::picture::{PictureError, picture_of_bytes};
+use super::picture::{PictureError, picture_of_bytes, read_picture};
 use super::stamp::{Stamp, stamp};
 use crate::render::ImageTexture;
 use rayon::prelude::*;
@@ -11,6 +12,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+/// A picture with a warning, or why there is none.
+type ReadPicture = Result<(ImageTexture, Option<String>), PictureError>;
+
 /// Files that are open, by path.
 #[derive(Debug, Default)]
 pub(super) struct Documents {
@@ -18,6 +22,8 @@ pub(super) struct Documents {
     open: Mutex<HashMap<PathBuf, Arc<Opened>>>,
     /// Vertices and indices that were made.
     made: AtomicU64,
+    /// Pictures that were decoded and not taken yet, by path.
+    decoded: Mutex<HashMap<PathBuf, (Stamp, ReadPicture)>>,
 }
 
 /// A file that is open.
@@ -81,12 +87,27 @@ impl Documents {
         Ok(lock(&opened.meshes).entry(known).or_insert(mesh).clone())
     }
 
-    /// A picture that is part of the file at `model`.
-    pub(super) fn picture(&self, model: &Path, number: u32) -> Result<(ImageTexture, Option<String>), PictureError> {
+    /// A picture in a file of its own, or in one of these.
+    pub(super) fn picture(&self, path: &Path) -> ReadPicture {
+        let Some((model, number)) = part_of_model(path) else { return read_picture(path) };
         let failed = |error: GltfError| PictureError::Model(error.to_string());
-        let opened = self.open(model).map_err(failed)?;
+        let opened = self.open(&model).map_err(failed)?;
         let bytes = opened.document.picture_bytes(number).map_err(|located| failed(opened.document.error(located)))?;
         picture_of_bytes(&bytes)
+    }
+
+    /// Decodes many pictures at once, to be taken afterwards.
+    pub(super) fn decode(&self, paths: Vec<PathBuf>) {
+        paths.into_par_iter().for_each(|path| {
+            let before = stamp(&part_of_model(&path).map_or_else(|| path.clone(), |(model, _)| model));
+            let read = self.picture(&path);
+            lock(&self.decoded).insert(path, (before, read));
+        });
+    }
+
+    /// A picture that was decoded, and what its file was before.
+    pub(super) fn take_picture(&self, path: &Path) -> Option<(Stamp, ReadPicture)> {
+        lock(&self.decoded).remove(path)
     }
 
     /// Makes many meshes at once; what is wrong with one is told when it is asked for by itself.

@@ -14,12 +14,12 @@ use super::input_file::{FileKind, InputFile};
 use super::loaded::LoadedScene;
 use super::meshes::{LoadedMesh, load_mesh};
 use super::model::ModelFormat;
-use super::picture::read_picture;
 use super::relative::{path_to_text, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
-use super::stamp::stamp;
+use super::stamp::{Stamp, stamp};
 use super::value::Rgb;
+use crate::render::ImageTexture;
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -245,10 +245,15 @@ fn resolve(
     if let EnvironmentSource::Image { file, .. } = &scene.file.environment {
         wanted.push(("environment/file".to_owned(), file.clone()));
     }
+    scene.decode_ahead(wanted.iter().map(|(_, file)| file.as_str()), options, documents);
     for (place, file) in wanted {
         let path = scene.folder.join(text_to_path(&file));
         if let Err(error) = scene.add_picture(&file, &path, options, documents) {
-            note(place, &error);
+            // A model is worth seeing without a picture that is lost.
+            match text {
+                Some(_) => note(place, &error),
+                None => scene.warnings.push(format!("{error}; the texture is omitted")),
+            }
         }
     }
     scene.add_mesh_pictures(options, documents);
@@ -281,15 +286,10 @@ impl LoadedScene {
         if self.pictures.contains_key(name) {
             return Ok(());
         }
-        // What is part of a model changes with it.
-        let part = part_of_model(path);
-        let on_disk = part.as_ref().map_or(path, |(model, _)| model);
-        let before = stamp(on_disk);
-        if let Some(known) = options.known
-            && known.picture_files.get(name) == Some(&(on_disk.to_owned(), before))
-            && before.is_some()
-            && let Some(picture) = known.pictures.get(name)
-        {
+        let on_disk = file_of(path);
+        let ahead = documents.take_picture(path);
+        let before = ahead.as_ref().map_or_else(|| stamp(&on_disk), |(before, _)| *before);
+        if let Some(picture) = known_picture(options, name, &on_disk, before) {
             self.pictures.insert(name.to_owned(), picture.clone());
             self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
             return Ok(());
@@ -297,14 +297,22 @@ impl LoadedScene {
         options.say(&format!("loading {name}"));
         // Also where it cannot be read: it may come to be.
         self.picture_files.insert(name.to_owned(), (on_disk.to_owned(), before));
-        let read = match part {
-            Some((model, number)) => documents.picture(&model, number),
-            None => read_picture(path),
-        };
+        let read = ahead.map_or_else(|| documents.picture(path), |(_, read)| read);
         let (picture, warning) = read.map_err(|reason| SceneError::in_file(path, reason))?;
         self.warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
         self.pictures.insert(name.to_owned(), Arc::new(picture));
         Ok(())
+    }
+
+    /// Decodes the pictures that are not known yet, side by side.
+    fn decode_ahead<'f>(&self, files: impl Iterator<Item = &'f str>, options: &LoadOptions, documents: &Documents) {
+        let is_new = |(file, path): &(&str, PathBuf)| {
+            let on_disk = file_of(path);
+            known_picture(options, file, &on_disk, stamp(&on_disk)).is_none() && !self.pictures.contains_key(*file)
+        };
+        let paths = files.map(|file| (file, self.folder.join(text_to_path(file)))).filter(is_new);
+        let paths: HashSet<PathBuf> = paths.map(|(_, path)| path).collect();
+        documents.decode(paths.into_iter().collect());
     }
 
     /// The pictures that materials of mesh files name. A missing one is a warning: many models come without theirs.
@@ -362,6 +370,26 @@ impl LoadedScene {
         }
         Ok(())
     }
+}
+
+/// What is part of a model changes with it.
+fn file_of(path: &Path) -> PathBuf {
+    part_of_model(path).map_or_else(|| path.to_owned(), |(model, _)| model)
+}
+
+/// A picture that was read before, if its file is still the same.
+fn known_picture<'a>(
+    options: &LoadOptions<'a>,
+    name: &str,
+    on_disk: &Path,
+    now: Stamp,
+) -> Option<&'a Arc<ImageTexture>> {
+    let known = options.known?;
+    let (path, then) = known.picture_files.get(name)?;
+    if path != on_disk || *then != now || now.is_none() {
+        return None;
+    }
+    known.pictures.get(name)
 }
 
 /// What tells one mesh from another: where it comes from, and what is made of it.

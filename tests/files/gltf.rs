@@ -223,6 +223,10 @@ fn texture_coordinates_grow_upwards_and_transforms_go_with_them() {
         let expected = glam::Vec2::new(u2 as f32, 1.0 - v2 as f32);
         assert!(ours.abs_diff_eq(expected, 1e-5), "({u}, {v}): {ours} for {expected}");
     }
+    // A model is worth seeing without its pictures.
+    std::fs::remove_file(kept.0.path().join("tile.png")).unwrap();
+    let bare = open(&kept.1, &ModelChoice::default()).unwrap();
+    assert!(bare.warnings.iter().any(|warning| warning.contains("the texture is omitted")), "{:?}", bare.warnings);
 }
 
 #[test]

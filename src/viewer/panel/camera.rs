@@ -3,9 +3,10 @@
 use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use super::{Around, Asked};
 use crate::frame::{
-    Bookmarks, Command, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals, f_stop, radius_of_f_stop,
-    sharp_zone,
+    Bookmarks, Command, CurrentScene, Focus, FocusTarget, Navigation, Session, ViewMode, f_number_decimals, f_stop,
+    radius_of_f_stop, sharp_zone,
 };
+use crate::printable;
 use crate::scene::{Lens, Projection, View};
 use crate::viewer::status::metres;
 use egui::Ui;
@@ -54,6 +55,25 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
     });
 }
 
+/// The cameras of the scene by name, where it has more than one.
+fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+    let Some(scene) = session.world().get_resource::<CurrentScene>() else { return };
+    if scene.0.file.cameras.is_empty() {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.weak("cameras");
+        for (name, part) in scene.0.file.cameras.iter() {
+            let Ok((view, projection, lens)) = part.components() else { continue };
+            if ui.button(&*printable::name(name)).on_hover_text("look through this camera of the scene").clicked() {
+                asked.send(Command::SetView(view));
+                asked.send(Command::SetProjection(projection));
+                asked.send(Command::SetLens(lens));
+            }
+        }
+    });
+}
+
 /// Views to go to, and the turntable.
 pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
@@ -71,6 +91,7 @@ pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked)
         let turntable = ui.selectable_label(around.spinning, "Turntable");
         asked.toggle_spin |= turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked();
     });
+    cameras(ui, session, asked);
     let bookmarks = session.world().resource::<Bookmarks>();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
