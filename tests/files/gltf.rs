@@ -462,7 +462,7 @@ fn variants_and_what_is_not_modelled_are_told() {
     writer.json["extensionsUsed"] = json!(["KHR_materials_variants", "EXT_from_the_future"]);
     writer.json["materials"] = json!([
         { "name": "white" },
-        { "name": "black", "extensions": { "KHR_materials_iridescence": { "iridescenceFactor": 1.0 } } },
+        { "name": "black", "extensions": { "KHR_materials_dispersion": { "dispersion": 1.0 } } },
     ]);
     let primitive = &mut writer.json["meshes"][0]["primitives"][0];
     primitive["material"] = json!(0);
@@ -474,7 +474,7 @@ fn variants_and_what_is_not_modelled_are_told() {
     let (day, night) = (with("day").unwrap(), with("night").unwrap());
     assert_eq!((material(&day).as_deref(), material(&night).as_deref()), (Some("white"), Some("black")));
     let told = night.warnings.join("\n");
-    assert!(told.contains("`black`: iridescence is not modelled") && told.contains("`EXT_from_the_future`"), "{told}");
+    assert!(told.contains("`black`: dispersion is not modelled") && told.contains("`EXT_from_the_future`"), "{told}");
     assert!(with("dusk").err().unwrap().contains("there is no variant `dusk`"));
     writer.json["extensionsRequired"] = json!(["EXT_from_the_future"]);
     let error = refusal(&writer.glb());

@@ -63,6 +63,10 @@ pub enum Property {
     Clearcoat,
     /// Of a principled material: root of the width of the coat's microfacets, 0..1.
     ClearcoatRoughness,
+    /// Of a principled material: share that has a thin film, 0..1.
+    Iridescence,
+    /// Of a principled material: thickness of the film, nanometres.
+    FilmThickness,
     /// Of a principled material: radiance that it adds.
     Emission,
     /// Of a principled material: share of the surface that is there, 0..1.
@@ -108,6 +112,8 @@ impl Property {
             "sheen_roughness" => Self::SheenRoughness,
             "clearcoat" => Self::Clearcoat,
             "clearcoat_roughness" => Self::ClearcoatRoughness,
+            "iridescence" => Self::Iridescence,
+            "iridescence_max" => Self::FilmThickness,
             "emission" => Self::Emission,
             "opacity" => Self::Opacity,
             "normal_scale" => Self::NormalScale,

@@ -166,6 +166,9 @@ impl Check<'_> {
                     let message = format!("`{field}` is {value}, but must be 0 or positive: 20 is dull, 200 sharp");
                     self.wrong(&path, message);
                 }
+                Param::Thickness(value) if !(value.is_finite() && *value >= 0.0) => {
+                    self.wrong(&path, format!("`{field}` is {value}, but must be finite and at least 0"));
+                }
                 Param::Ior(ior) if !(ior.is_finite() && *ior > 0.0) => {
                     self.wrong(&path, format!("`{field}` is {ior}, but must be positive: 1.5 is glass"));
                 }
@@ -180,7 +183,12 @@ impl Check<'_> {
                         return;
                     }
                 }
-                Param::ConstantShare(_) | Param::Exponent(_) | Param::Ior(_) | Param::Flag(_) | Param::Cutoff(_) => {}
+                Param::ConstantShare(_)
+                | Param::Thickness(_)
+                | Param::Exponent(_)
+                | Param::Ior(_)
+                | Param::Flag(_)
+                | Param::Cutoff(_) => {}
             }
         }
         if let MaterialPart::Blend { weight, .. } = material {

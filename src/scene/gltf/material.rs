@@ -69,6 +69,12 @@ pub(super) struct GltfMaterial {
     pub clearcoat_roughness: f32,
     pub clearcoat_roughness_texture: Option<TextureUse>,
     pub clearcoat_normal_texture: Option<TextureUse>,
+    pub iridescence: f32,
+    pub iridescence_texture: Option<TextureUse>,
+    pub iridescence_ior: f32,
+    /// Thickness of the film, nanometres: the first where its texture is 0, the second where it is 1 or there is none.
+    pub iridescence_thickness: [f32; 2],
+    pub iridescence_thickness_texture: Option<TextureUse>,
     pub sheen_color: Vec3,
     pub sheen_color_texture: Option<TextureUse>,
     pub sheen_roughness: f32,
@@ -136,6 +142,7 @@ impl Document {
         let strength = extension("emissive_strength").number("emissiveStrength", 1.0).max(0.0);
         let (specular, transmission, volume) = (extension("specular"), extension("transmission"), extension("volume"));
         let (clearcoat, sheen, anisotropy) = (extension("clearcoat"), extension("sheen"), extension("anisotropy"));
+        let iridescence = extension("iridescence");
         let mut material = GltfMaterial {
             name: json.name.clone().filter(|name| !name.is_empty()),
             base_color,
@@ -171,6 +178,14 @@ impl Document {
             clearcoat_roughness: unit(clearcoat.number("clearcoatRoughnessFactor", 0.0)),
             clearcoat_roughness_texture: texture(clearcoat.texture("clearcoatRoughnessTexture").as_ref())?,
             clearcoat_normal_texture: texture(clearcoat.texture("clearcoatNormalTexture").as_ref())?,
+            iridescence: unit(iridescence.number("iridescenceFactor", 0.0)),
+            iridescence_texture: texture(iridescence.texture("iridescenceTexture").as_ref())?,
+            iridescence_ior: iridescence.number("iridescenceIor", 1.3).max(1.0),
+            iridescence_thickness: [
+                iridescence.number("iridescenceThicknessMinimum", 100.0).max(0.0),
+                iridescence.number("iridescenceThicknessMaximum", 400.0).max(0.0),
+            ],
+            iridescence_thickness_texture: texture(iridescence.texture("iridescenceThicknessTexture").as_ref())?,
             sheen_color: sheen.color("sheenColorFactor", Vec3::ZERO).min(Vec3::ONE),
             sheen_color_texture: texture(sheen.texture("sheenColorTexture").as_ref())?,
             sheen_roughness: unit(sheen.number("sheenRoughnessFactor", 0.0)),
@@ -188,13 +203,8 @@ impl Document {
         if !(ior >= 1.0) {
             notes.push(format!("an index of refraction of {ior} is not modelled: 1.5 is used"));
         }
-        for (name, value, what) in [
-            ("iridescence", "iridescenceFactor", "iridescence is not modelled"),
-            ("dispersion", "dispersion", "dispersion is not modelled"),
-        ] {
-            if extension(name).number(value, 0.0) > 0.0 {
-                notes.push(what.to_owned());
-            }
+        if extension("dispersion").number("dispersion", 0.0) > 0.0 {
+            notes.push("dispersion is not modelled".to_owned());
         }
         if clearcoat.texture("clearcoatNormalTexture").and_then(|normal| normal.scale).is_some_and(|s| s != 1.0) {
             notes.push("the scale of its clear-coat normals is not used".to_owned());

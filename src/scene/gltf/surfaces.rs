@@ -290,6 +290,11 @@ fn surface(
         clearcoat,
         clearcoat_roughness,
         clearcoat_normal_map,
+        iridescence,
+        iridescence_ior,
+        iridescence_min,
+        iridescence_max,
+        iridescence_map,
         emission,
         opacity,
         opacity_cutoff,
@@ -341,6 +346,12 @@ fn surface(
     if let Some(map) = textures.map(material.clearcoat_normal_texture.as_ref(), "coat normals")? {
         *clearcoat_normal_map = map;
     }
+    *iridescence =
+        textures.scalar(material.iridescence, material.iridescence_texture.as_ref(), Channel::R, "iridescence")?;
+    *iridescence_ior = material.iridescence_ior;
+    [*iridescence_min, *iridescence_max] = material.iridescence_thickness;
+    let film_map = material.iridescence_thickness_texture.as_ref();
+    *iridescence_map = textures.scalar(1.0, film_map, Channel::G, "film thickness")?;
     *emission = textures.color(material.emission, material.emissive_texture.as_ref(), "emission")?;
     if let Some(map) = textures.map(material.normal_texture.as_ref(), "normals")? {
         *normal_map = map;
@@ -365,6 +376,7 @@ fn clear_glass(material: &GltfMaterial) -> Option<MaterialPart> {
         && material.specular_color == Vec3::ONE
         && material.specular_color_texture.is_none()
         && material.clearcoat == 0.0
+        && material.iridescence == 0.0
         && material.sheen_color == Vec3::ZERO
         && material.anisotropy == 0.0
         && material.emission == Vec3::ZERO

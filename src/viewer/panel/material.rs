@@ -134,6 +134,8 @@ impl Scale {
             Property::SheenRoughness => ("sheen roughness", "0: sharp at the rim, 1: wide", 0.0..=1.0),
             Property::Clearcoat => ("clearcoat", "strength of the coat", 0.0..=1.0),
             Property::ClearcoatRoughness => ("coat roughness", "0: mirror, 1: rough", 0.0..=1.0),
+            Property::Iridescence => ("iridescence", "strength of the colours of a thin film", 0.0..=1.0),
+            Property::FilmThickness => ("film thickness", "nanometres", 0.0..=1500.0),
             Property::Opacity => ("opacity", "share of the surface that is there", 0.0..=1.0),
             Property::NormalScale => ("normal scale", "strength of the normal map", -2.0..=2.0),
             _ => return None,
@@ -177,6 +179,7 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
         let value = match param {
             Param::Share(ScalarParam::Number(value))
             | Param::Number(value)
+            | Param::Thickness(value)
             | Param::ConstantShare(value)
             | Param::Ior(value)
             | Param::Exponent(value) => *value,

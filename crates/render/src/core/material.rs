@@ -6,8 +6,9 @@
 //! [`of_kind`](Material::of_kind).
 
 use super::material_defaults::{
-    along_tangent, black, dull, flat, glass_ior, half, is_along_tangent, is_black, is_default, is_flat, is_half,
-    is_one, is_one_number, is_white, is_yes, is_zero, light_grey, one, one_scalar, white, yes, zero,
+    along_tangent, black, dull, film_ior, flat, glass_ior, half, is_along_tangent, is_black, is_default, is_film_ior,
+    is_flat, is_half, is_one, is_one_number, is_thick, is_thin, is_white, is_yes, is_zero, light_grey, one, one_scalar,
+    thick, thin, white, yes, zero,
 };
 use super::material_kind::{MaterialKind, Param};
 use crate::core::texture::TextureId;
@@ -223,6 +224,21 @@ pub enum Material<P: Params = InSnapshot> {
         /// Normals of the coat about the smooth normal, as in `normal_map`.
         #[serde(default = "flat", skip_serializing_if = "is_flat")]
         clearcoat_normal_map: P::Color,
+        /// Share of the surface that has a thin film, whose reflection is coloured by interference, 0..1.
+        #[serde(default = "zero", skip_serializing_if = "is_zero")]
+        iridescence: P::Scalar,
+        /// Index of refraction of the film.
+        #[serde(default = "film_ior", skip_serializing_if = "is_film_ior")]
+        iridescence_ior: f32,
+        /// Thickness of the film where `iridescence_map` is 0, and where it is 1, nanometres.
+        #[serde(default = "thin", skip_serializing_if = "is_thin")]
+        iridescence_min: f32,
+        /// See `iridescence_min`.
+        #[serde(default = "thick", skip_serializing_if = "is_thick")]
+        iridescence_max: f32,
+        /// Place between the two, 0..1.
+        #[serde(default = "one_scalar", skip_serializing_if = "is_one")]
+        iridescence_map: P::Scalar,
         /// Radiance that the front sends out beside what it reflects, W·sr⁻¹·m⁻².
         #[serde(default = "black", skip_serializing_if = "is_black")]
         emission: P::Color,
@@ -325,6 +341,11 @@ macro_rules! params_of {
                 clearcoat,
                 clearcoat_roughness,
                 clearcoat_normal_map,
+                iridescence,
+                iridescence_ior,
+                iridescence_min,
+                iridescence_max,
+                iridescence_map,
                 emission,
                 opacity,
                 opacity_cutoff,
@@ -349,6 +370,11 @@ macro_rules! params_of {
                 ("clearcoat", Param::Share(clearcoat)),
                 ("clearcoat_roughness", Param::Share(clearcoat_roughness)),
                 ("clearcoat_normal_map", Param::Map(clearcoat_normal_map)),
+                ("iridescence", Param::Share(iridescence)),
+                ("iridescence_ior", Param::Ior(iridescence_ior)),
+                ("iridescence_min", Param::Thickness(iridescence_min)),
+                ("iridescence_max", Param::Thickness(iridescence_max)),
+                ("iridescence_map", Param::Share(iridescence_map)),
                 ("emission", Param::Radiance(emission)),
                 ("opacity", Param::Share(opacity)),
                 ("opacity_cutoff", Param::Cutoff(opacity_cutoff)),
@@ -436,6 +462,11 @@ impl<P: Params> Material<P> {
                 clearcoat,
                 clearcoat_roughness,
                 clearcoat_normal_map,
+                iridescence,
+                iridescence_ior,
+                iridescence_min,
+                iridescence_max,
+                iridescence_map,
                 emission,
                 opacity,
                 opacity_cutoff,
@@ -460,6 +491,11 @@ impl<P: Params> Material<P> {
                 clearcoat: to.scalar(clearcoat),
                 clearcoat_roughness: to.scalar(clearcoat_roughness),
                 clearcoat_normal_map: to.color(clearcoat_normal_map),
+                iridescence: to.scalar(iridescence),
+                iridescence_ior: *iridescence_ior,
+                iridescence_min: *iridescence_min,
+                iridescence_max: *iridescence_max,
+                iridescence_map: to.scalar(iridescence_map),
                 emission: to.color(emission),
                 opacity: to.scalar(opacity),
                 opacity_cutoff: *opacity_cutoff,
@@ -564,6 +600,11 @@ impl<P: Params> Material<P> {
             clearcoat: zero(),
             clearcoat_roughness: zero(),
             clearcoat_normal_map: flat(),
+            iridescence: zero(),
+            iridescence_ior: film_ior(),
+            iridescence_min: thin(),
+            iridescence_max: thick(),
+            iridescence_map: one_scalar(),
             emission: black(),
             opacity: one_scalar(),
             opacity_cutoff: None,

@@ -24,6 +24,9 @@ defaults! {
     zero, is_zero: f32 = 0.0;
     half, is_half: f32 = 0.5;
     one_scalar, is_one: f32 = 1.0;
+    film_ior, is_film_ior: f32 = 1.3;
+    thin, is_thin: f32 = 100.0;
+    thick, is_thick: f32 = 400.0;
 }
 
 pub(super) fn light_grey<C: From<Vec3>>() -> C {

@@ -81,6 +81,8 @@ pub enum Param<Color, Scalar, Number, Flag, Cutoff, Rgb, Part> {
     Ior(Number),
     /// 0 or more.
     Exponent(Number),
+    /// 0 or more, nanometres.
+    Thickness(Number),
     /// Per metre.
     Absorption(Rgb),
     /// Another material, of which a blend consists.

@@ -3,7 +3,7 @@
 use crate::core::material::MAX_LOBES;
 use crate::shading::bsdf::Lobe;
 use crate::shading::interface::Interface;
-use crate::shading::principled::Principled;
+use crate::shading::principled::layers::Principled;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use glam::{Vec2, Vec3};
 

@@ -1,6 +1,7 @@
 //! The parameters of a layered material at a point of a surface.
 
-use super::{Inside, Principled, Transmission};
+use super::iridescence::Film;
+use super::layers::{Inside, Principled, Transmission};
 use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::{Interface, MediumId};
@@ -37,6 +38,11 @@ pub(crate) fn principled_at(
         clearcoat,
         clearcoat_roughness,
         clearcoat_normal_map,
+        iridescence,
+        iridescence_ior,
+        iridescence_min,
+        iridescence_max,
+        iridescence_map,
         ..
     } = &scene.shading.materials[id as usize]
     else {
@@ -50,6 +56,15 @@ pub(crate) fn principled_at(
     let specular = share(specular);
     let at_normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
     let facing = (at_normal * specular_color.eval(scene, point).max(Vec3::ZERO)).min(Vec3::ONE) * specular;
+    let film_share = share(iridescence);
+    let (facing, metal) = if film_share > 0.0 {
+        let nanometres = iridescence_min + (iridescence_max - iridescence_min) * share(iridescence_map);
+        let film = Film { share: film_share, ior: *iridescence_ior, thickness: 1e-9 * nanometres };
+        let cos = vertex.normal.dot(vertex.wo).clamp(0.0, 1.0);
+        (film.tint(facing, cos), film.tint(base, cos))
+    } else {
+        (facing, base)
+    };
     let opaque = (1.0 - metallic) * (1.0 - transmitting);
     let anisotropy = share(anisotropy);
     let (mut widths, mut direction) = ([alpha; 2], None);
@@ -79,7 +94,7 @@ pub(crate) fn principled_at(
         grazing: Vec3::splat(specular),
         diffuse: opaque * base,
         metallic,
-        metal: base,
+        metal,
         alpha: widths,
         tangent: direction.map(|direction| vertex.tangent.along(direction, vertex.normal)),
         transmission,

@@ -1,6 +1,6 @@
 //! A layered surface as seen along one direction.
 
-use super::{COAT_FACING, Inside, Principled, Transmission};
+use super::layers::{COAT_FACING, Inside, Principled, Transmission};
 use crate::core::color::luminance;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::shading::dielectric::{fresnel, reflect, refract};
