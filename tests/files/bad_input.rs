@@ -256,7 +256,7 @@ fn the_command_line_fails_with_the_right_status_and_leaves_nothing_behind() {
     for (args, expected) in [
         (&["render", "none.ron", "-o", "a.png"][..], "no such file"),
         (&["render", "none.obj", "-o", "a.png"], "no such file"),
-        (&["render", "notes.txt", "-o", "a.png"], "expected a scene (.ron), a model (.obj, .ply, .stl)"),
+        (&["render", "notes.txt", "-o", "a.png"], "expected a scene (.ron), a model (.obj, .ply, .stl, .glb, .gltf)"),
         (&["render", "cornell", "-o", "nowhere/a.png"], "there is no folder nowhere"),
         (&["render", "cornell", "-o", "folder.png"], "is a folder"),
         (&["info", "none.ron"], "no such file"),
