@@ -7,6 +7,7 @@ pub(crate) mod arrays;
 pub(crate) mod delta;
 pub(crate) mod emitter;
 pub(crate) mod flat;
+mod mean_light;
 mod objects;
 mod sample_simd;
 mod selection;
@@ -22,6 +23,7 @@ use crate::core::texture::Texture;
 use crate::prepare::light::arrays::LightArrays;
 use crate::prepare::light::delta::EVERYTHING;
 use crate::prepare::light::emitter::{Light, LightSample};
+use crate::prepare::light::mean_light::MeanLight;
 use crate::prepare::light::objects::ObjectLights;
 use crate::prepare::light::selection::LightSelection;
 use crate::prepare::light::shape::{LightShape, sphere_as_point};
@@ -50,13 +52,14 @@ impl LightTable {
         delta_lights: &[DeltaLight],
     ) -> Self {
         let mut lights = Vec::new();
+        let mut means = MeanLight::new(textures);
         let by_object = geometry
             .objects
             .iter()
             .zip(geometry.tree.shapes())
             .map(|(object, shape)| {
                 let emission: Vec<_> = object.materials.iter().map(|&m| emission[m as usize]).collect();
-                ObjectLights::add(&mut lights, object, shape, &emission, textures)
+                ObjectLights::add(&mut lights, object, shape, &emission, &mut means)
             })
             .collect();
         let reach = (0.5 * geometry.tree.bounds().size().length()).clamp(1e-12, EVERYTHING);

@@ -4,13 +4,13 @@ use crate::core::color::luminance;
 use crate::core::material::{ColorInput, ScalarInput};
 use crate::core::material_queries::Emission;
 use crate::core::snapshot::Object;
-use crate::core::texture::{Texture, TexturePoint};
+use crate::core::texture::TexturePoint;
 use crate::prepare::light::emitter::Light;
+use crate::prepare::light::mean_light::MeanLight;
 use crate::prepare::light::shape::LightShape;
 use firstlight_kdtree::Shape;
 use firstlight_mesh::Mesh;
 use glam::{Vec2, Vec4};
-use rustc_hash::FxHashMap;
 
 /// The lights of an object by primitive: those of its front, and those of its back.
 #[derive(Clone, Debug, Default)]
@@ -49,18 +49,18 @@ impl ObjectLights {
 
     /// Finds the lights of an object.
     ///
-    /// - `emission`: of each of its materials; `lights`: all lights so far, to which these are added.
+    /// - `emission`: of each of its materials; `lights`: all lights so far, to which these are added; `means`: of all objects.
     pub fn add(
         lights: &mut Vec<Light>,
         object: &Object,
         shape: &Shape,
         emission: &[Option<Emission>],
-        textures: &[Texture],
+        means: &mut MeanLight,
     ) -> Self {
         if emission.iter().all(Option::is_none) {
             return Self::default();
         }
-        let mut adder = Adder { lights, object, textures, means: FxHashMap::default() };
+        let mut adder = Adder { lights, object, means };
         let only = emission[0].filter(|_| emission.len() == 1);
         let first = adder.lights.len() as u32;
         match (shape, only) {
@@ -129,15 +129,13 @@ fn corner_of(mesh: &Mesh, vertex: usize, k: usize) -> TexturePoint {
     TexturePoint { uv: [uv, second], color: mesh.colors.get(vertex).copied().unwrap_or(Vec4::ONE) }
 }
 
-struct Adder<'a> {
+struct Adder<'a, 'b> {
     lights: &'a mut Vec<Light>,
     object: &'a Object,
-    textures: &'a [Texture],
-    /// Luminance of the mean of a texture: a picture is gone through once, however many triangles show it.
-    means: FxHashMap<u32, f32>,
+    means: &'a mut MeanLight<'b>,
 }
 
-impl Adder<'_> {
+impl Adder<'_, '_> {
     fn add(&mut self, emission: Emission, shape: LightShape) -> u32 {
         self.push(emission, shape, None)
     }
@@ -158,9 +156,7 @@ impl Adder<'_> {
         let mean_radiance = emission.scale
             * match emission.radiance {
                 ColorInput::Constant(radiance) => luminance(radiance),
-                ColorInput::Texture(id) => {
-                    *self.means.entry(id).or_insert_with(|| luminance(self.textures[id as usize].mean()))
-                }
+                ColorInput::Texture(id) => self.means.of(id, corners.as_deref()),
             };
         let (is_point, turned) = (self.object.is_point_light, self.object.turned);
         self.lights.push(Light { shape, emission, mean_radiance, is_point, turned, corners });
