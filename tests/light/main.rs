@@ -6,6 +6,7 @@ mod common;
 mod caustics;
 mod delta_lights;
 mod determinism;
+mod features;
 mod filters;
 mod lanes;
 mod light_transport;

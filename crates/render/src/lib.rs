@@ -33,6 +33,7 @@ pub use crate::core::texture::{
     Channel, Encoding, ImageTexture, Texels, Texture, TextureId, TexturePattern, TexturePoint, Wrap,
 };
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
+pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
 pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };
@@ -40,6 +41,7 @@ pub use driver::renderer::{BadSample, PassReport, advance, advance_region, repla
 pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
 pub use film::error::{MergeError, RecordError};
 pub use film::estimate::ErrorEstimate;
+pub use film::features::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares};
 pub use film::record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
 pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};

@@ -4,12 +4,13 @@
 //! Views of the scene need one ray a pixel, through its middle and the middle of the lens, and stay the same while
 //! samples come in; views of the film are read off it. Start reading at [`inspect`].
 
-use crate::core::material::{Material, MaterialId};
+use crate::core::material::MaterialId;
 use crate::core::settings::RenderSettings;
 use crate::driver::renderer::mean_bounces;
 use crate::film::develop::encode_srgb;
 use crate::film::tiles::Film;
 use crate::prepare::prepared::Prepared;
+use crate::shading::albedo::surface_albedo;
 use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
@@ -132,7 +133,7 @@ pub fn inspect(
             None => [0; 3],
         })?),
         Inspection::Albedo => plain(first_hits(snapshot, size, stop, |seen| match seen {
-            Some((vertex, material)) => albedo(snapshot, &vertex, material, 0).to_array().map(encode_srgb),
+            Some((vertex, material)) => surface_albedo(snapshot, &vertex, material).to_array().map(encode_srgb),
             None => [0; 3],
         })?),
         Inspection::Depth => {
@@ -289,19 +290,6 @@ fn range_of(values: &[f32], share: f32) -> (f32, f32) {
     let (low, high) = (sorted[off.min(sorted.len() - 1)], sorted[(sorted.len() - 1).saturating_sub(off)]);
     // Everything alike still needs two ends.
     if high > low { (low, high) } else { (low, low + 1.0) }
-}
-
-fn albedo(snapshot: &Prepared, vertex: &Vertex, material: MaterialId, depth: u32) -> Vec3 {
-    match &snapshot.shading.materials[material as usize] {
-        Material::Emissive { .. } => Vec3::ZERO,
-        // Extraction lets no deeper ones through.
-        Material::Blend { .. } if depth > 16 => Vec3::ZERO,
-        Material::Blend { weight, a, b } => {
-            let part = |id| albedo(snapshot, vertex, id, depth + 1);
-            part(*a).lerp(part(*b), weight.eval(snapshot, vertex.texture_point).clamp(0.0, 1.0))
-        }
-        plain => plain.color().map_or(Vec3::ONE, |color| color.eval(snapshot, vertex.texture_point)),
-    }
 }
 
 /// From dark blue at 0 over green to red at 1, each step brighter or warmer than the one before; grey for no number.

@@ -14,10 +14,8 @@ use crate::integrators::record::{Record, TracedPath};
 use crate::integrators::simd::camera::{CameraRays, Pixels};
 use crate::integrators::survival::{at_depth, endless_depth};
 use crate::prepare::prepared::Prepared;
-use crate::sampling::Sampler;
 use crate::shading::paths::PathBatch;
-use firstlight_kdtree::geometry::Ray;
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -194,13 +192,13 @@ impl Wave {
         let Self { path, phong, pixels, .. } = self;
         let pixels = &*pixels;
         let slot = |sample: u32| (sample - samples.start) * stride;
+        let lens = pass.lens();
         let camera_paths = samples.clone().flat_map(|sample| {
             (0..pixels.local.len()).map(move |i| {
-                let (ray, sampler, weight) = pass.camera_ray(UVec2::new(pixels.x[i], pixels.y[i]), sample);
+                let (ray, sampler, weight) = lens.ray(UVec2::new(pixels.x[i], pixels.y[i]), sample);
                 CameraPath { ray, sampler, slot: slot(sample) + pixels.local[i], weight }
             })
         });
-        let lens = pass.lens();
         let start = |paths: &mut PathBatch| {
             if let Some(set) = pass.settings.simd
                 && lens.is_plain()
@@ -382,23 +380,10 @@ impl<'a> Pass<'a> {
         let RenderSettings { seed, techniques: Techniques { even_samples, .. }, .. } = *self.settings;
         CameraRays { camera: &self.snapshot.camera, size: self.size, filter: &self.filter, seed, even_samples }
     }
-
-    /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
-    #[inline]
-    fn camera_ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
-        let Techniques { even_samples, .. } = self.settings.techniques;
-        let new_sampler = if even_samples { Sampler::of_pixel } else { Sampler::independent };
-        let sampler = new_sampler(self.settings.seed, pixel.x, pixel.y, sample);
-        let (offset, weight) = self.filter.sample(sampler.pair(0));
-        let film = pixel.as_vec2() + offset;
-        let camera = &self.snapshot.camera;
-        let lens = if camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
-        (camera.ray(film, self.size.as_vec2(), lens), sampler, weight)
-    }
 }
 
 /// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.
-fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
+pub(super) fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
     const SIDE: u32 = 4;
     let mut pixels = Pixels::default();
     for top in (0..size.y).step_by(SIDE as usize) {

@@ -1,8 +1,10 @@
 //! From camera rays to light: waves of paths over [`crate::shading`].
 
 pub(crate) mod caustics;
+pub(crate) mod features;
 pub(crate) mod path;
 pub(crate) mod phong;
 pub(crate) mod record;
+pub(crate) mod seen;
 pub(crate) mod simd;
 pub(crate) mod survival;

@@ -1,5 +1,6 @@
 //! What light does at a surface and between surfaces: one hit at a time here, sixteen in [`simd`].
 
+pub(crate) mod albedo;
 pub(crate) mod blend;
 pub(crate) mod bsdf;
 pub(crate) mod cutouts;

@@ -1,12 +1,13 @@
-//! Camera rays, sixteen at a time; see `renderer.rs` for one.
+//! Camera rays, one or sixteen at a time.
 
 use crate::core::camera::Camera;
 use crate::core::filter::FilterSampler;
-use crate::sampling::SamplerLanes;
 use crate::sampling::warp::uniform_disc;
+use crate::sampling::{Sampler, SamplerLanes};
 use crate::shading::paths::{PathBatch, PathLanes};
+use firstlight_kdtree::geometry::Ray;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 /// Pixels whose camera rays are wanted, in the order of the rays.
 #[derive(Default)]
@@ -32,6 +33,17 @@ impl CameraRays<'_> {
     /// Whether [`Self::start_paths`] knows filter and aperture.
     pub fn is_plain(&self) -> bool {
         self.filter.is_plain() && (self.camera.lens_radius == 0.0 || self.camera.blades < 3)
+    }
+
+    /// A ray through a point of the film, by the pixel's filter, and of the lens; and the weight of what it sees.
+    #[inline]
+    pub fn ray(&self, pixel: UVec2, sample: u32) -> (Ray, Sampler, f32) {
+        let new_sampler = if self.even_samples { Sampler::of_pixel } else { Sampler::independent };
+        let sampler = new_sampler(self.seed, pixel.x, pixel.y, sample);
+        let (offset, weight) = self.filter.sample(sampler.pair(0));
+        let film = pixel.as_vec2() + offset;
+        let lens = if self.camera.lens_radius > 0.0 { sampler.pair(1) } else { Vec2::ZERO };
+        (self.camera.ray(film, self.size.as_vec2(), lens), sampler, weight)
     }
 
     /// Appends a path for each of the pixels; `slot` is that of local pixel 0. There must be room.

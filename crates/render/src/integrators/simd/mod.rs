@@ -10,6 +10,7 @@
 pub(crate) mod camera;
 pub(crate) mod classic;
 pub(crate) mod emitters;
+pub(crate) mod first_hits;
 pub(crate) mod misses;
 pub(crate) mod shade;
 pub(crate) mod sort;
