@@ -13,22 +13,22 @@
 //! ```
 //!
 //! [`Scene`], [`RenderOptions`] and [`Image`] cover what most programs need. An interactive program runs a
-//! [`Session`](frame::Session), which shows the image while it converges and obeys commands; its systems may change the
-//! world between two frames. `docs/library.md` is a guide to both.
+//! [`Session`](frame::Session), which shows the image while it converges and executes commands; its systems may change
+//! the world between two frames. `docs/library.md` is a guide to both.
 //!
-//! From the top down; imports point down:
+//! Modules, from the top layer down; imports point down:
 //!
 //! | module | contents |
 //! |---|---|
 //! | `viewer` (feature `viewer`) | the window: input, overlays, presenting |
 //! | [`embed`] | [`Scene`], [`RenderOptions`], [`Image`] |
-//! | `report`, `stability` (feature `cli`) | error against time; hard cases, counted |
+//! | `report`, `stability` (feature `cli`) | error against time; counts of hard cases |
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
 //! | [`printable`], `console` (feature `cli`) | escaping of foreign text; output to a terminal |
 //! | [`render`], [`sampling`] | snapshot, camera, film, integrators, lights, materials; sequences, warps, distributions |
 //! | [`mesh`] | mesh data, normals, procedural shapes, simplification |
-//! | [`kdtree`], [`geometry`] | which surface a ray meets first; rays, boxes, robust arithmetic |
+//! | [`kdtree`], [`geometry`] | closest-hit and any-hit queries; rays, boxes, robust arithmetic |
 
 pub use bevy_ecs;
 pub use embed::{Error, Image, RenderOptions, Scene};
@@ -37,7 +37,7 @@ pub use firstlight_mesh as mesh;
 pub use firstlight_render::{self as render, sampling};
 pub use glam;
 
-// Hidden: the program, its tests and its benchmarks use these modules, a library has no use for them.
+// Hidden: used by the program, its tests and its benchmarks, not by other libraries.
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 #[allow(missing_docs)]
@@ -46,24 +46,24 @@ pub mod embed;
 pub mod frame;
 pub mod prelude;
 pub mod printable;
-// Hidden as `console` is.
+// Hidden like `console`.
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 #[allow(missing_docs)]
 pub mod report;
 pub mod scene;
-// Hidden as `console` is.
+// Hidden like `console`.
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 #[allow(missing_docs)]
 pub mod stability;
-// Hidden as `console` is.
+// Hidden like `console`.
 #[cfg(feature = "viewer")]
 #[doc(hidden)]
 #[allow(missing_docs)]
 pub mod viewer;
 
-/// The Rust code of the guide and the README is compiled and run.
+/// Compiles and runs the Rust code of the guide and the README.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/library.md")]
 #[doc = include_str!("../README.md")]

@@ -1,4 +1,4 @@
-//! What most programs that render a scene use: `use firstlight::prelude::*`.
+//! The items that most programs that render a scene need: `use firstlight::prelude::*`.
 
 pub use crate::embed::{Error, Flow, Image, RenderOptions, Scene};
 pub use crate::frame::{Command, Progress, Session, SessionOptions, Target};

@@ -1,23 +1,23 @@
-//! What can go wrong with a scene or an image.
+//! Errors of opening, rendering and saving.
 
 use crate::render::{CameraError, NoRoom, SettingsError};
 use crate::scene::{BadValue, SceneError, WriteError};
 use thiserror::Error;
 
-/// Why there is no scene or no image; each says what is wrong, where, and what would be right.
+/// The reason why a scene or an image cannot be made; the message says what is wrong, where, and what is expected.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The scene or a file that it points at cannot be read.
+    /// The scene, or a file that it refers to, cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// An option or a value of the world is out of range.
+    /// An option, or a value in the world, is out of range.
     #[error(transparent)]
     Value(#[from] BadValue),
     /// The settings of the light model are out of range.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// No picture can be taken with the camera.
+    /// The camera is not valid.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// There is not enough memory for an image of that size.

@@ -11,7 +11,7 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct Image {
     film: Film,
-    /// Linear Rec. 709, row by row from the top, red, green and blue after each other.
+    /// Linear Rec. 709, row by row from the top, red, green and blue interleaved.
     pixels: Vec<f32>,
     display: Display,
     metadata: MetadataDraft,
@@ -31,12 +31,12 @@ impl Image {
         Self { film, pixels, display, metadata, report, warnings }
     }
 
-    /// Pixels.
+    /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.film.width()
     }
 
-    /// Pixels.
+    /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.film.height()
     }
@@ -46,7 +46,7 @@ impl Image {
         &self.pixels
     }
 
-    /// Samples that each pixel has at least.
+    /// The smallest number of samples that any pixel has.
     pub fn spp(&self) -> u32 {
         self.film.spp()
     }
@@ -56,12 +56,12 @@ impl Image {
         self.film.error_estimate()
     }
 
-    /// Seconds, rays, and samples that were left out.
+    /// Elapsed seconds, rays traced, and samples that were left out.
     pub fn report(&self) -> &OfflineReport {
         &self.report
     }
 
-    /// Objects of the world that could not be rendered, and why.
+    /// Objects of the world that could not be rendered, each with the reason.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -71,12 +71,12 @@ impl Image {
         &self.film
     }
 
-    /// Saves the image: `.png` with exposure and tone curve, 8 bits; `.exr` as it is, 32-bit floats. The file carries
-    /// scene and camera, so [`Scene::open`](super::Scene::open) opens it again. A file of that name is replaced, unless it
-    /// is a film.
+    /// Saves the image: `.png` in 8 bits with exposure and tone curve applied, `.exr` as unmodified 32-bit floats. The
+    /// file carries the scene and the camera, so [`Scene::open`](super::Scene::open) can open it again. An existing
+    /// file of that name is replaced, unless it is a film.
     ///
     /// # Errors
-    /// When the extension is neither, or the file cannot be written.
+    /// If the extension is neither of the two, or the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let (path, size) = (path.as_ref(), (self.width(), self.height()));
         let uneven = self.film.max_spp() > self.film.spp();

@@ -1,4 +1,4 @@
-//! How an image is rendered, and when it is good enough.
+//! Options of a rendering: size, light model, target, callbacks.
 
 use super::Error;
 use crate::frame::{Progress, Target};
@@ -6,19 +6,19 @@ use crate::render::{Integrator, PixelFilter, RenderSettings};
 use crate::scene::{check_film_size, check_max_depth};
 use std::fmt;
 
-/// Whether to go on.
+/// The answer of a progress callback: whether rendering continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// Take more samples until the target is reached.
+    /// Rendering continues until the target is reached.
     Continue,
-    /// End the rendering; the image has the samples so far.
+    /// Rendering ends; the image has the samples taken so far.
     Stop,
 }
 
 type OnProgress = Box<dyn Fn(&Progress) -> Flow + Send + Sync>;
 type Stop = Box<dyn Fn() -> bool + Send + Sync>;
 
-/// How an image is rendered. What is not set is as the scene has it.
+/// Options of a rendering. An option that is not set keeps the scene's value.
 ///
 /// ```
 /// # use firstlight::prelude::*;
@@ -39,77 +39,78 @@ pub struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// Samples per pixel where no other target is set.
+    /// Samples per pixel if no target is set.
     pub const DEFAULT_SPP: u32 = 256;
 
-    /// Pixels.
+    /// Sets the size of the image in pixels.
     pub fn size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((width, height));
         self
     }
 
-    /// Ends at so many samples per pixel. The first target that is reached ends the rendering.
+    /// Sets the target in samples per pixel. The first target that is reached ends the rendering.
     pub fn spp(mut self, spp: u32) -> Self {
         self.target.spp = Some(spp);
         self
     }
 
-    /// Ends after so many seconds, but not before each pixel has a sample.
+    /// Sets the target in seconds; each pixel gets at least one sample.
     pub fn seconds(mut self, seconds: f64) -> Self {
         self.target.seconds = Some(seconds);
         self
     }
 
-    /// Ends when the estimated relative error of the whole image is below this: 0.01 is 1 %.
+    /// Sets the target as the estimated relative error of the whole image: 0.01 is 1 %.
     pub fn error(mut self, relative: f64) -> Self {
         self.target.error = Some(relative);
         self
     }
 
-    /// The light model, in place of the scene's.
+    /// Sets the light model, in place of the scene's.
     pub fn integrator(mut self, integrator: Integrator) -> Self {
         self.integrator = Some(integrator);
         self
     }
 
-    /// Longest path in segments, at least 1; 1 shows emitters alone.
+    /// Sets the longest path in segments, at least 1; 1 shows emitters alone.
     pub fn max_depth(mut self, segments: u32) -> Self {
         self.max_depth = Some(segments);
         self
     }
 
-    /// Random seed: another one gives another noise of the same strength.
+    /// Sets the random seed: another seed gives different noise of the same strength.
     pub fn seed(mut self, seed: u32) -> Self {
         self.seed = Some(seed);
         self
     }
 
-    /// Pixel reconstruction filter.
+    /// Sets the pixel reconstruction filter.
     pub fn filter(mut self, filter: PixelFilter) -> Self {
         self.filter = Some(filter);
         self
     }
 
-    /// Stops added to the exposure of the scene; concerns PNG files alone, never [`Image::pixels`](super::Image::pixels).
+    /// Sets the stops added to the scene's exposure; affects PNG files only, never
+    /// [`Image::pixels`](super::Image::pixels).
     pub fn exposure(mut self, stops: f32) -> Self {
         self.exposure = stops;
         self
     }
 
-    /// Threads; all processors when not set. The image is the same for any number.
+    /// Sets the number of threads; the default is one per processor. The image is the same for any number.
     pub fn threads(mut self, threads: usize) -> Self {
         self.threads = Some(threads);
         self
     }
 
-    /// Called a few times per second, on the thread that renders.
+    /// Sets a callback that runs a few times per second on the thread that renders.
     pub fn on_progress(mut self, on_progress: impl Fn(&Progress) -> Flow + Send + Sync + 'static) -> Self {
         self.on_progress = Some(Box::new(on_progress));
         self
     }
 
-    /// Asked often and by all threads: `true` ends the rendering within milliseconds. Pixels may then have different
-    /// numbers of samples, or none.
+    /// Sets a stop condition, which all threads evaluate often: `true` ends the rendering within milliseconds. Pixels
+    /// may then have different numbers of samples, or none.
     pub fn stop_when(mut self, stop: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         self.stop = Some(Box::new(stop));
         self
@@ -129,7 +130,7 @@ impl RenderOptions {
         Target { spp: self.target.spp.or(is_open.then_some(Self::DEFAULT_SPP)), ..self.target }
     }
 
-    /// - `of_scene`: for what is not set.
+    /// Returns the settings of a rendering; `of_scene` supplies what is not set.
     pub(super) fn settings(&self, of_scene: RenderSettings) -> RenderSettings {
         RenderSettings {
             integrator: self.integrator.unwrap_or(of_scene.integrator),
@@ -141,7 +142,7 @@ impl RenderOptions {
     }
 
     pub(super) fn progress(&self, now: &Progress) -> bool {
-        self.on_progress.as_ref().is_none_or(|told| told(now) == Flow::Continue)
+        self.on_progress.as_ref().is_none_or(|on_progress| on_progress(now) == Flow::Continue)
     }
 
     pub(super) fn is_stopped(&self) -> bool {

@@ -1,4 +1,4 @@
-//! A scene to be changed and rendered.
+//! A scene that a program can change and render.
 
 use super::{Error, Image, RenderOptions};
 use crate::frame::{check_film_source, render_offline_until};
@@ -11,7 +11,7 @@ use bevy_ecs::world::World;
 use std::ffi::OsStr;
 use std::sync::{Mutex, PoisonError};
 
-/// A scene: an ECS world, and the meshes, images and kd-trees that its entities use.
+/// A scene: an ECS world with the meshes, images and kd-trees that its entities use.
 ///
 /// ```
 /// use firstlight::prelude::*;
@@ -27,22 +27,22 @@ use std::sync::{Mutex, PoisonError};
 /// ```
 #[derive(Debug)]
 pub struct Scene {
-    /// Queries need a world for themselves, even to read it.
+    /// In a mutex, because even read-only queries need `&mut World`.
     world: Mutex<World>,
     loaded: Option<LoadedScene>,
 }
 
 impl Scene {
-    /// Opens a model (`.obj`, `.ply`, `.stl`), a scene file (`.ron`), an image that firstlight saved (`.png`, `.exr`), or a built-in scene by
-    /// its name.
+    /// Opens a model (`.obj`, `.ply`, `.stl`, `.glb`, `.gltf`), a scene file (`.ron`), an image that firstlight saved
+    /// (`.png`, `.exr`), or a built-in scene by its name.
     ///
     /// # Errors
-    /// When there is no such file or scene, or it is not valid.
+    /// If there is no such file or scene, or it is not valid.
     pub fn open(source: impl AsRef<OsStr>) -> Result<Self, Error> {
         Self::open_with(&SceneSource::parse(source)?, &LoadOptions::default())
     }
 
-    /// The same with options: up axis, aspect ratio that a model is framed for, progress.
+    /// Like [`open`](Self::open), with options: up axis, the aspect ratio that a model is framed for, progress.
     ///
     /// # Errors
     /// As for [`open`](Self::open).
@@ -54,7 +54,7 @@ impl Scene {
         Ok(Self { world: Mutex::new(world), loaded: Some(loaded) })
     }
 
-    /// An empty scene: spawn objects, materials, lights and a camera into [`world_mut`](Self::world_mut).
+    /// Creates an empty scene: spawn objects, materials, lights and a camera into [`world_mut`](Self::world_mut).
     pub fn new() -> Self {
         let mut world = World::new();
         world.init_resource::<Rendering>();
@@ -68,21 +68,22 @@ impl Scene {
         self.world.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What was found while opening that is not as the file has it: missing images, for example.
+    /// Warnings of opening: where the scene differs from the file, for example because an image is missing.
     pub fn warnings(&self) -> &[String] {
         self.loaded.as_ref().map_or(&[], |loaded| &loaded.warnings)
     }
 
-    /// The scene as a scene file: it opens as what the world holds now.
+    /// Returns the current content of the world as a scene file.
     pub fn to_ron(&self) -> String {
         let mut world = self.world.lock().unwrap_or_else(PoisonError::into_inner);
         Description::of(&mut world, self.loaded.as_ref()).file.to_ron()
     }
 
-    /// Renders an image, with all processors unless the options say otherwise, and returns when it is done.
+    /// Renders an image and returns when the target is reached. Uses all processors unless the options set a number of
+    /// threads.
     ///
     /// # Errors
-    /// When an option is out of range, the world has no camera, or memory is short.
+    /// If an option is out of range, the world has no camera, or there is not enough memory.
     pub fn render(&self, options: &RenderOptions) -> Result<Image, Error> {
         options.check()?;
         match options.threads {
@@ -126,7 +127,7 @@ impl Default for Scene {
     }
 }
 
-/// Builds what the world has come to since it was opened.
+/// Builds the trees of shapes that were added to the world after the scene was opened.
 fn add_trees(trees: &mut Trees, inputs: &SceneInputs) {
     for object in &inputs.objects {
         if let Err(reason) = trees.add(&object.shape) {
