@@ -1,4 +1,4 @@
-//! Rays and hits as structures of arrays: what a wave of the integrator hands to the kernel and gets back.
+//! Rays and hits as structures of arrays: the input and the output of batch queries.
 
 use super::shape::Hit;
 use crate::geometry::Ray;
@@ -20,7 +20,7 @@ pub struct RayBatch {
     pub dir_y: Vec<f32>,
     /// z of each ray's direction.
     pub dir_z: Vec<f32>,
-    /// Lengths of `dir`, excluded.
+    /// End of each ray in lengths of its direction, excluded.
     pub t_max: Vec<f32>,
     len: usize,
 }
@@ -36,7 +36,7 @@ impl RayBatch {
         self.len == 0
     }
 
-    /// Forgets the rays and keeps the memory.
+    /// Removes all rays and keeps the allocation.
     pub fn clear(&mut self) {
         self.len = 0;
     }
@@ -68,7 +68,7 @@ impl RayBatch {
         }
     }
 
-    /// So that `n` more rays can be appended.
+    /// Reserves space for `n` more rays.
     pub fn make_room(&mut self, n: usize) {
         let least = self.len + n + LANES;
         if self.t_max.len() < least {
@@ -78,7 +78,7 @@ impl RayBatch {
         }
     }
 
-    /// Appends the rays of the lanes in `mask`; there must be room.
+    /// Appends the rays of the lanes in `mask`; space must have been reserved.
     #[inline(always)]
     pub fn append<S: Simd>(&mut self, mask: Mask, origin: Vector<S>, dir: Vector<S>, t_max: Float<S>) {
         let at = self.len;
@@ -100,19 +100,19 @@ impl RayBatch {
     }
 }
 
-/// Writes the lanes in `mask` to `to[at..]`, and anything to the rest of the sixteen numbers there.
+/// Writes the lanes in `mask` to `to[at..]`; the rest of the sixteen numbers there gets unspecified values.
 ///
 /// # Panics
-/// When `to` has fewer than sixteen numbers from `at` on.
+/// If `to` has fewer than sixteen numbers from `at` on.
 #[inline(always)]
 pub fn append<S: Simd>(to: &mut [f32], at: usize, mask: Mask, lanes: Float<S>) {
     lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
 }
 
-/// The same of integers.
+/// Like [`append`], for integers.
 ///
 /// # Panics
-/// When `to` has fewer than sixteen numbers from `at` on.
+/// If `to` has fewer than sixteen numbers from `at` on.
 #[inline(always)]
 pub fn append_bits<S: Simd>(to: &mut [u32], at: usize, mask: Mask, lanes: Bits<S>) {
     lanes.compress(mask).store(to[at..].first_chunk_mut().expect("room for all lanes"));
@@ -126,7 +126,7 @@ impl<'a> FromIterator<&'a Ray> for RayBatch {
     }
 }
 
-/// The nearest hit of each ray of a batch, one array per field.
+/// The closest hit of each ray of a batch, one array per field.
 ///
 /// | shape | `prim` | `u`, `v` |
 /// |---|---|---|
@@ -136,7 +136,7 @@ impl<'a> FromIterator<&'a Ray> for RayBatch {
 /// | plane | 0 | 0 |
 #[derive(Clone, Debug, Default)]
 pub struct HitBatch {
-    /// Lengths of `dir`; `f32::INFINITY` when the ray met nothing before its `t_max`.
+    /// Distance in lengths of the direction; `f32::INFINITY` for a miss.
     pub t: Vec<f32>,
     /// First surface coordinate of each hit; see the table above.
     pub u: Vec<f32>,
@@ -144,25 +144,25 @@ pub struct HitBatch {
     pub v: Vec<f32>,
     /// Index of the primitive within its object; see the table above.
     pub prim: Vec<u32>,
-    /// Index of the object in the scene tree, [`HitBatch::MISS`] when there is none.
+    /// Index of the object in the scene tree, [`HitBatch::MISS`] for a miss.
     pub object: Vec<u32>,
 }
 
 impl HitBatch {
-    /// Stands in `object` for a ray that hits nothing.
+    /// Value of `object` for a ray that hits nothing.
     pub const MISS: u32 = u32::MAX;
 
-    /// Number of answers, one per ray.
+    /// Number of results, one per ray.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// Whether there are no answers.
+    /// Whether there are no results.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
 
-    /// The answer for ray `i`, `None` for a miss.
+    /// The hit of ray `i`, `None` for a miss.
     #[inline]
     pub fn get(&self, i: usize) -> Option<Hit> {
         let object = self.object[i];
@@ -170,14 +170,14 @@ impl HitBatch {
         (object != Self::MISS).then_some(hit)
     }
 
-    /// Another answer for ray `i`.
+    /// Replaces the result of ray `i`.
     pub fn set(&mut self, i: usize, hit: Option<Hit>) {
         let miss = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: Self::MISS, object: Self::MISS };
         let hit = hit.unwrap_or(miss);
         (self.t[i], self.u[i], self.v[i], self.prim[i], self.object[i]) = (hit.t, hit.u, hit.v, hit.prim, hit.object);
     }
 
-    /// Makes room for `n` answers, which may still be those of an older batch.
+    /// Resizes to `n` results, which may still be those of an older batch.
     pub(super) fn resize(&mut self, n: usize) {
         self.t.resize(n, f32::INFINITY);
         self.u.resize(n, 0.0);
@@ -186,7 +186,7 @@ impl HitBatch {
         self.object.resize(n, Self::MISS);
     }
 
-    /// Makes room for `n` answers, all of them misses.
+    /// Resizes to `n` results, all of them misses.
     pub fn reset(&mut self, n: usize) {
         let Self { t, u, v, prim, object } = self;
         for array in [t, u, v] {

@@ -1,8 +1,9 @@
-//! Kd-tree over primitives of one kind: the binary nodes, the wide ones, and the leaf blocks below both.
+//! Kd-tree over primitives of one kind: binary nodes, the same nodes collapsed to [`Node8`], and leaf blocks shared by
+//! both.
 
 use super::build::{LeafMaker, build};
 use super::leaf::{BLOCK, LeafBlock, Prims};
-use super::node8::{LEAF, Node8, widen};
+use super::node8::{LEAF, Node8, collapse};
 use super::nodes::{KdNode, KdNodes};
 use super::ray::Nearest;
 use super::reference::{BuildConfig, Primitives};
@@ -10,10 +11,10 @@ use super::simd::KernelSimd;
 
 #[derive(Debug, PartialEq)]
 pub(super) struct BlockTree<B: LeafBlock> {
-    /// The tree for packets, picking and as the reference.
+    /// Binary nodes, for packets, for single rays, and as the reference.
     pub nodes: KdNodes,
-    /// The same tree for streams.
-    pub wide: Vec<Node8>,
+    /// The same tree as [`Node8`], for streams.
+    pub nodes8: Vec<Node8>,
     blocks: Vec<B>,
     /// The blocks of leaves whose first block has the bit [`COMPACT`] set.
     compact: Vec<B::Compact>,
@@ -21,18 +22,20 @@ pub(super) struct BlockTree<B: LeafBlock> {
     pub extent: f32,
 }
 
-/// The blocks of one leaf, all of one form.
+/// The blocks of one leaf, all regular or all compact.
 pub(super) struct Leaf<'a, B: LeafBlock> {
     pub blocks: &'a [B],
     pub compact: &'a [B::Compact],
 }
 
-/// In the number of a leaf's first block: it is one of the compact ones. The highest bit that a node has room for.
+/// Bit in the number of a leaf's first block that marks compact blocks: the highest bit that a node can store.
 const COMPACT: u32 = 1 << 29;
 
 impl<B: LeafBlock> BlockTree<B> {
-    /// - `make_block`: up to sixteen primitives as a block.
-    /// - `make_compact`: any number of primitives as compact blocks, or none where that does not pay.
+    /// Builds nodes and blocks.
+    ///
+    /// - `make_block`: packs up to sixteen primitives into a block.
+    /// - `make_compact`: packs any number of primitives into compact blocks; returns none where that does not pay.
     pub fn build(
         primitives: &impl Primitives,
         config: &BuildConfig,
@@ -40,17 +43,17 @@ impl<B: LeafBlock> BlockTree<B> {
         make_compact: impl Fn(&[u32]) -> Vec<B::Compact> + Sync,
     ) -> Self {
         let (nodes, Blocks { blocks, compact }) = build(primitives, config, &BlockMaker { make_block, make_compact });
-        let (extent, wide) = (nodes.extent(), widen(&nodes));
-        Self { nodes, wide, blocks, compact, extent }
+        let (extent, nodes8) = (nodes.extent(), collapse(&nodes));
+        Self { nodes, nodes8, blocks, compact, extent }
     }
 
-    /// Whether the tree outgrows the caches, so that asking for memory in advance pays.
+    /// Whether the tree exceeds the caches, so that prefetching pays.
     pub fn is_large(&self) -> bool {
         self.block_bytes() > 1 << 20
     }
 
     pub fn bytes(&self) -> usize {
-        self.nodes.nodes.len() * size_of::<KdNode>() + self.wide.len() * size_of::<Node8>() + self.block_bytes()
+        self.nodes.nodes.len() * size_of::<KdNode>() + self.nodes8.len() * size_of::<Node8>() + self.block_bytes()
     }
 
     fn block_bytes(&self) -> usize {
@@ -61,7 +64,7 @@ impl<B: LeafBlock> BlockTree<B> {
         self.blocks.len() + self.compact.len()
     }
 
-    /// The leaf of a binary node.
+    /// Returns the leaf of a binary node.
     pub fn leaf(&self, first: u32, count: u32) -> Leaf<'_, B> {
         let range = (first & !COMPACT) as usize..(first & !COMPACT) as usize + count as usize;
         if first & COMPACT == 0 {
@@ -71,7 +74,7 @@ impl<B: LeafBlock> BlockTree<B> {
         }
     }
 
-    /// Offers the hits of a leaf, which is a child of a wide node.
+    /// Offers the hits of a leaf, which is a child of a [`Node8`].
     #[inline(always)]
     pub fn test_leaf<S: KernelSimd>(&self, s: S, child: u32, ray: &B::Ray, nearest: &mut Nearest) {
         let first = (child & !(LEAF | COMPACT)) as usize;
@@ -82,11 +85,12 @@ impl<B: LeafBlock> BlockTree<B> {
         }
     }
 
-    /// Asks for the first `LINES` cache lines of a child of a wide node, whatever it is; 0 for all of a block.
+    /// Prefetches the first `LINES` cache lines of a child of a [`Node8`], be it a node or a leaf; 0 for all of a
+    /// block.
     #[inline(always)]
     pub fn prefetch<S: KernelSimd, const LINES: usize>(&self, s: S, child: u32) {
         let first = (child & !(LEAF | COMPACT)) as usize;
-        let node = self.wide.as_ptr().wrapping_add(child as usize).cast::<u8>();
+        let node = self.nodes8.as_ptr().wrapping_add(child as usize).cast::<u8>();
         let block = self.blocks.as_ptr().wrapping_add(first).cast::<u8>();
         let compact = self.compact.as_ptr().wrapping_add(first).cast::<u8>();
         let is_compact = child & COMPACT != 0;
@@ -99,7 +103,7 @@ impl<B: LeafBlock> BlockTree<B> {
     }
 }
 
-/// The blocks of some leaves.
+/// The blocks of a set of leaves.
 struct Blocks<B: LeafBlock> {
     blocks: Vec<B>,
     compact: Vec<B::Compact>,
@@ -147,7 +151,7 @@ impl<B: LeafBlock, M: Fn(&[u32]) -> B + Sync, C: Fn(&[u32]) -> Vec<B::Compact> +
     }
 }
 
-/// Appends the blocks of a leaf; returns the number of the first one, and how many there are.
+/// Appends the blocks of a leaf; returns the number of the first block and the count.
 fn append<B: LeafBlock>(to: &mut Vec<B>, blocks: impl IntoIterator<Item = B>) -> (u32, u32) {
     let first = to.len();
     to.extend(blocks);

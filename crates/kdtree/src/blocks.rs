@@ -1,4 +1,5 @@
-//! What leaves are made of: sixteen primitives side by side, tested by one ray at a time.
+//! Leaf blocks of triangles, quads and spheres: sixteen primitives as structure of arrays, tested against one ray at a
+//! time.
 
 use super::lanes::{LaneHits, may_hit, quad_hits, resolve, sphere_hits};
 use super::leaf::{BLOCK, LeafBlock, LeafRay, NoBlock, Prims, ShearedRay};
@@ -7,7 +8,7 @@ use super::simd::{KernelSimd, Mask};
 use crate::geometry::{Ray, Shear};
 use glam::Vec3;
 
-/// `points[k][axis][lane]`; lanes without a primitive hold NaN, which no comparison lets through.
+/// `points[k][axis][lane]`; lanes without a primitive hold NaN, which fails every comparison.
 type Points<const N: usize> = [[[f32; BLOCK]; 3]; N];
 
 fn gather<const N: usize>(prims: &[u32], points: impl Fn(u32) -> [Vec3; N]) -> Points<N> {
@@ -29,7 +30,7 @@ pub(super) struct TriangleBlock {
 }
 const _: () = assert!(size_of::<TriangleBlock>() == 640);
 
-/// Bit by bit, for the empty lanes are NaN.
+/// Compares bits, because empty lanes are NaN.
 impl PartialEq for TriangleBlock {
     fn eq(&self, other: &Self) -> bool {
         let bits = |block: &Self| block.vertices.map(|vertex| vertex.map(|axis| axis.map(f32::to_bits)));
@@ -113,7 +114,7 @@ pub(super) struct SphereBlock {
     prims: Prims,
 }
 
-/// Bit by bit, for the empty lanes are NaN.
+/// Compares bits, because empty lanes are NaN.
 impl PartialEq for SphereBlock {
     fn eq(&self, other: &Self) -> bool {
         let bits = |block: &Self| (block.center.map(|axis| axis.map(f32::to_bits)), block.radius.map(f32::to_bits));
@@ -134,7 +135,7 @@ impl SphereBlock {
     }
 }
 
-/// A ray in `f64`.
+/// A ray converted to `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PreciseRay {
     origin: [f64; 3],

@@ -1,9 +1,9 @@
-//! The builder of every kd-tree here: surface area heuristic over references that are clipped to their cells.
+//! Kd-tree builder: surface area heuristic (SAH) over references that are clipped to their cells.
 //!
-//! Top-down. Large nodes bin their references along each axis, small ones try every face of every reference. A split must lower
-//! the expected cost, so that a fan of thousands of triangles around one vertex ends as one leaf, and the
-//! number of references is bounded besides ([`BuildConfig::max_growth`]). Large subtrees are built in parallel; what is built
-//! never depends on the number of threads.
+//! Builds top-down. Large nodes bin their references along each axis, small ones evaluate every face of every
+//! reference. A split must lower the expected cost, so a fan of thousands of triangles around one vertex ends as one
+//! leaf; the number of references is bounded as well ([`BuildConfig::max_growth`]). Large subtrees are built in
+//! parallel; the result never depends on the number of threads.
 //!
 //! Sources: Wald and Havran 2006 for cost and clipping; Hunt, Mark and Stoll 2006 for bins.
 //! Start reading at [`build`].
@@ -17,22 +17,22 @@ use crate::geometry::Aabb;
 use glam::Vec3;
 use std::collections::HashSet;
 
-/// What becomes of the leaves.
+/// Creates and stores the leaves of a tree.
 pub(super) trait LeafMaker: Sync {
-    /// Those of a part of the tree, in order.
+    /// The leaves of a part of the tree, in order.
     type Leaves: Default + Send;
 
     /// Adds the leaf with these primitives, ascending; returns the two numbers that its node stores.
     fn make(&self, leaves: &mut Self::Leaves, prims: &[u32]) -> (u32, u32);
 
-    /// None yet, with room for those of all parts.
+    /// Returns an empty set with capacity for the leaves of all parts.
     fn with_room_for(&self, parts: &[&Self::Leaves]) -> Self::Leaves;
 
-    /// Puts the leaves of a part behind the others; returns what turns the first of the two numbers into that of the whole.
+    /// Appends the leaves of a part; returns the map from a leaf's first number in the part to that in the whole.
     fn add_part(&self, leaves: &mut Self::Leaves, part: Self::Leaves) -> impl Fn(u32) -> u32;
 }
 
-/// Builds the nodes and, in their order, the leaves.
+/// Builds the nodes and, in the order of the nodes, the leaves.
 pub(super) fn build<M: LeafMaker>(
     primitives: &impl Primitives,
     config: &BuildConfig,
@@ -58,7 +58,7 @@ pub(super) fn build<M: LeafMaker>(
     (KdNodes { nodes, bounds }, leaves)
 }
 
-/// A finished part of the tree, before it gets its place in the arrays.
+/// A finished part of the tree, before it is copied into the arrays.
 enum Subtree<L> {
     Fork { axis: usize, split: f32, children: Box<[Subtree<L>; 2]> },
     Done(Arena<L>),
@@ -125,13 +125,13 @@ fn flatten(part: &[ArenaNode], index: usize, slot: usize, nodes: &mut Vec<KdNode
     }
 }
 
-/// Where one thread keeps what it works on.
+/// Working memory of one thread.
 struct BuildScratch {
-    /// The references of nodes that wait, those of the next one on top.
+    /// References of pending nodes, those of the next node on top.
     stack: Vec<Reference>,
-    /// Lower parts of one node's references: no node has more than the first.
+    /// References below the split of one node: never more than the root has.
     below: Vec<Reference>,
-    /// Primitives of one leaf.
+    /// Primitives of the leaf that is being made.
     prims: Vec<u32>,
 }
 
@@ -143,14 +143,16 @@ struct Builder<'a, P, M> {
     set: InstructionSet,
 }
 
-/// Leaves of more primitives than this are searched for copies. No split parts those, and a ray would test all of them for a
-/// hit that is always the first one's.
-const TWINS_BEYOND: usize = 64;
+/// Leaves of more primitives than this are searched for duplicates. No split separates duplicates, and a ray would test
+/// all of them for a hit that is always the first one's.
+const DEDUP_ABOVE: usize = 64;
 
-/// Subtrees with more references than this are built side by side.
+/// Subtrees with more references than this are built in parallel.
 const FORK_ABOVE: usize = 1024;
 
 impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
+    /// Builds a subtree, in parallel if it is large.
+    ///
     /// - `growth`: references that this subtree may add to those given.
     fn subtree(&self, mut references: Vec<Reference>, cell: Aabb, growth: usize, depth: u32) -> Subtree<M::Leaves> {
         let count = references.len();
@@ -176,49 +178,49 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
             );
             return Subtree::Fork { axis: split.axis, split: split.at, children: Box::new([lower, upper]) };
         }
-        let mut room = BuildScratch { stack: references, below, prims: Vec::new() };
-        self.sequential(&mut room, 0, cell, growth, depth, &mut arena);
+        let mut scratch = BuildScratch { stack: references, below, prims: Vec::new() };
+        self.sequential(&mut scratch, 0, cell, growth, depth, &mut arena);
         Subtree::Done(arena)
     }
 
-    /// Builds the subtree over `room.stack[start..]`, which it consumes.
+    /// Builds the subtree over `scratch.stack[start..]`, which it consumes, on this thread.
     fn sequential(
         &self,
-        room: &mut BuildScratch,
+        scratch: &mut BuildScratch,
         start: usize,
         cell: Aabb,
         growth: usize,
         depth: u32,
         arena: &mut Arena<M::Leaves>,
     ) {
-        let count = room.stack.len() - start;
-        if let Some(split) = self.choose(&room.stack[start..], &cell, depth) {
-            let (n_below, n_above) = self.divide(&mut room.stack[start..], &mut room.below, &split);
-            room.stack.truncate(start + n_above);
-            room.stack.extend_from_slice(&room.below[..n_below]);
+        let count = scratch.stack.len() - start;
+        if let Some(split) = self.choose(&scratch.stack[start..], &cell, depth) {
+            let (n_below, n_above) = self.divide(&mut scratch.stack[start..], &mut scratch.below, &split);
+            scratch.stack.truncate(start + n_above);
+            scratch.stack.extend_from_slice(&scratch.below[..n_below]);
             if let Some((growth_below, growth_above)) = share(growth, count, n_below, n_above) {
                 let (cell_below, cell_above) = split_cell(&cell, &split);
                 let index = arena.nodes.len();
                 arena.nodes.push(ArenaNode::Inner { axis: split.axis, split: split.at, above: 0 });
-                self.sequential(room, start + n_above, cell_below, growth_below, depth + 1, arena);
+                self.sequential(scratch, start + n_above, cell_below, growth_below, depth + 1, arena);
                 let above = arena.nodes.len() as u32;
                 arena.nodes[index] = ArenaNode::Inner { axis: split.axis, split: split.at, above };
-                self.sequential(room, start, cell_above, growth_above, depth + 1, arena);
+                self.sequential(scratch, start, cell_above, growth_above, depth + 1, arena);
                 return;
             }
         }
-        self.make_leaf(&room.stack[start..], &mut room.prims, arena);
-        room.stack.truncate(start);
+        self.make_leaf(&scratch.stack[start..], &mut scratch.prims, arena);
+        scratch.stack.truncate(start);
     }
 
-    /// The leaf of these references. After a split that would have made too many copies both of its sides are among them, and may
-    /// name the same primitive.
+    /// Makes the leaf of these references. After a split that was rejected because it adds too many references, the
+    /// references of both sides are among them and may name the same primitive.
     fn make_leaf(&self, references: &[Reference], prims: &mut Vec<u32>, arena: &mut Arena<M::Leaves>) {
         prims.clear();
         prims.extend(references.iter().map(|reference| reference.prim));
         prims.sort_unstable();
         prims.dedup();
-        if prims.len() > TWINS_BEYOND {
+        if prims.len() > DEDUP_ABOVE {
             let mut seen = HashSet::new();
             prims.retain(|&prim| self.primitives.shape(prim).is_none_or(|shape| seen.insert(shape)));
         }
@@ -237,10 +239,11 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
         }
     }
 
-    /// Packs the parts below the plane at the front of `below`, those above at the front of `references`, and returns how
-    /// many there are of each; none where a primitive does not reach.
+    /// Moves the parts below the plane to the front of `below`, those above to the front of `references`; returns the
+    /// number of each. A side that a primitive does not reach gets no part.
     ///
-    /// Most references lie on one side, and nobody can foretell on which: they are written to both and counted on one.
+    /// Most references lie on one side, and the branch is unpredictable: each is written to both sides and counted on
+    /// one.
     fn divide(&self, references: &mut [Reference], below: &mut [Reference], split: &Split) -> (usize, usize) {
         let (mut n_above, mut n_below) = (0, 0);
         for i in 0..references.len() {
@@ -278,7 +281,7 @@ impl<P: Primitives, M: LeafMaker> Builder<'_, P, M> {
     }
 }
 
-/// Divides what is left of the allowed growth among the children; `None` if the split takes more than that or separates nothing.
+/// Divides the remaining allowed growth among the children; `None` if the split exceeds it or separates nothing.
 fn share(growth: usize, count: usize, below: usize, above: usize) -> Option<(usize, usize)> {
     let left = (growth + count).checked_sub(below + above)?;
     if below.min(above) == count {
@@ -295,7 +298,7 @@ fn split_cell(cell: &Aabb, split: &Split) -> (Aabb, Aabb) {
     (below, above)
 }
 
-/// Box of the part of a triangle with `axis <= limit` or `axis >= limit`, padded.
+/// The padded bounds of the part of a triangle with `axis <= limit` or `axis >= limit`.
 pub(super) fn clip_triangle(vertices: &[Vec3; 3], axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
     let mut bounds = Aabb::EMPTY;
     for i in 0..3 {

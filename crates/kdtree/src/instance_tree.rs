@@ -1,4 +1,4 @@
-//! The objects with a tree of their own, when they are many: a tree over their boxes.
+//! Kd-tree over the bounds of objects that have their own tree, used when there are many of them.
 
 use super::build::{LeafMaker, build};
 use super::mesh_tree::BuildPreset;
@@ -13,23 +13,23 @@ pub(super) struct InstanceTree {
     pub nodes: KdNodes,
     /// The largest side of the bounds.
     pub extent: f32,
-    /// Places in `objects`, leaf after leaf.
+    /// Indices into `objects`, leaf after leaf.
     leaf_places: Vec<u32>,
     objects: Vec<u32>,
     boxes: Vec<Aabb>,
 }
 
-/// A ray enters the box of an instance.
+/// The entry of a ray into the bounds of an instance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub t: f32,
     pub object: u32,
 }
 
-/// The objects tested last: one that spans many cells need not be tested in each.
+/// The objects tested last, so that an object that spans many cells is not tested in each of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Recent {
-    /// Plus 1; 0 for none.
+    /// Object index plus 1; 0 for an empty slot.
     objects: [u32; 8],
 }
 
@@ -41,11 +41,14 @@ impl Recent {
     }
 }
 
-/// Entries that a ray asks for at a time: most rays end before they need more.
+/// Entries that a query collects at a time: most rays end before they need more.
 const ENTRIES: usize = 4;
 
 impl InstanceTree {
-    /// - `boxes`: of all objects of the scene.
+    /// Builds the tree.
+    ///
+    /// - `boxes`: bounds of all objects of the scene.
+    /// - `objects`: indices of those in the tree.
     pub fn build(boxes: &[Aabb], objects: Vec<u32>) -> Self {
         let boxes: Vec<Aabb> = objects.iter().map(|&object| boxes[object as usize]).collect();
         let config = BuildConfig { exact_below: 8, block_cost: 4.0, max_growth: 2.0, ..BuildPreset::Best.config(1) };
@@ -53,19 +56,19 @@ impl InstanceTree {
         Self { extent: nodes.extent(), nodes, leaf_places, objects, boxes }
     }
 
-    /// The objects of a leaf.
+    /// Returns the objects of a leaf.
     pub fn leaf(&self, first: u32, count: u32) -> impl Iterator<Item = u32> {
         self.leaf_places[first as usize..][..count as usize].iter().map(|&place| self.objects[place as usize])
     }
 
-    /// Appends some boxes that the ray meets within `from..=t_max`, nearest first, and returns from where to go on;
-    /// infinity when there are no more.
+    /// Appends some of the boxes that the ray enters within `from..=t_max`, nearest first. Returns the `t` from which
+    /// the next call resumes; infinity when there are no more.
     ///
-    /// - `recent`: the objects of these are left out, and the new ones put in.
+    /// - `recent`: objects in it are skipped; new ones are added.
     pub fn entries(&self, ray: &Ray, from: f32, t_max: f32, recent: &mut Recent, entries: &mut Vec<Entry>) -> f32 {
         let first = entries.len();
         let tree_ray = TreeRay::new(ray.origin, ray.dir, &Shear::new(ray.dir), self.extent);
-        let mut go_on = f32::INFINITY;
+        let mut resume = f32::INFINITY;
         let visit = |begin, count, end| {
             for &place in &self.leaf_places[begin as usize..][..count as usize] {
                 let object = self.objects[place as usize];
@@ -76,16 +79,16 @@ impl InstanceTree {
                     }
                 }
             }
-            // From a cell without an extent along the ray no step forward is certain.
+            // A cell without extent along the ray does not guarantee progress.
             if entries.len() - first >= ENTRIES && end > from {
-                go_on = end;
+                resume = end;
                 return f32::NEG_INFINITY;
             }
             t_max
         };
         self.nodes.walk_cells(&tree_ray, from, t_max, visit, || ());
         entries[first..].sort_unstable_by(|a, b| a.t.total_cmp(&b.t));
-        go_on
+        resume
     }
 }
 

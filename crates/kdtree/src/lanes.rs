@@ -1,15 +1,15 @@
-//! The tests of `geometry`, sixteen at a time: one shape against sixteen rays, or one ray against sixteen triangles.
+//! The tests of `geometry` in SIMD: one shape against sixteen rays, or one ray against sixteen triangles.
 //!
-//! Every operation is that of the scalar test, in its order, so the bits are the same.
+//! Every operation and its order are those of the scalar test, so the bits are the same.
 
 use super::simd::{KernelSimd, LANES, Mask};
 use crate::geometry::{TINY_EDGE, tiny_edges};
 use glam::Affine3A;
 
-/// Vertices in the ray's sheared frame: across, across, along.
+/// Vertices in the ray's sheared frame: two coordinates across the ray, one along it.
 pub(super) type Sheared<S> = [<S as firstlight_simd::Simd>::F; 3];
 
-/// Lanes that hit, with their `t`, `u`, `v`; other lanes hold anything.
+/// Mask of lanes that hit, with their `t`, `u`, `v`; the values of other lanes are unspecified.
 pub(super) struct LaneHits<S: KernelSimd> {
     pub mask: Mask,
     pub t: S::F,
@@ -25,7 +25,8 @@ impl<S: KernelSimd> LaneHits<S> {
     }
 }
 
-/// Lanes whose direction is longest along x, and those along y; all others along z. On ties the first axis, as in `geometry::Shear`.
+/// Returns the lanes whose direction is longest along x, and those along y; all others are longest along z. Ties go to
+/// the first axis, as in `geometry::Shear`.
 #[inline(always)]
 pub(super) fn longest_axis<S: KernelSimd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask) {
     let [x, y, z] = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
@@ -33,9 +34,9 @@ pub(super) fn longest_axis<S: KernelSimd>(s: S, dir: &[S::F; 3]) -> (Mask, Mask)
     (along_x, !along_x & s.le(z, y))
 }
 
-/// Shears a vertex that is given along the ray's own axes.
+/// Shears a vertex whose coordinates are in the order of the ray's axes.
 ///
-/// Closures are not inlined reliably into functions with instructions of their own; hence functions, here and below.
+/// Closures are not inlined reliably into functions with target features, so this file uses functions.
 #[inline(always)]
 pub(super) fn shear<S: KernelSimd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], sx: S::F, sy: S::F) -> Sheared<S> {
     let (x, y) = (s.sub(vertex[0], origin[0]), s.sub(vertex[1], origin[1]));
@@ -43,14 +44,14 @@ pub(super) fn shear<S: KernelSimd>(s: S, vertex: [S::F; 3], origin: [S::F; 3], s
     [s.sub(x, s.mul(sx, z)), s.sub(y, s.mul(sy, z)), z]
 }
 
-/// Lanes whose three numbers do not have both signs among them. False for NaN.
+/// Returns the lanes whose three numbers do not have mixed signs; false for NaN.
 #[inline(always)]
 pub(super) fn same_sign<S: KernelSimd>(s: S, a: S::F, b: S::F, c: S::F) -> Mask {
     let zero = s.splat(0.0);
     s.le(zero, s.min(a, s.min(b, c))) | s.le(s.max(a, s.max(b, c)), zero)
 }
 
-/// The plain cross product in the plane, whose sign is never wrong but may be lost.
+/// The cross product in the plane without compensation: its sign is never wrong but may be lost.
 #[inline(always)]
 pub(super) fn plain<S: KernelSimd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
     s.sub(s.mul(p[0], q[1]), s.mul(p[1], q[0]))
@@ -63,13 +64,13 @@ fn exact<S: KernelSimd>(s: S, p: &Sheared<S>, q: &Sheared<S>) -> S::F {
     s.add(s.mul_sub(p[0], q[1], cd), rounding)
 }
 
-/// Lanes that may hit, by the plain edge functions.
+/// Returns the lanes that may hit according to the uncompensated edge functions.
 #[inline(always)]
 pub(super) fn may_hit<S: KernelSimd>(s: S, a: &Sheared<S>, b: &Sheared<S>, c: &Sheared<S>) -> Mask {
     same_sign(s, plain(s, c, b), plain(s, a, c), plain(s, b, a))
 }
 
-/// The rest of the triangle test, for lanes that may hit.
+/// Completes the triangle test for lanes that may hit.
 #[inline(always)]
 pub(super) fn resolve<S: KernelSimd>(
     s: S,
@@ -93,7 +94,7 @@ pub(super) fn resolve<S: KernelSimd>(
     LaneHits { mask, t: s.mul(depth, sz), u, v }
 }
 
-/// Two triangles that share the diagonal `a c`, the first one first (`geometry::intersect_quad`).
+/// Intersects two triangles that share the diagonal `a c`, testing the first one first (`geometry::intersect_quad`).
 ///
 /// - `corners`: `a`, `b`, `c`, `d` around the quad.
 #[inline(always)]
@@ -112,7 +113,7 @@ pub(super) fn quad_hits<S: KernelSimd>(s: S, lanes: Mask, [a, b, c, d]: [&Sheare
     let (u, v) = (hits.u, hits.v);
     hits.u = s.select(first, sum, u);
     hits.v = s.select(first, v, sum);
-    // On the diagonal the plain signs may name the first triangle where only the second is hit.
+    // On the diagonal the uncompensated signs may select the first triangle where only the second is hit.
     let again = first & second & !hits.mask;
     if again != 0 {
         let other = resolve(s, again, a, c, d, sz);
@@ -129,7 +130,8 @@ fn choose<S: KernelSimd>(s: S, mask: Mask, p: &Sheared<S>, q: &Sheared<S>) -> Sh
     [s.select(mask, p[0], q[0]), s.select(mask, p[1], q[1]), s.select(mask, p[2], q[2])]
 }
 
-/// Where rays meet spheres in front of them (`geometry::intersect_sphere`): the near side, from inside the far one.
+/// Intersects rays with spheres in front of them (`geometry::intersect_sphere`): the near side, or the far side from
+/// inside.
 ///
 /// - `to_center`: from the origin of the ray.
 /// - `inv_dir_squared`: `1 / (dir · dir)`.
@@ -165,7 +167,8 @@ pub(super) fn dot<S: KernelSimd>(s: S, a: &[S::D; 3], b: &[S::D; 3]) -> S::D {
     s.add_d(s.add_d(s.mul_d(a[0], b[0]), s.mul_d(a[1], b[1])), s.mul_d(a[2], b[2]))
 }
 
-/// Does the lanes of `tiny` again in `f64`; returns the lanes that are still hit, all others included.
+/// Repeats the test for the lanes of `tiny` in `f64`; returns the lanes that still hit, including all lanes outside
+/// `tiny`.
 #[inline(never)]
 fn resolve_tiny<S: KernelSimd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners: [&Sheared<S>; 3]) -> Mask {
     let mut stored = [[0.0; LANES]; 3];
@@ -188,7 +191,7 @@ fn resolve_tiny<S: KernelSimd>(s: S, tiny: Mask, edges: &mut [S::F; 3], corners:
     hit
 }
 
-/// Origins and directions in the space of an object.
+/// Transforms origins and directions into an object's space.
 #[inline(always)]
 pub(super) fn to_own_space<S: KernelSimd>(s: S, map: &Affine3A, origin: &[S::F; 3], dir: &[S::F; 3]) -> [[S::F; 3]; 2] {
     let turned = transform(s, map, origin);
@@ -200,7 +203,7 @@ pub(super) fn to_own_space<S: KernelSimd>(s: S, map: &Affine3A, origin: &[S::F; 
     [origin, transform(s, map, dir)]
 }
 
-/// As `scene_tree::transform_vector`, rounding for rounding.
+/// Like `scene_tree::transform_vector`, with the same roundings.
 #[inline(always)]
 fn transform<S: KernelSimd>(s: S, map: &Affine3A, v: &[S::F; 3]) -> [S::F; 3] {
     [transform_row(s, map, 0, v), transform_row(s, map, 1, v), transform_row(s, map, 2, v)]

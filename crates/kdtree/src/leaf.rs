@@ -1,4 +1,4 @@
-//! What all leaf blocks have in common: sixteen primitives, side by side, and rays made ready for them.
+//! The interface of leaf blocks, sixteen primitives each, and of rays prepared for them.
 
 use super::lanes::{LaneHits, shear};
 use super::ray::Nearest;
@@ -7,10 +7,10 @@ use crate::geometry::{Ray, Shear};
 use std::convert::Infallible;
 use std::marker::PhantomData;
 
-/// Primitives in a leaf block: what one AVX-512 instruction tests.
+/// Primitives in a leaf block: as many as one AVX-512 instruction tests.
 pub(super) const BLOCK: usize = LANES;
 
-/// What the test of a leaf wants to know of a ray, made once for all leaves.
+/// A ray prepared for leaf tests, once for all leaves.
 pub(super) trait LeafRay: Copy + Send {
     const IDLE: Self;
 
@@ -21,17 +21,17 @@ pub(super) trait LeafRay: Copy + Send {
 pub(super) trait LeafBlock: Sized + Send {
     type Ray: LeafRay;
 
-    /// A smaller form for leaves whose primitives have much in common.
+    /// A smaller form for leaves whose primitives share data.
     type Compact: LeafBlock<Ray = Self::Ray>;
 
     fn prims(&self) -> &Prims;
 
     fn prims_mut(&mut self) -> &mut Prims;
 
-    /// All lanes that the ray meets, whatever the sign of `t`.
+    /// Returns all lanes that the ray hits, with any sign of `t`.
     fn hits<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray) -> LaneHits<S>;
 
-    /// Offers the nearest hit.
+    /// Offers the nearest hit of the block.
     #[inline(always)]
     fn test<S: KernelSimd>(s: S, block: &Self, ray: &Self::Ray, nearest: &mut Nearest) {
         let hits = Self::hits(s, block, ray);
@@ -40,7 +40,7 @@ pub(super) trait LeafBlock: Sized + Send {
             return;
         }
         let t = s.least(valid, hits.t);
-        // Primitives ascend within a block: the first lane is the lowest of those at the same `t`.
+        // Primitives ascend within a block: the first lane has the lowest index among those at the same `t`.
         let lane = (valid & s.eq(hits.t, s.splat(t))).trailing_zeros() as usize % BLOCK;
         let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
         s.store(hits.u, &mut u);
@@ -49,15 +49,15 @@ pub(super) trait LeafBlock: Sized + Send {
     }
 }
 
-/// The numbers of a block's primitives, ascending; lanes without one come last.
+/// The indices of a block's primitives, ascending; empty lanes come last.
 ///
-/// The highest bit of the first says that the leaf goes on in the next block.
+/// The highest bit of the first is set if the leaf continues in the next block.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Prims([u32; BLOCK]);
 
 const FOLLOWED: u32 = 1 << 31;
 
-/// Primitives that blocks can tell apart.
+/// Exclusive limit on primitive indices.
 pub(super) const MAX_PRIMS: usize = FOLLOWED as usize;
 
 impl Prims {
@@ -72,7 +72,7 @@ impl Prims {
         self.0[lane] & !FOLLOWED
     }
 
-    /// Whether the leaf goes on in the next block.
+    /// Whether the leaf continues in the next block.
     #[inline(always)]
     pub fn is_followed(&self) -> bool {
         self.0[0] & FOLLOWED != 0
@@ -88,7 +88,7 @@ impl Prims {
         s.lt_u(s.load_u(&self.0), s.splat_u(u32::MAX))
     }
 
-    /// How many lanes hold a primitive.
+    /// Number of lanes that hold a primitive.
     pub fn len(&self) -> usize {
         self.0.iter().filter(|&&prim| prim != u32::MAX).count()
     }
@@ -98,7 +98,7 @@ impl Prims {
     }
 }
 
-/// For primitives that have nothing in common: there is none.
+/// Compact form of primitives that share no data: never constructed.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct NoBlock<R>(Infallible, PhantomData<R>);
 
@@ -120,12 +120,12 @@ impl<R: LeafRay> LeafBlock for NoBlock<R> {
     }
 }
 
-/// A ray in the sheared frame of the watertight test.
+/// A ray prepared for the watertight test: its shear and its origin along the sheared axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ShearedRay {
-    /// Axes across, across and along.
+    /// The two axes across the ray and the axis along it.
     pub axes: [usize; 3],
-    /// The origin along these.
+    /// The origin along these axes.
     pub origin: [f32; 3],
     pub sx: f32,
     pub sy: f32,
@@ -143,7 +143,7 @@ impl LeafRay for ShearedRay {
 }
 
 impl ShearedRay {
-    /// Brings sixteen points into the frame.
+    /// Transforms sixteen points into the sheared frame.
     #[inline(always)]
     pub fn shear<S: KernelSimd>(&self, s: S, points: &[[f32; BLOCK]; 3]) -> [S::F; 3] {
         let [kx, ky, kz] = self.axes;

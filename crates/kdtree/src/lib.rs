@@ -1,8 +1,8 @@
-//! Which surface does a ray meet first, and is anything in its way? Asked in batches.
+//! Closest-hit and any-hit queries over scenes, meshes and sphere clouds, answered in batches.
 //!
-//! [`SceneTree`] stands above the objects of a scene; a mesh brings a [`MeshTree`] and a cloud of spheres a
-//! [`SphereTree`], each built once in the space of its own and shared by all objects that use it.
-//! Knows nothing of materials or entities: positions go in, hits come out.
+//! [`SceneTree`] is the top level over the objects of a scene. A mesh has a [`MeshTree`] and a cloud of spheres a
+//! [`SphereTree`], each built once in its own space and shared by all objects that use it. Knows nothing of materials
+//! or entities: positions go in, hits come out.
 
 mod batch;
 mod block_tree;

@@ -1,7 +1,7 @@
-//! Sixteen rays side by side through one mesh or one cloud of spheres: for rays that go the same way.
+//! Packet traversal: sixteen coherent rays through one mesh or one cloud of spheres.
 //!
-//! All rays of a packet visit a node together, as long as one of them has business there. Rays of different octants
-//! would disagree about which child comes first, and rays with different longest axes are sheared differently, so a mixed packet is
+//! All rays of a packet visit a node together while at least one of them intersects it. Rays of different octants would
+//! need different child orders, and rays with different longest axes are sheared differently, so a mixed packet is
 //! traced in groups.
 
 use super::block_tree::{BlockTree, Leaf};
@@ -10,11 +10,11 @@ use super::lanes::{LaneHits, longest_axis, may_hit, resolve, shear, sphere_hits}
 use super::leaf::{BLOCK, LeafBlock, ShearedRay};
 use super::nodes::{MAX_DEPTH, Node};
 use super::objects::FrameF64;
-use super::ray::{Nearest, WIDEN};
+use super::ray::{Nearest, RELATIVE_PADDING};
 use super::shared_block::SharedBlock;
 use super::simd::{KernelSimd, LANES, Mask};
 
-/// Sixteen rays in the mesh's own space, and what they have hit so far.
+/// Sixteen rays in the mesh's own space, and their nearest hits so far.
 pub(super) struct MeshPacket<S: KernelSimd> {
     pub origin: [S::F; 3],
     pub dir: [S::F; 3],
@@ -23,29 +23,29 @@ pub(super) struct MeshPacket<S: KernelSimd> {
     pub nearest: NearestLanes,
 }
 
-/// [`Nearest`] of sixteen rays; in memory, for single lanes are read and written too.
+/// [`Nearest`] of sixteen rays; in memory, because single lanes are read and written too.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct NearestLanes {
     pub t: [f32; LANES],
     pub u: [f32; LANES],
     pub v: [f32; LANES],
-    /// At equal `t` only a lower index wins.
+    /// At equal `t` the lower index wins.
     pub prim: [u32; LANES],
     pub found: Mask,
 }
 
-/// What packets test in leaves.
+/// Leaf blocks that packets can test.
 pub(super) trait PacketBlock: LeafBlock {
-    /// What the test of spheres wants to know of the rays.
+    /// Ray data prepared for the test, of use for spheres only.
     type Frame<S: KernelSimd>: Copy;
 
-    /// Whether a [`Footprint`] is of any use.
+    /// Whether the test uses the [`Footprint`].
     const HAS_FOOTPRINT: bool;
 
     fn frame<S: KernelSimd>(s: S, packet: &MeshPacket<S>) -> Self::Frame<S>;
 
-    /// The rays of `mask` against all of the leaf.
+    /// Tests the rays of `mask` against the whole leaf.
     fn test_rays<S: KernelSimd>(
         s: S,
         packet: &mut MeshPacket<S>,
@@ -55,11 +55,12 @@ pub(super) trait PacketBlock: LeafBlock {
     );
 }
 
-/// Sixteen triangles, however their vertices are kept.
+/// Sixteen triangles in either vertex layout.
 trait Triangles: LeafBlock<Ray = ShearedRay> {
     fn corner(&self, lane: usize, corner: usize) -> [f32; 3];
 
-    /// Where the three corners come to lie across, across and along the rays, at the least and at the most.
+    /// Bounds of the three sheared corners over the rays of the footprint: two coordinates across the rays, one along
+    /// them, each as minimum and maximum.
     fn reach<S: KernelSimd>(&self, s: S, footprint: &Footprint, axes: [usize; 3]) -> [[[S::F; 2]; 3]; 3];
 }
 
@@ -141,16 +142,16 @@ impl PacketBlock for SphereBlock {
         mask: Mask,
     ) {
         for block in leaf.blocks {
-            packet.test_balls(s, frame, block, mask);
+            packet.test_spheres(s, frame, block, mask);
         }
     }
 }
 
-/// So few rays are tested one after the other, without asking which triangles they could hit.
+/// Up to so many rays are tested one after the other, without culling triangles by the footprint.
 const FEW_RAYS: u32 = 2;
 
-/// What waits to be visited: node, lanes, and their intervals. Made once for many packets, for clearing it takes
-/// longer than tracing some of them.
+/// Stack of pending nodes with their lanes and intervals. Reused for many packets, because clearing it takes longer
+/// than tracing some of them.
 pub(super) struct PacketStack<S: KernelSimd>([(u32, Mask, S::F, S::F); MAX_DEPTH]);
 
 impl<S: KernelSimd> PacketStack<S> {
@@ -160,12 +161,12 @@ impl<S: KernelSimd> PacketStack<S> {
     }
 }
 
-/// What all rays of a group share, and their reciprocals.
+/// Data that all rays of a group share, and the reciprocals of their directions.
 pub(super) struct PacketGroup<S: KernelSimd> {
     inv_lo: [S::F; 3],
     inv_hi: [S::F; 3],
-    slack: S::F,
-    /// Axes across, across and along.
+    padding: S::F,
+    /// The two axes across the rays and the axis along them.
     axes: [usize; 3],
     sx: S::F,
     sy: S::F,
@@ -173,7 +174,7 @@ pub(super) struct PacketGroup<S: KernelSimd> {
     footprint: Footprint,
 }
 
-/// What the rays of a group have in common, as intervals.
+/// Bounds of the rays of a group, as intervals.
 #[derive(Clone, Copy)]
 struct Footprint {
     /// Of the origins, along the axes of the group.
@@ -186,10 +187,11 @@ struct Footprint {
 impl Footprint {
     const NONE: Self = Self { origin: [[0.0; 2]; 3], sx: [0.0; 2], sy: [0.0; 2], down: false };
 
-    /// Lanes of the block whose triangle one of the rays might hit.
+    /// Returns the lanes of the block whose triangle at least one of the rays might hit.
     ///
-    /// Rounding is monotone: the steps of the test done on intervals, in the order of the test, bound what it gets for every ray,
-    /// and a triangle whose sheared vertices all lie on one side of the rays, or behind them, is missed by all of them.
+    /// Rounding is monotonic: the steps of the test in interval arithmetic, in the order of the test, bound its values
+    /// for every ray. A triangle whose sheared vertices all lie on one side of the rays, or behind them, is missed by
+    /// all of them.
     #[inline(always)]
     fn may_hit<S: KernelSimd>(&self, s: S, axes: [usize; 3], block: &impl Triangles) -> Mask {
         let zero = s.splat(0.0);
@@ -207,7 +209,7 @@ impl Footprint {
         !missed
     }
 
-    /// Where sixteen vertices come to lie, at the least and at the most.
+    /// Bounds of sixteen sheared vertices over the rays of the footprint.
     #[inline(always)]
     fn reach<S: KernelSimd>(&self, s: S, points: &[[f32; BLOCK]; 3], [x, y, z]: [usize; 3]) -> [[S::F; 2]; 3] {
         let depth = less(s, s.load(&points[z]), self.origin[2]);
@@ -234,14 +236,15 @@ fn less<S: KernelSimd>(s: S, at: S::F, from: [f32; 2]) -> [S::F; 2] {
     [s.sub(at, s.splat(from[1])), s.sub(at, s.splat(from[0]))]
 }
 
-/// The least and the most of the lanes in the mask.
+/// Minimum and maximum of the lanes in the mask.
 #[inline(always)]
 fn interval<S: KernelSimd>(s: S, mask: Mask, a: S::F) -> [f32; 2] {
     [s.least(mask, a), -s.least(mask, s.sub(s.splat(0.0), a))]
 }
 
 impl<S: KernelSimd> MeshPacket<S> {
-    /// Finds the nearest hits; with `ANY` a ray ends at its first hit, and looks for it from its far end as in streams.
+    /// Finds the nearest hits; with `ANY` a ray ends at its first hit and traversal starts from its far end, as in
+    /// streams.
     #[inline(always)]
     pub fn trace<B: PacketBlock, const ANY: bool>(&mut self, s: S, tree: &BlockTree<B>, stack: &mut PacketStack<S>) {
         let frame = B::frame(s, self);
@@ -272,7 +275,7 @@ impl<S: KernelSimd> MeshPacket<S> {
     ) {
         let one = s.splat(1.0);
         let inv = [s.div(one, self.dir[0]), s.div(one, self.dir[1]), s.div(one, self.dir[2])];
-        let (shorter, longer) = (s.splat(1.0 - WIDEN), s.splat(1.0 + WIDEN));
+        let (shorter, longer) = (s.splat(1.0 - RELATIVE_PADDING), s.splat(1.0 + RELATIVE_PADDING));
         let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
         let sz = inv[kz];
         let (sx, sy) = (s.div(self.dir[axes[0]], self.dir[kz]), s.div(self.dir[axes[1]], self.dir[kz]));
@@ -293,7 +296,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         let group = PacketGroup::<S> {
             inv_lo: [s.mul(inv[0], shorter), s.mul(inv[1], shorter), s.mul(inv[2], shorter)],
             inv_hi: [s.mul(inv[0], longer), s.mul(inv[1], longer), s.mul(inv[2], longer)],
-            slack: s.mul(s.splat(WIDEN * tree.extent), s.abs(sz)),
+            padding: s.mul(s.splat(RELATIVE_PADDING * tree.extent), s.abs(sz)),
             axes,
             sx,
             sy,
@@ -305,7 +308,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         for axis in 0..3 {
             let down = octant >> axis & 1;
             let (entry, exit) = (bounds[down], bounds[1 - down]);
-            // NaN as the first argument loses against the second.
+            // NaN as the first argument yields the second.
             t0 = s.max(self.crossing(s, &group, axis, entry[axis]).0, t0);
             t1 = s.min(self.crossing(s, &group, axis, exit[axis]).1, t1);
         }
@@ -356,8 +359,8 @@ impl<S: KernelSimd> MeshPacket<S> {
     #[inline(always)]
     fn crossing(&self, s: S, group: &PacketGroup<S>, axis: usize, split: f32) -> (S::F, S::F) {
         let distance = s.sub(s.splat(split), self.origin[axis]);
-        let lo = s.sub(s.mul(distance, group.inv_lo[axis]), group.slack);
-        (lo, s.add(s.mul(distance, group.inv_hi[axis]), group.slack))
+        let lo = s.sub(s.mul(distance, group.inv_lo[axis]), group.padding);
+        (lo, s.add(s.mul(distance, group.inv_hi[axis]), group.padding))
     }
 
     #[inline(always)]
@@ -376,7 +379,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         }
     }
 
-    /// One ray after the other against all triangles.
+    /// Tests one ray after the other against all triangles.
     #[inline(always)]
     fn test_by_ray(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, mut mask: Mask) {
         let [kx, ky, kz] = group.axes;
@@ -396,13 +399,13 @@ impl<S: KernelSimd> MeshPacket<S> {
         }
     }
 
-    /// Whichever are fewer, spheres or rays, one after the other.
+    /// Tests one sphere or one ray after the other, whichever are fewer.
     #[inline(always)]
-    fn test_balls(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, mut mask: Mask) {
-        let n_balls = block.prims().len();
-        if n_balls <= mask.count_ones() as usize {
-            for lane in 0..n_balls {
-                self.test_ball(s, frame, block, lane, mask);
+    fn test_spheres(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, mut mask: Mask) {
+        let n_spheres = block.prims().len();
+        if n_spheres <= mask.count_ones() as usize {
+            for lane in 0..n_spheres {
+                self.test_sphere(s, frame, block, lane, mask);
             }
             return;
         }
@@ -416,9 +419,9 @@ impl<S: KernelSimd> MeshPacket<S> {
         }
     }
 
-    /// One sphere against all rays.
+    /// Tests one sphere against all rays.
     #[inline(always)]
-    fn test_ball(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, lane: usize, mask: Mask) {
+    fn test_sphere(&mut self, s: S, frame: &FrameF64<S>, block: &SphereBlock, lane: usize, mask: Mask) {
         let (center, radius) = block.sphere(lane % BLOCK);
         let to_center = frame.towards(s, &center.as_dvec3().to_array());
         let radius_squared = s.splat_d(f64::from(radius).powi(2));
@@ -428,7 +431,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         }
     }
 
-    /// One triangle against all rays.
+    /// Tests one triangle against all rays.
     #[inline(always)]
     fn test_triangle(&mut self, s: S, group: &PacketGroup<S>, block: &impl Triangles, lane: usize, mask: Mask) {
         let lane = lane % BLOCK;
@@ -449,7 +452,7 @@ impl<S: KernelSimd> MeshPacket<S> {
         self.offer(s, hits, block.prims().get(lane));
     }
 
-    /// Keeps the lanes that are nearer; at equal `t` the lower primitive.
+    /// Keeps the hits of lanes that are nearer; at equal `t` the lower primitive wins.
     #[inline(always)]
     fn offer(&mut self, s: S, hits: LaneHits<S>, prim: u32) {
         let best = s.load(&self.nearest.t);
@@ -470,7 +473,7 @@ impl<S: KernelSimd> MeshPacket<S> {
 }
 
 impl NearestLanes {
-    /// One ray against all of a block.
+    /// Tests one ray against a whole block.
     #[inline(always)]
     fn offer_one<S: KernelSimd, B: LeafBlock>(&mut self, s: S, block: &B, ray: &B::Ray, lane: usize) {
         let (t, prim) = (self.t[lane], self.prim[lane]);

@@ -11,15 +11,15 @@ use super::visits::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_triangle};
 use glam::Vec3;
 
-/// How much time a build spends on the speed of its rays.
+/// Trade-off between build time and traversal speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BuildPreset {
-    /// A first picture within tens of milliseconds.
+    /// Fast build: a first image within tens of milliseconds.
     Quick,
-    /// The full surface area heuristic.
+    /// Full surface area heuristic.
     #[default]
     Best,
-    /// Split at the median, axes in turn: what the 1990s did; kept for comparison.
+    /// Median splits along the longest axis, as was common in the 1990s; for comparison.
     Median,
 }
 
@@ -45,10 +45,10 @@ impl BuildPreset {
     }
 }
 
-/// Cost of testing a block of a mesh, in visits of an inner node.
+/// Cost of testing a leaf block of a mesh, relative to visiting an inner node.
 pub(super) const BLOCK_COST: f32 = 3.0;
 
-/// Built once from a mesh and never edited; a changed mesh gets a new tree.
+/// A kd-tree over a mesh, built once and never edited; a changed mesh gets a new tree.
 #[derive(Debug, PartialEq)]
 pub struct MeshTree {
     pub(super) positions: Vec<Vec3>,
@@ -56,7 +56,7 @@ pub struct MeshTree {
     pub(super) tree: BlockTree<TriangleBlock>,
 }
 
-/// What the builder sees of a mesh.
+/// The builder's view of a mesh.
 struct Triangles<'a> {
     positions: &'a [Vec3],
     triangles: &'a [[u32; 3]],
@@ -75,7 +75,7 @@ impl Primitives for Triangles<'_> {
 
     fn bounds(&self, prim: u32) -> Aabb {
         let [a, b, c] = self.vertices(prim);
-        // Two equal vertices: the edge functions cancel exactly, no ray can hit.
+        // With two equal vertices the edge functions cancel exactly, so no ray can hit.
         if a == b || b == c || c == a { Aabb::EMPTY } else { Aabb::from_points([a, b, c]) }
     }
 
@@ -90,13 +90,13 @@ impl Primitives for Triangles<'_> {
 }
 
 impl MeshTree {
-    /// Indices must lie within `positions`, and positions must be finite.
+    /// Builds the tree. Indices must lie within `positions`, and positions must be finite.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset) -> Self {
         Self::build_by(positions, triangles, &preset.config(BLOCK))
     }
 
-    /// The same with leaves of at most `leaf_limit` triangles, at least 1, that are split no further, whatever it
-    /// would save; for comparison. [`Self::build`] leaves that to the cost, or in a median tree to the block.
+    /// Like [`build`](Self::build), but leaves of at most `leaf_limit` triangles, at least 1, are never split further,
+    /// whatever the cost; for comparison. [`Self::build`] decides by the cost, or in a median tree by the block size.
     pub fn build_limited(positions: &[Vec3], triangles: &[[u32; 3]], preset: BuildPreset, leaf_limit: usize) -> Self {
         Self::build_by(positions, triangles, &BuildConfig { leaf_limit: leaf_limit.max(1), ..preset.config(BLOCK) })
     }
@@ -116,7 +116,7 @@ impl MeshTree {
         self.tree.nodes.bounds
     }
 
-    /// Number of triangles of the mesh, those without area included.
+    /// Number of triangles of the mesh, including those without area.
     pub fn n_triangles(&self) -> usize {
         self.triangles.len()
     }
@@ -127,7 +127,7 @@ impl MeshTree {
         self.triangles[prim as usize].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// Offers the triangles along the ray until nothing nearer can come; `ray.t_max` does not count, `nearest` does.
+    /// Offers the triangles along the ray until no nearer hit is possible; `nearest` limits the ray, not `ray.t_max`.
     pub(super) fn offer_hits(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest, any: bool) {
         let tree_ray = TreeRay::new(ray.origin, ray.dir, shear, self.tree.extent);
         self.tree.nodes.walk(&tree_ray, nearest.t, |first, count| {
@@ -136,7 +136,8 @@ impl MeshTree {
         });
     }
 
-    /// What the nearest hit of a ray costs, whatever traversal finds it.
+    /// Counts the nodes, leaves and blocks that the closest-hit query of a ray visits, independent of the traversal
+    /// used.
     pub fn count_visits(&self, ray: &Ray) -> Visits {
         let shear = Shear::new(ray.dir);
         let tree_ray = TreeRay::new(ray.origin, ray.dir, &shear, self.tree.extent);
@@ -151,8 +152,8 @@ impl MeshTree {
         Visits { inner, leaves, blocks }
     }
 
-    /// What lies along a ray that nothing stops, the empty leaves left out: [`KdTreeStats`] has the mean of it over
-    /// all lines through the bounds.
+    /// Counts the nodes, leaves and blocks along an unobstructed ray, without empty leaves: [`KdTreeStats`] has the
+    /// mean over all lines through the bounds.
     ///
     /// [`KdTreeStats`]: super::KdTreeStats
     pub fn count_visits_through(&self, ray: &Ray) -> Visits {
@@ -175,7 +176,7 @@ impl MeshTree {
         }
     }
 
-    /// The same by trying every triangle: the reference for all trees.
+    /// Like [`offer_hits`](Self::offer_hits), by brute force: the reference for all trees.
     pub(super) fn offer_hits_naive(&self, ray: &Ray, shear: &Shear, nearest: &mut Nearest) {
         for prim in 0..self.triangles.len() as u32 {
             if let Some(hit) = intersect_triangle(ray.origin, shear, &self.vertices(prim)) {

@@ -1,25 +1,26 @@
-//! Three levels of the binary tree in one node: eight children and the seven planes between them.
+//! Three levels of the binary tree collapsed into one node: eight children and the seven planes between them.
 //!
-//! One visit does what up to seven visits of the binary tree would, without a branch that could be mispredicted:
-//! the plain walk in `nodes` says what must come out.
+//! One visit replaces up to seven visits of the binary tree, without a branch that could be mispredicted. The walk in
+//! `nodes` is the reference.
 
 use super::nodes::{KdNodes, Node};
 
 /// The planes and children of three levels.
 ///
-/// Plane 0 is the root's, 1 and 2 those of its lower and upper child, 3 to 6 those below. Child `c` is reached by the bits of `c`, the
-/// highest first, 1 for the upper side. Where the binary tree ends early, the missing planes lie at infinity and
-/// only the lowest of the lanes below has a child.
+/// Plane 0 is the root's, 1 and 2 are those of its lower and upper child, 3 to 6 those of the third level. The bits of
+/// a child's index, the highest first, select the side at each level, 1 for the upper side. Where the binary tree ends
+/// early, the missing planes lie at infinity and only the lowest of the lanes below has a child.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node8 {
     pub splits: [f32; 7],
-    /// Three bits a plane.
+    /// Three bits per plane.
     pub axes: u32,
-    /// [`EMPTY`], a wide node, or with [`LEAF`] set the first block of a leaf.
+    /// [`EMPTY`], the index of a node, or with [`LEAF`] set the first block of a leaf.
     pub children: [u32; 8],
-    /// For each octant of directions (bit `a` set: down axis `a`) the children from far to near, three bits each,
-    /// and above these 24 bits, for each level from the root one byte: which children lie on the far side of their plane.
+    /// For each octant of directions (bit `a` set: the direction is negative along axis `a`): in the low 24 bits the
+    /// children from far to near, three bits each; above them one byte per level from the root, whose bits mark the
+    /// children on the far side of their plane.
     pub octants: [u64; 8],
 }
 // Two cache lines.
@@ -28,11 +29,11 @@ const _: () = assert!(size_of::<Node8>() == 128);
 pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Entries that a walk may have on its stack, and room for one full store beyond. An odd number of cache lines, so
-/// that the stacks of many rays do not compete for the same few sets of the cache.
+/// Capacity of a traversal stack, including one full store beyond the last entry. An odd number of cache lines, so that
+/// the stacks of many rays do not compete for the same few cache sets.
 pub(super) const STACK: usize = 144;
 
-/// What waits to be visited, nearest on top.
+/// Stack of pending nodes, nearest on top.
 #[repr(C, align(64))]
 pub(super) struct Stack {
     pub child: [u32; STACK],
@@ -44,15 +45,16 @@ impl Stack {
     pub const NEW: Self = Self { child: [0; STACK], t0: [0.0; STACK], t1: [0.0; STACK] };
 }
 
-/// A ray as [`super::simd::KernelSimd::descend`] reads it: `ray::TreeRay` padded so that three bits can index it, twice.
+/// A ray in the layout that [`super::simd::KernelSimd::descend`] reads: `ray::TreeRay` padded so that a three-bit axis
+/// can index it, stored twice.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct DescentRay {
     pub origin: [[f32; 8]; 2],
-    /// Shortened reciprocals of the direction, and lengthened ones with their sign turned: times a distance they are the
-    /// earliest crossing, and the negative of the latest.
+    /// Shortened reciprocals of the direction, and negated lengthened ones: multiplied by a distance they give the
+    /// earliest crossing and the negative of the latest.
     pub inv: [[f32; 8]; 2],
-    pub slack: f32,
+    pub padding: f32,
     pub octant: usize,
     /// The octant in whose order children are visited.
     pub order: usize,
@@ -60,7 +62,7 @@ pub(super) struct DescentRay {
 
 impl DescentRay {
     #[inline(always)]
-    pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], slack: f32) -> Self {
+    pub fn new(origin: [f32; 3], inv_lo: [f32; 3], inv_hi: [f32; 3], padding: f32) -> Self {
         let [x, y, z] = origin;
         let origin = [[x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]; 2];
         let down = |axis: usize| usize::from(inv_lo[axis].is_sign_negative()) << axis;
@@ -69,26 +71,26 @@ impl DescentRay {
             [-inv_hi[0], -inv_hi[1], -inv_hi[2], 0.0, 0.0, 0.0, 0.0, 0.0],
         ];
         let octant = down(0) | down(1) | down(2);
-        Self { origin, inv, slack, octant, order: octant }
+        Self { origin, inv, padding, octant, order: octant }
     }
 
-    /// The same ray, which visits what is farthest first.
+    /// Returns the ray with the far child visited first.
     #[inline(always)]
     pub fn far_first(self) -> Self {
         Self { order: self.octant ^ 7, ..self }
     }
 }
 
-/// All wide nodes over a binary tree, root first.
-pub(super) fn widen(tree: &KdNodes) -> Vec<Node8> {
+/// Collapses a binary tree into nodes of three levels each, root first.
+pub(super) fn collapse(tree: &KdNodes) -> Vec<Node8> {
     let mut nodes = Vec::new();
     if !tree.bounds.is_empty() {
-        // Each wide node consumes three levels and leaves at most seven entries behind; one lies at the bottom.
+        // Each node replaces three levels and leaves at most seven entries on the stack; one entry lies at the bottom.
         assert!(tree.depth().div_ceil(3) * 7 + 9 < STACK, "a tree too deep for the stack");
         let mut roots = vec![(0, 0)];
         nodes.push(None);
         while let Some((binary, slot)) = roots.pop() {
-            let node = widen_one(tree, binary, |child| {
+            let node = collapse_one(tree, binary, |child| {
                 roots.push((child, nodes.len()));
                 nodes.push(None);
                 nodes.len() as u32 - 1
@@ -99,9 +101,9 @@ pub(super) fn widen(tree: &KdNodes) -> Vec<Node8> {
     nodes.into_iter().flatten().collect()
 }
 
-fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> Node8 {
+fn collapse_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32) -> Node8 {
     let mut node = Node8 { splits: [f32::INFINITY; 7], axes: 0, children: [EMPTY; 8], octants: [0; 8] };
-    // The subtree at each place of a level; `None` below a leaf.
+    // The subtree at each position of a level; `None` below a leaf.
     let mut level = vec![Some(binary)];
     let mut plane = 0;
     for depth in 0..3 {
@@ -137,9 +139,9 @@ fn widen_one(tree: &KdNodes, binary: u32, mut make_child: impl FnMut(u32) -> u32
     node
 }
 
-/// Order and far sides for one octant.
+/// Returns the order of the children and their far sides for one octant.
 ///
-/// A child's rank from the near end has a bit for each level, 1 where it is on the far side.
+/// The rank of a child from the near end has one bit per level, 1 on the far side.
 fn octant_word(axes: u32, octant: usize) -> u64 {
     let mut word = 0;
     for child in 0..8u64 {
@@ -157,10 +159,10 @@ fn octant_word(axes: u32, octant: usize) -> u64 {
     word
 }
 
-/// The plain version of [`super::simd::KernelSimd::descend`].
+/// Scalar reference of [`super::simd::KernelSimd::descend`].
 ///
-/// Pushes the children that the ray meets within `t0..=t1`, farthest first (of a ray that goes far first: nearest), and returns the new
-/// height.
+/// Pushes the children that the ray enters within `t0..=t1`, farthest first (nearest first for a far-first ray), and
+/// returns the new stack height.
 #[inline(always)]
 pub(super) fn descend_plain(
     node: &Node8,
@@ -180,11 +182,11 @@ pub(super) fn descend_plain(
             let axis = (node.axes >> (3 * plane) & 7) as usize;
             let distance = node.splits[plane] - ray.origin[0][axis];
             let side = lane >> (2 - depth) & 1;
-            // NaN, a ray inside the plane, bounds neither side.
+            // NaN, for a ray in the plane, bounds neither side.
             if (side == 1) == (ray.octant >> axis & 1 == 1) {
-                t1 = f32::min(t1, ray.slack - distance * ray.inv[1][axis]);
+                t1 = f32::min(t1, ray.padding - distance * ray.inv[1][axis]);
             } else {
-                t0 = f32::max(t0, distance * ray.inv[0][axis] - ray.slack);
+                t0 = f32::max(t0, distance * ray.inv[0][axis] - ray.padding);
             }
             plane = 2 * plane + 1 + side;
         }
@@ -206,7 +208,7 @@ mod tests {
             let height = s.descend(node, ray, *t0, *t1, &mut stack, 3);
             out.push(height as u64);
             for i in 3..height {
-                // Adding 0 makes the zeros alike.
+                // Adding 0 turns -0 into +0.
                 let bits = |t: f32| (t + 0.0).to_bits();
                 out.extend([stack.child[i], bits(stack.t0[i]), bits(stack.t1[i])].map(u64::from));
             }

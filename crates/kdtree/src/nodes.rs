@@ -1,4 +1,4 @@
-//! The binary tree in 8-byte nodes, and the plain walk through it that is the reference for the fast ones.
+//! The binary tree in 8-byte nodes, and the scalar traversal that is the reference for the others.
 
 use super::ray::TreeRay;
 use crate::geometry::Aabb;
@@ -17,7 +17,7 @@ pub(super) struct KdNode {
 }
 const _: () = assert!(size_of::<KdNode>() == 8);
 
-/// A node, taken apart.
+/// A decoded node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Node {
     Inner { axis: usize, split: f32, first_child: u32 },
@@ -44,10 +44,10 @@ impl KdNode {
     }
 }
 
-/// Depth of the deepest leaf that any walk must be ready for.
+/// Greatest leaf depth that traversals must support.
 pub(super) const MAX_DEPTH: usize = 64;
 
-/// The nodes, root first, and the box around everything in them.
+/// The nodes, root first, and the bounds of all primitives in them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct KdNodes {
     pub nodes: Vec<KdNode>,
@@ -60,22 +60,22 @@ impl KdNodes {
         if self.bounds.is_empty() { 0.0 } else { self.bounds.size().max_element() }
     }
 
-    /// Of the deepest leaf; the root has 0.
+    /// Depth of the deepest leaf; the root has depth 0.
     pub fn depth(&self) -> usize {
         let mut depth = 0;
         self.visit_cells(&mut |_, _, at| depth = depth.max(at));
         depth
     }
 
-    /// Calls `visit(first, count)` for the leaves along the ray, front to back, as long as they start no later than
-    /// the limit that `visit` returns; the first limit is `t_max`.
+    /// Calls `visit(first, count)` for the leaves along the ray, front to back, as long as they start no later than the
+    /// limit that `visit` returns; the initial limit is `t_max`.
     #[inline]
     pub fn walk(&self, ray: &TreeRay, t_max: f32, mut visit: impl FnMut(u32, u32) -> f32) {
         self.walk_cells(ray, 0.0, t_max, |first, count, _| visit(first, count), || ());
     }
 
-    /// The same from `t_min` on; `visit` also gets where the ray leaves the cell at the latest, and every inner node calls
-    /// `at_inner`.
+    /// Like [`walk`](Self::walk), starting at `t_min`. `visit` also gets the latest `t` at which the ray leaves the
+    /// cell, and `at_inner` is called for every inner node.
     #[inline]
     pub fn walk_cells(
         &self,
@@ -101,11 +101,11 @@ impl KdNodes {
                     let (lo, hi) = ray.crossing(axis, split);
                     let near = first_child + ray.down[axis] as u32;
                     let far = first_child + 1 - ray.down[axis] as u32;
-                    // Written so that NaN, a ray inside the plane, goes both ways.
+                    // NaN, for a ray in the plane, must visit both children.
                     let skip_near = hi < t0;
                     let skip_far = lo > t1;
                     if skip_near {
-                        // Both can only be skipped if the cell was empty: then any one will do.
+                        // Both can only be skipped if the cell was empty: then either is right.
                         (index, t0) = (far, t0.max(lo));
                     } else if skip_far {
                         (index, t1) = (near, t1.min(hi));

@@ -1,7 +1,7 @@
 //! The simple objects of a scene as flat records, and the packet of sixteen rays that is tested against them.
 //!
-//! Most scenes have a handful of walls and spheres. Testing sixteen rays against each of them without any
-//! branch costs less than finding out which ones to leave away, however little the rays have in common.
+//! Most scenes have a handful of walls and spheres. Testing sixteen rays against each of them without branches costs
+//! less than culling, even for incoherent rays.
 
 use super::batch::{HitBatch, RayBatch};
 use super::lanes::{LaneHits, Sheared, dot, longest_axis, may_hit, quad_hits, resolve, shear, sphere_hits};
@@ -13,7 +13,7 @@ use super::sphere_tree::SphereTree;
 use crate::geometry::quad_corners;
 use glam::Vec3;
 
-/// A point that `KernelSimd` can take axes from.
+/// A point padded to four floats, from which `KernelSimd` can pick axes by index.
 type Point = [f32; 4];
 
 fn point(p: Vec3) -> Point {
@@ -26,39 +26,39 @@ struct Quad {
     object: u32,
 }
 
-/// Quads of which each ray is expected to meet few: those that can be the nearest are found first.
+/// Quads with a conservative filter, used when each ray is expected to hit only a few of them.
 #[derive(Debug, Default)]
 struct QuadFilter {
     quads: Vec<FilteredQuad>,
-    /// Of these, for lanes to look up: four corners, and which of the scene's objects.
+    /// Tables of the filtered quads that lanes look up: the four corners and the object index.
     corners: [[Vec<f32>; 3]; 4],
     objects: Vec<u32>,
-    /// Places among the quads of the scene of the sieved ones, and of those that always have to be tested.
-    sieved: Vec<u32>,
+    /// Indices among the scene's quads of those in the filter, and of those that are always tested.
+    filtered: Vec<u32>,
     others: Vec<u32>,
 }
 
-/// From so many quads on it is quicker to sieve them.
-const MIN_SIEVED: usize = 5;
+/// Number of quads from which the filter pays.
+const MIN_FILTERED: usize = 5;
 
 impl QuadFilter {
     fn add(&mut self, place: u32, object: u32, [corner, edge_u, edge_v]: [Vec3; 3]) {
         let Some(quad) = FilteredQuad::new(corner, edge_u, edge_v) else { return self.others.push(place) };
         self.quads.push(quad);
-        self.sieved.push(place);
+        self.filtered.push(place);
         self.objects.push(object);
         for (table, corner) in self.corners.iter_mut().zip(quad_corners(corner, edge_u, edge_v)) {
             table.iter_mut().zip(corner.to_array()).for_each(|(table, x)| table.push(x));
         }
     }
 
-    /// Sixteen and thirty-two numbers are looked up fastest.
+    /// Pads the tables: lookups are fastest with sixteen or thirty-two entries.
     fn padded(mut self) -> Option<Self> {
         let n = self.quads.len();
         let length = [LANES, 2 * LANES, n].into_iter().find(|&length| length >= n)?;
         self.corners.iter_mut().flatten().for_each(|table| table.resize(length, 0.0));
         self.objects.resize(length, 0);
-        (n >= MIN_SIEVED).then_some(self)
+        (n >= MIN_FILTERED).then_some(self)
     }
 }
 
@@ -86,20 +86,22 @@ struct Plane {
 #[derive(Debug, Default)]
 pub(super) struct SimpleObjects {
     quads: Vec<Quad>,
-    sieve: Option<QuadFilter>,
+    filter: Option<QuadFilter>,
     triangles: Vec<Triangle>,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
 }
 
 impl SimpleObjects {
-    /// - `objects`: which shapes to take.
+    /// Collects shapes by kind.
+    ///
+    /// - `objects`: indices of the shapes to include.
     pub fn new(shapes: &[Shape], objects: impl Iterator<Item = u32>) -> Self {
-        let (mut simple, mut sieve) = (Self::default(), QuadFilter::default());
+        let (mut simple, mut filter) = (Self::default(), QuadFilter::default());
         for object in objects {
             match &shapes[object as usize] {
                 Shape::Quad { corner, edge_u, edge_v } => {
-                    sieve.add(simple.quads.len() as u32, object, [*corner, *edge_u, *edge_v]);
+                    filter.add(simple.quads.len() as u32, object, [*corner, *edge_u, *edge_v]);
                     let corners = quad_corners(*corner, *edge_u, *edge_v).map(point);
                     simple.quads.push(Quad { corners, object });
                 }
@@ -117,7 +119,7 @@ impl SimpleObjects {
                 Shape::Mesh { .. } | Shape::Spheres { .. } => {}
             }
         }
-        simple.sieve = sieve.padded();
+        simple.filter = filter.padded();
         simple
     }
 }
@@ -128,7 +130,7 @@ pub(super) struct Packet<S: KernelSimd> {
     pub dir: [S::F; 3],
     /// Lanes that hold a ray.
     pub lanes: Mask,
-    /// The ray's `t_max` until something is hit.
+    /// `t_max` of the ray until something is hit.
     pub t: S::F,
     pub u: S::F,
     pub v: S::F,
@@ -138,7 +140,7 @@ pub(super) struct Packet<S: KernelSimd> {
 }
 
 impl<S: KernelSimd> Packet<S> {
-    /// Rays `first..first + 16`, or as many as there are.
+    /// Loads rays `first..first + 16`, or as many as there are.
     #[inline(always)]
     pub fn load(s: S, rays: &RayBatch, first: usize) -> Self {
         let count = (rays.len() - first).min(LANES);
@@ -172,7 +174,7 @@ impl<S: KernelSimd> Packet<S> {
         store_some_u(s, object, &mut hits.object[first..]);
     }
 
-    /// Keeps the lanes that are nearer; at equal `t` the lower object. Returns them.
+    /// Keeps the hits of lanes that are nearer; at equal `t` the lower object wins. Returns these lanes.
     #[inline(always)]
     fn offer(&mut self, s: S, hits: LaneHits<S>, object: u32) -> Mask {
         let ahead = hits.mask & s.lt(s.splat(0.0), hits.t);
@@ -191,14 +193,14 @@ impl<S: KernelSimd> Packet<S> {
         take
     }
 
-    /// Tests all simple objects; with `ANY` stops once every ray has hit something.
+    /// Tests all simple objects; with `ANY` stops once every ray has a hit.
     #[inline(always)]
     pub fn test_objects<const ANY: bool>(&mut self, s: S, objects: &SimpleObjects) {
         if !objects.quads.is_empty() || !objects.triangles.is_empty() {
             let frame = ShearFrame::new(s, &self.origin, &self.dir);
-            match &objects.sieve {
-                Some(sieve) if ANY => self.sift_any(s, &frame, &objects.quads, sieve),
-                Some(sieve) => self.sift(s, &frame, &objects.quads, sieve),
+            match &objects.filter {
+                Some(filter) if ANY => self.filter_any(s, &frame, &objects.quads, filter),
+                Some(filter) => self.filter_nearest(s, &frame, &objects.quads, filter),
                 None => self.test_quads::<ANY>(s, &frame, &objects.quads),
             }
             if self.is_done::<ANY>() {
@@ -234,7 +236,7 @@ impl<S: KernelSimd> Packet<S> {
 
     /// Tests every sphere of a cloud.
     ///
-    /// - `origin`, `dir`: in its space.
+    /// - `origin`, `dir`: in the space of the cloud.
     #[inline(always)]
     pub fn test_cloud<const ANY: bool>(
         &mut self,
@@ -253,7 +255,7 @@ impl<S: KernelSimd> Packet<S> {
             let radius_squared = s.splat_d(f64::from(*radius).powi(2));
             let hits = sphere_hits(s, self.lanes, &to_center, radius_squared, &wide.dir, wide.inv_dir_squared);
             if hits.mask != 0 {
-                // The first of spheres at equal distance is there already.
+                // Of spheres at equal distance, the first is kept already.
                 let take = self.offer(s, hits, object);
                 self.prim = s.select_u(take, s.splat_u(prim), self.prim);
             }
@@ -275,23 +277,23 @@ impl<S: KernelSimd> Packet<S> {
         }
     }
 
-    /// The nearest of many quads, in rays that have met nothing yet: each tests the one that comes first by the sieve, and
-    /// only where that leaves a doubt all of them.
+    /// Finds the nearest of many quads for rays that have no hit yet. Each lane tests the quad that the filter puts
+    /// first; all quads are tested only where the filter leaves the order open.
     #[inline(always)]
-    fn sift(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadFilter) {
+    fn filter_nearest(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], filter: &QuadFilter) {
         let rays = QuadFilterRays::new(s, &self.origin, &self.dir);
-        // The earliest times at which the two nearest may be met.
+        // The earliest possible `t` of the two nearest quads.
         let (mut first, mut second) = (self.t, self.t);
         let mut which = s.splat_u(0);
-        for (k, quad) in (0..).zip(&sieve.quads) {
-            let earliest = rays.look::<false>(s, quad).earliest;
+        for (k, quad) in (0..).zip(&filter.quads) {
+            let earliest = rays.filter::<false>(s, quad).earliest;
             second = s.min(s.max(earliest, first), second);
             which = s.select_u(s.lt(earliest, first), s.splat_u(k), which);
             first = s.min(earliest, first);
         }
         let some = self.lanes & s.lt(first, self.t);
         if some != 0 {
-            let [a, b, c, d] = &sieve.corners;
+            let [a, b, c, d] = &filter.corners;
             let (a, b) = (frame.shear_each(s, a, which), frame.shear_each(s, b, which));
             let (c, d) = (frame.shear_each(s, c, which), frame.shear_each(s, d, which));
             let hits = quad_hits(s, some, [&a, &b, &c, &d], frame.sz);
@@ -299,7 +301,7 @@ impl<S: KernelSimd> Packet<S> {
             self.t = s.select(take, hits.t, self.t);
             self.u = s.select(take, hits.u, self.u);
             self.v = s.select(take, hits.v, self.v);
-            self.object = s.select_u(take, s.gather_u(&sieve.objects, which), self.object);
+            self.object = s.select_u(take, s.gather_u(&filter.objects, which), self.object);
             self.found |= take;
             let all = std::mem::replace(&mut self.lanes, some & !take);
             if self.lanes != 0 {
@@ -307,20 +309,20 @@ impl<S: KernelSimd> Packet<S> {
             }
             self.lanes = all;
         }
-        for &place in &sieve.others {
+        for &place in &filter.others {
             self.test_quad(s, frame, &quads[place as usize]);
         }
     }
 
-    /// The same for any hit: a quad is tested only where the sieve cannot tell.
+    /// The any-hit variant of the filtered test: a quad is tested exactly only where the filter is undecided.
     #[inline(always)]
-    fn sift_any(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], sieve: &QuadFilter) {
+    fn filter_any(&mut self, s: S, frame: &ShearFrame<S>, quads: &[Quad], filter: &QuadFilter) {
         let rays = QuadFilterRays::new(s, &self.origin, &self.dir);
         let mut doubts = [0; MAX_SIMPLE];
-        // To ask after each whether that was enough would cost more than to look at a few in vain.
-        for (quads, doubts) in sieve.quads.chunks(4).zip(doubts.chunks_mut(4)) {
+        // Checking for completion after each quad would cost more than filtering a few in vain.
+        for (quads, doubts) in filter.quads.chunks(4).zip(doubts.chunks_mut(4)) {
             for (quad, doubt) in quads.iter().zip(doubts) {
-                let seen = rays.look::<true>(s, quad);
+                let seen = rays.filter::<true>(s, quad);
                 let sure = seen.hits & s.lt(seen.latest, self.t);
                 self.found |= self.lanes & sure;
                 *doubt = !s.le(self.t, seen.earliest) & !sure;
@@ -330,14 +332,14 @@ impl<S: KernelSimd> Packet<S> {
             }
         }
         let all = self.lanes;
-        for (&place, &doubt) in sieve.sieved.iter().zip(&doubts) {
+        for (&place, &doubt) in filter.filtered.iter().zip(&doubts) {
             self.lanes = all & doubt & !self.found;
             if self.lanes != 0 {
                 self.test_quad(s, frame, &quads[place as usize]);
             }
         }
         self.lanes = all;
-        for &place in &sieve.others {
+        for &place in &filter.others {
             self.test_quad(s, frame, &quads[place as usize]);
         }
     }
@@ -363,9 +365,9 @@ impl<S: KernelSimd> Packet<S> {
     }
 }
 
-/// The rays' shears (`geometry::Shear`), each with axes of its own.
+/// Shears of the rays (`geometry::Shear`), with separate axes for each lane.
 pub(super) struct ShearFrame<S: KernelSimd> {
-    /// For each lane the axes across, across and along.
+    /// For each lane the two axes across and the axis along the ray.
     axes: [S::U; 3],
     along_x: Mask,
     along_y: Mask,
@@ -380,7 +382,7 @@ impl<S: KernelSimd> ShearFrame<S> {
     #[inline(always)]
     fn new(s: S, origin: &[S::F; 3], dir: &[S::F; 3]) -> Self {
         let (along_x, along_y) = longest_axis(s, dir);
-        // Across, across, along are x y z, z x y or y z x.
+        // The axes (across, across, along) are (x, y, z), (z, x, y) or (y, z, x).
         let [x, y, z] = *dir;
         let d = [
             by_axis(s, along_x, along_y, y, z, x),
@@ -410,7 +412,7 @@ impl<S: KernelSimd> ShearFrame<S> {
         shear(s, vertex, self.origin, self.sx, self.sy)
     }
 
-    /// A point for each lane, from a table.
+    /// Shears one point per lane, looked up in a table.
     #[inline(always)]
     fn shear_each(&self, s: S, [x, y, z]: &[Vec<f32>; 3], which: S::U) -> Sheared<S> {
         let (x, y, z) = (s.gather(x, which), s.gather(y, which), s.gather(z, which));
@@ -423,13 +425,13 @@ impl<S: KernelSimd> ShearFrame<S> {
     }
 }
 
-/// What belongs to the longest axis of each lane.
+/// Selects the value that belongs to the longest axis of each lane.
 #[inline(always)]
 fn by_axis<S: KernelSimd>(s: S, along_x: Mask, along_y: Mask, on_x: S::F, on_y: S::F, on_z: S::F) -> S::F {
     s.select(along_x, on_x, s.select(along_y, on_y, on_z))
 }
 
-/// The first sixteen, or all and `idle` for the rest.
+/// Loads the first sixteen numbers, or all of them with `idle` in the remaining lanes.
 #[inline(always)]
 fn load_some<S: KernelSimd>(s: S, from: &[f32], idle: f32) -> S::F {
     if let Some(all) = from.first_chunk() {
@@ -460,7 +462,7 @@ fn store_some_u<S: KernelSimd>(s: S, from: S::U, to: &mut [u32]) {
     to.copy_from_slice(&all[..to.len()]);
 }
 
-/// The rays in `f64`.
+/// Sixteen rays in `f64`.
 #[derive(Clone, Copy)]
 pub(super) struct FrameF64<S: KernelSimd> {
     origin: [S::D; 3],

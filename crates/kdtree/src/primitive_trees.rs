@@ -1,4 +1,4 @@
-//! The simple objects of a scene that are too many to be tested one after the other: a tree for each kind.
+//! Kd-trees over the simple objects of a scene, one tree per kind, for kinds with too many objects to test one by one.
 
 use super::block_tree::BlockTree;
 use super::blocks::{QuadBlock, SphereBlock, TriangleBlock};
@@ -8,14 +8,14 @@ use super::mesh_tree::BuildPreset;
 use super::reference::Primitives;
 use super::shape::Shape;
 use super::shared_block::SharedBlock;
-use super::sphere_tree::clip_ball;
+use super::sphere_tree::clip_sphere;
 use crate::geometry::{Aabb, quad_corners};
 use glam::Vec3;
 
-/// Up to this many simple objects are tested by every ray; a tree pays above.
+/// Up to this many simple objects are tested by every ray; above, a tree pays.
 pub(super) const MAX_SIMPLE: usize = 48;
 
-/// Trees over spheres, quads and triangles. What their leaves hold are the numbers of the objects.
+/// Trees over spheres, quads and triangles. Their leaves store object indices.
 #[derive(Debug, Default)]
 pub(super) struct PrimitiveTrees {
     pub spheres: Option<BlockTree<SphereBlock>>,
@@ -24,9 +24,9 @@ pub(super) struct PrimitiveTrees {
 }
 
 impl PrimitiveTrees {
-    /// Builds trees for the kinds that need one, the most frequent first, and returns the objects that are left.
+    /// Builds trees for the kinds that need one, the most frequent first, and returns the remaining objects.
     ///
-    /// - `boxes`: of all the shapes.
+    /// - `boxes`: bounds of all shapes.
     pub fn build(shapes: &[Shape], boxes: &[Aabb]) -> (Self, Vec<u32>) {
         let of_kind = |is_kind: fn(&Shape) -> bool| -> Vec<u32> {
             (0u32..).zip(shapes).filter(|(_, shape)| is_kind(shape)).map(|(object, _)| object).collect()
@@ -96,7 +96,7 @@ fn tree<B: LeafBlock>(
     BlockTree::build(loose, &config, make_block, |prims| make_compact(&of_prims(prims)))
 }
 
-/// What the builder sees of them.
+/// The builder's view of the objects of one kind.
 struct Loose<'a> {
     shapes: &'a [Shape],
     boxes: &'a [Aabb],
@@ -121,7 +121,7 @@ impl Primitives for Loose<'_> {
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb> {
         match self.shape(prim) {
             Shape::Triangle { vertices } => clip_triangle(vertices, axis, limit, below, padding),
-            Shape::Sphere { center, radius } => Some(clip_ball(*center, *radius, axis, limit, below, padding)),
+            Shape::Sphere { center, radius } => Some(clip_sphere(*center, *radius, axis, limit, below, padding)),
             _ => Some(Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY }),
         }
     }

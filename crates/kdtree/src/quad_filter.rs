@@ -1,43 +1,46 @@
-//! A cheap look at flat objects for sixteen rays at once: which of them could be the nearest?
+//! Conservative filter for quads, sixteen rays at a time: it finds which quads could be the closest hit.
 //!
-//! The watertight test of a quad is dear, and in a room most quads are far from most rays. Here each is met as a plane with
-//! two coordinates in it, in plain `f32`, together with a bound on how far rounding, here *and* in the watertight test,
-//! can have moved what was found. Only quads that the bound leaves open are then tested in earnest, so the answers are
+//! The watertight test of a quad is expensive, and in a room most quads are far from most rays. The filter intersects
+//! each quad as a plane with two coordinates, in plain `f32`, and bounds how far rounding, here *and* in the watertight
+//! test, can have moved the result. Only quads that the bound leaves undecided are tested exactly, so the results are
 //! those of the watertight test, bit for bit.
 //!
-//! Bounds, with u the unit roundoff, m the middle of the quad, R the largest distance of a corner from it along an axis, and
-//! |n|₁ = 1: the watertight test moves corners by at most `5u` of their distance from the origin and depths by `8u` of it
-//! (`kdtree::surface`); corners are rounded by `2u` of their size; a dot product of rounded numbers is off by `4u`
-//! of its largest terms, of differences by `5u`. Rays and quads of extreme sizes, and what is not a number, are left open.
+//! Bounds, with u the unit roundoff, m the centre of the quad, R the largest distance of a corner from it along an
+//! axis, and |n|₁ = 1: the watertight test moves corners by at most `5u` of their distance from the origin and depths
+//! by `8u` of it (`kdtree::surface`); corners are rounded by `2u` of their size; a dot product of rounded numbers is
+//! off by `4u` of its largest terms, of differences by `5u`. Rays and quads of extreme sizes, and NaN, are left
+//! undecided.
 
 use super::simd::{KernelSimd, Mask};
 use crate::geometry::robust::UNIT_ROUNDOFF;
 use glam::{DVec3, Vec3};
 
-/// A parallelogram as a plane with coordinates.
+/// A parallelogram as a plane with two coordinates.
 #[derive(Debug)]
 pub(super) struct FilteredQuad {
     middle: [f32; 3],
-    /// The sum of its components' sizes is 1.
+    /// Scaled so that the absolute values of its components sum to 1.
     normal: [f32; 3],
-    /// Products with an offset from the middle are coordinates: ±1 at the rim.
+    /// Dot products with an offset from the centre give the coordinates: ±1 at the edges.
     rows: [[f32; 3]; 2],
-    /// Bound on the height of the origin over the plane, metres along `normal`, beside what grows with the distance.
+    /// Bound on the error of the origin's height over the plane, metres along `normal`, without the part that grows
+    /// with the distance.
     height_error: f32,
-    /// The same of points on the plane, along each axis.
+    /// Bound on the error of points on the plane, metres along each axis.
     place_error: f32,
-    /// Coordinates a metre, three times over.
+    /// Coordinate change per metre, times three.
     growth: f32,
 }
 
-/// Sizes, in metres, within which none of the products here can overflow or vanish.
+/// Sizes, in metres, within which none of the products here can overflow or underflow.
 const SIZES: std::ops::Range<f64> = 1e-15..1e12;
-/// The same of directions, whatever they are measured in, and of how far away a ray may begin: `t` is a number then.
+/// Range of direction components in any unit, and limit on the distance of a ray's origin, for which `t` is finite.
 const DIRECTIONS: std::ops::Range<f32> = 1e-15..1e10;
 const FARTHEST: f32 = 1e15;
 
 impl FilteredQuad {
-    /// `None` for what has no area to speak of, or is too large or too small: such a quad is never left out.
+    /// Returns `None` for a quad whose area is negligible, or that is too large or too small: such a quad is always
+    /// tested.
     pub fn new(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Option<Self> {
         let (c, u, v) = (corner.as_dvec3(), edge_u.as_dvec3(), edge_v.as_dvec3());
         let cross = u.cross(v);
@@ -68,23 +71,23 @@ impl FilteredQuad {
     }
 }
 
-/// Sixteen rays as the sieve wants them.
+/// Sixteen rays prepared for the filter.
 pub(super) struct QuadFilterRays<S: KernelSimd> {
     origin: [S::F; 3],
     dir: [S::F; 3],
     /// The largest component of the direction.
     size: S::F,
-    /// Slopes up to here may have either sign.
+    /// Slopes up to this size may have either sign.
     flat: S::F,
-    /// What `t` in `time_error` is multiplied by.
+    /// Factor of `t` in `time_error`.
     drift: S::F,
 }
 
-/// What can be said of a quad.
+/// Result of the filter for one quad.
 pub(super) struct Filtered<S: KernelSimd> {
-    /// No hit in front of the origin comes before; ∞ where there is none, −∞ where nothing is known.
+    /// No hit in front of the origin comes before this `t`; ∞ for a certain miss, −∞ if nothing is known.
     pub earliest: S::F,
-    /// Lanes in which there is one, and not after `latest`.
+    /// Lanes with a certain hit no later than `latest`.
     pub hits: Mask,
     pub latest: S::F,
 }
@@ -107,16 +110,18 @@ impl<S: KernelSimd> QuadFilterRays<S> {
         }
     }
 
-    /// - `SURE`: whether [`Filtered::hits`] and `latest` are wanted.
+    /// Filters a quad.
+    ///
+    /// - `SURE`: whether [`Filtered::hits`] and `latest` are needed.
     #[inline(always)]
-    pub fn look<const SURE: bool>(&self, s: S, quad: &FilteredQuad) -> Filtered<S> {
+    pub fn filter<const SURE: bool>(&self, s: S, quad: &FilteredQuad) -> Filtered<S> {
         let from = [
             s.sub(s.splat(quad.middle[0]), self.origin[0]),
             s.sub(s.splat(quad.middle[1]), self.origin[1]),
             s.sub(s.splat(quad.middle[2]), self.origin[2]),
         ];
         let away = s.max(s.abs(from[0]), s.max(s.abs(from[1]), s.abs(from[2])));
-        let (height, slope) = (about(s, &quad.normal, &from), about(s, &quad.normal, &self.dir));
+        let (height, slope) = (dot(s, &quad.normal, &from), dot(s, &quad.normal, &self.dir));
         let inv = s.reciprocal_about(slope);
         let t = s.mul(height, inv);
         let (zero, one) = (s.splat(0.0), s.splat(1.0));
@@ -127,12 +132,12 @@ impl<S: KernelSimd> QuadFilterRays<S> {
 
         let mut far = zero;
         for row in &quad.rows {
-            // From the middle to the ray's origin is the other way.
-            let coordinate = s.neg_mul_add_about(about(s, row, &self.dir), t, about(s, row, &from));
+            // `from` points from the ray's origin to the centre, hence the negative sign.
+            let coordinate = s.neg_mul_add_about(dot(s, row, &self.dir), t, dot(s, row, &from));
             far = s.max(s.abs(coordinate), far);
         }
         let margin = s.mul(s.mul(time_error, self.size), s.splat(quad.growth));
-        // Comparisons that NaN leaves open.
+        // Written so that NaN leaves the result undecided.
         let certain_slope = s.lt(self.flat, s.abs(slope));
         let certain_side = s.lt(height_error, s.abs(height));
         let outside = s.lt(s.add(one, margin), far);
@@ -149,9 +154,9 @@ impl<S: KernelSimd> QuadFilterRays<S> {
     }
 }
 
-/// A dot product, however it rounds.
+/// A dot product with unspecified rounding.
 #[inline(always)]
-fn about<S: KernelSimd>(s: S, a: &[f32; 3], b: &[S::F; 3]) -> S::F {
+fn dot<S: KernelSimd>(s: S, a: &[f32; 3], b: &[S::F; 3]) -> S::F {
     s.mul_add_about(s.splat(a[0]), b[0], s.mul_add_about(s.splat(a[1]), b[1], s.mul(s.splat(a[2]), b[2])))
 }
 
@@ -165,28 +170,28 @@ mod tests {
     use glam::vec3;
     use proptest::prelude::*;
 
-    /// One ray and one quad in all lanes: whether it may hit, whether it does, earliest and latest.
+    /// Result for one ray and one quad in all lanes: whether it may hit, whether it does, earliest and latest `t`.
     type Answer = (bool, bool, f32, f32);
 
     #[inline(always)]
-    fn look_once<S: KernelSimd>(s: S, quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer) {
+    fn filter_once<S: KernelSimd>(s: S, quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer) {
         let [origin, dir] = ray.map(|v| [s.splat(v.x), s.splat(v.y), s.splat(v.z)]);
-        let seen = QuadFilterRays::new(s, &origin, &dir).look::<true>(s, quad);
+        let seen = QuadFilterRays::new(s, &origin, &dir).filter::<true>(s, quad);
         let (mut earliest, mut latest) = ([0.0; LANES], [0.0; LANES]);
         s.store(seen.earliest, &mut earliest);
         s.store(seen.latest, &mut latest);
         *out = (!(earliest[0] == f32::INFINITY), seen.hits & 1 != 0, earliest[0], latest[0]);
     }
 
-    fn look(set: InstructionSet, quad: &FilteredQuad, ray: [Vec3; 2]) -> Answer {
+    fn filter(set: InstructionSet, quad: &FilteredQuad, ray: [Vec3; 2]) -> Answer {
         let mut answer = (false, false, 0.0, 0.0);
         let out = &mut answer;
-        dispatch!(set, look_once(quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer));
+        dispatch!(set, filter_once(quad: &FilteredQuad, ray: [Vec3; 2], out: &mut Answer));
         answer
     }
 
     fn point() -> impl Strategy<Value = Vec3> {
-        // Small whole numbers meet rims, corners and planes; the others meet everything else.
+        // Small integers hit edges, corners and planes; the others cover the general case.
         let whole = (-3i8..=3, -3i8..=3, -3i8..=3).prop_map(|(x, y, z)| vec3(x.into(), y.into(), z.into()));
         let any = (-3.0f32..3.0, -3.0f32..3.0, -3.0f32..3.0).prop_map(|(x, y, z)| vec3(x, y, z));
         prop_oneof![whole, any]
@@ -206,7 +211,7 @@ mod tests {
             let Some(quad) = FilteredQuad::new(corner, u, v) else { return Ok(()) };
             let far = (far + shift) * scale;
             let on = corner + a * u + b * v;
-            // At a point in the quad's plane, from one, into a corner, out of one, along the plane, anywhere.
+            // Towards a point of the quad, away from one, towards a corner, away from one, along the plane, arbitrary.
             let ray = match way {
                 0 => [far, on - far],
                 1 => [on + u.cross(v).normalize() * (scale * lift as f32 * 1e-8), far - on],
@@ -219,7 +224,7 @@ mod tests {
             let exact = intersect_quad(ray[0], &Shear::new(ray[1]), &quad_corners(corner, u, v));
             let in_front = exact.filter(|hit| hit.t > 0.0);
             for set in InstructionSet::available() {
-                let (may_hit, hits, earliest, latest) = look(set, &quad, ray);
+                let (may_hit, hits, earliest, latest) = filter(set, &quad, ray);
                 if let Some(hit) = in_front {
                     prop_assert!(may_hit && earliest <= hit.t, "{set:?}: {hit:?}, {may_hit} from {earliest}");
                     prop_assert!(!hits || hit.t <= latest, "{set:?}: {hit:?} is later than {latest}");
@@ -229,7 +234,7 @@ mod tests {
             }
         }
 
-        /// What makes it worth while.
+        /// The property that makes the filter worthwhile.
         #[test]
         fn a_ray_does_not_look_back_at_the_quad_that_it_leaves(
             corner in point(), edge_u in point(), edge_v in point(), away in point(),
@@ -242,7 +247,7 @@ mod tests {
             let on = corner + a * edge_u + b * edge_v;
             let origin = offset_ray_origin(on, rim.error, rim.normal, away);
             for set in InstructionSet::available() {
-                prop_assert!(!look(set, &quad, [origin, away]).0, "{set:?}");
+                prop_assert!(!filter(set, &quad, [origin, away]).0, "{set:?}");
             }
         }
     }
@@ -256,11 +261,11 @@ mod tests {
             let rays =
                 odd.map(|x| [[inside * x, -Vec3::Y], [inside, Vec3::new(0.0, -x, 0.0)], [inside, Vec3::splat(x)]]);
             for ray in rays.into_iter().flatten() {
-                let (_, hits, ..) = look(set, &quad, ray);
+                let (_, hits, ..) = filter(set, &quad, ray);
                 assert!(!hits, "{set:?}: {ray:?}");
             }
             for dir in [Vec3::X, Vec3::ZERO, vec3(0.0, -1e38, 0.0), vec3(0.0, -1e-38, 0.0), Vec3::NAN] {
-                let (may_hit, ..) = look(set, &quad, [vec3(0.5, 0.0, 0.5), dir]);
+                let (may_hit, ..) = filter(set, &quad, [vec3(0.5, 0.0, 0.5), dir]);
                 assert!(may_hit, "{set:?}: {dir}");
             }
         }

@@ -1,11 +1,11 @@
-//! Where rays wait to enter a tree, sixteen at a time: what each needs on its way is worked out for all of them at once.
+//! Preparation of rays for a tree, sixteen at a time.
 //!
-//! One by one it takes five divisions and branches on directions, which nothing foretells.
+//! For a single ray it takes five divisions and unpredictable branches on the direction.
 
 use super::lanes::{longest_axis, to_own_space};
 use super::leaf::LeafRay;
 use super::node8::DescentRay;
-use super::ray::{Nearest, WIDEN};
+use super::ray::{Nearest, RELATIVE_PADDING};
 use super::simd::{KernelSimd, LANES, Mask};
 use crate::geometry::{Aabb, Ray, Shear};
 use firstlight_simd::three;
@@ -13,15 +13,15 @@ use glam::{Affine3A, Vec3};
 
 type Lanes = [f32; LANES];
 
-/// Where the stream gets its rays, and leaves what they hit.
+/// Source of rays for a stream, and receiver of their hits.
 pub(super) trait Source {
-    /// No fewer than the rays that are left.
+    /// Upper bound on the number of remaining rays.
     fn left(&self) -> usize;
-    /// The next ray, what it hit before, and a number that `finish` gets back.
+    /// Returns the next ray, its nearest hit so far, and an id that is passed to `finish`.
     fn next(&mut self) -> Option<(Ray, Nearest, u32)>;
-    /// From the space of the rays to the tree's own; `None` if they are the same.
+    /// Map from the space of the rays to the tree's own; `None` if they are the same.
     fn own_from_world(&self) -> Option<&Affine3A>;
-    /// For rays that met the tree's bounds; `nearest.found` says whether it has something nearer.
+    /// Called for rays that entered the tree's bounds; `nearest.found` says whether the tree has a nearer hit.
     fn finish(&mut self, ray: u32, nearest: &Nearest);
 }
 
@@ -33,7 +33,7 @@ pub(super) struct RaySetup {
     /// As in `ray::TreeRay`.
     inv_lo: [Lanes; 3],
     inv_hi: [Lanes; 3],
-    slack: Lanes,
+    padding: Lanes,
     /// The part of the ray inside the bounds.
     from: Lanes,
     until: Lanes,
@@ -42,12 +42,12 @@ pub(super) struct RaySetup {
     sx: Lanes,
     sy: Lanes,
     sz: Lanes,
-    /// What was hit before: `t`, and which primitive wins at equal `t`.
+    /// Nearest hit so far: `t`, and the primitive index for ties.
     t: Lanes,
     prim: [u32; LANES],
-    /// By which the source knows them.
+    /// Ids given by the source.
     id: [u32; LANES],
-    /// Those that have yet to enter.
+    /// Lanes that have not been taken yet.
     waiting: Mask,
 }
 
@@ -56,11 +56,11 @@ impl RaySetup {
     pub fn new() -> Self {
         Self {
             origin: [[0.0; LANES]; 3],
-            // Lanes without a ray are worked out too.
+            // Unused lanes take part in the computation and need finite values.
             dir: [[1.0; LANES]; 3],
             inv_lo: [[0.0; LANES]; 3],
             inv_hi: [[0.0; LANES]; 3],
-            slack: [0.0; LANES],
+            padding: [0.0; LANES],
             from: [0.0; LANES],
             until: [0.0; LANES],
             kz: [0; LANES],
@@ -74,7 +74,7 @@ impl RaySetup {
         }
     }
 
-    /// The lane of the next ray that meets the bounds; `None` if there are no more.
+    /// Returns the lane of the next ray that enters the bounds; `None` if there are no more.
     ///
     /// - `extent`: the largest side of the tree's bounds.
     #[inline(always)]
@@ -92,7 +92,7 @@ impl RaySetup {
         Some(lane)
     }
 
-    /// Returns how many rays there were.
+    /// Loads up to sixteen rays; returns their number.
     #[inline(always)]
     fn fetch(&mut self, source: &mut impl Source) -> usize {
         for lane in 0..LANES {
@@ -106,7 +106,7 @@ impl RaySetup {
         LANES
     }
 
-    /// [`Shear::new`], `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
+    /// Does [`Shear::new`], `TreeRay::new` and `TreeRay::clip` for all lanes, operation by operation.
     #[inline(always)]
     fn prepare<S: KernelSimd>(&mut self, s: S, bounds: &Aabb, extent: f32, source: &impl Source) {
         let mut origin = three!(|axis| s.load(&self.origin[axis]));
@@ -130,20 +130,20 @@ impl RaySetup {
         s.store(s.div(first, longest), &mut self.sx);
         s.store(s.div(second, longest), &mut self.sy);
         s.store(sz, &mut self.sz);
-        let slack = s.mul(s.splat(WIDEN * extent), s.abs(sz));
-        s.store(slack, &mut self.slack);
+        let padding = s.mul(s.splat(RELATIVE_PADDING * extent), s.abs(sz));
+        s.store(padding, &mut self.padding);
         let (mut from, mut until) = (s.splat(0.0), s.load(&self.t));
         for axis in 0..3 {
             let inv = s.div(one, dir[axis]);
-            let (lo, hi) = (s.mul(inv, s.splat(1.0 - WIDEN)), s.mul(inv, s.splat(1.0 + WIDEN)));
+            let (lo, hi) = (s.mul(inv, s.splat(1.0 - RELATIVE_PADDING)), s.mul(inv, s.splat(1.0 + RELATIVE_PADDING)));
             s.store(lo, &mut self.inv_lo[axis]);
             s.store(hi, &mut self.inv_hi[axis]);
             let (min, max) = (s.splat(bounds.min[axis]), s.splat(bounds.max[axis]));
             let down = s.negative(dir[axis]);
             let (entry, exit) = (s.select(down, max, min), s.select(down, min, max));
-            // NaN, a ray inside a face, loses against either number.
-            from = s.max(s.sub(s.mul(s.sub(entry, origin[axis]), lo), slack), from);
-            until = s.min(s.add(s.mul(s.sub(exit, origin[axis]), hi), slack), until);
+            // NaN, for a ray in a face, leaves the other number.
+            from = s.max(s.sub(s.mul(s.sub(entry, origin[axis]), lo), padding), from);
+            until = s.min(s.add(s.mul(s.sub(exit, origin[axis]), hi), padding), until);
         }
         s.store(from, &mut self.from);
         s.store(until, &mut self.until);
@@ -156,7 +156,7 @@ impl RaySetup {
         let [lx, ly, lz] = &self.inv_lo;
         let [hx, hy, hz] = &self.inv_hi;
         let origin = [x[lane], y[lane], z[lane]];
-        DescentRay::new(origin, [lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]], self.slack[lane])
+        DescentRay::new(origin, [lx[lane], ly[lane], lz[lane]], [hx[lane], hy[lane], hz[lane]], self.padding[lane])
     }
 
     #[inline(always)]
@@ -180,7 +180,7 @@ impl RaySetup {
         self.id[lane]
     }
 
-    /// First and last `t` inside the bounds.
+    /// Returns the first and the last `t` inside the bounds.
     #[inline(always)]
     pub fn within(&self, lane: usize) -> (f32, f32) {
         (self.from[lane], self.until[lane])

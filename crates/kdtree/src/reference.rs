@@ -1,47 +1,47 @@
-//! What the builder divides: primitives, or what of them lies in a cell.
+//! Input of the builder: its configuration, the primitives, and references to their parts in a cell.
 
 use super::simd::LANES;
 use crate::geometry::Aabb;
 
-/// What the builder weighs; [`super::BuildPreset`] has the values.
+/// Parameters of the builder; [`super::BuildPreset`] has the values.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BuildConfig {
-    /// Splits tried per axis in large nodes.
+    /// Split candidates per axis in large nodes.
     pub bins: usize,
-    /// Nodes with at most this many references try every face instead.
+    /// Nodes with at most this many references evaluate every face instead.
     pub exact_below: usize,
     /// Primitives tested at once.
     pub block: usize,
-    /// Cost of testing a block, in visits of an inner node.
+    /// Cost of testing a block, relative to visiting an inner node.
     pub block_cost: f32,
     /// Factor on the cost of a split that cuts off empty space.
     pub empty_factor: f32,
-    /// Nodes with at most this many references are leaves, whatever a split would save.
+    /// Nodes with at most this many references become leaves, whatever the cost.
     pub leaf_limit: usize,
-    /// Depth of the deepest leaf.
+    /// Greatest depth of a leaf.
     pub max_depth: u32,
     /// References per primitive that the whole tree may add.
     pub max_growth: f32,
-    /// Shrink references to their part in the cell.
+    /// Whether references shrink to their part in the cell.
     pub clip: bool,
-    /// Split at the median of the longest axis and ignore the cost.
+    /// Whether to split at the median of the longest axis and ignore the cost.
     pub median: bool,
 }
 
-/// What the tree is built over.
+/// The primitives that a tree is built over.
 pub(super) trait Primitives: Sync {
     fn len(&self) -> usize;
-    /// Box of a primitive; empty if no ray can hit it.
+    /// Bounds of a primitive; empty if no ray can hit it.
     fn bounds(&self, prim: u32) -> Aabb;
-    /// Box of the part of the primitive with `axis <= limit` (`below`) or `axis >= limit`, padded by `padding`.
+    /// Bounds of the part of the primitive with `axis <= limit` (`below`) or `axis >= limit`, padded by `padding`.
     fn clipped(&self, prim: u32, axis: usize, limit: f32, below: bool, padding: f32) -> Option<Aabb>;
-    /// What every hit of a primitive follows from, bit by bit: of primitives that share it only the first can be hit.
+    /// Bits that determine every hit of a primitive: of primitives with equal bits only the first can be hit.
     fn shape(&self, _prim: u32) -> Option<[u32; 9]> {
         None
     }
 }
 
-/// A primitive in a cell: the box of what the cell holds of it.
+/// A primitive in a cell: the bounds of its part in the cell.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Reference {
@@ -61,7 +61,7 @@ impl Reference {
         Aabb { min: self.min.into(), max: self.max.into() }
     }
 
-    /// Two of them, as they lie in memory.
+    /// Two references in their memory layout.
     #[inline(always)]
     pub fn pair([a, b]: &[Self; 2]) -> [f32; LANES] {
         let (a_prim, b_prim) = (f32::from_bits(a.prim), f32::from_bits(b.prim));
@@ -72,7 +72,7 @@ impl Reference {
         ]
     }
 
-    /// A flat reference inside the plane goes below.
+    /// Whether a part is below the plane. A flat reference in the plane counts as below.
     #[inline]
     pub fn is_below(&self, axis: usize, split: f32) -> bool {
         self.min[axis] < split || self.max[axis] <= split
@@ -84,10 +84,10 @@ impl Reference {
     }
 }
 
-/// How far the box of a clipped primitive reaches beyond it.
+/// Padding of the bounds of a clipped primitive.
 ///
-/// Covers the rounding of the clip and what the watertight test moves an edge by (see `super::ray`).
+/// Covers the rounding of the clip and the distance by which the watertight test moves an edge (see `super::ray`).
 pub(super) fn clip_padding(bounds: &Aabb) -> f32 {
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    super::ray::WIDEN * (bounds.size().max_element() + 0.25 * largest)
+    super::ray::RELATIVE_PADDING * (bounds.size().max_element() + 0.25 * largest)
 }

@@ -1,4 +1,4 @@
-//! The upper level: all objects of a scene.
+//! The top level: closest-hit and any-hit queries over all objects of a scene.
 
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
@@ -14,10 +14,10 @@ use super::visits::Visits;
 use crate::geometry::{Aabb, Ray, Shear, intersect_plane, intersect_quad, intersect_triangle, quad_corners};
 use rayon::prelude::*;
 
-/// Which surface does a ray meet first?
+/// Answers closest-hit and any-hit queries over the objects of a scene.
 ///
-/// Equal distances are decided by the lower object, then the lower primitive, so that every traversal and every
-/// preset of the trees below answers with the same bits.
+/// Ties at equal distance go to the lower object, then to the lower primitive, so every traversal and every build
+/// preset of the trees below gives the same bits.
 #[derive(Debug, Default)]
 pub struct SceneTree {
     objects: PlacedShapes,
@@ -25,60 +25,61 @@ pub struct SceneTree {
     top: TopLevel,
 }
 
-/// In parallel where there are many: to ask other threads takes longer than to work out a few.
-fn of_each<T: Send>(shapes: &[Shape], work_out: impl Fn(&Shape) -> T + Send + Sync) -> Vec<T> {
-    const SIDE_BY_SIDE: usize = 512;
-    if shapes.len() <= SIDE_BY_SIDE {
-        return shapes.iter().map(work_out).collect();
+/// Applies a function to each shape, in parallel if there are many: for a few, the overhead of other threads exceeds
+/// the work.
+fn map_shapes<T: Send>(shapes: &[Shape], compute: impl Fn(&Shape) -> T + Send + Sync) -> Vec<T> {
+    const MIN_PARALLEL: usize = 512;
+    if shapes.len() <= MIN_PARALLEL {
+        return shapes.iter().map(compute).collect();
     }
-    shapes.par_iter().with_min_len(SIDE_BY_SIDE).map(work_out).collect()
+    shapes.par_iter().with_min_len(MIN_PARALLEL).map(compute).collect()
 }
 
 impl SceneTree {
-    /// Object `i` of all later hits is `shapes[i]`.
+    /// Builds the tree. Object `i` of all later hits is `shapes[i]`.
     pub fn build(shapes: Vec<Shape>) -> Self {
-        let instances = of_each(&shapes, Instance::new);
-        let boxes = of_each(&shapes, object_bounds);
+        let instances = map_shapes(&shapes, Instance::new);
+        let boxes = map_shapes(&shapes, object_bounds);
         let bounds = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
         let top = TopLevel::new(&shapes, &boxes);
         Self { objects: PlacedShapes { shapes, instances }, bounds, top }
     }
 
-    /// The shapes as given to [`Self::build`]; a hit's `object` is an index into them.
+    /// The shapes passed to [`Self::build`]; a hit's `object` is an index into them.
     pub fn shapes(&self) -> &[Shape] {
         &self.objects.shapes
     }
 
-    /// The maps of an object, by its number.
+    /// The transforms of an object, by its index.
     pub fn instance(&self, object: usize) -> &Instance {
         &self.objects.instances[object]
     }
 
-    /// The point of a hit that this tree gave for this ray.
+    /// Returns the surface point of a hit that this tree reported for this ray.
     #[inline]
     pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         self.objects.surface_point(ray, hit)
     }
 
-    /// The box around all finite objects; empty if there are none.
+    /// The bounds of all finite objects; empty if there are none.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The nearest hit of each ray with `0 < t < t_max`; `hits` is reset to the size of the batch.
+    /// Finds the closest hit of each ray with `0 < t < t_max`; `hits` is resized to the batch.
     pub fn closest_hits(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         self.closest_hits_with(InstructionSet::detect(), rays, class, hits);
     }
 
-    /// Whether anything lies on each ray with `0 < t < t_max`; `occluded` is resized to the batch.
+    /// Finds whether each ray has any hit with `0 < t < t_max`; `occluded` is resized to the batch.
     pub fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
         self.any_hits_with(InstructionSet::detect(), rays, class, occluded);
     }
 
-    /// The same by the instructions of the caller's choice, for tests and benchmarks.
+    /// Like [`closest_hits`](Self::closest_hits), with the given instruction set, for tests and benchmarks.
     ///
     /// # Panics
-    /// If the processor does not have them.
+    /// If the processor does not support the instruction set.
     #[doc(hidden)]
     pub fn closest_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         assert!(set.is_available(), "this processor does not have {set:?}");
@@ -86,7 +87,7 @@ impl SceneTree {
         self.top.closest_hits(set, &self.objects, rays, class, hits);
     }
 
-    /// As [`Self::closest_hits_with`].
+    /// Like [`any_hits`](Self::any_hits), with the given instruction set; panics as [`Self::closest_hits_with`].
     #[doc(hidden)]
     pub fn any_hits_with(&self, set: InstructionSet, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
         assert!(set.is_available(), "this processor does not have {set:?}");
@@ -94,17 +95,18 @@ impl SceneTree {
         self.top.any_hits(set, &self.objects, rays, class, occluded);
     }
 
-    /// One ray, for the mouse.
+    /// Finds the closest hit of a single ray, for picking.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.trace(ray, false)
     }
 
-    /// Whether anything lies on the ray, one ray at a time.
+    /// Whether a single ray has any hit.
     pub fn any_hit(&self, ray: &Ray) -> bool {
         self.trace(ray, true).is_some()
     }
 
-    /// The same as [`Self::closest_hit`] by trying every primitive of every object: the reference for all else.
+    /// Like [`Self::closest_hit`], by brute force over every primitive of every object: the reference for all
+    /// traversals.
     pub fn closest_hit_naive(&self, ray: &Ray) -> Option<Hit> {
         let scene_ray = SceneRay::new(ray);
         let mut best = None;
@@ -114,8 +116,8 @@ impl SceneTree {
         best
     }
 
-    /// What the nearest hit of a ray costs in the trees of meshes and in the one above them, whatever traversal finds
-    /// it.
+    /// Counts the visits of a closest-hit query in the trees of meshes and in the top-level trees, independent of the
+    /// traversal used.
     pub fn count_visits(&self, ray: &Ray) -> Visits {
         let scene_ray = SceneRay::new(ray);
         let (mut best, mut visits) = (None, Visits::default());
@@ -248,7 +250,7 @@ impl SceneTree {
     }
 }
 
-/// How far a walk goes on.
+/// The `t` beyond which a traversal stops.
 fn limit(best: &Option<Hit>, ray: &Ray, effort: Effort) -> f32 {
     match best {
         Some(_) if effort == Effort::Any => f32::NEG_INFINITY,
@@ -264,7 +266,7 @@ enum Effort {
     Naive,
 }
 
-/// A ray with all that the objects of the world want to know about it.
+/// A ray with the data that tests in world space need.
 struct SceneRay {
     ray: Ray,
     shear: Shear,

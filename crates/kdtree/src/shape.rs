@@ -1,8 +1,8 @@
-//! Shapes as they are given, and what rays ask of them.
+//! Shapes, ray classes and hits: the input and output of queries.
 
 use super::mesh_tree::MeshTree;
-use super::ray::WIDEN;
-use super::sphere_tree::{SphereTree, ball_bounds};
+use super::ray::RELATIVE_PADDING;
+use super::sphere_tree::{SphereTree, sphere_bounds};
 use crate::geometry::{Aabb, quad_corners};
 use glam::{Affine3A, DAffine3, Vec3};
 use std::sync::Arc;
@@ -17,14 +17,14 @@ pub enum Shape {
         /// Radius in metres, positive.
         radius: f32,
     },
-    /// Infinite; `normal` is unit.
+    /// An infinite plane.
     Plane {
         /// A point of the plane, metres.
         point: Vec3,
-        /// Unit normal on its front.
+        /// Unit normal of the front.
         normal: Vec3,
     },
-    /// A parallelogram; its front looks along `edge_u × edge_v`.
+    /// A parallelogram; its front faces along `edge_u × edge_v`.
     Quad {
         /// The corner at `u = v = 0`, metres.
         corner: Vec3,
@@ -33,19 +33,19 @@ pub enum Shape {
         /// From the corner to the one at `v = 1`, metres.
         edge_v: Vec3,
     },
-    /// A single triangle; its front is where its vertices run counter-clockwise.
+    /// A single triangle; on its front the vertices run counter-clockwise.
     Triangle {
         /// The corners, metres.
         vertices: [Vec3; 3],
     },
-    /// A mesh with a tree of its own, seen through an invertible map.
+    /// A mesh with its own tree, placed by an invertible map.
     Mesh {
         /// The tree over the triangles, in the mesh's own space.
         tree: Arc<MeshTree>,
         /// Map from the mesh's own space to that of the snapshot.
         world_from_object: Affine3A,
     },
-    /// `world_from_object` rotates, moves and scales evenly.
+    /// A cloud of spheres with its own tree; `world_from_object` rotates, translates and scales uniformly.
     Spheres {
         /// The tree over the spheres, in the object's own space.
         tree: Arc<SphereTree>,
@@ -54,10 +54,10 @@ pub enum Shape {
     },
 }
 
-/// What the caller knows of a batch: it picks the traversal, never the answer.
+/// A hint about the rays of a batch: it selects the traversal, never the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayClass {
-    /// Neighbours in the batch run side by side: camera rays and their shadow rays, in tile order.
+    /// Neighbours in the batch are similar: camera rays and their shadow rays, in tile order.
     Coherent,
     /// Everything else.
     Incoherent,
@@ -78,13 +78,13 @@ pub struct Hit {
     pub object: u32,
 }
 
-/// Inverted in `f64`: the result is as good as `f32` can hold.
+/// Returns the inverse, computed in `f64` and rounded once to `f32`.
 pub(super) fn inverse(matrix: &Affine3A) -> Affine3A {
     let wide = DAffine3::from_mat3_translation(matrix.matrix3.as_dmat3(), matrix.translation.as_dvec3()).inverse();
     Affine3A::from_mat3_translation(wide.matrix3.as_mat3(), wide.translation.as_vec3())
 }
 
-/// In an order of roundings that every instruction set repeats.
+/// Transforms a vector, in an order of roundings that every instruction set repeats.
 #[inline]
 pub(super) fn transform_vector(map: &Affine3A, v: Vec3) -> Vec3 {
     let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(Vec3::from);
@@ -96,8 +96,8 @@ pub(super) fn transform_point(map: &Affine3A, p: Vec3) -> Vec3 {
     transform_vector(map, p) + Vec3::from(map.translation)
 }
 
-/// The box around an object in the world, wide enough for the rounding of rays that are moved into its own space.
-/// Empty for planes and for objects without any surface.
+/// Returns the bounds of an object in the world, padded for the rounding of rays transformed into its own space. Empty
+/// for planes and for objects without surface.
 pub(super) fn object_bounds(shape: &Shape) -> Aabb {
     let placed = |bounds: Aabb, map: &Affine3A| {
         if bounds.is_empty() {
@@ -108,16 +108,16 @@ pub(super) fn object_bounds(shape: &Shape) -> Aabb {
             transform_point(map, Vec3::new(pick(0), pick(1), pick(2)))
         });
         let around = Aabb::from_points(corners);
-        // The map back may stretch errors by the condition of the matrix.
+        // The inverse map may amplify errors by the condition number of the matrix.
         let back = inverse(map);
         let condition = max_row_sum(map) * max_row_sum(&back);
         let largest = around.min.abs().max(around.max.abs()).max_element() + map.translation.abs().max_element();
-        let slack = WIDEN * condition * largest;
-        Aabb { min: around.min - slack, max: around.max + slack }
+        let padding = RELATIVE_PADDING * condition * largest;
+        Aabb { min: around.min - padding, max: around.max + padding }
     };
     match shape {
         Shape::Plane { .. } => Aabb::EMPTY,
-        Shape::Sphere { center, radius } => ball_bounds(*center, *radius),
+        Shape::Sphere { center, radius } => sphere_bounds(*center, *radius),
         Shape::Quad { corner, edge_u, edge_v } => Aabb::from_points(quad_corners(*corner, *edge_u, *edge_v)),
         Shape::Triangle { vertices } => Aabb::from_points(*vertices),
         Shape::Mesh { tree, world_from_object } => placed(tree.bounds(), world_from_object),

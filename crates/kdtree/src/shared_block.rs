@@ -1,8 +1,8 @@
-//! Leaf blocks of half the bytes: triangles that share their vertices.
+//! Compact leaf blocks of triangles that share vertices: half the bytes of a regular block.
 //!
 //! The triangles of a leaf are neighbours on a surface, and sixteen of them rarely have more than sixteen vertices.
-//! Each vertex is kept, fetched and sheared once; the corners are looked up in registers. A corner gets the bits that it has in a
-//! [`TriangleBlock`](super::blocks::TriangleBlock), so both find the same hits.
+//! Each vertex is stored, fetched and sheared once; the corners are looked up in registers. A corner has the same bits
+//! as in a [`TriangleBlock`](super::blocks::TriangleBlock), so both find the same hits.
 
 use super::lanes::{LaneHits, may_hit, resolve};
 use super::leaf::{BLOCK, LeafBlock, NoBlock, Prims, ShearedRay};
@@ -13,16 +13,16 @@ use glam::Vec3;
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct SharedBlock {
-    /// `[axis][vertex]`; 0 where there is none.
+    /// `[axis][vertex]`; 0 in unused entries.
     vertices: [[f32; BLOCK]; 3],
-    /// For each triangle the numbers of its vertices, four bits each. Lanes without a triangle repeat the first one, which
-    /// loses every tie against itself.
+    /// For each triangle the indices of its vertices, four bits each. Lanes without a triangle repeat the first one,
+    /// which loses every tie against itself.
     corners: [u32; BLOCK],
     prims: Prims,
 }
 const _: () = assert!(size_of::<SharedBlock>() == 320);
 
-/// Bit by bit.
+/// Compares bits.
 impl PartialEq for SharedBlock {
     fn eq(&self, other: &Self) -> bool {
         let bits = |block: &Self| (block.vertices.map(|axis| axis.map(f32::to_bits)), block.corners);
@@ -31,13 +31,13 @@ impl PartialEq for SharedBlock {
 }
 
 impl SharedBlock {
-    /// The blocks of a leaf, or none where vertices are shared so little that plain blocks would be fewer.
+    /// Packs a leaf; returns no blocks if vertices are shared so little that regular blocks would be fewer.
     pub fn pack_if_small(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Vec<Self> {
         let blocks = Self::pack(prims, triangle);
         if blocks.len() > prims.len().div_ceil(BLOCK) { Vec::new() } else { blocks }
     }
 
-    /// As many blocks as these primitives need, in their order.
+    /// Packs the primitives, in their order, into as many blocks as they need.
     fn pack(prims: &[u32], triangle: impl Fn(u32) -> [Vec3; 3]) -> Vec<Self> {
         let mut blocks = Vec::new();
         let mut table = VertexTable::EMPTY;
@@ -69,7 +69,7 @@ impl SharedBlock {
         [self.vertices[0][vertex], self.vertices[1][vertex], self.vertices[2][vertex]]
     }
 
-    /// What sixteen vertices have, for each of the three corners of sixteen triangles.
+    /// Looks up a per-vertex value for each of the three corners of sixteen triangles.
     #[inline(always)]
     pub fn by_corner<S: KernelSimd>(&self, s: S, of_vertices: S::F) -> [S::F; 3] {
         let corners = s.load_u(&self.corners);
@@ -86,7 +86,7 @@ impl SharedBlock {
     }
 }
 
-/// Vertices so far, by their bits.
+/// The vertices of a block, compared by their bits.
 struct VertexTable {
     /// `[axis][vertex]`.
     points: [[u32; BLOCK]; 3],
@@ -96,13 +96,13 @@ struct VertexTable {
 impl VertexTable {
     const EMPTY: Self = Self { points: [[0; BLOCK]; 3], len: 0 };
 
-    /// The packed numbers of three vertices; `None`, and nothing is changed, if there is no room for them.
+    /// Returns the packed indices of three vertices; `None`, with the table unchanged, if they do not fit.
     fn add(&mut self, triangle: &[Vec3; 3]) -> Option<u32> {
         let (len, mut packed) = (self.len, 0);
         for (corner, point) in triangle.iter().enumerate() {
             let [x, y, z] = point.to_array().map(f32::to_bits);
             let [xs, ys, zs] = &self.points;
-            // All at once, which takes fewer steps than stopping at the right one.
+            // Compares all entries, which takes fewer steps than stopping at the right one.
             let same = (0..BLOCK).fold(0u32, |same, i| same | u32::from(xs[i] == x && ys[i] == y && zs[i] == z) << i);
             let known = same & ((1 << self.len) - 1);
             let vertex = if known != 0 { known.trailing_zeros() as usize } else { self.len };
@@ -155,7 +155,7 @@ mod tests {
     use glam::vec3;
     use proptest::prelude::*;
 
-    /// Triangles over few places, some of which differ in the sign of a zero only.
+    /// Triangles over few distinct points, some of which differ in the sign of a zero only.
     fn triangles() -> impl Strategy<Value = Vec<[Vec3; 3]>> {
         (2usize..60, any::<u64>(), 1usize..70).prop_map(|(n_places, seed, n_triangles)| {
             let mut state = seed;
@@ -219,7 +219,7 @@ mod tests {
             }
             let expected: Vec<_> = prims.iter().map(|&prim| (prim, bits(triangles[prim as usize / 3]))).collect();
             prop_assert_eq!(unpacked, expected);
-            // With all vertices in one block, nothing but the number of triangles ends it.
+            // With all vertices in one block, only the number of triangles limits it.
             let mut places: Vec<_> = triangles.iter().flat_map(|triangle| bits(*triangle)).collect();
             places.sort_unstable();
             places.dedup();
@@ -235,7 +235,7 @@ mod tests {
             let shared = &SharedBlock::pack(&prims, triangle)[..];
             let plain: Vec<_> = prims.chunks(BLOCK).map(|prims| TriangleBlock::new(prims, triangle)).collect();
             let plain = &plain[..];
-            // Into the middle of a triangle, or past all of them; some down an axis.
+            // Rays into the middle of a triangle or past all of them; some along an axis.
             let rays: Vec<Ray> = (0..32)
                 .map(|i| {
                     let origin = vec3(2.0, -1.5, 3.0) * aims[i % 8];

@@ -1,15 +1,15 @@
-//! What the traversal asks of the processor beyond [`firstlight_simd`]: to visit a node of eight children at once.
+//! SIMD operations of the traversal beyond [`firstlight_simd`]: visiting a node of eight children, and prefetching.
 
 use super::node8::{DescentRay, Node8, Stack, descend_plain};
 use firstlight_simd::Portable;
 pub(super) use firstlight_simd::{InstructionSet, LANES, Mask, dispatch};
 
-/// See [`firstlight_simd::Simd`].
+/// Extends [`firstlight_simd::Simd`].
 pub(super) trait KernelSimd: firstlight_simd::Simd {
-    /// Visits a node: see `wide::descend_plain`.
+    /// Visits a node: see `node8::descend_plain`.
     fn descend(self, node: &Node8, ray: &DescentRay, t0: f32, t1: f32, stack: &mut Stack, height: usize) -> usize;
 
-    /// Asks the memory for the cache line at `at`; any address will do.
+    /// Prefetches the cache line at `at`; any address is allowed.
     fn prefetch(self, at: *const u8);
 }
 

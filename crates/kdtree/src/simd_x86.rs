@@ -14,26 +14,25 @@ impl KernelSimd for Avx512 {
             assert!(height <= STACK - 8);
             let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
             let shifts = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(shifts), shifts);
-            // The lower half is about entries and holds times, the upper half about exits and holds their negatives:
-            // then both only ever grow.
+            // The lower half holds entry times, the upper half negated exit times: then both are updated by a maximum.
             let upper_half = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
-            // Lane 7 holds the axes: a plane that no child asks for.
+            // Lane 7 holds the axes: no child refers to this plane.
             let splits = _mm256_load_ps(std::ptr::from_ref(node).cast());
             let splits = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(splits), splits);
             let axes = _mm512_srlv_epi32(_mm512_set1_epi32(node.axes as i32), shifts);
-            // Only three bits of the axes are their own.
+            // Only the low three bits of each lane are its axis.
             let axes = _mm512_ternarylogic_epi32::<0xF8>(upper_half, axes, _mm512_set1_epi32(7));
             let origin = _mm512_permutexvar_ps(axes, _mm512_load_ps(ray.origin.as_ptr().cast()));
             let inv = _mm512_permutexvar_ps(axes, _mm512_load_ps(ray.inv.as_ptr().cast()));
             let times = _mm512_mul_ps(_mm512_sub_ps(splits, origin), inv);
-            let times = _mm512_sub_ps(times, _mm512_set1_ps(ray.slack));
+            let times = _mm512_sub_ps(times, _mm512_set1_ps(ray.padding));
             let root = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 8, 8, 8, 8);
             let middle = _mm512_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2, 9, 9, 9, 9, 10, 10, 10, 10);
             let bottom = _mm512_setr_epi32(3, 3, 4, 4, 5, 5, 6, 6, 11, 11, 12, 12, 13, 13, 14, 14);
-            // The far side has a new entry, the near side a new exit.
+            // The far side gets a new entry, the near side a new exit.
             let octant = node.octants[ray.octant & 7];
             let bounds = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(t0), _mm512_set1_ps(-t1));
-            // NaN as the first argument loses against the second.
+            // NaN as the first argument yields the second.
             let mask = both_halves(octant >> 24);
             let bounds = _mm512_mask_max_ps(bounds, mask, _mm512_permutexvar_ps(root, times), bounds);
             let mask = both_halves(octant >> 32);
@@ -66,7 +65,7 @@ impl KernelSimd for Avx512 {
     }
 }
 
-/// The low byte, and its complement above it.
+/// Returns the low byte, with its complement in the byte above.
 #[inline(always)]
 fn both_halves(far: u64) -> Mask {
     let far = far as Mask & 0xFF;
@@ -81,29 +80,29 @@ impl KernelSimd for Avx2 {
             // The stores below write eight entries each.
             assert!(height <= STACK - 8);
             let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            // Lane 7 holds the axes: a plane that no child asks for.
+            // Lane 7 holds the axes: no child refers to this plane.
             let splits = _mm256_loadu_ps(std::ptr::from_ref(node).cast());
             let axes = _mm256_srlv_epi32(_mm256_set1_epi32(node.axes as i32), shifts);
             let inv_lo = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv[0].as_ptr()), axes);
             let minus_inv_hi = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.inv[1].as_ptr()), axes);
             let origin = _mm256_permutevar8x32_ps(_mm256_load_ps(ray.origin[0].as_ptr()), axes);
-            let slack = _mm256_set1_ps(ray.slack);
+            let padding = _mm256_set1_ps(ray.padding);
             let distance = _mm256_sub_ps(splits, origin);
-            let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), slack);
-            let hi = _mm256_sub_ps(slack, _mm256_mul_ps(distance, minus_inv_hi));
+            let lo = _mm256_sub_ps(_mm256_mul_ps(distance, inv_lo), padding);
+            let hi = _mm256_sub_ps(padding, _mm256_mul_ps(distance, minus_inv_hi));
             let (never, always) = (_mm256_set1_ps(f32::NEG_INFINITY), _mm256_set1_ps(f32::INFINITY));
-            // Where the direction points down, the upper side comes first.
+            // Where the direction is negative, the upper side comes first.
             let down = _mm256_castps_si256(inv_lo);
             let down = _mm256_castsi256_ps(_mm256_srai_epi32::<31>(down));
             let lower_t0 = _mm256_blendv_ps(never, lo, down);
             let upper_t0 = _mm256_blendv_ps(lo, never, down);
             let lower_t1 = _mm256_blendv_ps(hi, always, down);
             let upper_t1 = _mm256_blendv_ps(always, hi, down);
-            // For each child the plane of each level, and which children are on its upper side.
+            // For each child its plane at each level, and which children are on the upper side.
             let root = _mm256_setzero_si256();
             let middle = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
             let bottom = _mm256_setr_epi32(3, 3, 4, 4, 5, 5, 6, 6);
-            // NaN as the first argument loses against the second.
+            // NaN as the first argument yields the second.
             let mut first = _mm256_set1_ps(t0);
             first = _mm256_max_ps(sides::<0b1111_0000>(lower_t0, root, upper_t0), first);
             first = _mm256_max_ps(sides::<0b1100_1100>(lower_t0, middle, upper_t0), first);
@@ -119,7 +118,7 @@ impl KernelSimd for Avx2 {
             let empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(EMPTY as i32));
             let within = _mm256_cmp_ps::<_CMP_LE_OQ>(first, last);
             let met = _mm256_movemask_ps(_mm256_andnot_ps(_mm256_castsi256_ps(empty), within)) as u32;
-            // Spread the mask to bytes and collect the numbers of its lanes: a compress in two steps.
+            // Spreads the mask to bytes and collects its lane indices: a compress in two steps.
             let bytes = _pdep_u64(u64::from(met), 0x0101_0101_0101_0101) * 0xFF;
             let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(_pext_u64(0x0706_0504_0302_0100, bytes) as i64));
             let children = _mm256_permutevar8x32_epi32(children, lanes);
@@ -136,14 +135,14 @@ impl KernelSimd for Avx2 {
     }
 }
 
-/// For each child its plane's number: from `upper` where the bit is set, else from `lower`.
+/// Returns for each child the value of its plane: from `upper` where the bit is set, else from `lower`.
 ///
 /// # Safety
 ///
 /// The processor must have AVX2.
 #[inline(always)]
 unsafe fn sides<const UPPER: i32>(lower: __m256, planes: __m256i, upper: __m256) -> __m256 {
-    // SAFETY: the caller sees to it that the processor has AVX2; registers alone are read.
+    // SAFETY: the caller ensures that the processor has AVX2; only registers are read.
     unsafe {
         let (lower, upper) = (_mm256_permutevar8x32_ps(lower, planes), _mm256_permutevar8x32_ps(upper, planes));
         _mm256_blend_ps::<UPPER>(lower, upper)

@@ -1,6 +1,8 @@
-//! Where to split a cell: the surface area heuristic, by bins or face by face, and the median for comparison.
+//! Choice of the split of a cell: the surface area heuristic over bins or over all faces, and the median for
+//! comparison.
 //!
-//! Plain, for processors without wide registers, and the reference for `split_lanes`, which must find the same splits.
+//! Scalar version, for processors without SIMD support, and the reference for `split_simd`, which must find the same
+//! splits.
 
 use super::reference::{BuildConfig, Reference};
 use crate::geometry::Aabb;
@@ -12,14 +14,14 @@ pub(super) struct Split {
     pub at: f32,
 }
 
-/// Cuts of less than this share of a cell earn no bonus for the empty space they remove.
+/// Cuts of less than this share of a cell get no bonus for the empty space they remove.
 pub(super) const EMPTY_CUT: f32 = 0.05;
 
-/// The most bins, and the most references of a node whose faces are tried.
+/// Limits on the number of bins, and on the references of a node whose faces are evaluated.
 pub(super) const MAX_BINS: usize = 16;
 pub(super) const MAX_FACES: usize = 32;
 
-/// The split with the lowest expected cost, or `None` if a leaf costs no more.
+/// Returns the split with the lowest expected cost, or `None` if a leaf costs no more.
 pub(super) fn find_split(references: &[Reference], cell: &Aabb, config: &BuildConfig) -> Option<Split> {
     let mut search = Search::new(references.len(), cell, config);
     if references.len() <= config.exact_below {
@@ -31,16 +33,18 @@ pub(super) fn find_split(references: &[Reference], cell: &Aabb, config: &BuildCo
     search.best
 }
 
-/// Whether parts of a block count in the cost: large nodes are split further, so that the steps of a block even out.
-pub(super) fn is_smooth(count: usize, config: &BuildConfig) -> bool {
+/// Whether partial blocks count proportionally in the cost: in large nodes they do, because further splits even out the
+/// steps of a block.
+pub(super) fn counts_partial_blocks(count: usize, config: &BuildConfig) -> bool {
     count > 4 * config.block
 }
 
-/// References that lie flat in a face of the cell: all that a ray through the cell would test of a wall behind it.
+/// Offers splits that separate references lying flat in a face of the cell, which a ray through the cell would test
+/// although they are a wall behind it.
 ///
-/// The plane next to the face leaves them a cell of their own without any thickness, which only rays that cross the wall visit.
+/// The plane next to the face puts them in a cell without thickness, which only rays that cross the wall visit.
 ///
-/// - `offer`: gets the plane and how many references lie on either side.
+/// - `offer`: receives the plane and the number of references on either side.
 pub(super) fn walls(references: &[Reference], cell: &Aabb, axis: usize, mut offer: impl FnMut(f32, usize, usize)) {
     let (lo, hi) = (cell.min[axis], cell.max[axis]);
     let is_flat = |face: f32| references.iter().any(|r| r.min[axis] == face && r.max[axis] == face);
@@ -57,7 +61,7 @@ struct Search<'a> {
     config: &'a BuildConfig,
     cell: &'a Aabb,
     count: usize,
-    /// 1 over half the area of the cell's surface.
+    /// 1 over half the surface area of the cell.
     inv_area: f32,
     best_cost: f32,
     best: Option<Split>,
@@ -76,7 +80,7 @@ impl<'a> Search<'a> {
     }
 
     fn side_cost(&self, count: usize) -> f32 {
-        if is_smooth(self.count, self.config) {
+        if counts_partial_blocks(self.count, self.config) {
             self.config.block_cost * count as f32 / self.config.block as f32
         } else {
             self.leaf_cost(count)
@@ -86,7 +90,7 @@ impl<'a> Search<'a> {
     #[inline]
     fn offer(&mut self, axis: usize, at: f32, below: usize, above: usize) {
         let (lo, hi) = (self.cell.min[axis], self.cell.max[axis]);
-        // Also false where rounding or a flat cell leaves no room.
+        // Also false if rounding or a flat cell leaves no room for a split.
         if !(at > lo && at < hi) {
             return;
         }
@@ -122,7 +126,7 @@ impl<'a> Search<'a> {
         let mut ends = [[0u32; MAX_BINS]; 3];
         for reference in references {
             for axis in 0..3 {
-                // `as` saturates, so an infinite scale does no harm.
+                // `as` saturates, so an infinite scale is harmless.
                 let first = ((reference.min[axis] - min[axis]) * scale[axis]) as usize;
                 let last = ((reference.max[axis] - min[axis]) * scale[axis]) as usize;
                 starts[axis][first.min(bins - 1)] += 1;
@@ -145,7 +149,7 @@ impl<'a> Search<'a> {
         let count = references.len();
         assert!(count <= MAX_FACES, "only small nodes try every face");
         for axis in 0..3 {
-            // Missing references lie outside of every candidate, on neither side.
+            // The padding is outside of every candidate, on neither side.
             let (mut min, mut max) = ([f32::INFINITY; MAX_FACES], [f32::NEG_INFINITY; MAX_FACES]);
             for (i, reference) in references.iter().enumerate() {
                 (min[i], max[i]) = (reference.min[axis], reference.max[axis]);
@@ -174,11 +178,11 @@ fn tight_bounds(references: &[Reference]) -> Aabb {
             max[axis] = max[axis].max(reference.max[axis]);
         }
     }
-    // 0 is positive, whatever the order.
+    // Adding 0 makes zeros positive, independent of the order.
     Aabb { min: (Vec3::from(min) + 0.0), max: (Vec3::from(max) + 0.0) }
 }
 
-/// The middle reference along the longest side of the cell.
+/// Splits at the median reference along the longest side of the cell.
 pub(super) fn median_split(references: &[Reference], cell: &Aabb) -> Option<Split> {
     let size = cell.size();
     let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b]))?;

@@ -1,14 +1,15 @@
-//! [`split::find_split`] sixteen numbers at a time: two references are binned, or one candidate compared with sixteen
-//! references, at once; then sixteen candidates are weighed.
+//! SIMD version of [`split::find_split`]: it bins two references, or compares one candidate with sixteen references, at
+//! a time, and then evaluates sixteen candidates at a time.
 //!
-//! Every operation is that of the plain version, in its order, and so is the choice among equals: the split has the same bits.
+//! Every operation, its order, and the choice among ties are those of the scalar version, so the split has the same
+//! bits.
 
 use super::reference::{BuildConfig, Reference};
 use super::simd::{InstructionSet, KernelSimd, LANES, Mask, dispatch};
 use super::split::{self, EMPTY_CUT, MAX_BINS, MAX_FACES, Split};
 use crate::geometry::Aabb;
 
-/// The split with the lowest expected cost, or `None` if a leaf costs no more.
+/// Returns the split with the lowest expected cost, or `None` if a leaf costs no more.
 pub(super) fn find_split(
     set: InstructionSet,
     references: &[Reference],
@@ -33,18 +34,18 @@ fn search<S: KernelSimd>(s: S, references: &[Reference], cell: &Aabb, config: &B
         if is_flat {
             let mut candidates = Candidates::NONE;
             split::walls(references, cell, axis, |at, below, above| candidates.push(at, below, above));
-            search.weigh(axis, &candidates);
+            search.evaluate(axis, &candidates);
         }
     }
     *into = search.best;
 }
 
-/// As many as the faces of the largest node whose faces are tried.
+/// The number of faces of the largest node whose faces are evaluated.
 const MAX_CANDIDATES: usize = 2 * MAX_FACES;
-// Between bins, and at either end of the references.
+// Planes between bins, and at either end of the references.
 const _: () = assert!(MAX_BINS < MAX_CANDIDATES);
 
-/// Planes across one axis, and how many references would lie on either side.
+/// Planes across one axis, and the number of references on either side.
 struct Candidates {
     at: [f32; MAX_CANDIDATES],
     below: [u32; MAX_CANDIDATES],
@@ -88,16 +89,16 @@ impl<'a, S: KernelSimd> SimdSearch<'a, S> {
     #[inline(always)]
     fn side_cost(&self, counts: S::U) -> S::F {
         let (s, block_cost) = (self.s, self.s.splat(self.config.block_cost));
-        if split::is_smooth(self.count, self.config) {
+        if split::counts_partial_blocks(self.count, self.config) {
             return s.div(s.mul(block_cost, s.to_f(counts)), s.splat(self.config.block as f32));
         }
         let full = s.add_u(counts, s.splat_u(self.config.block as u32 - 1));
         s.mul(block_cost, s.to_f(s.shr_u(full, self.log_block)))
     }
 
-    /// `split::SimdSearch::offer` for all candidates.
+    /// `split::Search::offer` for all candidates.
     #[inline(always)]
-    fn weigh(&mut self, axis: usize, candidates: &Candidates) {
+    fn evaluate(&mut self, axis: usize, candidates: &Candidates) {
         let s = self.s;
         let size = self.cell.size();
         let (a, b) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
@@ -140,7 +141,7 @@ impl<'a, S: KernelSimd> SimdSearch<'a, S> {
         candidates.len = 2 * count;
         let mut any_flat = [false; 3];
         for (axis, is_any_flat) in any_flat.iter_mut().enumerate() {
-            // Missing references lie outside of every candidate, on neither side.
+            // The padding is outside of every candidate, on neither side.
             let (mut min, mut max) = ([f32::INFINITY; MAX_FACES], [f32::NEG_INFINITY; MAX_FACES]);
             for (i, reference) in references.iter().enumerate() {
                 (min[i], max[i]) = (reference.min[axis], reference.max[axis]);
@@ -166,7 +167,7 @@ impl<'a, S: KernelSimd> SimdSearch<'a, S> {
                 }
                 (candidates.below[i], candidates.above[i]) = (below, above);
             }
-            self.weigh(axis, &candidates);
+            self.evaluate(axis, &candidates);
         }
         any_flat
     }
@@ -190,15 +191,16 @@ impl<'a, S: KernelSimd> SimdSearch<'a, S> {
         let max: [f32; 3] = std::array::from_fn(|axis| lanes_most[4 + axis].max(lanes_most[12 + axis]) + 0.0);
         let size: [f32; 3] = std::array::from_fn(|axis| max[axis] - min[axis]);
         let scale = size.map(|size| if size > 0.0 { bins as f32 / size } else { 0.0 });
-        // As the references lie in memory: least corner, number, greatest corner, nothing; twice. The numbers, which may be
-        // anything when read as `f32`, are not to become subnormal, which multiply slowly.
+        // The memory layout of references, twice: minimum, index, maximum, unused. The indices, reinterpreted as `f32`,
+        // are arbitrary and must not become subnormal, because subnormals multiply slowly.
         let by_axis = |of: [f32; 3], other: f32| -> [f32; LANES] {
             std::array::from_fn(|lane| if lane % 4 < 3 { of[lane % 4] } else { other })
         };
         let (origin, scale) = (s.load(&by_axis(min, 1.0)), s.load(&by_axis(scale, 0.0)));
         let other_end = s.load_u(&std::array::from_fn(|lane| lane as u32 ^ 4));
         let (first_bin, last_bin) = (s.splat(0.0), s.splat((bins - 1) as f32));
-        // Starts and ends of either reference of a pair, so that neighbours in the same bin need not wait for each other.
+        // Separate counts for starts and ends of either reference of a pair, so that neighbours in the same bin are
+        // independent.
         let mut counts = [[0u32; MAX_BINS]; LANES];
         let mut flat: Mask = 0;
         for (i, pair) in pairs.iter().chain(&single).enumerate() {
@@ -229,7 +231,7 @@ impl<'a, S: KernelSimd> SimdSearch<'a, S> {
                 above -= (counts[4 + axis][bin - 1] + counts[12 + axis][bin - 1]) as usize;
                 candidates.push(min[axis] + size[axis] * (bin as f32 / bins as f32), below, above);
             }
-            self.weigh(axis, &candidates);
+            self.evaluate(axis, &candidates);
         }
         std::array::from_fn(|axis| flat >> axis & 1 != 0 || flat >> (8 + axis) & 1 != 0)
     }
@@ -252,10 +254,10 @@ mod tests {
         let counts = [1, 2, 7, 15, 16, 17, 31, 32, 33, 40, 64, 65, 130, 517];
         for case in 0..4032 {
             let count = counts[case % counts.len()];
-            // Each of these with each of the others, and with each count.
+            // Each of these is combined with each of the others, and with each count.
             let (kind, block) = (case / counts.len() % 8, [1, 16][case / counts.len() / 8 % 2]);
             let scale = [1.0, 1.0, 1.0, 1.0, 1e-40, 1e38][case / counts.len() / 16 % 6];
-            // Few different numbers in half of the cases, so that many planes cost the same; zeros of both signs.
+            // Half of the cases have few distinct numbers, so that many planes cost the same; zeros of both signs.
             let coarse = kind % 2 == 0;
             let mut number = || {
                 let x = random() * 2.0 - 1.0;
@@ -267,7 +269,7 @@ mod tests {
                     let (mut a, b) = (point(), point());
                     let mut b = a + 0.3 * (b - a);
                     if prim % 5 == 0 {
-                        // Flat, in some nodes as a wall.
+                        // Flat, in some nodes lying in a face.
                         a.y = if kind % 4 == 1 { -scale } else { a.y };
                         b.y = a.y;
                     }
@@ -275,7 +277,7 @@ mod tests {
                 })
                 .collect();
             let mut cell = Aabb { min: Vec3::splat(-scale), max: Vec3::splat(scale) };
-            // A cell without thickness, and one without an area.
+            // A cell without thickness, and one without area.
             if kind >= 6 {
                 cell.max.x = cell.min.x;
             }

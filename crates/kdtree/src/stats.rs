@@ -1,4 +1,4 @@
-//! What a tree looks like: counts for reports, and the invariants that tests rely on.
+//! Statistics of a tree for reports, and the invariants that tests check.
 
 use super::MeshTree;
 use super::leaf::BLOCK;
@@ -7,48 +7,48 @@ use super::nodes::{KdNodes, Node};
 use crate::geometry::Aabb;
 use glam::Vec3;
 
-/// Counts over one tree.
+/// Statistics of one tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct KdTreeStats {
-    /// Triangles of the mesh, those without area included.
+    /// Triangles of the mesh, including those without area.
     pub primitives: usize,
     /// Nodes with two children.
     pub inner_nodes: usize,
-    /// Leaves with something in them.
+    /// Leaves with at least one primitive.
     pub leaves: usize,
-    /// Leaves with nothing in them.
+    /// Leaves without primitives.
     pub empty_leaves: usize,
-    /// Of the deepest leaf; the root has 0.
+    /// Depth of the deepest leaf; the root has depth 0.
     pub depth: usize,
     /// Entries in leaves; a primitive in several cells counts several times.
     pub references: usize,
-    /// Blocks of up to sixteen primitives, which are tested at once.
+    /// Blocks of up to sixteen primitives, which are tested together.
     pub blocks: usize,
-    /// Memory of nodes and blocks.
+    /// Memory of nodes and blocks, bytes.
     pub bytes: usize,
-    /// Inner nodes that a line through the bounds crosses on average if nothing stops it.
+    /// Mean number of inner nodes that an unobstructed line through the bounds crosses.
     pub expected_inner_visits: f64,
-    /// Leaves with something in them that such a line crosses on average.
+    /// Mean number of non-empty leaves that such a line crosses.
     pub expected_leaf_visits: f64,
-    /// Blocks in the leaves that such a line crosses on average.
+    /// Mean number of blocks in the leaves that such a line crosses.
     pub expected_block_tests: f64,
 }
 
 impl KdTreeStats {
-    /// Entries in leaves per primitive, on average.
+    /// Mean number of leaf entries per primitive.
     pub fn references_per_primitive(&self) -> f64 {
         self.references as f64 / self.primitives.max(1) as f64
     }
 
-    /// What a line through the bounds costs on average if nothing stops it, in visits of an inner node: what the
-    /// surface area heuristic makes small.
+    /// Expected cost of an unobstructed line through the bounds, in visits of an inner node: the quantity that the
+    /// surface area heuristic minimises.
     pub fn sah_cost(&self) -> f64 {
         self.expected_inner_visits + f64::from(BLOCK_COST) * self.expected_block_tests
     }
 }
 
 impl MeshTree {
-    /// Counts over the tree and the costs that the surface area heuristic expects of it.
+    /// Computes statistics of the tree and the costs that the surface area heuristic expects.
     pub fn stats(&self) -> KdTreeStats {
         let mut stats = KdTreeStats {
             primitives: self.n_triangles(),
@@ -77,10 +77,11 @@ impl MeshTree {
         stats
     }
 
-    /// Checks that every triangle with an area, or an earlier copy of it, is in every leaf whose cell it passes through.
+    /// Checks that every triangle with an area, or an earlier copy of it, is in every leaf whose cell it passes
+    /// through.
     ///
     /// # Panics
-    /// When it is not.
+    /// If one is not.
     pub fn check_invariants(&self) {
         let mut seen = vec![false; self.n_triangles()];
         self.tree.nodes.visit_cells(&mut |node, cell, _| {
@@ -101,7 +102,7 @@ impl MeshTree {
         let is_copy = |prim, other| other < prim && bits(other) == bits(prim);
         let mut shapes = std::collections::HashSet::new();
         for (prim, seen) in (0u32..).zip(seen) {
-            // The leaves of the first are looked for, and hold it.
+            // A later copy may be in no leaf: the first copy is checked instead.
             if !shapes.insert(bits(prim)) && !seen {
                 continue;
             }

@@ -1,8 +1,8 @@
-//! Many rays in flight through one tree: for rays that have nothing in common.
+//! Stream traversal: many rays in state through one tree, for incoherent rays.
 //!
-//! A single ray waits: for its node, for its comparison, for the branch that was guessed wrong. Here a ray makes one step
-//! (a wide node or a leaf block) and goes to the back of a queue while the others make theirs, so the processor
-//! always has several independent steps at hand, and the only branches are those of the queues.
+//! A single ray is bound by latency: of its node, of its comparisons, of mispredicted branches. In a stream a ray makes
+//! one step (a node or a leaf block) and goes to the back of a queue while the others make theirs. So the processor
+//! always has several independent steps, and the only branches are those of the queues.
 //!
 //! Start reading at [`run`].
 
@@ -14,7 +14,7 @@ use super::ray::Nearest;
 use super::ray_setup::{RaySetup, Source};
 use super::simd::KernelSimd;
 
-/// Rays in flight. Half as many bring 5 % less speed on bounces, twice as many 9 %.
+/// Rays in state. Half as many are 5 % slower on bounces, twice as many 9 %.
 const SLOTS: usize = 64;
 
 #[derive(Clone, Copy)]
@@ -31,11 +31,11 @@ pub(super) struct Slot<R> {
     t1: f32,
 }
 
-/// The entry below all others: the ray is through.
+/// The entry at the bottom of every stack: the ray is finished.
 const DONE: u32 = LEAF - 1;
 
-/// The slots in one state. A slot is written to every list and kept in the one that it belongs to, which takes
-/// no branch; hence the spare place.
+/// The slots in one state. A slot is written to every list and counted only in the list that it belongs to, which takes
+/// no branch; hence the spare element.
 struct List {
     slots: [u8; SLOTS + 1],
     len: usize,
@@ -50,15 +50,15 @@ impl List {
         self.len += usize::from(belongs);
     }
 
-    /// Empties the list and returns what was in it.
+    /// Empties the list and returns its content.
     #[inline(always)]
     fn take(&mut self) -> ([u8; SLOTS + 1], usize) {
         (self.slots, std::mem::take(&mut self.len))
     }
 }
 
-/// Room for the rays in flight and for what waits to be visited by each of them. Made once for many streams, for clearing it takes
-/// longer than tracing a few rays.
+/// Slots of the rays in state and their stacks. Reused for many streams, because clearing it takes longer than tracing
+/// a few rays.
 pub(super) struct StreamState {
     stacks: Box<[Stack]>,
     sheared: Box<[Slot<ShearedRay>]>,
@@ -75,7 +75,7 @@ impl StreamState {
     }
 }
 
-/// A ray that may be in flight.
+/// A kind of ray that streams support.
 pub(super) trait StreamRay: LeafRay {
     /// The slots for rays of this kind.
     fn slots<'a>(sheared: &'a mut [Slot<ShearedRay>], precise: &'a mut [Slot<PreciseRay>]) -> &'a mut [Slot<Self>];
@@ -95,34 +95,34 @@ impl StreamRay for PreciseRay {
     }
 }
 
-/// Traces all rays of the source; with `ANY` a ray ends at its first hit, and looks for it from its far end.
+/// Traces all rays of the source; with `ANY` a ray ends at its first hit and traversal starts from its far end.
 ///
-/// A ray that leaves a surface first comes past everything around it, and most of that is not in its way. What is, in a room a wall, is as
-/// likely to be found from the other end.
+/// A ray that leaves a surface first passes its surroundings, most of which do not block it. An occluder, such as a
+/// wall of a room, is as likely to be found from the other end.
 #[inline(always)]
 pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     source: &mut impl Source,
-    flight: &mut StreamState,
+    state: &mut StreamState,
 ) where
     B::Ray: StreamRay,
 {
-    let wide = &tree.wide[..];
-    if wide.is_empty() {
+    let nodes8 = &tree.nodes8[..];
+    if nodes8.is_empty() {
         return;
     }
     let prefetch = tree.is_large();
-    let stacks: &mut [Stack; SLOTS] = (&mut *flight.stacks).try_into().expect("one for each slot");
-    let slots = B::Ray::slots(&mut flight.sheared, &mut flight.precise);
+    let stacks: &mut [Stack; SLOTS] = (&mut *state.stacks).try_into().expect("one for each slot");
+    let slots = B::Ray::slots(&mut state.sheared, &mut state.precise);
     let slots: &mut [Slot<B::Ray>; SLOTS] = slots.try_into().expect("as many as there are");
     let (mut inner, mut leaf, mut idle) = (List::NEW, List::NEW, List::NEW);
     for (i, slot) in (0..).zip(slots.iter_mut().take(source.left())) {
-        // A stream that ended by a panic leaves rays of its own behind.
+        // A stream that ended by a panic leaves busy slots behind.
         slot.is_busy = false;
         idle.push_if(true, i);
     }
-    let mut gate = RaySetup::new();
+    let mut setup = RaySetup::new();
     loop {
         let (list, len) = idle.take();
         for &i in &list[..len] {
@@ -130,7 +130,7 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
             if slot.is_busy {
                 source.finish(slot.id, &slot.nearest);
             }
-            slot.is_busy = refill::<S, B, ANY>(s, tree, slot, &mut gate, source);
+            slot.is_busy = refill::<S, B, ANY>(s, tree, slot, &mut setup, source);
             inner.push_if(slot.is_busy, i);
         }
         if inner.len + leaf.len == 0 {
@@ -140,9 +140,9 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
         for &i in &list[..len] {
             let (slot, stack) = (&mut slots[i as usize % SLOTS], &mut stacks[i as usize % SLOTS]);
             let t1 = if slot.nearest.t < slot.t1 { slot.nearest.t } else { slot.t1 };
-            slot.height = s.descend(&wide[slot.child as usize], &slot.descent, slot.t0, t1, stack, slot.height);
+            slot.height = s.descend(&nodes8[slot.child as usize], &slot.descent, slot.t0, t1, stack, slot.height);
         }
-        // A loop of its own: what it guesses wrong throws little away.
+        // A separate loop, so that a misprediction discards little work.
         for &i in &list[..len] {
             let slot = &mut slots[i as usize % SLOTS];
             slot.pop(&stacks[i as usize % SLOTS]);
@@ -180,22 +180,22 @@ pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     }
 }
 
-/// Starts the next ray that meets the bounds; false if there are no more.
+/// Starts the next ray that enters the bounds; false if there are no more.
 #[inline(always)]
 fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
     s: S,
     tree: &BlockTree<B>,
     slot: &mut Slot<B::Ray>,
-    gate: &mut RaySetup,
+    setup: &mut RaySetup,
     source: &mut impl Source,
 ) -> bool {
-    let Some(lane) = gate.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
-    let (t0, t1) = gate.within(lane);
+    let Some(lane) = setup.next(s, &tree.nodes.bounds, tree.extent, source) else { return false };
+    let (t0, t1) = setup.within(lane);
     *slot = Slot {
-        descent: if ANY { gate.descent(lane).far_first() } else { gate.descent(lane) },
-        leaf: gate.leaf(lane),
-        nearest: gate.nearest(lane),
-        id: gate.id(lane),
+        descent: if ANY { setup.descent(lane).far_first() } else { setup.descent(lane) },
+        leaf: setup.leaf(lane),
+        nearest: setup.nearest(lane),
+        id: setup.id(lane),
         is_busy: true,
         height: 1,
         child: 0,
@@ -207,7 +207,7 @@ fn refill<S: KernelSimd, B: LeafBlock, const ANY: bool>(
 
 impl<R: LeafRay> Slot<R> {
     const IDLE: Self = Self {
-        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], slack: 0.0, octant: 0, order: 0 },
+        descent: DescentRay { origin: [[0.0; 8]; 2], inv: [[0.0; 8]; 2], padding: 0.0, octant: 0, order: 0 },
         leaf: R::IDLE,
         nearest: Nearest { t: 0.0, u: 0.0, v: 0.0, prim: 0, found: false },
         id: 0,
@@ -218,7 +218,7 @@ impl<R: LeafRay> Slot<R> {
         t1: 0.0,
     };
 
-    /// Takes the nearest entry that can still matter; the last of all is [`DONE`].
+    /// Pops the nearest entry that can still matter; the last entry is [`DONE`].
     #[inline(always)]
     fn pop(&mut self, stack: &Stack) {
         let mut top = self.height - 1;
@@ -240,7 +240,7 @@ mod tests {
     use glam::Vec3;
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
-    /// Rays of a list, and what became of each; a bug in what takes the answers ends it at the ray `poisoned`.
+    /// A source that reads rays from a list and records their results; `finish` panics at the ray `poisoned`.
     struct Listed<'a> {
         rays: &'a [Ray],
         next: usize,
@@ -269,9 +269,9 @@ mod tests {
         }
     }
 
-    fn trace(tree: &MeshTree, rays: &[Ray], poisoned: Option<u32>, flight: &mut StreamState) -> Vec<(u32, bool, u32)> {
+    fn trace(tree: &MeshTree, rays: &[Ray], poisoned: Option<u32>, state: &mut StreamState) -> Vec<(u32, bool, u32)> {
         let mut source = Listed { rays, next: 0, poisoned, finished: Vec::new() };
-        run::<Portable, _, false>(Portable, &tree.tree, &mut source, flight);
+        run::<Portable, _, false>(Portable, &tree.tree, &mut source, state);
         source.finished.sort_unstable();
         source.finished
     }
@@ -292,15 +292,15 @@ mod tests {
             .collect();
         let whole = trace(&tree, &rays, None, &mut StreamState::new());
         assert!(whole.iter().filter(|(_, found, _)| *found).count() > 50);
-        let mut flight = StreamState::new();
+        let mut state = StreamState::new();
         for poisoned in [0, 70, 150] {
             let poisoned = whole.iter().map(|(ray, ..)| *ray).find(|ray| *ray >= poisoned);
-            let cut = catch_unwind(AssertUnwindSafe(|| trace(&tree, &rays, poisoned, &mut flight)));
+            let cut = catch_unwind(AssertUnwindSafe(|| trace(&tree, &rays, poisoned, &mut state)));
             assert!(cut.is_err(), "the ray {poisoned:?} was to be finished");
-            // Fewer than were in flight, and then all.
+            // First fewer rays than were in state, then all.
             for n in [3, rays.len()] {
                 let fresh = trace(&tree, &rays[..n], None, &mut StreamState::new());
-                assert_eq!(trace(&tree, &rays[..n], None, &mut flight), fresh);
+                assert_eq!(trace(&tree, &rays[..n], None, &mut state), fresh);
             }
         }
     }

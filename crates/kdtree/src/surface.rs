@@ -1,15 +1,17 @@
-//! From a hit to the point on the surface, with a bound on the error of that point.
+//! Surface points of hits, with bounds on their errors.
 //!
-//! The point is built from the surface, not from `origin + t · dir`, and the bound is wide enough that
-//! [`crate::geometry::robust::offset_ray_origin`] puts the next ray where the surface it leaves cannot be met again:
+//! The point is computed from the surface, not from `origin + t · dir`, and the bound is wide enough that
+//! [`crate::geometry::robust::offset_ray_origin`] moves the origin of the next ray to where it cannot hit the surface
+//! it leaves again. The bound covers:
 //!
 //! - the rounding of the point itself (Pharr, Jakob and Humphreys 2023, section 6.8);
-//! - what the watertight test moves the vertices by, as seen from that point: `5u` of their distance each, so the
-//!   whole triangle stays within that slab, and a ray that starts outside of it and points away never meets it;
-//! - for an instance, the way to the world and back again, of the point and of the direction.
+//! - the distance by which the watertight test moves the vertices, as seen from that point: `5u` of their distance
+//!   each, so the whole triangle stays within that slab, and a ray that starts outside of it and points away never hits
+//!   it;
+//! - for an instance, the transforms of the point and of the direction to the world and back.
 //!
-//! At the rim of a triangle that is not all: the neighbour is as uncertain as the triangle itself, so a ray that starts
-//! where the two meet may start behind it and get away. Points are kept clear of the rim by as much ([`INSET`]).
+//! At the edge of a triangle that is not enough: the neighbour is as uncertain as the triangle itself, so a ray that
+//! starts where the two meet may start behind it and leak. Points are kept clear of the edge by as much ([`INSET`]).
 //!
 //! Start reading at [`PlacedShapes::surface_point`].
 
@@ -18,35 +20,35 @@ use crate::geometry::robust::{UNIT_ROUNDOFF, gamma};
 use crate::geometry::{Aabb, Ray, quad_corners};
 use glam::{Affine3A, Mat3A, Vec2, Vec3};
 
-/// Where a ray met a surface.
+/// The point at which a ray hits a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// The point on the surface, metres, in the space of the snapshot.
     pub position: Vec3,
     /// Bound on the absolute error of `position`, metres per axis, including that of later ray tests from there.
     pub error: Vec3,
-    /// Unit. The front: `cross(v1 - v0, v2 - v0)` of a triangle in its own space (carried to the world so that outside stays
-    /// outside under mirroring), `edge_u × edge_v` of a quad, outwards for a sphere, the plane's own.
+    /// Unit normal of the front: `cross(v1 - v0, v2 - v0)` of a triangle in its own space (transformed so that outside
+    /// stays outside under mirroring), `edge_u × edge_v` of a quad, outwards for a sphere, the plane's own.
     pub geometric_normal: Vec3,
     /// Weights of vertices 1 and 2 of a triangle, 0..1 along the edges of a quad, otherwise 0.
     pub uv: Vec2,
 }
 
-/// Maps between an object's own space and the world, with bounds on what the maps cost in precision.
+/// Maps between an object's own space and the world, with bounds on their rounding errors.
 #[derive(Clone, Copy, Debug)]
 pub struct Instance {
     pub object_from_world: Affine3A,
-    /// Inverse transpose: carries normals, up to length.
+    /// Inverse transpose: transforms normals, up to length.
     pub normal_from_object: Mat3A,
     /// |world_from_object|, component by component.
     world_from_object_abs: Mat3A,
-    /// |world_from_object| · |object_from_world|: what a relative error in the world becomes on the way there and back.
+    /// |world_from_object| · |object_from_world|: the growth of a relative error in the world on the round trip.
     pub round_trip: Mat3A,
-    /// The same of the translations.
+    /// The corresponding growth for the translations.
     pub round_trip_offset: Vec3,
-    /// Largest growth of a relative error of a direction.
+    /// Largest growth of the relative error of a direction.
     pub condition: f32,
-    /// What the way to the world and back adds to the error of points, in the object's own metres.
+    /// Addition to the error of points by the round trip, in the object's own metres.
     pub rim: f32,
 }
 
@@ -81,7 +83,8 @@ impl Instance {
         }
     }
 
-    /// The direction keeps its length in the world's measure, so `t` means the same on both sides.
+    /// Transforms a ray into the object's own space. The direction is not normalised, so `t` is the same in both
+    /// spaces.
     #[inline]
     pub fn ray(&self, ray: &Ray) -> Ray {
         Ray {
@@ -91,7 +94,7 @@ impl Instance {
         }
     }
 
-    /// Carries a point, its error (the same on each axis) and its normal to the world.
+    /// Transforms a point, its error (the same on each axis) and its normal to the world.
     #[inline]
     fn carry_to_world(&self, map: &Affine3A, local: LocalPoint, uv: Vec2) -> SurfacePoint {
         let position = transform_point(map, local.position);
@@ -106,7 +109,7 @@ impl Instance {
     }
 }
 
-/// Distance of a point from the rim of its triangle, in bounds of its error along one axis.
+/// Minimum distance of a point from the edges of its triangle, as a multiple of its error bound along one axis.
 ///
 /// A ray that starts `e` above one face and `4e` from the edge lies at least `e` in front of the other face, for all
 /// angles between the faces down to 30°.
@@ -118,7 +121,7 @@ struct LocalPoint {
     normal: Vec3,
 }
 
-/// All objects of a scene, and how they are placed; the two lists run in parallel.
+/// All objects of a scene and their instances, in parallel lists.
 #[derive(Debug, Default)]
 pub(super) struct PlacedShapes {
     pub shapes: Vec<Shape>,
@@ -126,7 +129,7 @@ pub(super) struct PlacedShapes {
 }
 
 impl PlacedShapes {
-    /// The point of a hit that this tree gave for this ray.
+    /// Returns the surface point of a hit that this tree reported for this ray.
     #[inline]
     pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let uv = Vec2::new(hit.u, hit.v);
@@ -159,7 +162,7 @@ impl PlacedShapes {
                 let instance = &self.instances[hit.object as usize];
                 let (center, radius) = tree.sphere(hit.prim);
                 let (position, error, normal) = sphere_point(&instance.ray(ray), hit.t, center, radius);
-                // A grazing direction that rounding tips inwards cuts off a chord of at most that angle.
+                // A grazing direction that rounding tilts inwards cuts off a chord of at most that angle.
                 let error = error + gamma(4) * instance.condition * radius;
                 instance.carry_to_world(world_from_object, LocalPoint { position, error, normal }, uv)
             }
@@ -175,20 +178,21 @@ impl PlacedShapes {
     }
 }
 
-/// What all points of a quad share.
+/// Data shared by all points of a quad.
 pub struct QuadRim {
-    /// Unit.
+    /// Unit normal.
     pub normal: Vec3,
-    /// As of [`SurfacePoint`].
+    /// Error bound, as in [`SurfacePoint`].
     pub error: Vec3,
-    /// How far points stay away from the rim, as points of triangles do: least `u` and `v`, and as far from 1.
+    /// Inset of points from the edges, as for triangles: the least `u` and `v`, and the same distance from 1.
     pub least: [f32; 2],
 }
 
-/// Normal, error bound and inset of a quad with this corner and these edges, metres; the edges must not be parallel.
+/// Returns normal, error bound and inset of a quad with this corner and these edges, metres; the edges must not be
+/// parallel.
 #[inline]
 pub fn quad_rim(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> QuadRim {
-    // The corners that are tested are rounded themselves.
+    // The tested corners are rounded themselves.
     let size = corner.abs() + edge_u.abs() + edge_v.abs();
     let middle = corner + 0.5 * edge_u + 0.5 * edge_v;
     let error = gamma(6) * size + 2.0 * test_slab(&quad_corners(corner, edge_u, edge_v), middle, 1.0);
@@ -198,15 +202,17 @@ pub fn quad_rim(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> QuadRim {
     QuadRim { normal: cross.normalize(), error, least }
 }
 
-/// Error of a point of a sphere along each axis, without the rounding of the point itself: next to the origin, where `f32` has
-/// more digits than the centre has in `f64`, those of `f64` count.
+/// Returns the error of a point of a sphere along each axis, without the rounding of the point itself. Close to the
+/// origin, where `f32` resolves more than the centre in `f64`, the precision of `f64` decides.
 #[inline]
 pub fn sphere_error(center: Vec3, radius: f32) -> f32 {
     (F64_ERROR * f64::from(center.abs().max_element() + radius)) as f32
 }
 
-/// - `condition`: growth of a relative error of the next ray's direction on its way into this space.
-/// - `rim`: what will be added to the error on the way to the world.
+/// Returns the point of a triangle with its error and normal.
+///
+/// - `condition`: growth of the relative error of the next ray's direction on its way into this space.
+/// - `rim`: addition to the error on the way to the world.
 #[inline]
 fn triangle_point(vertices: &[Vec3; 3], u: f32, v: f32, condition: f32, rim: f32) -> LocalPoint {
     let [a, b, c] = *vertices;
@@ -218,7 +224,7 @@ fn triangle_point(vertices: &[Vec3; 3], u: f32, v: f32, condition: f32, rim: f32
     };
     let (cross, doubled_area) = wide_cross(b - a, c - a);
     let (mut position, mut error) = at(u, v);
-    // The longest edge is at most four times as long as its largest component: most points are clear of the rim.
+    // The longest edge is at most four times as long as its largest component: most points are clear of the edges.
     let longest = (b - a).abs().max((c - a).abs()).max_element() * 4.0;
     let inset = INSET * (error.max_element() + rim);
     if u.min(v).min(1.0 - u - v) * doubled_area < inset * longest {
@@ -228,17 +234,18 @@ fn triangle_point(vertices: &[Vec3; 3], u: f32, v: f32, condition: f32, rim: f32
     LocalPoint { position, error, normal: cross }
 }
 
-/// The weights of vertices 1 and 2, moved so that the point is `inset` away from all edges, or as far as can be.
+/// Returns the weights of vertices 1 and 2, moved so that the point is `inset` away from all edges, or as far as
+/// possible.
 #[cold]
 fn clear_of_rim(&[a, b, c]: &[Vec3; 3], [u, v]: [f32; 2], doubled_area: f32, inset: f32) -> [f32; 2] {
-    // The weight of a vertex is the distance from the edge across over the height of the vertex above it.
+    // The weight of a vertex is the distance from the opposite edge over the height of the vertex above it.
     let least = [b.distance(c), c.distance(a), a.distance(b)].map(|edge| inset * edge / doubled_area);
     let sum: f32 = least.iter().sum();
     let weights = if sum < 1.0 {
         let kept = [1.0 - u - v, u, v].map(|weight| weight.max(0.0));
         std::array::from_fn(|k| least[k] + (1.0 - sum) * kept[k])
     } else if sum.is_finite() {
-        // Thinner than twice the inset: in the middle.
+        // Thinner than twice the inset: the point goes to the middle.
         least.map(|least| least / sum)
     } else {
         [1.0 - u - v, u, v]
@@ -246,16 +253,16 @@ fn clear_of_rim(&[a, b, c]: &[Vec3; 3], [u, v]: [f32; 2], doubled_area: f32, ins
     [weights[1], weights[2]]
 }
 
-/// Half the thickness of the slab that holds the polygon, however a test from `point` rounds it: `5u` of the
-/// distance of its vertices along each axis and `8u` of their depth along the ray, twice over.
+/// Returns half the thickness of the slab that contains the polygon under every rounding of a test from `point`: `5u`
+/// of the distance of its vertices along each axis and `8u` of their depth along the ray, twice over.
 #[inline]
 fn test_slab<const N: usize>(vertices: &[Vec3; N], point: Vec3, condition: f32) -> Vec3 {
     let reach = vertices.iter().fold(Vec3::ZERO, |reach, vertex| reach.max((*vertex - point).abs()));
     Vec3::splat((16.0 + 4.0 * condition) * UNIT_ROUNDOFF * reach.max_element())
 }
 
-/// The cross product, exact to a rounding for needles too, scaled so that it neither vanishes nor overflows; and its
-/// largest component, which is its length within a factor of √3.
+/// Returns the cross product, accurate to one rounding for needles too, scaled so that it neither underflows nor
+/// overflows; and its largest component, which is its length within a factor of √3.
 #[inline]
 fn wide_cross(a: Vec3, b: Vec3) -> (Vec3, f32) {
     let cross = a.as_dvec3().cross(b.as_dvec3());
@@ -263,10 +270,10 @@ fn wide_cross(a: Vec3, b: Vec3) -> (Vec3, f32) {
     if largest > 0.0 { ((cross / largest).as_vec3(), largest as f32) } else { (Vec3::ZERO, 0.0) }
 }
 
-/// What a few roundings in `f64` add, here and in the test of the next ray, relative to the numbers that they work on.
+/// Relative error bound of a few roundings in `f64`, here and in the test of the next ray.
 pub const F64_ERROR: f64 = 16.0 * f64::EPSILON;
 
-/// The hit projected onto the sphere, its error, and the outward normal.
+/// Returns the hit projected onto the sphere, its error, and the outward normal.
 #[inline]
 fn sphere_point(ray: &Ray, t: f32, center: Vec3, radius: f32) -> (Vec3, Vec3, Vec3) {
     let near = ray.origin.as_dvec3() + f64::from(t) * ray.dir.as_dvec3();

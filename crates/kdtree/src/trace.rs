@@ -1,9 +1,9 @@
-//! Batches of rays through a scene: which objects are tested by which traversal.
+//! Batch queries over a scene: selects the traversal for each kind of object.
 //!
-//! A handful of simple objects, and of spheres in a cloud, is tested by sixteen rays at once; many of them have trees, which rays stream through. Rays that meet the
-//! box of an instance go on through its own tree, as a packet when the caller says that they belong together, otherwise
-//! in a stream. Of many instances each ray asks for the nearest first, and rays that ask for the same one go together, round
-//! after round. None of this changes what is found.
+//! A handful of simple objects, or of spheres in a cloud, is tested by packets of sixteen rays; larger numbers have
+//! trees that are traversed by streams. Rays that enter the bounds of an instance traverse its own tree, as a packet if
+//! the batch is coherent, otherwise in a stream. With many instances each ray selects its nearest instance first, and
+//! rays that select the same one are traced group, round after round. None of this changes the results.
 
 use super::batch::{HitBatch, RayBatch};
 use super::block_tree::BlockTree;
@@ -23,27 +23,27 @@ use crate::geometry::{Aabb, Ray};
 use glam::Affine3A;
 use std::cell::RefCell;
 
-/// Rays that are taken through all objects before the next ones start.
+/// Rays that pass through all objects before the next ones start.
 const CHUNK: usize = 2048;
 
-/// The same where there are many instances, of which each may be met by few rays.
+/// Chunk size with many instances, each of which few rays may enter.
 const LARGE_CHUNK: usize = 8192;
 
-/// The objects of a scene, by how rays get to them.
+/// The objects of a scene, grouped by traversal.
 #[derive(Debug, Default)]
 pub(super) struct TopLevel {
-    /// Tested by every ray; planes are among them.
+    /// Tested by every ray; includes planes.
     pub simple: SimpleObjects,
-    /// The numbers of `simple`.
+    /// Object indices of `simple`.
     pub simple_objects: Vec<u32>,
     pub loose: PrimitiveTrees,
     pub instances: Instances,
 }
 
-/// Objects with a space of their own.
+/// Objects with their own space.
 #[derive(Debug)]
 pub(super) enum Instances {
-    /// Few enough for every ray to look at each.
+    /// Few enough that every ray tests the bounds of each.
     Few(Vec<u32>),
     Many(InstanceTree),
 }
@@ -54,14 +54,16 @@ impl Default for Instances {
     }
 }
 
-/// Clouds of at most so many spheres are tested by sixteen rays at once, sphere by ball.
-const MAX_BALLS: usize = 16;
+/// Clouds of up to this many spheres are tested by packets, sphere by sphere.
+const MAX_PACKET_SPHERES: usize = 16;
 
-/// With more instances than this a tree above them pays.
+/// With more instances than this, a tree over them pays.
 const MAX_INSTANCES: usize = 12;
 
 impl TopLevel {
-    /// - `boxes`: of all the shapes.
+    /// Groups the objects.
+    ///
+    /// - `boxes`: bounds of all shapes.
     pub fn new(shapes: &[Shape], boxes: &[Aabb]) -> Self {
         let (loose, simple_objects) = PrimitiveTrees::build(shapes, boxes);
         let is_instance = |object: &u32| matches!(shapes[*object as usize], Shape::Mesh { .. } | Shape::Spheres { .. });
@@ -98,7 +100,7 @@ impl TopLevel {
     }
 }
 
-/// Any of the trees that rays stream through.
+/// Any tree that streams traverse.
 #[derive(Clone, Copy)]
 enum StreamTree<'a> {
     Triangles(&'a BlockTree<TriangleBlock>),
@@ -106,21 +108,21 @@ enum StreamTree<'a> {
     Spheres(&'a BlockTree<SphereBlock>),
 }
 
-/// Where the answers to a batch are kept.
+/// Storage for the results of a batch.
 trait Answers {
-    /// Distance and object of the hit so far; `None` if the ray needs no other.
+    /// Distance and object of the hit so far; `None` if the ray is done.
     fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)>;
 
     fn set(&mut self, ray: usize, object: u32, prim: u32, nearest: &Nearest);
 
-    /// What a packet found for the rays from `first` on.
+    /// Stores the hits of a packet for the rays from `first` on.
     fn store<S: KernelSimd>(&mut self, s: S, packet: &Packet<S>, first: usize);
 
-    /// Packets by the instructions of `set`.
+    /// Traces packets with the instruction set `set`.
     fn packets(&mut self, set: InstructionSet, packets: &Packets);
 
-    /// [`stream`] by the instructions of `set`.
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, flight: &mut StreamState);
+    /// Traces a [`stream`] with the instruction set `set`.
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamState);
 }
 
 impl Answers for HitBatch {
@@ -146,13 +148,13 @@ impl Answers for HitBatch {
         dispatch!(set, closest_packets(packets: &Packets, answers: &mut HitBatch));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, flight: &mut StreamState) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamState) {
         let answers = self;
-        dispatch!(set, closest_stream(tree: StreamTree, rays: QueuedRays, answers: &mut HitBatch, flight: &mut StreamState));
+        dispatch!(set, closest_stream(tree: StreamTree, rays: QueuedRays, answers: &mut HitBatch, state: &mut StreamState));
     }
 }
 
-/// Whether a ray is occluded.
+/// Results of any-hit queries: whether each ray is occluded.
 impl Answers for [bool] {
     #[inline(always)]
     fn so_far(&self, ray: usize, t_max: f32) -> Option<(f32, Option<u32>)> {
@@ -176,9 +178,9 @@ impl Answers for [bool] {
         dispatch!(set, any_packets(packets: &Packets, answers: &mut [bool]));
     }
 
-    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, flight: &mut StreamState) {
+    fn stream(&mut self, set: InstructionSet, tree: StreamTree, rays: QueuedRays, state: &mut StreamState) {
         let answers = self;
-        dispatch!(set, any_stream(tree: StreamTree, rays: QueuedRays, answers: &mut [bool], flight: &mut StreamState));
+        dispatch!(set, any_stream(tree: StreamTree, rays: QueuedRays, answers: &mut [bool], state: &mut StreamState));
     }
 }
 
@@ -190,23 +192,23 @@ fn trace<A: Answers + ?Sized>(
     class: RayClass,
     answers: &mut A,
 ) {
-    ROOM.with_borrow_mut(|room| trace_in(room, set, (top, scene), (rays, class), answers));
+    SCRATCH.with_borrow_mut(|scratch| trace_in(scratch, set, (top, scene), (rays, class), answers));
 }
 
-/// What tracing a batch takes besides it, kept from one to the next.
+/// Buffers for tracing a batch, reused for the next.
 struct TraceScratch {
-    flight: StreamState,
+    state: StreamState,
     rounds: Rounds,
     all: Vec<u32>,
 }
 
 thread_local! {
-    static ROOM: RefCell<TraceScratch> =
-        RefCell::new(TraceScratch { flight: StreamState::new(), rounds: Rounds::default(), all: Vec::new() });
+    static SCRATCH: RefCell<TraceScratch> =
+        RefCell::new(TraceScratch { state: StreamState::new(), rounds: Rounds::default(), all: Vec::new() });
 }
 
 fn trace_in<A: Answers + ?Sized>(
-    TraceScratch { flight, rounds, all }: &mut TraceScratch,
+    TraceScratch { state, rounds, all }: &mut TraceScratch,
     set: InstructionSet,
     (top, scene): (&TopLevel, &PlacedShapes),
     (rays, class): (&RayBatch, RayClass),
@@ -218,7 +220,7 @@ fn trace_in<A: Answers + ?Sized>(
     };
     let goes_in_packets = |object: &u32| match &scene.shapes[*object as usize] {
         Shape::Mesh { .. } => class == RayClass::Coherent,
-        Shape::Spheres { tree, .. } => class == RayClass::Coherent || tree.len() <= MAX_BALLS,
+        Shape::Spheres { tree, .. } => class == RayClass::Coherent || tree.len() <= MAX_PACKET_SPHERES,
         _ => false,
     };
     let (in_packets, streamed): (Vec<u32>, Vec<u32>) = few.iter().partition(|object| goes_in_packets(object));
@@ -232,26 +234,26 @@ fn trace_in<A: Answers + ?Sized>(
             instance: instance.map(|i| (i, &scene.instances[i as usize])),
         };
         if let Some(tree) = &top.loose.spheres {
-            answers.stream(set, StreamTree::Spheres(tree), own(None), flight);
+            answers.stream(set, StreamTree::Spheres(tree), own(None), state);
         }
         if let Some(tree) = &top.loose.quads {
-            answers.stream(set, StreamTree::Quads(tree), own(None), flight);
+            answers.stream(set, StreamTree::Quads(tree), own(None), state);
         }
         if let Some(tree) = &top.loose.triangles {
-            answers.stream(set, StreamTree::Triangles(tree), own(None), flight);
+            answers.stream(set, StreamTree::Triangles(tree), own(None), state);
         }
         for &object in &streamed {
             if let Some(tree) = tree_of(scene, object) {
-                answers.stream(set, tree, own(Some(object)), flight);
+                answers.stream(set, tree, own(Some(object)), state);
             }
         }
         if let Instances::Many(tree) = &top.instances {
-            rounds.trace(set, tree, scene, rays, answers, queue, flight);
+            rounds.trace(set, tree, scene, rays, answers, queue, state);
         }
     }
 }
 
-/// `None` for an object without a tree.
+/// Returns the tree of an object; `None` for an object without one.
 fn tree_of(scene: &PlacedShapes, object: u32) -> Option<StreamTree<'_>> {
     match &scene.shapes[object as usize] {
         Shape::Mesh { tree, .. } => Some(StreamTree::Triangles(&tree.tree)),
@@ -260,14 +262,14 @@ fn tree_of(scene: &PlacedShapes, object: u32) -> Option<StreamTree<'_>> {
     }
 }
 
-/// What rays are taken through sixteen at a time.
+/// Input of packet traversal.
 struct Packets<'a> {
     simple: &'a SimpleObjects,
     /// Meshes and small clouds of spheres.
     instances: &'a [u32],
     scene: &'a PlacedShapes,
     rays: &'a RayBatch,
-    /// Rays in a row.
+    /// Indices of consecutive rays.
     queue: &'a [u32],
 }
 
@@ -294,7 +296,7 @@ fn trace_packets<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(s: S, pack
                 Shape::Mesh { tree, .. } => {
                     trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
                 }
-                Shape::Spheres { tree, .. } if tree.len() > MAX_BALLS => {
+                Shape::Spheres { tree, .. } if tree.len() > MAX_PACKET_SPHERES => {
                     trace_packet::<S, _, ANY>(s, &tree.tree, instance, object, &mut packet, &mut stack);
                 }
                 Shape::Spheres { tree, .. } => {
@@ -308,7 +310,7 @@ fn trace_packets<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(s: S, pack
     }
 }
 
-/// Takes a packet through one mesh or cloud of spheres.
+/// Traces a packet through one mesh or cloud of spheres.
 #[inline(always)]
 fn trace_packet<S: KernelSimd, B: PacketBlock, const ANY: bool>(
     s: S,
@@ -346,14 +348,14 @@ fn closest_stream<S: KernelSimd>(
     tree: StreamTree,
     rays: QueuedRays,
     answers: &mut HitBatch,
-    flight: &mut StreamState,
+    state: &mut StreamState,
 ) {
-    run_stream::<S, HitBatch, false>(s, tree, rays, answers, flight);
+    run_stream::<S, HitBatch, false>(s, tree, rays, answers, state);
 }
 
 #[inline(always)]
-fn any_stream<S: KernelSimd>(s: S, tree: StreamTree, rays: QueuedRays, answers: &mut [bool], flight: &mut StreamState) {
-    run_stream::<S, [bool], true>(s, tree, rays, answers, flight);
+fn any_stream<S: KernelSimd>(s: S, tree: StreamTree, rays: QueuedRays, answers: &mut [bool], state: &mut StreamState) {
+    run_stream::<S, [bool], true>(s, tree, rays, answers, state);
 }
 
 #[inline(always)]
@@ -362,22 +364,22 @@ fn run_stream<S: KernelSimd, A: Answers + ?Sized, const ANY: bool>(
     tree: StreamTree,
     rays: QueuedRays,
     answers: &mut A,
-    flight: &mut StreamState,
+    state: &mut StreamState,
 ) {
     let mut source = Queue { rays, answers };
     match tree {
-        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, flight),
-        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, flight),
-        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, flight),
+        StreamTree::Triangles(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, state),
+        StreamTree::Quads(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, state),
+        StreamTree::Spheres(tree) => stream::run::<S, _, ANY>(s, tree, &mut source, state),
     }
 }
 
-/// Rays of a batch on their way through one tree.
+/// Rays of a batch queued for one tree.
 #[derive(Clone, Copy)]
 struct QueuedRays<'a> {
     rays: &'a RayBatch,
     queue: &'a [u32],
-    /// Whose tree it is; without one, the tree's primitives are themselves the objects.
+    /// The instance of the tree; `None` if the tree's primitives are themselves the objects.
     instance: Option<(u32, &'a Instance)>,
 }
 
@@ -424,33 +426,33 @@ impl<A: Answers + ?Sized> Source for Queue<'_, A> {
     }
 }
 
-/// Each ray looks at the instances along its way, front to back. In every round it enters the next one, together with all
-/// other rays that want the same.
+/// Traversal of many instances: each ray visits the instances along its way, front to back. In every round it enters
+/// its next instance, together with all other rays that select the same one.
 #[derive(Default)]
 struct Rounds {
     /// Of all rays.
     entries: Vec<Entry>,
     pending: Vec<Pending>,
-    /// Instance and ray of this round.
-    wishes: Vec<(u32, u32)>,
-    together: Vec<u32>,
+    /// Selected instance and ray, in this round.
+    requests: Vec<(u32, u32)>,
+    group: Vec<u32>,
 }
 
-/// A ray on its way from instance to instance.
+/// A ray between instances.
 struct Pending {
     ray: u32,
-    /// Entries that are left of those found.
+    /// Range of its entries that are still to be visited.
     left: std::ops::Range<usize>,
-    /// From where others may follow.
+    /// The `t` from which further entries may follow.
     from: f32,
     recent: Recent,
 }
 
 impl Pending {
-    /// The next instance to enter; `None` if none can matter.
+    /// Returns the next instance to enter; `None` if no further one can matter.
     fn next(&mut self, tree: &InstanceTree, ray: &Ray, t: f32, entries: &mut Vec<Entry>) -> Option<u32> {
         loop {
-            // Beyond one that is too far lie only others that are.
+            // Entries are sorted: if one is too far, all later ones are.
             if let Some(entry) = self.left.next().map(|entry| entries[entry])
                 && entry.t <= t
             {
@@ -476,33 +478,33 @@ impl Rounds {
         rays: &RayBatch,
         answers: &mut A,
         queue: &[u32],
-        flight: &mut StreamState,
+        state: &mut StreamState,
     ) {
         self.entries.clear();
         self.pending.clear();
         let start = |&ray: &u32| Pending { ray, left: 0..0, from: 0.0, recent: Recent::default() };
         self.pending.extend(queue.iter().map(start));
         loop {
-            self.wishes.clear();
-            let (entries, wishes) = (&mut self.entries, &mut self.wishes);
+            self.requests.clear();
+            let (entries, requests) = (&mut self.entries, &mut self.requests);
             self.pending.retain_mut(|pending| {
                 let ray = rays.get(pending.ray as usize);
                 let so_far = answers.so_far(pending.ray as usize, ray.t_max);
                 let next = so_far.and_then(|(t, _)| pending.next(tree, &ray, t, entries));
-                wishes.extend(next.map(|object| (object, pending.ray)));
+                requests.extend(next.map(|object| (object, pending.ray)));
                 next.is_some()
             });
-            if self.wishes.is_empty() {
+            if self.requests.is_empty() {
                 break;
             }
-            self.wishes.sort_unstable();
-            for wish in self.wishes.chunk_by(|a, b| a.0 == b.0) {
-                self.together.clear();
-                self.together.extend(wish.iter().map(|&(_, ray)| ray));
+            self.requests.sort_unstable();
+            for wish in self.requests.chunk_by(|a, b| a.0 == b.0) {
+                self.group.clear();
+                self.group.extend(wish.iter().map(|&(_, ray)| ray));
                 let object = wish[0].0;
                 let instance = Some((object, &scene.instances[object as usize]));
                 if let Some(tree) = tree_of(scene, object) {
-                    answers.stream(set, tree, QueuedRays { rays, queue: &self.together, instance }, flight);
+                    answers.stream(set, tree, QueuedRays { rays, queue: &self.group, instance }, state);
                 }
             }
         }

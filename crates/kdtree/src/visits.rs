@@ -1,11 +1,11 @@
-//! What one ray costs, counted.
+//! Counts of traversal steps of one ray.
 
-/// What one ray looked at in one tree.
+/// Steps of one ray in one tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Visits {
     /// Nodes with two children.
     pub inner: usize,
-    /// Leaves with something in them.
+    /// Leaves with at least one primitive.
     pub leaves: usize,
     /// Blocks of primitives in these leaves.
     pub blocks: usize,

@@ -9,7 +9,7 @@ pub struct Aabb {
     pub max: Vec3,
 }
 
-/// Empty.
+/// The empty box.
 impl Default for Aabb {
     fn default() -> Self {
         Self::EMPTY
@@ -17,7 +17,7 @@ impl Default for Aabb {
 }
 
 impl Aabb {
-    /// The box without any point.
+    /// The box that contains no point.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// The smallest box around the points; empty if there are none.
@@ -30,22 +30,22 @@ impl Aabb {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
-    /// The smallest box around both.
+    /// The smallest box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// The points that lie in both; empty if there are none.
+    /// The box of the points that lie in both boxes; empty if there are none.
     pub fn intersection(self, other: Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
-    /// Whether no point lies in it.
+    /// Whether the box contains no point.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// Length of its sides along the axes; negative along an axis where it is empty.
+    /// Side lengths along the axes; negative along an axis where the box is empty.
     pub fn size(&self) -> Vec3 {
         self.max - self.min
     }
@@ -72,7 +72,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn point() -> impl Strategy<Value = Vec3> {
-        // Whole numbers share faces, the others do not.
+        // Integer coordinates make boxes share faces; the others do not.
         let whole = (-3i8..=3, -3i8..=3, -3i8..=3).prop_map(|(x, y, z)| vec3(x.into(), y.into(), z.into()));
         let any = (-1e3f32..1e3, -1e-3f32..1e-3, -1e6f32..1e6).prop_map(|(x, y, z)| vec3(x, y, z));
         prop_oneof![whole, any]

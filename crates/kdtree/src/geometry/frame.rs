@@ -13,20 +13,20 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// See [`frame_around`].
+    /// Builds the frame around a normal; see [`frame_around`].
     #[inline]
     pub fn around(normal: Vec3) -> Self {
         let [x, y, z] = frame_around(normal.into()).map(Vec3::from);
         Self { x, y, z }
     }
 
-    /// A vector given by its coordinates in the frame, in the coordinates that the axes are given in.
+    /// Converts a vector from frame coordinates to the coordinates in which the axes are given.
     #[inline]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         local.x * self.x + local.y * self.y + local.z * self.z
     }
 
-    /// Coordinates of a vector in the frame.
+    /// Converts a vector to frame coordinates.
     #[inline]
     pub fn to_local(&self, world: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(world), self.y.dot(world), self.z.dot(world))
@@ -45,7 +45,7 @@ mod tests {
         fn frames_are_orthonormal_right_handed_and_turn_back(
             n in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0), tiny in -9i32..1, v in (-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0),
         ) {
-            // Also right next to the axis, where the construction changes sign.
+            // Also close to the axis where the construction changes sign.
             let (n, v) = (Vec3::from(n), Vec3::from(v));
             let normal = (n * Vec3::new(10f32.powi(tiny), 10f32.powi(tiny), 1.0)).normalize_or(Vec3::NEG_Z);
             let Frame { x, y, z } = Frame::around(normal);

@@ -1,4 +1,4 @@
-//! Rays, boxes and the arithmetic that keeps them honest. Knows no trees, materials or entities.
+//! Rays, boxes, shapes, and robust intersection arithmetic. Knows no trees, materials or entities.
 
 mod aabb;
 mod frame;

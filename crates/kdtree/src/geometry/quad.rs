@@ -1,12 +1,12 @@
-//! Watertight ray test of parallelograms: two triangles that share a diagonal.
+//! Watertight ray-parallelogram test: two triangles that share a diagonal.
 //!
-//! A direct solution for `u` and `v` would be cheaper, but seen edge-on its depth would no longer be that of a point
-//! near the ray, which the kd-tree relies on (see [`super::Shear`]).
+//! A direct solution for `u` and `v` would be cheaper, but close to edge-on its depth is not that of a point near the
+//! ray, on which the kd-tree relies (see [`super::Shear`]).
 
 use super::triangle::{Shear, TriangleHit, intersect_triangle};
 use glam::Vec3;
 
-/// The four corners in order around the parallelogram: `u v` = 00, 10, 11, 01.
+/// Returns the four corners in order around the parallelogram: `u v` = 00, 10, 11, 01.
 ///
 /// Quads that meet at an edge are watertight when these rounded corners are equal.
 #[inline]
@@ -14,10 +14,11 @@ pub fn quad_corners(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> [Vec3; 4] {
     [corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v]
 }
 
-/// The hit of the line `origin + t · dir`, from either side, with any sign of `t`; `u` and `v` in 0..1 along the edges.
+/// Intersects the line `origin + t · dir` with a quad, from either side, with any sign of `t`; `u` and `v` are in 0..1
+/// along the edges.
 #[inline]
 pub fn intersect_quad(origin: Vec3, shear: &Shear, &[a, b, c, d]: &[Vec3; 4]) -> Option<TriangleHit> {
-    // Weights of the corners 10 and 11, or of 11 and 01, become coordinates.
+    // The weights of the corners 10 and 11, or of 11 and 01, are combined into coordinates.
     let first =
         || intersect_triangle(origin, shear, &[a, b, c]).map(|hit| TriangleHit { u: (hit.u + hit.v).min(1.0), ..hit });
     let second =
@@ -45,7 +46,7 @@ mod tests {
             prop_assume!(eu.cross(ev).length() > 0.1 && (eu.cross(ev).dot(corner - o)).abs() > 0.1);
             let dir = corner + u * eu + v * ev - o;
             let hit = intersect_quad(o, &Shear::new(dir), &quad_corners(corner, eu, ev));
-            // Aimed at the rim, rounding may decide either way.
+            // At the boundary, rounding may decide either way.
             prop_assume!(u.min(v).min(1.0 - u).min(1.0 - v) > 1e-4);
             let hit = hit.expect("aimed at the inside");
             let [u64, v64, t64] = [hit.u, hit.v, hit.t].map(f64::from);

@@ -5,16 +5,16 @@ use glam::Vec3;
 /// `t` counts lengths of `dir`; the integrator always passes unit directions, so there `t` is in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where the ray starts, metres.
+    /// Start of the ray, metres.
     pub origin: Vec3,
-    /// Where the ray goes; any length but 0.
+    /// Direction of the ray; any length but 0.
     pub dir: Vec3,
-    /// Excluded; `f32::INFINITY` for a ray without an end.
+    /// End of the ray, excluded; `f32::INFINITY` for an unbounded ray.
     pub t_max: f32,
 }
 
 impl Ray {
-    /// A ray without an end.
+    /// Creates an unbounded ray.
     pub fn new(origin: Vec3, dir: Vec3) -> Self {
         Self { origin, dir, t_max: f32::INFINITY }
     }

@@ -1,8 +1,8 @@
-//! Bounded rounding error and the offset of ray origins that follows from it.
+//! Bounds on rounding errors, and the offset of ray origins that follows from them.
 //!
-//! No epsilon in the renderer is tuned: each hit brings a bound on the error of its position, and a ray that
-//! leaves the hit starts beyond that bound along the geometric normal (Pharr, Jakob and Humphreys,
-//! "Physically Based Rendering", 4th edition, section 6.8).
+//! No epsilon in the renderer is tuned: each hit comes with a bound on the error of its position, and a ray that leaves
+//! the hit starts beyond that bound along the geometric normal (Pharr, Jakob and Humphreys, "Physically Based
+//! Rendering", 4th edition, section 6.8).
 
 use firstlight_simd::{Real, Vector3, select};
 use glam::Vec3;
@@ -17,9 +17,9 @@ pub const fn gamma(n: u32) -> f32 {
     n / (1.0 - n)
 }
 
-/// `a · b - c · d` within 1.5 units in the last place of the *difference*, however much of it cancels.
+/// Computes `a · b - c · d` within 1.5 units in the last place of the *difference*, however much of it cancels.
 ///
-/// Always by fused multiply-add, so that every instruction set gives the same bits.
+/// Always uses fused multiply-add, so that every instruction set gives the same bits.
 /// Source: Kahan's algorithm; Jeannerod, Louvet and Muller 2013 prove the bound (for results clear of underflow).
 #[inline]
 pub fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
@@ -28,7 +28,7 @@ pub fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
     f32::mul_add(a, b, -cd) + rounding
 }
 
-/// Moves `point` off its surface so that no ray towards `dir` can meet that surface again.
+/// Moves `point` off its surface so that a ray towards `dir` cannot hit that surface again.
 ///
 /// - `error`: bound on the absolute error of `point`, metres per axis.
 /// - `geometric_normal`: unit, either orientation.
@@ -41,7 +41,7 @@ pub fn offset_ray_origin(point: Vec3, error: Vec3, geometric_normal: Vec3, dir: 
     offset_along(point.into(), distance, outwards.into()).into()
 }
 
-/// Moves `point` off its surface to the side of `normal`, farther than it is known to be from the surface.
+/// Moves `point` off its surface to the side of `normal`, farther than its error bound.
 ///
 /// - `distance`: bound on the error of `point` along `normal`, metres.
 /// - `normal`: unit, the geometric normal or its opposite.
@@ -52,14 +52,15 @@ pub fn offset_along<R: Real>(point: Vector3<R>, distance: R, normal: Vector3<R>)
     Vector3 { x: rounded_away(sum.x, offset.x), y: rounded_away(sum.y, offset.y), z: rounded_away(sum.z, offset.z) }
 }
 
-/// The addition rounds by half a unit in the last place at most: a whole one, away from the surface, makes up for it.
+/// Rounds away from the surface. The addition rounds by at most half a unit in the last place; adding a whole unit
+/// compensates.
 #[inline(always)]
 fn rounded_away<R: Real>(sum: R, offset: R) -> R {
     let away = sum + (sum.abs() * (2.0 * UNIT_ROUNDOFF)).copysign(offset);
     select(offset.is_zero(), sum, away)
 }
 
-/// Property tests that draw the same cases on every run.
+/// Property-test configuration that generates the same cases on every run.
 #[cfg(test)]
 pub(crate) fn fixed_cases(cases: u32) -> proptest::test_runner::Config {
     let rng_seed = proptest::test_runner::RngSeed::Fixed(0x5EED);

@@ -1,11 +1,11 @@
-//! Ray tests of spheres and planes.
+//! Ray tests against spheres and planes.
 //!
-//! Both run in `f64`: the inputs are `f32`, so differences and products of coordinates are exact or nearly so, and
-//! neither a sphere of 10 km seen from 1 m nor a sphere of 1 mm seen from 10 km loses its digits.
+//! Both run in `f64`: the inputs are `f32`, so differences and products of coordinates are exact or nearly so. Neither
+//! a sphere of 10 km seen from 1 m nor a sphere of 1 mm seen from 10 km loses precision.
 
 use glam::{DVec3, Vec3};
 
-/// The two crossings of the line with the sphere, nearer first, rounded once; `None` if it passes by.
+/// Returns the two intersections of the line with the sphere, nearer first, each rounded once; `None` for a miss.
 ///
 /// The square of the half chord comes from the perpendicular, not from `b² - 4ac`, which cancels for small spheres
 /// far away (Haines, Günther and Akenine-Möller 2019, "Precision Improvements for Ray/Sphere Intersection").
@@ -31,13 +31,13 @@ pub fn intersect_sphere(
     Some(((t_middle - half_chord) as f32, (t_middle + half_chord) as f32))
 }
 
-/// The order of the sums is part of the promise that every implementation gives the same bits.
+/// The dot product with a fixed order of sums, so that every implementation gives the same bits.
 #[inline]
 pub(crate) fn dot(a: DVec3, b: DVec3) -> f64 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// Where the line crosses the plane, infinite or NaN if it runs along it.
+/// Returns where the line crosses the plane; infinite or NaN if the line is parallel to it.
 #[inline]
 pub fn intersect_plane(origin: DVec3, dir: DVec3, point: Vec3, normal: Vec3) -> f32 {
     let normal = normal.as_dvec3();
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn huge_sphere_from_close_by() {
-        // A planet of 10 km under an camera 1 m above it: f32 arithmetic would be off by millimetres to metres.
+        // A planet of 10 km radius below a camera 1 m above it: f32 arithmetic would be off by millimetres to metres.
         let (near, far) = hits(vec3(0.0, 1.0, 0.0), -Vec3::Y, vec3(0.0, -1e4, 0.0), 1e4).unwrap();
         assert_eq!((near, far), (1.0, 20001.0));
     }
@@ -111,7 +111,7 @@ mod tests {
         let dir = center.normalize();
         let (near, far) = hits(Vec3::ZERO, dir, center, 0.25).unwrap();
         let distance = center.as_dvec3().length() as f32;
-        // Aimed with an f32 direction, the ray passes the centre within a millimetre or so.
+        // The direction is rounded to f32, so the ray passes the centre within about a millimetre.
         assert!((near - (distance - 0.25)).abs() <= 2.0 * 0.00390625 && far > near, "{near} {far}");
         assert_eq!(hits(vec3(0.0, 0.2500001, -1e6), Vec3::Z, Vec3::ZERO, 0.25), None);
         assert!(hits(vec3(0.0, 0.2499999, -1e6), Vec3::Z, Vec3::ZERO, 0.25).is_some());

@@ -1,14 +1,13 @@
 //! Watertight ray-triangle test: a ray that crosses a closed mesh cannot slip through an edge or a vertex.
 //!
-//! The triangle is moved to the ray's origin and sheared so that the ray runs along +z; what is left are three edge
-//! functions in the plane. Each vertex lands on a rounded point that depends on the ray and the vertex alone, and the
-//! *signs* of the edge functions over these points are exact. So both triangles at an edge agree about the side
-//! on which the ray passes, however thin they are (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle
-//! Intersection").
+//! The triangle is translated to the ray's origin and sheared so that the ray runs along +z; three edge functions in
+//! the plane remain. Each vertex is rounded to a point that depends on the ray and the vertex alone, and the *signs* of
+//! the edge functions over these points are exact. So both triangles at an edge agree about the side on which the ray
+//! passes, however thin they are (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection").
 //!
-//! The *values* are exact to a few roundings as well (Kahan's difference of products), so `t` is the depth of a true point of
-//! the rounded triangle, not a quotient of two cancelled sums. The kd-tree builds on that: every tree over the same
-//! triangles, and trying all of them, finds the same bits (see `kdtree::ray`).
+//! The *values* are accurate to a few roundings as well (Kahan's difference of products), so `t` is the depth of a true
+//! point of the rounded triangle, not a quotient of two cancelled sums. The kd-tree relies on that: every tree over the
+//! same triangles, and brute force over them, finds the same bits (see `kdtree::ray`).
 //!
 //! Start reading at [`intersect_triangle`].
 
@@ -33,21 +32,23 @@ pub struct Shear {
 }
 
 impl Shear {
+    /// Prepares the test for a direction.
+    ///
     /// - `dir`: any length but 0.
     #[inline]
     pub fn new(dir: Vec3) -> Self {
         let size = dir.abs();
-        // On ties the first axis: the choice must be the same in every implementation.
+        // Ties go to the first axis: every implementation must make the same choice.
         let kz = if size.x >= size.y && size.x >= size.z { 0 } else { 2 - usize::from(size.y >= size.z) };
         let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
         Self { kz, kx, ky, sx: dir[kx] / dir[kz], sy: dir[ky] / dir[kz], sz: 1.0 / dir[kz] }
     }
 }
 
-/// Where a ray meets a triangle: `t` in lengths of the direction, `u` and `v` the weights of vertices 1 and 2.
+/// Intersection of a ray with a triangle: `t` in lengths of the direction, `u` and `v` the weights of vertices 1 and 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleHit {
-    /// Lengths of the direction from the origin, of either sign.
+    /// Distance from the origin in lengths of the direction, of either sign.
     pub t: f32,
     /// Barycentric weight of vertex 1.
     pub u: f32,
@@ -55,10 +56,10 @@ pub struct TriangleHit {
     pub v: f32,
 }
 
-/// Below this an edge function has lost bits to underflow, and the test is done again in `f64`.
+/// Threshold below which an edge function has lost bits to underflow and the test is repeated in `f64`.
 pub const TINY_EDGE: f32 = f32::MIN_POSITIVE * (1u64 << 60) as f32;
 
-/// The hit of the line `origin + t · dir`, from either side, with any sign of `t`.
+/// Intersects the line `origin + t · dir` with a triangle, from either side, with any sign of `t`.
 ///
 /// A triangle without area is never hit, nor is one seen exactly edge-on.
 #[inline]
@@ -69,7 +70,7 @@ pub fn intersect_triangle(origin: Vec3, shear: &Shear, vertices: &[Vec3; 3]) -> 
     let (bx, by) = (b[kx] - sx * b[kz], b[ky] - sy * b[kz]);
     let (cx, cy) = (c[kx] - sx * c[kz], c[ky] - sy * c[kz]);
 
-    // Rounding is monotone, so a plain difference never has the wrong sign; it can only be 0 by mistake.
+    // Rounding is monotonic, so a plain difference never has the wrong sign; it can only be 0 by mistake.
     if mixed_signs(cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax) {
         return None;
     }
@@ -88,7 +89,7 @@ pub fn intersect_triangle(origin: Vec3, shear: &Shear, vertices: &[Vec3; 3]) -> 
     let inv = 1.0 / (e0 + e1 + e2);
     let (w, u, v) = (e0 * inv, e1 * inv, e2 * inv);
     let t = (w * a[kz] + u * b[kz] + v * c[kz]) * sz;
-    // A vanishing area makes `inv` infinite and `t` NaN or infinite.
+    // An area of zero makes `inv` infinite and `t` NaN or infinite.
     t.is_finite().then_some(TriangleHit { t, u, v })
 }
 
@@ -105,7 +106,7 @@ pub fn tiny_edges([[ax, ay], [bx, by], [cx, cy]]: [[f32; 2]; 3]) -> Option<[f32;
     let edges = [edge(cx, by, cy, bx), edge(ax, cy, ay, cx), edge(bx, ay, by, ax)];
     let largest = edges.iter().fold(0.0, |largest: f64, edge| largest.max(edge.abs()));
     let mixed = edges.iter().any(|&edge| edge < 0.0) && edges.iter().any(|&edge| edge > 0.0);
-    // Only the ratios count from here on.
+    // Only the ratios are used from here on.
     (!mixed && largest > 0.0).then(|| edges.map(|edge| (edge / largest) as f32))
 }
 
@@ -116,13 +117,13 @@ mod tests {
     use proptest::prelude::*;
 
     fn point() -> impl Strategy<Value = Vec3> {
-        // Small whole numbers meet edges, vertices and planes; the others meet everything else.
+        // Small integers hit edges, vertices and planes; the others cover the general case.
         let whole = (-3i8..=3, -3i8..=3, -3i8..=3).prop_map(|(x, y, z)| vec3(x.into(), y.into(), z.into()));
         let any = (-3.0f32..3.0, -3.0f32..3.0, -3.0f32..3.0).prop_map(|(x, y, z)| vec3(x, y, z));
         prop_oneof![whole, any]
     }
 
-    /// Distance from the line to the point of the triangle that the hit names.
+    /// Distance from the line to the point of the triangle given by the hit's coordinates.
     fn distance_from_line(origin: Vec3, dir: Vec3, vertices: &[Vec3; 3], hit: TriangleHit) -> f64 {
         let [a, b, c] = vertices.map(Vec3::as_dvec3);
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
