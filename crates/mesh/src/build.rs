@@ -1,20 +1,20 @@
-//! From numbers of any origin to a mesh that the rest of the program can trust.
+//! Checked construction of meshes from positions and indices of any origin.
 
 use super::Mesh;
 use glam::{DVec3, Vec3};
 
-/// Why numbers are not a mesh. Indices count from 0.
+/// Reasons why data are not a valid mesh. Indices count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// The list of triangles is empty.
     #[error("the mesh has no triangles")]
     NoTriangles,
-    /// A triangle names a vertex that does not exist.
+    /// A triangle refers to a vertex that does not exist.
     #[error("triangle {triangle} uses vertex {index}, but there are {count}")]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
-        /// Index of the vertex that it names.
+        /// The index that it refers to.
         index: u32,
         /// Number of vertices.
         count: usize,
@@ -25,13 +25,13 @@ pub enum MeshError {
         /// Index of the vertex; 0 for the centre.
         vertex: usize,
     },
-    /// Squared lengths or areas of the mesh's box overflow `f32`.
+    /// Squared lengths or areas of the mesh's bounds overflow `f32`.
     #[error("the mesh is {size:e} across, more than single precision can hold")]
     TooLarge {
-        /// Longest side of the box, metres.
+        /// Longest side of the bounds, metres.
         size: f64,
     },
-    /// There are more vertices than a `u32` can number.
+    /// There are more vertices than a `u32` can index.
     #[error("the mesh has {count} vertices, more than 32-bit indices can name")]
     TooManyVertices {
         /// Number of vertices.
@@ -61,7 +61,7 @@ pub enum MeshError {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// A list that is not empty has another length than it must have.
+    /// A list that is not empty has the wrong length.
     #[error("there are {found} {what}, but {expected} were expected")]
     WrongCount {
         /// Name of the list: normals, texture coordinates or material slots.
@@ -74,9 +74,10 @@ pub enum MeshError {
 }
 
 impl Mesh {
-    /// Stores positions given in file coordinates about the centre of their box, and checks everything.
+    /// Creates a mesh from positions in file coordinates, stored relative to the centre of their bounds, and validates
+    /// it.
     ///
-    /// A position is off by at most 2⁻²⁴ of the box's half size, wherever the box lies.
+    /// The error of a position is at most 2⁻²⁴ of half the size of the bounds, wherever the bounds lie.
     ///
     /// # Errors
     /// As [`Self::validate`].
@@ -86,7 +87,7 @@ impl Mesh {
         }
         let min = positions.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let max = positions.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-        // Halved before the sum: the sum of two huge coordinates may overflow.
+        // Halved before adding: the sum of two huge coordinates may overflow.
         let center = if positions.is_empty() { DVec3::ZERO } else { 0.5 * min + 0.5 * max };
         let mesh = Self {
             positions: positions.iter().map(|p| (p - center).as_vec3()).collect(),
@@ -98,11 +99,11 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Checks all that the rest of the program relies on: indices in range, finite positions whose box has a finite size
-    /// and area in `f32`, unit normals, finite texture coordinates, list lengths.
+    /// Checks everything that the rest of the program relies on: indices in range, finite positions whose bounds have a
+    /// finite size and area in `f32`, unit normals, finite texture coordinates, list lengths.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first violation found.
     pub fn validate(&self) -> Result<(), MeshError> {
         let count = self.positions.len();
         if u32::try_from(count).is_err() {
@@ -125,7 +126,7 @@ impl Mesh {
         let min = self.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
         let max = self.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
         let size = (max - min).max_element();
-        // Squared lengths and areas of the box must stay finite in single precision.
+        // Squared lengths and areas of the bounds must stay finite in single precision.
         let square = 16.0 * size * size;
         if square.is_nan() || square > f64::from(f32::MAX) {
             return Err(MeshError::TooLarge { size });

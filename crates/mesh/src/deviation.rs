@@ -1,7 +1,7 @@
-//! How far two surfaces are apart, measured.
+//! Measured distance between two surfaces.
 //!
-//! Points spread evenly over one surface look for the nearest point of the other, both ways. The points depend on
-//! the mesh alone and sums have a fixed order, so that the figures repeat to the bit.
+//! Points spread evenly over one surface search for the nearest point of the other, in both directions. The points
+//! depend on the mesh alone and sums have a fixed order, so results are reproducible bit for bit.
 
 mod nearest;
 
@@ -17,11 +17,11 @@ pub struct Distances {
     pub mean: f64,
     /// Root mean square over the sample points.
     pub rms: f64,
-    /// Largest distance of a sample point or a used vertex.
+    /// Largest distance of a sample point or a referenced vertex.
     pub max: f64,
 }
 
-/// Both directions between two surfaces.
+/// Distances between two surfaces in both directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
     /// From the first surface to the second.
@@ -31,7 +31,8 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Measures with `samples` points spread over the area of each surface, and every used vertex for the maxima.
+    /// Measures the distances from `samples` points spread over the area of each surface; the maxima include every
+    /// referenced vertex.
     ///
     /// Triangles without area count through their vertices only.
     pub fn between(first: &Mesh, second: &Mesh, samples: usize) -> Self {
@@ -45,7 +46,7 @@ impl Deviation {
         }
     }
 
-    /// The Hausdorff distance, as far as the samples show it.
+    /// The Hausdorff distance, as estimated by the samples.
     pub fn max(&self) -> f64 {
         self.forward.max.max(self.backward.max)
     }
@@ -61,7 +62,7 @@ impl Deviation {
     }
 }
 
-/// Points a task: neighbours along the surface, so that each one's answer bounds the next one's search.
+/// Points per task. They are neighbours along the surface, so the result of each bounds the search of the next.
 const CHUNK: usize = 2048;
 
 fn distances(from: &Mesh, offset: DVec3, to: &NearestTree, samples: usize) -> Distances {
@@ -98,7 +99,7 @@ fn distances(from: &Mesh, offset: DVec3, to: &NearestTree, samples: usize) -> Di
     Distances { mean: sum / count, rms: (squares / count).sqrt(), max: max.sqrt() }
 }
 
-/// `samples` points, each standing for an equal share of the area, in the order of the triangles.
+/// Returns `samples` points, each representing an equal share of the area, in the order of the triangles.
 fn spread_points(mesh: &Mesh, offset: DVec3, samples: usize) -> Vec<DVec3> {
     let mut up_to = 0.0;
     let sums: Vec<f64> = (0..mesh.triangles.len())
@@ -146,7 +147,7 @@ mod tests {
             assert!((found.mean - 0.25).abs() < 1e-12 && (found.rms - 0.25).abs() < 1e-12);
             assert!((found.max - 0.25).abs() < 1e-12);
         }
-        // Points on a face are known to rounding, and so is their distance to it.
+        // Points on a face are rounded, and so is their distance to it.
         assert!(Deviation::between(&plate, &plate, 1000).max() < 1e-12);
     }
 

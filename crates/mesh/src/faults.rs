@@ -1,27 +1,29 @@
-//! Triangles that add nothing to a surface, counted once for everyone who tells of them.
+//! Counts of triangles that add nothing to a surface; the single definition for all reports.
 
 use super::{Mesh, Welding};
 
-/// Triangles of each kind; no triangle is of two.
+/// Numbers of faulty triangles by kind; the kinds are disjoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Faults {
-    /// Two corners at one place.
+    /// Triangles with two corners at one position.
     pub collapsed: usize,
-    /// On the same three different places as an earlier triangle, whichever way they face.
+    /// Triangles on the same three distinct positions as an earlier one, of either orientation.
     pub duplicates: usize,
-    /// On three different places along one line, and no duplicates.
+    /// Triangles whose three distinct positions are collinear, except duplicates.
     pub flat: usize,
 }
 
 impl Faults {
-    /// Takes the time of a sort.
+    /// Counts the faults of a mesh in the time of a sort.
     pub fn of(mesh: &Mesh) -> Self {
         let welding = Welding::of(&mesh.positions);
         let places: Vec<[u32; 3]> = mesh.triangles.iter().map(|&triangle| welding.places(triangle)).collect();
         Self::in_places(mesh, &places)
     }
 
-    /// - `places`: of each triangle's corners.
+    /// Counts faults.
+    ///
+    /// - `places`: welded position indices of each triangle's corners.
     pub(super) fn in_places(mesh: &Mesh, places: &[[u32; 3]]) -> Self {
         let mut keys: Vec<([u32; 3], u32)> = (places.iter().zip(0..))
             .filter(|(corners, _)| distinct(corners))
@@ -42,7 +44,7 @@ impl Faults {
         Self { collapsed, duplicates: keys.len() - n_firsts, flat }
     }
 
-    /// A sentence for each kind that is there.
+    /// Returns a sentence for each kind that occurs.
     pub fn sentences(&self) -> impl Iterator<Item = String> {
         [
             (self.collapsed, "have two corners at one place"),
@@ -66,7 +68,7 @@ mod tests {
 
     #[test]
     fn each_faulty_triangle_is_counted_once() {
-        // Vertex 3 is at the place of vertex 0, vertex 4 on a line with 0 and 1.
+        // Vertex 3 is at the position of vertex 0, vertex 4 on a line with 0 and 1.
         let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::ZERO, dvec3(2.0, 0.0, 0.0), DVec3::Z];
         let triangles =
             vec![[0, 1, 2], [0, 1, 2], [2, 1, 3], [0, 0, 1], [0, 3, 1], [3, 0, 1], [0, 1, 4], [4, 1, 3], [0, 1, 5]];

@@ -1,7 +1,7 @@
 //! Triangle meshes: data, normals, procedural shapes, simplification. Knows no trees, files or entities.
 //!
-//! A [`Mesh`] comes from [`Mesh::from_f64`] (an importer), from [`procedural`], or from another mesh; each gives
-//! only meshes that pass [`Mesh::validate`]. Start reading at [`Mesh`].
+//! A [`Mesh`] comes from [`Mesh::from_f64`] (an importer), from [`procedural`], or from another mesh; all of them
+//! produce only meshes that pass [`Mesh::validate`]. Start reading at [`Mesh`].
 
 mod build;
 mod deviation;
@@ -23,28 +23,28 @@ pub use weld::Welding;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-/// An indexed triangle mesh in a space of its own, stored about its centre so that `f32` suffices.
+/// An indexed triangle mesh in its own space, stored relative to its centre so that `f32` suffices.
 ///
-/// Vertices that differ in normal or texture coordinates are stored apart with exactly equal positions.
+/// Vertices that differ in normal or texture coordinates are stored separately with exactly equal positions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Metres, relative to `center`.
     pub positions: Vec<Vec3>,
-    /// Where the numbers of the file lay: add it to a position to get the file's coordinates.
+    /// Centre of the mesh in file coordinates: position plus centre is the position in the file.
     pub center: DVec3,
     /// Counter-clockwise seen from the front; every index lies within `positions`.
     pub triangles: Vec<[u32; 3]>,
-    /// One unit shading normal a vertex, or empty for flat shading.
+    /// One unit shading normal per vertex, or empty for flat shading.
     pub normals: Vec<Vec3>,
-    /// One texture coordinate a vertex, or empty.
+    /// One texture coordinate per vertex, or empty.
     pub uvs: Vec<Vec2>,
-    /// A second texture coordinate a vertex, or empty.
+    /// A second texture coordinate per vertex, or empty.
     pub uvs2: Vec<Vec2>,
-    /// One colour a vertex, linear Rec. 709 with alpha, or empty.
+    /// One colour per vertex, linear Rec. 709 with alpha, or empty.
     pub colors: Vec<Vec4>,
-    /// One tangent a vertex, or empty: `xyz` is the direction in which the first texture coordinate grows, unit; the bitangent
-    /// is `w · normal × xyz`, `w` being 1 or -1.
+    /// One tangent per vertex, or empty: `xyz` is the unit direction in which the first texture coordinate grows; the
+    /// bitangent is `w · normal × xyz`, where `w` is 1 or -1.
     pub tangents: Vec<Vec4>,
-    /// One material slot a triangle, or empty when all use slot 0.
+    /// One material slot per triangle, or empty if all use slot 0.
     pub slots: Vec<u16>,
 }

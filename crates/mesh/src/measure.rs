@@ -1,11 +1,11 @@
-//! Sizes of a mesh.
+//! Bounds, corners, area and volume of a mesh.
 
 use super::Mesh;
 use firstlight_kdtree::geometry::Aabb;
 use glam::{DVec3, Vec3};
 
 impl Mesh {
-    /// The box around all vertices, relative to `center`.
+    /// The bounds of all vertices, relative to `center`.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points(self.positions.iter().copied())
     }
@@ -16,7 +16,7 @@ impl Mesh {
         self.triangles[triangle].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// The triangle's normal times twice its area; zero for a triangle without area.
+    /// The normal of a triangle times twice its area; zero for a triangle without area.
     #[inline]
     pub fn doubled_area_normal(&self, triangle: usize) -> DVec3 {
         // Single precision would lose the normals of triangles smaller than about 1e-19.
@@ -24,12 +24,12 @@ impl Mesh {
         (b - a).cross(c - a)
     }
 
-    /// Square metres.
+    /// Surface area in square metres.
     pub fn area(&self) -> f64 {
         (0..self.triangles.len()).map(|t| 0.5 * self.doubled_area_normal(t).length()).sum()
     }
 
-    /// Cubic metres inside a closed mesh; positive when its triangles face outwards.
+    /// Volume of a closed mesh in cubic metres; positive if its triangles face outwards.
     pub fn signed_volume(&self) -> f64 {
         let sixfold = |t| {
             let [a, b, c] = self.corners(t).map(|p| p.as_dvec3());

@@ -1,7 +1,7 @@
-//! Shading normals from the shape alone.
+//! Shading normals computed from the geometry alone.
 //!
-//! A shading normal is a weighted sum of the normals of the triangles around a vertex. Vertices at equal places
-//! count as one ([`Welding`]), so a seam of doubled vertices does not show; a crease angle keeps hard edges hard.
+//! A shading normal is a weighted sum of the normals of the triangles around a vertex. Vertices at equal positions
+//! count as one ([`Welding`]), so a seam of duplicated vertices is invisible; a crease angle keeps hard edges hard.
 
 use super::topology::DisjointSets;
 use super::{Mesh, Welding};
@@ -9,34 +9,36 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// What each triangle around a vertex counts.
+/// The weight of each triangle in the normal of a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NormalWeight {
-    /// Its area: cheap, and what most programs of the field do.
+    /// The triangle's area: cheap, and the most common choice.
     Area,
-    /// Its angle at the vertex: the same for any triangulation of the same faces (Thürmer and Wüthrich 1998).
+    /// The triangle's angle at the vertex: independent of the triangulation of the same faces (Thürmer and Wüthrich
+    /// 1998).
     #[default]
     Angle,
 }
 
-/// More triangles than this at one edge have no smooth surface in common; it bounds the work on hostile meshes.
+/// Edges of more triangles than this are never smooth; this bounds the work on hostile meshes.
 const MAX_TRIANGLES_AT_EDGE: usize = 16;
 
 impl Mesh {
-    /// The same triangles with the triangle's own normal everywhere.
+    /// Removes the shading normals, so that each triangle has its own normal.
     pub fn flat(mut self) -> Self {
         self.normals.clear();
         self
     }
 
-    /// Area-weighted normals of stored vertices, doubled vertices kept apart: the sum of the triangles'
-    /// unnormalised normals, as the 2013 program and the neutral reference format define `smooth`.
+    /// Computes area-weighted normals per stored vertex, without welding: the sum of the triangles' unnormalised
+    /// normals, as the 2013 program and the neutral reference format define `smooth`.
     pub fn with_vertex_normals(self) -> Self {
         self.with_normals_of_vertices(|vertex| vertex)
     }
 
-    /// The same where several of the stored vertices stand for one: `origin` has the number of that one, no larger
-    /// than that of the last stored vertex.
+    /// Like [`with_vertex_normals`](Self::with_vertex_normals), for stored vertices that are copies of fewer original
+    /// ones: `origin` maps a stored vertex to its original, whose index is no larger than that of the last stored
+    /// vertex.
     pub fn with_normals_of_vertices(mut self, origin: impl Fn(u32) -> u32) -> Self {
         let n = self.positions.len();
         let n_origins = (0..n as u32).map(&origin).max().map_or(0, |last| last as usize + 1);
@@ -49,13 +51,13 @@ impl Mesh {
         self
     }
 
-    /// Normals that are smooth across every edge whose triangles meet at no more than `crease_angle`.
+    /// Computes normals that are smooth across every edge whose triangles meet at an angle of at most `crease_angle`.
     ///
     /// - `crease_angle`: radians between the normals of two neighbours, `[0, π]`; `None` smooths everything.
     ///
-    /// A crease stores its vertices once a side, after the others; everything else keeps its number. Triangles
-    /// without area neither add to a normal nor join their neighbours; where nothing else is left, any unit
-    /// vector is given, so that no normal is ever NaN.
+    /// A crease duplicates its vertices, one copy per side, after all others; existing vertices keep their indices.
+    /// Triangles without area neither contribute to a normal nor connect their neighbours. A vertex with no other
+    /// triangles gets an arbitrary unit vector, so that no normal is ever NaN.
     pub fn with_smooth_normals(mut self, weight: NormalWeight, crease_angle: Option<f32>) -> Self {
         let welding = Welding::of(&self.positions);
         let face_normals: Vec<DVec3> =
@@ -88,11 +90,11 @@ impl Mesh {
         self
     }
 
-    /// Gives each (vertex, group) pair a vertex of its own, with the group's normal.
+    /// Gives each (vertex, group) pair its own vertex, with the group's normal.
     fn split_by_groups(&mut self, groups: &[u32], sums: &[DVec3], face_normals: &[DVec3]) {
         const NONE: u32 = u32::MAX;
         self.normals = vec![Vec3::Z; self.positions.len()];
-        // Most vertices have one group, kept here; only those on creases reach the map.
+        // Most vertices have one group, stored here; only those on creases need the map.
         let mut first_group = vec![NONE; self.positions.len()];
         let mut copies: HashMap<(u32, u32), u32> = HashMap::new();
         for t in 0..self.triangles.len() {
@@ -122,17 +124,17 @@ impl Mesh {
     }
 }
 
-/// The attribute of a vertex once more, at the end; nothing where there is no such attribute.
+/// Appends a copy of a vertex's attribute; does nothing if the mesh lacks the attribute.
 fn repeat<T: Copy>(attribute: &mut Vec<T>, vertex: u32) {
     if let Some(&value) = attribute.get(vertex as usize) {
         attribute.push(value);
     }
 }
 
-/// For each corner of each triangle the number of its group: corners at one place whose triangles are joined over
-/// edges that end there and bend no more than `crease_angle`. A group is named by its first corner.
+/// Returns the group of each corner of each triangle: corners at one position whose triangles are connected across
+/// edges that end there and bend by at most `crease_angle`. A group is identified by its first corner.
 fn smooth_groups(triangles: &[[u32; 3]], welding: &Welding, normals: &[DVec3], crease_angle: f64) -> Vec<u32> {
-    // Per triangle side: the two places, and the corner at each of them.
+    // Per triangle side: the two positions, and the corner at each of them.
     let mut sides: Vec<(u32, u32, u32, u32)> = Vec::with_capacity(triangles.len() * 3);
     for (t, &corners) in triangles.iter().enumerate() {
         let places = welding.places(corners);
@@ -147,7 +149,7 @@ fn smooth_groups(triangles: &[[u32; 3]], welding: &Welding, normals: &[DVec3], c
         }
     }
     sides.par_sort_unstable();
-    // The rounding of two unit normals may lift a flat edge just above an angle of zero.
+    // Rounding of two unit normals may raise the angle of a flat edge slightly above zero.
     let min_cos = crease_angle.cos() - 4.0 * f64::EPSILON;
     let mut sets = DisjointSets::new(triangles.len() * 3);
     let unit: Vec<DVec3> = normals.par_iter().map(|n| n.normalize_or_zero()).collect();
@@ -178,7 +180,7 @@ fn corner_weights(mesh: &Mesh, triangle: usize, weight: NormalWeight) -> [f64; 3
     }
 }
 
-/// Radians; accurate for needles too, where the arc cosine loses half the digits.
+/// Angle in radians; accurate for needles too, where the arc cosine loses half the digits.
 fn angle_between(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b))
 }
@@ -193,7 +195,7 @@ mod tests {
     use crate::procedural;
     use glam::dvec3;
 
-    /// Two unit squares that share an edge (the y axis) and meet at `bend` radians; the edge's vertices are doubled.
+    /// Two unit squares that share an edge (the y axis) and meet at `bend` radians; the edge's vertices are duplicated.
     fn book(bend: f64) -> Mesh {
         let (s, c) = bend.sin_cos();
         let points = [

@@ -1,4 +1,4 @@
-//! Tangents from texture coordinates, as normal maps are made for.
+//! Tangents from texture coordinates, as normal maps expect them.
 //!
 //! Source: Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited" (MikkTSpace), in the crate `bevy_mikktspace`.
 
@@ -7,10 +7,10 @@ use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{Vec3, Vec4};
 use std::collections::HashMap;
 
-/// The mesh while the tangents of its corners are found.
+/// A mesh while the tangents of its corners are computed.
 struct Corners<'a> {
     mesh: &'a Mesh,
-    /// Three a triangle.
+    /// Three per triangle.
     tangents: Vec<Vec4>,
 }
 
@@ -45,7 +45,7 @@ impl Geometry for Corners<'_> {
         let normal = self.mesh.normals[self.vertex(face, corner)];
         let encoded = tangent.map_or(Vec4::ZERO, |tangent| Vec4::from(tangent.tangent_encoded()));
         let sign = if encoded.w < 0.0 { -1.0 } else { 1.0 };
-        // Where the texture coordinates have no direction, any will do.
+        // Where the texture coordinates have no direction, an arbitrary tangent is used.
         let direction = encoded.truncate().try_normalize().filter(|direction| direction.is_finite());
         let direction = direction.unwrap_or_else(|| normal.any_orthonormal_vector());
         self.tangents[3 * face + corner] = direction.extend(sign);
@@ -53,9 +53,9 @@ impl Geometry for Corners<'_> {
 }
 
 impl Mesh {
-    /// The mesh with tangents of its first texture coordinates; vertices whose corners differ in them are split.
+    /// Adds tangents for the first texture coordinate; vertices whose corners differ in their tangent are split.
     ///
-    /// Without normals or texture coordinates it stays as it is.
+    /// A mesh without normals or texture coordinates is returned unchanged.
     pub fn with_tangents(mut self) -> Self {
         if self.normals.len() != self.positions.len() || self.uvs.len() != self.positions.len() {
             return self;
@@ -63,7 +63,7 @@ impl Mesh {
         let along = |normal: &Vec3| normal.any_orthonormal_vector().extend(1.0);
         let tangents = vec![Vec4::X; 3 * self.triangles.len()];
         let mut corners = Corners { mesh: &self, tangents };
-        // It fails for no mesh that has passed `validate`; should it all the same, some tangent is better than none.
+        // It fails for no mesh that passes `validate`; if it does, an arbitrary tangent is better than none.
         if generate_tangents(&mut corners).is_err() {
             self.tangents = self.normals.iter().map(along).collect();
             return self;
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use glam::{DVec3, Vec2};
 
-    /// Two triangles of a square; `u` runs along `direction`, mirrored on the second one if asked.
+    /// Two triangles of a square; `u` runs along `direction`, mirrored on the second triangle if `mirrored`.
     fn square(angle: f32, mirrored: bool) -> Mesh {
         let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
         let positions: Vec<DVec3> = points.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect();

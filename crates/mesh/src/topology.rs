@@ -1,18 +1,18 @@
-//! How the triangles of a mesh hang together, counted.
+//! Topology of a mesh: counts of edges, borders, pieces and defects.
 
 use super::faults::{Faults, distinct};
 use super::{Mesh, Welding};
 
-/// Counts over the mesh with vertices at equal places welded.
+/// Counts over the mesh with vertices at equal positions welded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
-    /// Different places that triangles use.
+    /// Distinct positions that triangles use.
     pub vertices: usize,
     /// Vertices that no triangle uses.
     pub loose_vertices: usize,
-    /// Triangles, degenerate ones and duplicates included.
+    /// Triangles, including degenerate ones and duplicates.
     pub triangles: usize,
-    /// Different pairs of places that a triangle with three different corners joins.
+    /// Distinct pairs of positions that are sides of triangles with three different corners.
     pub edges: usize,
     /// Edges of exactly one triangle.
     pub boundary_edges: usize,
@@ -22,16 +22,16 @@ pub struct Topology {
     pub misoriented_edges: usize,
     /// Vertices where two fans of triangles touch.
     pub non_manifold_vertices: usize,
-    /// Triangles without area that are no duplicates: corners at one place or on one line.
+    /// Triangles without area, except duplicates: corners at one position or collinear.
     pub degenerate_triangles: usize,
-    /// Triangles on the same three different places as an earlier one, whichever way they face.
+    /// Triangles on the same three distinct positions as an earlier one, of either orientation.
     pub duplicate_triangles: usize,
     /// Pieces connected over edges or vertices.
     pub pieces: usize,
 }
 
 impl Topology {
-    /// Counts over a mesh that passes [`Mesh::validate`].
+    /// Analyses a mesh that passes [`Mesh::validate`].
     pub fn of(mesh: &Mesh) -> Self {
         let welding = Welding::of(&mesh.positions);
         let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|&t| welding.places(t)).collect();
@@ -48,7 +48,7 @@ impl Topology {
         counts
     }
 
-    /// Whether each edge has exactly two triangles that agree on which side is the front.
+    /// Whether each edge has exactly two triangles with consistent orientation.
     pub fn is_closed(&self) -> bool {
         self.triangles > 0 && self.boundary_edges + self.non_manifold_edges + self.misoriented_edges == 0
     }
@@ -64,7 +64,7 @@ impl Topology {
     }
 
     fn count_edges(&mut self, triangles: &[[u32; 3]]) {
-        // One entry an edge and triangle: the edge, and whether the triangle runs from its lower end to its higher.
+        // One entry per edge and triangle: the edge, and whether the triangle runs from its lower end to its higher.
         let mut sides: Vec<(u32, u32, bool)> = triangles
             .iter()
             .filter(|t| distinct(t))
@@ -83,7 +83,7 @@ impl Topology {
     }
 
     fn count_vertices(&mut self, triangles: &[[u32; 3]], places: usize) {
-        // Fans at a vertex: its corners, joined when they share an edge that ends there.
+        // Fans at a vertex: its corners, connected if they share an edge that ends there.
         let mut spokes: Vec<(u32, u32, u32)> = Vec::with_capacity(triangles.len() * 6);
         for (t, &[a, b, c]) in triangles.iter().enumerate().filter(|(_, t)| distinct(t)) {
             for (corner, (at, others)) in [(a, [b, c]), (b, [c, a]), (c, [a, b])].into_iter().enumerate() {
@@ -117,7 +117,7 @@ fn loose_vertices(mesh: &Mesh) -> usize {
     used.iter().filter(|&&u| !u).count()
 }
 
-/// Union–find with path halving; the smaller number leads, so that results do not depend on the order of joins.
+/// Union–find with path halving; the smaller index is the root, so that results do not depend on the order of joins.
 pub(super) struct DisjointSets {
     parent: Vec<u32>,
 }
@@ -168,7 +168,7 @@ mod tests {
     fn faults_are_counted() {
         let points =
             [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, dvec3(2.0, 0.0, 0.0), DVec3::ONE];
-        // Three triangles at one edge, one of them twice, one without area, one touching at a vertex.
+        // Three triangles at one edge, one of them duplicated, one without area, one touching at a vertex.
         let found = Topology::of(&mesh(&points, &[[0, 1, 2], [1, 0, 3], [0, 1, 5], [0, 5, 1], [0, 1, 6], [4, 5, 0]]));
         assert_eq!(found.duplicate_triangles, 1);
         assert_eq!(found.degenerate_triangles, 1);

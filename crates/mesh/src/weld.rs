@@ -1,20 +1,20 @@
-//! Vertices at exactly the same place, found and numbered.
+//! Welding: vertices at exactly equal positions get one index.
 
 use glam::{DVec3, Vec3};
 
-/// Which vertices share a place: texture seams and duplicated vertices vanish in it.
+/// The welding of a mesh's vertices: texture seams and duplicated vertices vanish in it.
 ///
-/// Places are equal when all coordinates compare equal (so −0 is 0); nothing is ever moved.
+/// Positions are equal if all coordinates compare equal (so −0 is 0); nothing is ever moved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Welding {
-    /// The place of each vertex, numbered in the order in which places first appear.
+    /// Welded position of each vertex, numbered in the order of first appearance.
     pub place: Vec<u32>,
-    /// The first vertex at each place.
+    /// The first vertex at each position.
     pub first: Vec<u32>,
 }
 
 impl Welding {
-    /// Linear time on average. `positions` must hold no NaN and at most `u32::MAX` entries.
+    /// Welds positions in linear time on average. `positions` must hold no NaN and at most `u32::MAX` entries.
     pub fn of(positions: &[Vec3]) -> Self {
         // Adding zero turns −0 into 0 and changes nothing else.
         let words = |p: Vec3| (p + Vec3::ZERO).to_array().map(|v| u64::from(v.to_bits()));
@@ -24,7 +24,7 @@ impl Welding {
         })
     }
 
-    /// The same of positions in double precision.
+    /// Like [`of`](Self::of), for positions in double precision.
     pub fn of_f64(positions: &[DVec3]) -> Self {
         Self::by(positions, |p| {
             let [x, y, z] = (p + DVec3::ZERO).to_array().map(f64::to_bits);
@@ -32,10 +32,12 @@ impl Welding {
         })
     }
 
+    /// Welds with a hash function.
+    ///
     /// - `hash`: equal for positions that compare equal.
     fn by<P: Copy + PartialEq>(positions: &[P], hash: impl Fn(P) -> u64) -> Self {
-        // Open addressing at half load: the standard map spends most of its time on a hash that resists attack;
-        // here a bad input can only cost time, and the finaliser below leaves no cheap way to collide.
+        // Open addressing at half load: the standard map spends most of its time on a hash that resists attacks; here a
+        // hostile input can only cost time, and the finaliser below leaves no cheap way to collide.
         const FREE: u32 = u32::MAX;
         let mask = (positions.len() * 2).next_power_of_two().max(2) - 1;
         let mut table = vec![FREE; mask + 1];
@@ -59,17 +61,17 @@ impl Welding {
         Self { place, first }
     }
 
-    /// How many different places there are.
+    /// Number of distinct positions.
     pub fn len(&self) -> usize {
         self.first.len()
     }
 
-    /// Whether there are no places.
+    /// Whether there are no positions.
     pub fn is_empty(&self) -> bool {
         self.first.is_empty()
     }
 
-    /// The places of a triangle's corners.
+    /// Returns the welded positions of a triangle's corners.
     #[inline]
     pub fn places(&self, triangle: [u32; 3]) -> [u32; 3] {
         triangle.map(|vertex| self.place[vertex as usize])

@@ -1,11 +1,11 @@
-//! Sixteen numbers at a time: the operations of each instruction set, and numbers and vectors that read like plain ones.
+//! Sixteen-lane SIMD: the operations of each instruction set, and number and vector types with operators.
 //!
-//! [`Simd`] is what a processor can do; [`Float`], [`Bits`] and [`Vector`] give it operators. Code is generic over
-//! `S: Simd`, `#[inline(always)]` all the way down, and compiled once a set by [`dispatch`]. Nothing is contracted or
-//! approximated differently from one set to the next: all give the same bits.
+//! [`Simd`] is the interface of an instruction set; [`Float`], [`Bits`] and [`Vector`] add operators. Code is generic
+//! over `S: Simd`, `#[inline(always)]` throughout, and compiled once per set by [`dispatch`]. No set contracts or
+//! approximates operations that another does not: all give the same bits.
 //!
-//! A formula is written once, generic over [`Real`], [`Word`] and [`Vector3`]: with `f32` it is the code for one point, with
-//! [`Float`] that for sixteen.
+//! A formula is written once, generic over [`Real`], [`Word`] and [`Vector3`]: with `f32` it is the code for one point,
+//! with [`Float`] the code for sixteen.
 
 mod math;
 mod number;
@@ -24,10 +24,10 @@ pub use simd::{Kernel, LANES, Mask, Portable, Simd};
 pub use vector::{Vector, Vector3, frame_around, select_vector};
 pub use word::Word;
 
-/// The array of an expression for 0, 1 and 2.
+/// Evaluates an expression for 0, 1 and 2 and returns the array.
 ///
-/// Written out, where a closure given to `array::map` may end up as a function of its own: compiled without the
-/// instructions of its caller, it would call each of them.
+/// It is expanded inline, whereas a closure passed to `array::map` may be compiled as a separate function without the
+/// target features of its caller, and then each of its operations would be a call.
 #[macro_export]
 macro_rules! three {
     (|$k:ident| $of:expr) => {
@@ -48,7 +48,7 @@ macro_rules! three {
     };
 }
 
-/// The same for 0 and 1.
+/// Like [`three!`], for 0 and 1.
 #[macro_export]
 macro_rules! two {
     (|$k:ident| $of:expr) => {

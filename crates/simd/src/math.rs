@@ -1,4 +1,4 @@
-//! Functions that are no single operation: of the standard library for one number, series for sixteen.
+//! Elementary functions: from the standard library for one number, by series for sixteen.
 
 use super::number::Float;
 use super::real::{Real, select};
@@ -6,7 +6,8 @@ use super::simd::Simd;
 use super::word::Word;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
 
-/// Functions that one number and sixteen of them do not have to the same bit: formulas that use them agree but for rounding.
+/// Functions whose one-lane and sixteen-lane versions differ in the last bits: formulas that use them agree up to
+/// rounding.
 pub trait Elementary: Real {
     /// Sine and cosine of an angle within ±100, to 2e-7.
     fn sin_cos(self) -> (Self, Self);
@@ -14,14 +15,14 @@ pub trait Elementary: Real {
     /// The angle of (`x`, `self`), in −π..π; relative error below 4e-7. At the origin sixteen are NaN.
     fn atan2(self, x: Self) -> Self;
 
-    /// `self` to the power of `y`, for `self` in 0..=1 and `y` from 0 on. With sixteen, the relative error is below
+    /// `self` to the power of `y`, for `self` in 0..=1 and `y >= 0`. With sixteen lanes, the relative error is below
     /// 3e-7 (1 + |log₂ selfʸ|), and results below 2⁻¹²⁶ are 0.
     fn power(self, y: Self) -> Self;
 
-    /// The largest whole number that is not above it, for finite ones; the sign of zero may differ.
+    /// The largest integer that is not above `self`, for finite values; the sign of zero may differ.
     fn floor(self) -> Self;
 
-    /// The next whole number towards zero, for finite ones; the sign of zero may differ.
+    /// Rounds towards zero, for finite values; the sign of zero may differ.
     fn truncated(self) -> Self;
 }
 
@@ -81,19 +82,19 @@ impl<S: Simd> Elementary for Float<S> {
 
 /// Sine and cosine of angles within ±100, to 2e-7.
 ///
-/// The angle is brought to an eighth of a turn by whole quarters; there Taylor's series are cut where the rest falls
-/// below rounding.
+/// The angle is reduced to ±π/4 by subtracting multiples of π/2; there Taylor series are truncated where the remainder
+/// falls below rounding.
 #[inline(always)]
 fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
-    // To the nearest quarter, by truncation after a half away from zero.
+    // Rounds to the nearest multiple: adds a half away from zero and truncates.
     let quarters = (x * (1.0 / FRAC_PI_2) + x.all(0.5).copysign(x)).truncate();
     let count = quarters.to_float();
-    // π/2 in two parts, of which the first has few enough digits that its product is exact.
+    // π/2 in two parts, the first with so few digits that its product is exact.
     let r = (x - count * QUARTER_HIGH) - count * QUARTER_LOW;
     let (sin, cos) = sin_cos_eighth(r);
     let odd = quarters.has(1);
     let (a, b) = (select(odd, cos, sin), select(odd, sin, cos));
-    // The sign of the sine flips in the third and fourth quarter, that of the cosine in the second and third.
+    // The sine changes sign in the third and fourth quadrant, the cosine in the second and third.
     let flip_sin = (quarters & 2).shift_left(30);
     let flip_cos = ((quarters + 1) & 2).shift_left(30);
     ((a.to_bits() ^ flip_sin).as_float(), (b.to_bits() ^ flip_cos).as_float())
@@ -102,7 +103,8 @@ fn sin_cos<S: Simd>(x: Float<S>) -> (Float<S>, Float<S>) {
 const QUARTER_HIGH: f32 = 1.570_312_5;
 const QUARTER_LOW: f32 = 4.838_268e-4;
 
-/// Sine and cosine of an angle in −π/4..π/4, to 1e-7: Taylor's series, cut where the rest falls below rounding.
+/// Sine and cosine of an angle in −π/4..π/4, to 1e-7: Taylor series, truncated where the remainder falls below
+/// rounding.
 #[inline(always)]
 pub fn sin_cos_eighth<R: Real>(x: R) -> (R, R) {
     let (x2, one) = (x * x, x.all(1.0));
@@ -116,7 +118,7 @@ pub fn sin_cos_eighth<R: Real>(x: R) -> (R, R) {
 
 /// The angle of (x, y), in −π..π; relative error below 4e-7. NaN at the origin.
 ///
-/// The quotient is brought below tan(π/8), where a short polynomial does (Moshier's Cephes library, `atanf`).
+/// The quotient is reduced to below tan(π/8), where a short polynomial suffices (Moshier's Cephes library, `atanf`).
 #[inline(always)]
 fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
     const TAN_PI_8: f32 = 0.414_213_57;
@@ -133,10 +135,10 @@ fn atan2<S: Simd>(y: Float<S>, x: Float<S>) -> Float<S> {
     angle.copysign(y)
 }
 
-/// `x` to the power of `y`, for `x` in 0..=1 and `y` from 0 on; relative error below 3e-7 (1 + |log₂ xʸ|), and 0 for what is
+/// `x` to the power of `y`, for `x` in 0..=1 and `y >= 0`; relative error below 3e-7 (1 + |log₂ xʸ|), and 0 for results
 /// below 2⁻¹²⁶.
 ///
-/// The mantissa is brought to within a factor √2 of 1, where the series of the area tangent is short.
+/// The mantissa is reduced to within a factor √2 of 1, where the series of the inverse hyperbolic tangent is short.
 #[inline(always)]
 fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
     const ONE: u32 = 0x3f80_0000;
@@ -160,17 +162,17 @@ fn power<S: Simd>(x: Float<S>, y: Float<S>) -> Float<S> {
     select(vanishes, one.all(0.0), raised)
 }
 
-/// The largest whole number that is not above `x`, as `f32::floor` for all finite numbers.
+/// The largest integer that is not above `x`, like `f32::floor` for all finite numbers.
 #[inline(always)]
 fn floor<S: Simd>(x: Float<S>) -> Float<S> {
     let whole = truncated(x);
     select(x.lt(whole), whole - 1.0, whole)
 }
 
-/// As `f32::trunc` for all finite numbers but for the sign of zero.
+/// Like `f32::trunc` for all finite numbers, except for the sign of zero.
 #[inline(always)]
 fn truncated<S: Simd>(x: Float<S>) -> Float<S> {
-    // Larger ones have no digits behind the point.
+    // Larger numbers have no fractional part.
     let small = x.abs().lt(x.all(8_388_608.0));
     select(small, select(small, x, x.all(0.0)).truncate().to_float(), x)
 }

@@ -22,7 +22,7 @@ pub struct Bits<S: Simd> {
     pub v: S::U,
 }
 
-/// A table as [`Float::gather`] reads it fastest: filled up to a multiple of sixteen.
+/// Pads a table to a multiple of sixteen entries, which [`Float::gather`] reads fastest.
 pub fn padded<T: Copy + Default>(mut table: Vec<T>) -> Vec<T> {
     table.resize(table.len().next_multiple_of(LANES).max(LANES), T::default());
     table
@@ -55,7 +55,7 @@ impl<S: Simd> Float<S> {
         array
     }
 
-    /// See [`Simd::gather`].
+    /// Looks up an entry per lane; see [`Simd::gather`].
     #[inline(always)]
     pub fn gather(from: &[f32], indices: Bits<S>) -> Self {
         Self { s: indices.s, v: indices.s.gather(from, indices.v) }
@@ -67,7 +67,7 @@ impl<S: Simd> Float<S> {
         Bits { s: self.s, v: self.s.to_bits(self.v) }
     }
 
-    /// Towards zero; within the range of `i32`.
+    /// Rounds towards zero; the result must be within the range of `i32`.
     #[inline(always)]
     pub fn truncate(self) -> Bits<S> {
         Bits { s: self.s, v: self.s.truncate(self.v) }
@@ -161,7 +161,7 @@ impl<S: Simd> Bits<S> {
         array
     }
 
-    /// See [`Simd::gather`].
+    /// Looks up an entry per lane; see [`Simd::gather`].
     #[inline(always)]
     pub fn gather(from: &[u32], indices: Self) -> Self {
         Self { s: indices.s, v: indices.s.gather_u(from, indices.v) }
@@ -173,19 +173,19 @@ impl<S: Simd> Bits<S> {
         self.s.eq_u(self.v, self.s.splat_u(x))
     }
 
-    /// Lanes with any of these bits.
+    /// Lanes with any of these bits set.
     #[inline(always)]
     pub fn has(self, bits: u32) -> Mask {
         !(self & Self::splat(self.s, bits)).equals(0)
     }
 
-    /// The number that these are the bits of.
+    /// Reinterprets the bits as `f32`.
     #[inline(always)]
     pub fn as_float(self) -> Float<S> {
         Float { s: self.s, v: self.s.float_of(self.v) }
     }
 
-    /// The number itself, below 2³¹ and rounded.
+    /// Converts numbers below 2³¹ to `f32`, rounded.
     #[inline(always)]
     pub fn to_float(self) -> Float<S> {
         Float { s: self.s, v: self.s.to_f(self.v) }

@@ -1,21 +1,21 @@
-//! One `f32`, or sixteen: what a formula needs to be written once for both.
+//! Numbers that formulas are generic over: one `f32` or sixteen.
 //!
-//! Code that is generic over [`Real`] is `#[inline(always)]` all the way down, as everything for sixteen lanes is. With `f32` it
-//! is the scalar code, and what tests hold the lanes against.
+//! Code that is generic over [`Real`] is `#[inline(always)]` throughout, like all sixteen-lane code. With `f32` it is
+//! the scalar code, which is the reference of tests for the SIMD code.
 
 use super::simd::Mask;
 use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
 
-/// Answers to a question: a `bool`, or one bit a lane.
+/// Result of a comparison: a `bool`, or one bit per lane.
 pub trait Truth:
     Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> + BitAndAssign + BitOrAssign
 {
-    /// Whether it is true of any lane.
+    /// Whether it is true in any lane.
     fn any(self) -> bool;
 }
 
-/// One number or sixteen of them. All operations round as IEEE 754 says, so one lane of sixteen agrees with the one to the last
-/// bit; functions that do not are in [`crate::Elementary`].
+/// One number or sixteen. All operations round according to IEEE 754, so each of the sixteen lanes agrees with scalar
+/// code to the last bit; functions that do not agree are in [`crate::Elementary`].
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -38,37 +38,37 @@ pub trait Real:
     /// `a` where the mask is true, else `b`; see [`select`].
     fn choose(mask: Self::Mask, a: Self, b: Self) -> Self;
 
-    /// Square root, rounded to nearest; NaN for numbers below zero.
+    /// Square root, rounded to nearest; NaN for negative numbers.
     fn sqrt(self) -> Self;
 
     /// Absolute value, with the sign bit cleared.
     fn abs(self) -> Self;
 
-    /// The second where either is NaN.
+    /// The smaller of the two; `other` if either is NaN.
     fn min(self, other: Self) -> Self;
 
-    /// The second where either is NaN.
+    /// The larger of the two; `other` if either is NaN.
     fn max(self, other: Self) -> Self;
 
     /// The magnitude of `self` with the sign bit of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
-    /// False where either is NaN, as all comparisons are.
+    /// Whether `self < other`; false if either is NaN.
     fn lt(self, other: Self) -> Self::Mask;
 
-    /// Whether `self <= other`; false where either is NaN.
+    /// Whether `self <= other`; false if either is NaN.
     fn le(self, other: Self) -> Self::Mask;
 
-    /// Whether `self == other`; false where either is NaN.
+    /// Whether `self == other`; false if either is NaN.
     fn equals(self, other: Self) -> Self::Mask;
 
-    /// At least `least`, also where it is NaN.
+    /// The larger of `self` and `least`; `least` for NaN.
     #[inline(always)]
     fn at_least(self, least: f32) -> Self {
         self.max(self.all(least))
     }
 
-    /// At most `most`, also where it is NaN.
+    /// The smaller of `self` and `most`; `most` for NaN.
     #[inline(always)]
     fn at_most(self, most: f32) -> Self {
         self.min(self.all(most))

@@ -1,22 +1,24 @@
-//! Sixteen numbers at a time, in three builds: AVX-512, AVX2 and plain arrays.
+//! The [`Simd`] trait and its implementations: AVX-512, AVX2 and portable arrays.
 //!
-//! Kernels are generic over [`Simd`], compiled once for each implementation inside a function that enables its
-//! instructions, and [`InstructionSet::detect`] picks one when the program first asks. All operations round like
-//! the scalar ones, nothing is contracted or approximated, so all builds give the same bits; but for the three whose
-//! name ends in `about`, which only help to decide what need not be computed.
+//! Kernels are generic over [`Simd`] and compiled once per implementation inside a function that enables its
+//! instructions; [`InstructionSet::detect`] selects one on first use. All operations round like the scalar ones,
+//! nothing is contracted or approximated, so all builds give the same bits. The exceptions are the three operations
+//! whose name ends in `about`, which only serve to decide what need not be computed.
 
 use std::sync::OnceLock;
 
-/// How many lanes.
+/// Number of lanes.
 pub const LANES: usize = 16;
 
-/// One bit a lane.
+/// One bit per lane.
 pub type Mask = u16;
 
-/// Implementations must be called from functions compiled for their instruction set, or they are slow;
-/// values must not be made unless the processor has it.
+/// An instruction set with sixteen lanes.
 ///
-/// Comparisons with NaN are false; `min` and `max` give the second argument if either is NaN.
+/// Implementations must be called from functions compiled for their instruction set, or they are slow. Values must not
+/// be created unless the processor supports the set.
+///
+/// Comparisons with NaN are false; `min` and `max` return the second argument if either is NaN.
 pub trait Simd: Copy {
     /// 16 `f32`.
     type F: Copy;
@@ -25,7 +27,7 @@ pub trait Simd: Copy {
     /// 16 `f64`.
     type D: Copy;
 
-    /// Runs a kernel as a function of its own, compiled once for the instruction set however often it is called for.
+    /// Runs a kernel as a separate function, compiled once for the instruction set, however many call sites it has.
     fn call<K: Kernel<Self>>(self, kernel: K) -> K::Output;
 
     /// `x` in all lanes.
@@ -52,11 +54,11 @@ pub trait Simd: Copy {
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `c - a · b`, rounded once.
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
-    /// `a · b + c`, rounded once or twice, as is quickest: for bounds, since the bits depend on the build.
+    /// `a · b + c`, rounded once or twice, whichever is fastest: for bounds only, since the bits depend on the build.
     fn mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
-    /// `c - a · b` in the same way.
+    /// `c - a · b`, rounded like [`mul_add_about`](Self::mul_add_about).
     fn neg_mul_add_about(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
-    /// `1 / a` within 2⁻²² of itself, for bounds too. NaN or infinite where `a` is 0 or subnormal.
+    /// `1 / a` with relative error below 2⁻²², for bounds only. NaN or infinite if `a` is 0 or subnormal.
     fn reciprocal_about(self, a: Self::F) -> Self::F;
     /// Lanes whose sign bit is set.
     fn negative(self, a: Self::F) -> Mask;
@@ -68,11 +70,11 @@ pub trait Simd: Copy {
     fn eq(self, a: Self::F, b: Self::F) -> Mask;
     /// `a` where the bit is set, else `b`.
     fn select(self, mask: Mask, a: Self::F, b: Self::F) -> Self::F;
-    /// The smallest of the lanes with their bit set, which must not be NaN.
+    /// The minimum over the lanes with their bit set, which must not be NaN.
     fn least(self, mask: Mask, a: Self::F) -> f32;
-    /// The axis of a point that each lane asks for.
+    /// The coordinate of the point that each lane selects by axis.
     fn pick(self, point: &[f32; 4], axes: Self::U) -> Self::F;
-    /// Entries of the table by the low four bits of the indices.
+    /// Looks up table entries by the low four bits of the indices.
     fn lookup(self, table: Self::F, indices: Self::U) -> Self::F;
 
     /// `x` in all lanes.
@@ -111,15 +113,15 @@ pub trait Simd: Copy {
 
     /// Square root.
     fn sqrt(self, a: Self::F) -> Self::F;
-    /// Towards zero; anything from numbers that no `i32` can hold.
+    /// Rounds towards zero; unspecified for numbers outside the range of `i32`.
     fn truncate(self, a: Self::F) -> Self::U;
-    /// Of two's complement.
+    /// Converts integers in two's complement to `f32`.
     fn to_f(self, a: Self::U) -> Self::F;
     /// The IEEE 754 bits of each lane.
     fn to_bits(self, a: Self::F) -> Self::U;
     /// The `f32` that has these IEEE 754 bits; the inverse of [`Self::to_bits`].
     fn float_of(self, a: Self::U) -> Self::F;
-    /// Modulo 2³², as is `mul_u`.
+    /// `a + b` modulo 2³².
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
     /// `a · b` modulo 2³².
     fn mul_u(self, a: Self::U, b: Self::U) -> Self::U;
@@ -129,20 +131,20 @@ pub trait Simd: Copy {
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
     /// Bitwise `a ^ b`.
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
-    /// `a << bits`, for `bits` below 32; zeros come in.
+    /// `a << bits`, for `bits` below 32; shifts in zeros.
     fn shl_u(self, a: Self::U, bits: u32) -> Self::U;
-    /// `a >> bits`, for `bits` below 32; zeros come in.
+    /// `a >> bits`, for `bits` below 32; shifts in zeros.
     fn shr_u(self, a: Self::U, bits: u32) -> Self::U;
     /// Lanes where `a == b`.
     fn eq_u(self, a: Self::U, b: Self::U) -> Mask;
-    /// `from[i]` for each index; indices beyond the end read some number of it. `from` must not be empty. Fastest where
-    /// it has exactly 16 or 32.
+    /// `from[i]` for each index; indices beyond the end read an unspecified element. `from` must not be empty. Fastest
+    /// if its length is exactly 16 or 32.
     fn gather(self, from: &[f32], indices: Self::U) -> Self::F;
-    /// [`Self::gather`] from a table of `u32`.
+    /// Like [`Self::gather`], from a table of `u32`.
     fn gather_u(self, from: &[u32], indices: Self::U) -> Self::U;
-    /// Moves the lanes with their bit set to the front, in order; what follows them is anything.
+    /// Moves the lanes with their bit set to the front, in order; the remaining lanes are unspecified.
     fn compress(self, mask: Mask, a: Self::F) -> Self::F;
-    /// [`Self::compress`] of `u32`.
+    /// Like [`Self::compress`], for `u32`.
     fn compress_u(self, mask: Mask, a: Self::U) -> Self::U;
 }
 
@@ -151,32 +153,32 @@ pub trait Kernel<S: Simd> {
     /// What the kernel returns.
     type Output;
 
-    /// To be `#[inline(always)]`.
+    /// Runs the kernel; implementations are `#[inline(always)]`.
     fn run(self, s: S) -> Self::Output;
 }
 
-/// What the processor can do.
+/// An instruction set that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
     /// AVX-512 F, VL, DQ and BW, besides all of [`Self::Avx2`]: a register of 512 bits holds sixteen `f32`.
     Avx512,
     /// AVX2 with FMA, BMI 1 and 2, LZCNT and POPCNT: two registers of 256 bits hold sixteen `f32`.
     Avx2,
-    /// Plain arrays, on any processor.
+    /// Portable arrays, on any processor.
     Portable,
 }
 
 static DEFAULT: OnceLock<InstructionSet> = OnceLock::new();
 
 impl InstructionSet {
-    /// What is used unless something else is asked for: the widest set of this processor, or that of [`Self::set_default`].
+    /// Returns the default set: the widest of this processor, unless [`Self::set_default`] has set another one.
     #[inline]
     pub fn detect() -> Self {
         *DEFAULT.get_or_init(Self::widest)
     }
 
-    /// Makes a set the one that [`Self::detect`] gives, for the rest of the process. False if the processor does not have it,
-    /// or if another one is the default already: call it before anything is built or rendered.
+    /// Makes this set the result of [`Self::detect`] for the rest of the process. Returns false if the processor does
+    /// not support it, or if another set is already the default: call it before anything is built or rendered.
     pub fn set_default(self) -> bool {
         self.is_available() && *DEFAULT.get_or_init(|| self) == self
     }
@@ -186,13 +188,13 @@ impl InstructionSet {
         *WIDEST.get_or_init(|| Self::available()[0])
     }
 
-    /// Whether this processor can run code that is compiled for the set.
+    /// Whether this processor supports the set.
     #[inline]
     pub fn is_available(self) -> bool {
         self == Self::Portable || self as usize >= Self::widest() as usize
     }
 
-    /// All that this processor has, widest first; tests run them all.
+    /// Returns all sets that this processor supports, widest first; tests run them all.
     pub fn available() -> Vec<Self> {
         let mut sets = Vec::new();
         #[cfg(target_arch = "x86_64")]
@@ -220,15 +222,16 @@ impl InstructionSet {
     }
 }
 
-/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set. Panics if the processor does not have it: any
-/// caller can name one, in `RenderSettings::lanes` too.
+/// Runs `$kernel::<S>(simd, args..)` compiled for the given instruction set. Panics if the processor does not support
+/// it: any caller can name a set, also in `RenderSettings::simd`.
 #[macro_export]
 macro_rules! dispatch {
     ($set:expr, $kernel:ident ( $($name:ident : $kind:ty),* $(,)? )) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn avx512($($name: $kind),*) {
-            // SAFETY: this function has these instructions enabled, and whoever called it has promised that they are there.
+            // SAFETY: this function has these instructions enabled, and its caller guarantees that the processor has
+            // them.
             $kernel(unsafe { $crate::Avx512::new() }, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
@@ -240,7 +243,7 @@ macro_rules! dispatch {
         let set: $crate::InstructionSet = $set;
         assert!(set.is_available(), "this processor does not have {set:?}");
         match set {
-            // SAFETY: the processor has the set, which was asserted, and with it all that `available` looks for.
+            // SAFETY: the processor supports the set, as asserted, and with it everything that `available` checks.
             #[cfg(target_arch = "x86_64")]
             $crate::InstructionSet::Avx512 => unsafe { avx512($($name),*) },
             // SAFETY: as above.
@@ -251,7 +254,7 @@ macro_rules! dispatch {
     }};
 }
 
-/// Plain arrays: the reference, and what other processors get.
+/// Portable arrays: the reference, and the implementation for all other processors.
 #[derive(Clone, Copy)]
 pub struct Portable;
 
@@ -572,7 +575,7 @@ fn pack<T: Copy>(mask: Mask, a: [T; LANES]) -> [T; LANES] {
     packed
 }
 
-/// Of an array that `gather` may read.
+/// Returns the last index of an array that `gather` may read.
 #[inline(always)]
 fn last_index(len: usize) -> u32 {
     assert!(len > 0 && len <= i32::MAX as usize, "nothing to gather from, or too much");
@@ -590,7 +593,7 @@ mod x86;
 mod tests {
     use super::*;
 
-    /// Runs every operation on awkward numbers and returns all the bits.
+    /// Runs every operation on edge cases and returns all result bits.
     #[inline(always)]
     fn everything<S: Simd>(s: S, out: &mut Vec<u64>) {
         let numbers = [0.0, -0.0, 1.5, -2.25, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 3.1e-41, 7.7e37, -1e-20];
@@ -600,7 +603,7 @@ mod tests {
             let mut push = |values: S::F| {
                 let mut stored = [0.0; LANES];
                 s.store(values, &mut stored);
-                // The sign and payload of a NaN are nobody's business.
+                // Sign and payload of a NaN are unspecified.
                 out.extend(stored.map(|x| if x.is_nan() { 1 << 40 } else { u64::from(x.to_bits()) }));
             };
             for values in [

@@ -1,9 +1,9 @@
-//! The x86 implementations of [`Simd`]: one AVX-512 register, or two of AVX2, for sixteen numbers.
+//! The x86 implementations of [`Simd`]: sixteen numbers in one AVX-512 register or two AVX2 registers.
 
 use super::{Kernel, LANES, Mask, Simd, last_index};
 use std::arch::x86_64::*;
 
-/// Proof that the processor has AVX-512 F, VL, DQ and BW, and all that [`Avx2`] is proof of.
+/// Proof that the processor has AVX-512 F, VL, DQ and BW, and everything that [`Avx2`] proves.
 #[derive(Clone, Copy)]
 pub struct Avx512(());
 
@@ -12,8 +12,10 @@ pub struct Avx512(());
 pub struct Avx2(());
 
 impl Avx512 {
+    /// Creates the proof.
+    ///
     /// # Safety
-    /// The processor must have the instructions that this is the proof of.
+    /// The processor must have the instructions that this type proves.
     #[inline(always)]
     pub unsafe fn new() -> Self {
         Self(())
@@ -21,22 +23,25 @@ impl Avx512 {
 }
 
 impl Avx2 {
+    /// Creates the proof.
+    ///
     /// # Safety
-    /// The processor must have the instructions that this is the proof of.
+    /// The processor must have the instructions that this type proves.
     #[inline(always)]
     pub unsafe fn new() -> Self {
         Self(())
     }
 }
 
-/// Functions whose body is one expression of intrinsics. Loads and stores of all of them take any alignment.
+/// Defines functions whose body is one expression of intrinsics. All loads and stores accept any alignment.
 macro_rules! operations {
     ($($(#[$attribute:meta])* fn $name:ident($($arg:ident: $kind:ty),*) $(-> $result:ty)? $body:block)*) => {
         $($(#[$attribute])*
         #[inline(always)]
         fn $name(self, $($arg: $kind),*) $(-> $result)? {
             // SAFETY: `self` proves that the processor has the instructions. Pointers come from references to arrays of
-            // the size that is read or written; a gather reads below `last_index` of its slice, which is checked there.
+            // the size that is read or written; a gather reads at most index `last_index` of its slice, which is
+            // checked there.
             unsafe { $body }
         })*
     };
@@ -74,7 +79,7 @@ impl Simd for Avx512 {
         fn mul_add_about(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmadd_ps(a, b, c) }
         fn neg_mul_add_about(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fnmadd_ps(a, b, c) }
         fn reciprocal_about(a: __m512) -> __m512 {
-            // One step of Newton's from 14 bits.
+            // One Newton step from 14 bits.
             let r = _mm512_rcp14_ps(a);
             _mm512_mul_ps(r, _mm512_fnmadd_ps(a, r, _mm512_set1_ps(2.0)))
         }
@@ -126,7 +131,7 @@ impl Simd for Avx512 {
         fn shr_u(a: __m512i, bits: u32) -> __m512i { _mm512_srlv_epi32(a, _mm512_set1_epi32(bits as i32)) }
         fn eq_u(a: __m512i, b: __m512i) -> Mask { _mm512_cmpeq_epi32_mask(a, b) }
         fn gather(from: &[f32], indices: __m512i) -> __m512 {
-            // Sixteen or thirty-two numbers are looked up in registers.
+            // Tables of sixteen or thirty-two numbers are looked up in registers.
             if let Some(table) = from.as_array::<LANES>() {
                 return _mm512_permutexvar_ps(indices, _mm512_loadu_ps(table.as_ptr()));
             }
@@ -149,13 +154,13 @@ impl Simd for Avx512 {
     }
 }
 
-/// A mask of 8 bits as a register of lanes that are all ones or all zeros.
+/// Expands a mask of 8 bits to a register whose lanes are all ones or all zeros.
 ///
 /// # Safety
-/// The processor must have the instructions that [`Avx2`] is the proof of.
+/// The processor must have the instructions that [`Avx2`] proves.
 #[inline(always)]
 unsafe fn lanes_of(mask: Mask) -> __m256 {
-    // SAFETY: the caller's promise; no memory is touched.
+    // SAFETY: guaranteed by the caller; no memory is accessed.
     unsafe {
         let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
         let both = _mm256_and_si256(_mm256_set1_epi32(i32::from(mask)), bit);
@@ -163,29 +168,33 @@ unsafe fn lanes_of(mask: Mask) -> __m256 {
     }
 }
 
+/// Collects the sign bits of all lanes.
+///
 /// # Safety
 /// As [`lanes_of`].
 #[inline(always)]
 unsafe fn bits_of(low: __m256, high: __m256) -> Mask {
-    // SAFETY: the caller's promise; no memory is touched.
+    // SAFETY: guaranteed by the caller; no memory is accessed.
     unsafe { _mm256_movemask_ps(low) as Mask | (_mm256_movemask_ps(high) as Mask) << 8 }
 }
 
+/// Selects `a` where the bit is set, else `b`.
+///
 /// # Safety
 /// As [`lanes_of`].
 #[inline(always)]
 unsafe fn blend(mask: Mask, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-    // SAFETY: the caller's promise; no memory is touched.
+    // SAFETY: guaranteed by the caller; no memory is accessed.
     unsafe { [_mm256_blendv_ps(b[0], a[0], lanes_of(mask)), _mm256_blendv_ps(b[1], a[1], lanes_of(mask >> 8))] }
 }
 
-/// Moves the lanes of the mask to the front: each half by itself, then the upper one behind the lower.
+/// Moves the lanes of the mask to the front: each half separately, then the upper one behind the lower.
 ///
 /// # Safety
 /// As [`lanes_of`].
 #[inline(always)]
 unsafe fn compress(mask: Mask, a: [__m256i; 2]) -> [__m256i; 2] {
-    // SAFETY: the caller's promise; the second store begins at the eighth of sixteen numbers at the latest.
+    // SAFETY: guaranteed by the caller; the second store starts at index 8 of sixteen numbers at the latest.
     unsafe {
         let (low, high) = (compress_half(mask as u8, a[0]), compress_half((mask >> 8) as u8, a[1]));
         let mut both = [0u32; 16];
@@ -195,13 +204,13 @@ unsafe fn compress(mask: Mask, a: [__m256i; 2]) -> [__m256i; 2] {
     }
 }
 
-/// Spreads the mask to bytes and collects the numbers of its lanes: a compress in two steps.
+/// Spreads the mask to bytes and collects its lane indices: a compress in two steps.
 ///
 /// # Safety
 /// As [`lanes_of`].
 #[inline(always)]
 unsafe fn compress_half(mask: u8, a: __m256i) -> __m256i {
-    // SAFETY: the caller's promise; no memory is touched.
+    // SAFETY: guaranteed by the caller; no memory is accessed.
     unsafe {
         let bytes = _pdep_u64(u64::from(mask), 0x0101_0101_0101_0101) * 0xFF;
         let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(_pext_u64(0x0706_0504_0302_0100, bytes) as i64));
@@ -209,22 +218,22 @@ unsafe fn compress_half(mask: u8, a: __m256i) -> __m256i {
     }
 }
 
-/// Entries of the table by the low four bits of the indices.
+/// Looks up table entries by the low four bits of the indices.
 ///
 /// # Safety
 /// As [`lanes_of`].
 #[inline(always)]
 unsafe fn lookup_half(table: [__m256; 2], indices: __m256i) -> __m256 {
-    // SAFETY: the caller's promise; no memory is touched.
+    // SAFETY: guaranteed by the caller; no memory is accessed.
     unsafe {
         let low = _mm256_permutevar8x32_ps(table[0], indices);
         let high = _mm256_permutevar8x32_ps(table[1], indices);
-        // The fourth bit becomes the sign, by which blends choose.
+        // The fourth bit becomes the sign bit, which selects in a blend.
         _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(indices)))
     }
 }
 
-/// The same operation on both halves.
+/// Applies an operation to both halves.
 macro_rules! halves {
     ($operation:ident($($arg:ident),+)) => { [$operation($($arg[0]),+), $operation($($arg[1]),+)] };
     ($operation:ident($($arg:ident),+), 4) => {
@@ -270,7 +279,7 @@ impl Simd for Avx2 {
         fn mul_add_about(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fmadd_ps(a, b, c)) }
         fn neg_mul_add_about(a: Self::F, b: Self::F, c: Self::F) -> Self::F { halves!(_mm256_fnmadd_ps(a, b, c)) }
         fn reciprocal_about(a: Self::F) -> Self::F {
-            // One step of Newton's from 11 bits.
+            // One Newton step from 11 bits.
             let (r, two) = (halves!(_mm256_rcp_ps(a)), [_mm256_set1_ps(2.0); 2]);
             let rest = halves!(_mm256_fnmadd_ps(a, r, two));
             halves!(_mm256_mul_ps(r, rest))

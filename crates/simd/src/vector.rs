@@ -1,4 +1,4 @@
-//! Vectors of three, one or sixteen of them.
+//! Three-component vectors, one or sixteen at a time.
 
 use super::number::{Bits, Float};
 use super::real::{Real, select};
@@ -6,7 +6,7 @@ use super::simd::Simd;
 use glam::Vec3;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A [`Vec3`], or sixteen, one register a coordinate; every operation rounds as glam's does.
+/// A [`Vec3`], or sixteen with one register per coordinate; every operation rounds like glam's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vector3<R> {
     /// Coordinate along x.
@@ -40,7 +40,7 @@ pub fn select_vector<R: Real>(mask: R::Mask, a: Vector3<R>, b: Vector3<R>) -> Ve
     Vector3 { x: select(mask, a.x, b.x), y: select(mask, a.y, b.y), z: select(mask, a.z, b.z) }
 }
 
-/// Right-handed axes at right angles, all unit, of which the last is the given unit normal.
+/// Returns a right-handed orthonormal basis whose last axis is the given unit normal.
 ///
 /// Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
 #[inline(always)]
@@ -57,25 +57,25 @@ pub fn frame_around<R: Real>(normal: Vector3<R>) -> [Vector3<R>; 3] {
 }
 
 impl<R: Real> Vector3<R> {
-    /// The same vector in all lanes, of which `like` has as many.
+    /// The same vector in all lanes; `like` determines the number of lanes.
     #[inline(always)]
     pub fn in_all(like: R, v: Vec3) -> Self {
         Self { x: like.all(v.x), y: like.all(v.y), z: like.all(v.z) }
     }
 
-    /// The same number in all three.
+    /// The vector with the same number in all three coordinates.
     #[inline(always)]
     pub fn all(x: R) -> Self {
         Self { x, y: x, z: x }
     }
 
-    /// Scalar product.
+    /// Dot product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> R {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
-    /// Right-handed vector product.
+    /// Cross product.
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         Self {
@@ -85,7 +85,7 @@ impl<R: Real> Vector3<R> {
         }
     }
 
-    /// Euclidean length, squared.
+    /// Squared Euclidean length.
     #[inline(always)]
     pub fn length_squared(self) -> R {
         self.dot(self)
@@ -103,19 +103,19 @@ impl<R: Real> Vector3<R> {
         self * (self.x.all(1.0) / self.length())
     }
 
-    /// Absolute values, coordinate by coordinate.
+    /// Absolute values of the coordinates.
     #[inline(always)]
     pub fn abs(self) -> Self {
         Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
     }
 
-    /// Coordinate by coordinate.
+    /// Componentwise product.
     #[inline(always)]
     pub fn times(self, other: Self) -> Self {
         Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
     }
 
-    /// Coordinate by coordinate.
+    /// Componentwise maximum.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self { x: self.x.max(other.x), y: self.y.max(other.y), z: self.z.max(other.z) }
@@ -133,19 +133,19 @@ impl<R: Real> Vector3<R> {
         self.x.is_zero() & self.y.is_zero() & self.z.is_zero()
     }
 
-    /// From coordinates along these axes.
+    /// Converts from coordinates along these axes.
     #[inline(always)]
     pub fn to_world(self, axes: &[Self; 3]) -> Self {
         axes[0] * self.x + axes[1] * self.y + axes[2] * self.z
     }
 
-    /// To coordinates along these axes.
+    /// Converts to coordinates along these axes.
     #[inline(always)]
     pub fn to_local(self, axes: &[Self; 3]) -> Self {
         Self { x: axes[0].dot(self), y: axes[1].dot(self), z: axes[2].dot(self) }
     }
 
-    /// The vector times a number that all lanes share.
+    /// The vector times a number shared by all lanes.
     #[inline(always)]
     pub fn mul_all(self, x: f32) -> Self {
         Self { x: self.x * x, y: self.y * x, z: self.z * x }
@@ -159,7 +159,7 @@ impl<S: Simd> Vector<S> {
         Self { x: Float::splat(s, v.x), y: Float::splat(s, v.y), z: Float::splat(s, v.z) }
     }
 
-    /// One vector per index from a table of x, one of y and one of z; see [`Simd::gather`].
+    /// Looks up one vector per index in tables of x, y and z; see [`Simd::gather`].
     #[inline(always)]
     pub fn gather(from: &[Vec<f32>; 3], indices: Bits<S>) -> Self {
         Self {
@@ -169,13 +169,13 @@ impl<S: Simd> Vector<S> {
         }
     }
 
-    /// The x, y and z of all lanes, one array each.
+    /// The x, y and z of all lanes as three arrays.
     #[inline(always)]
     pub fn to_arrays(self) -> [[f32; super::LANES]; 3] {
         [self.x.to_array(), self.y.to_array(), self.z.to_array()]
     }
 
-    /// The vectors whose x, y and z are the first, second and third array, one lane per entry.
+    /// Creates vectors from arrays of x, y and z, one lane per entry.
     #[inline(always)]
     pub fn from_arrays(s: S, arrays: &[[f32; super::LANES]; 3]) -> Self {
         Self { x: Float::load(s, &arrays[0]), y: Float::load(s, &arrays[1]), z: Float::load(s, &arrays[2]) }

@@ -1,11 +1,11 @@
-//! One `u32`, or sixteen; see [`Real`].
+//! Integers that formulas are generic over: one `u32` or sixteen; see [`Real`].
 
 use super::number::{Bits, Float};
 use super::real::{Real, Truth};
 use super::simd::{Mask, Simd};
 use std::ops::{BitAnd, BitOr, BitXor};
 
-/// One number of 32 bits or sixteen of them; sums and products are modulo 2³².
+/// One 32-bit number or sixteen; sums and products are modulo 2³².
 pub trait Word:
     Copy
     + BitAnd<Output = Self>
@@ -17,7 +17,7 @@ pub trait Word:
 {
     /// Result of a comparison: `bool` for one number, [`Mask`] for sixteen.
     type Mask: Truth;
-    /// The numbers that these convert to: `f32`, or [`Float`].
+    /// The type of converted numbers: `f32`, or [`Float`].
     type Real: Real;
 
     /// The same number in all lanes.
@@ -29,22 +29,22 @@ pub trait Word:
     /// `self · other` modulo 2³².
     fn times(self, other: Self) -> Self;
 
-    /// `self << bits`, for `bits` below 32; zeros come in.
+    /// `self << bits`, for `bits` below 32; shifts in zeros.
     fn shift_left(self, bits: u32) -> Self;
 
-    /// `self >> bits`, for `bits` below 32; zeros come in.
+    /// `self >> bits`, for `bits` below 32; shifts in zeros.
     fn shift_right(self, bits: u32) -> Self;
 
-    /// The bits back to front.
+    /// The bits in reversed order.
     fn reversed(self) -> Self;
 
-    /// Whether it is equal to `x`.
+    /// Whether the number is equal to `x`.
     fn equals(self, x: u32) -> Self::Mask;
 
-    /// Entries of a table; the index must lie within.
+    /// Looks up table entries; the index must be in range.
     fn gather(from: &[u32], index: Self) -> Self;
 
-    /// The number itself, below 2³¹ and rounded.
+    /// Converts numbers below 2³¹ to floating point, rounded.
     fn to_real(self) -> Self::Real;
 
     /// `self · x` modulo 2³², with the same `x` in all lanes.

@@ -1,11 +1,11 @@
-//! Meshes that are hard on a kd-tree, for benchmarks and stress tests.
+//! Meshes that are difficult for a kd-tree, for benchmarks and stress tests.
 
 use super::noise::lattice_unit;
 use super::{DisplacedSphere, Terrain, built, cuboid, displaced_sphere, terrain};
 use crate::Mesh;
 use glam::{DVec3, dvec3};
 
-/// A dense blob of 101,920 triangles in a bowl 200 times its size of 11,250: detail where few rays go.
+/// A dense blob of 101,920 triangles in a bowl 200 times its size of 11,250 triangles: detail where few rays go.
 pub fn blob_in_bowl() -> Mesh {
     let blob = displaced_sphere(&DisplacedSphere { frequency: 71, ..DisplacedSphere::default() });
     let cells: u32 = 75;
@@ -25,7 +25,7 @@ pub fn room() -> Mesh {
     parts.add(&walls, |p| p);
     for i in 0..12_u32 {
         let (x, z) = (f64::from(i % 6) * 3.2 - 8.0, if i < 6 { -3.5 } else { 3.5 });
-        // Clear of floor and ceiling, so that no two parts touch.
+        // Slightly shorter than the room, so that no two parts touch.
         parts.add(&column(48, 8), |p| p * dvec3(1.0, 2.99, 1.0) + dvec3(x, 0.0, z));
     }
     for i in 0..9_u32 {

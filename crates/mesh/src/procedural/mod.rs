@@ -1,7 +1,7 @@
-//! Meshes made by formula: the same numbers in, the same mesh out, bit for bit on one build target.
+//! Procedural meshes: equal parameters give equal meshes, bit for bit on one build target.
 //!
-//! None of them has normals yet: call [`Mesh::with_smooth_normals`] or leave them flat. The subjects a picture is
-//! about are in [`serpent_knot`] and [`displaced_sphere`]; the rest are plain shapes and kernel benchmarks.
+//! They have no normals: call [`Mesh::with_smooth_normals`] or leave them flat. [`serpent_knot`] and
+//! [`displaced_sphere`] are meant as main subjects of images; the others are plain shapes and kernel benchmarks.
 
 mod bench;
 mod noise;
@@ -19,7 +19,7 @@ pub use terrain::{Terrain, terrain};
 use super::Mesh;
 use glam::DVec3;
 
-/// For meshes whose numbers come from this folder: a failure is a bug here.
+/// Creates a mesh from data of this folder: a failure is a bug here.
 fn built(positions: &[DVec3], triangles: Vec<[u32; 3]>) -> Mesh {
     match Mesh::from_f64(positions, triangles) {
         Ok(mesh) => mesh,
@@ -43,7 +43,7 @@ fn open_grid(nu: u32, nv: u32) -> Vec<[u32; 3]> {
     (0..nu).flat_map(|i| (0..nv).flat_map(move |j| cell(vertex, i, j))).collect()
 }
 
-/// The diagonals alternate, so that no direction is favoured.
+/// Splits a grid cell into two triangles. The diagonals alternate, so that no direction is preferred.
 fn cell(vertex: impl Fn(u32, u32) -> u32, i: u32, j: u32) -> [[u32; 3]; 2] {
     let (a, b, c, d) = (vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
     if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }

@@ -1,4 +1,4 @@
-//! Gradient noise over space, and sums of it.
+//! Gradient noise in space, and sums of it.
 
 use glam::DVec3;
 
@@ -53,7 +53,7 @@ pub fn ridged_noise(point: DVec3, octaves: u32, seed: u32) -> f64 {
     sum / total
 }
 
-/// A number in `[0, 1)` for a lattice point.
+/// Returns a number in `[0, 1)` for a lattice point.
 pub fn lattice_unit(point: [u32; 3], seed: u32) -> f64 {
     f64::from(hash(point, seed)) / (f64::from(u32::MAX) + 1.0)
 }
@@ -70,7 +70,7 @@ fn hash(point: [u32; 3], seed: u32) -> u32 {
             (x, y, z) = (x ^ (x >> 16), y ^ (y >> 16), z ^ (z >> 16));
         }
     }
-    // The low bits are the weakest, and they choose the gradient.
+    // The low bits are the weakest, and they select the gradient.
     (x ^ (x >> 16)).rotate_right(7)
 }
 

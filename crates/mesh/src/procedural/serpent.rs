@@ -1,8 +1,8 @@
-//! A serpent that has tied itself into a trefoil knot: the star of the gallery.
+//! A serpent tied into a trefoil knot: the main subject of the gallery.
 //!
 //! One closed surface without self-intersection, with detail at four scales: the knot, the swept fins of the crest,
-//! overlapping keeled scales and belly plates, and the grain of the skin. Everything is a formula of two angles,
-//! so any resolution gives the same sculpture.
+//! overlapping keeled scales and belly plates, and the grain of the skin. Everything is a function of two angles, so
+//! any resolution gives the same sculpture.
 
 use super::noise::{fractal_noise, ridged_noise};
 use super::{built, closed_grid};
@@ -31,7 +31,7 @@ impl Default for SerpentKnot {
     }
 }
 
-/// Radius of the torus on which the body runs, and of that torus's tube. Metres, like all lengths here.
+/// Radius of the torus on which the body runs, and radius of that torus's tube. Metres, like all lengths here.
 const KNOT: DVec2 = dvec2(1.0, 0.46);
 /// Radius of the body.
 const BODY: f64 = 0.24;
@@ -41,10 +41,10 @@ const SCALE_ROWS: u32 = 200;
 const SCALES_AROUND: f64 = 20.0;
 const BELLY_PLATES: f64 = 100.0;
 
-/// A knot about 3.4 metres wide and 1.5 high about the origin, lying flat, y up. Closed, manifold, genus 1.
+/// Builds a knot about 3.4 metres wide and 1.5 high about the origin, lying flat, y up. Closed, manifold, genus 1.
 ///
 /// # Panics
-/// With fewer than 64 segments along or 8 around.
+/// If there are fewer than 64 segments along or 8 around.
 pub fn serpent_knot(shape: &SerpentKnot) -> Mesh {
     let SerpentKnot { along, around, .. } = *shape;
     assert!(along >= 64 && around >= 8, "the knot needs at least 64 × 8 segments, not {along} × {around}");
@@ -55,22 +55,24 @@ pub fn serpent_knot(shape: &SerpentKnot) -> Mesh {
             let s = f64::from(k / around) / f64::from(along);
             let t = knot.parameter_at(s);
             let theta = TAU * f64::from(k % around) / f64::from(around);
-            // Twice as many vertices on the back as on the belly: the fins are the thinnest thing here.
+            // Twice as many vertices on the back as on the belly, because the fins are the thinnest detail.
             surface_point(shape, s, t, theta - 0.5 * theta.sin())
         })
         .collect();
     built(&positions, closed_grid(along, around))
 }
 
-/// - `s`: place along the body as a share of its length, `[0, 1)`.
-/// - `t`: the same place as the knot's own parameter, `[0, 1)`.
+/// Returns a point of the surface.
+///
+/// - `s`: position along the body as a fraction of its length, `[0, 1)`.
+/// - `t`: the same position as the knot's own parameter, `[0, 1)`.
 /// - `angle`: around the body, radians, 0 on the back, π on the belly.
 fn surface_point(shape: &SerpentKnot, s: f64, t: f64, angle: f64) -> DVec3 {
     let (center, tangent, back, side) = body_frame(t);
     let (sin, cos) = angle.sin_cos();
     let outward = cos * back + sin * side;
     let from_back = angle.min(TAU - angle);
-    // The body breathes a little, and is flatter below than above.
+    // The girth varies slightly, and the belly is flatter than the back.
     let girth = 1.0 + 0.05 * (3.0 * TAU * s).sin();
     let profile = 1.0 - 0.07 * (0.5 - 0.5 * cos).powi(2);
     let radius = BODY * girth * profile;
@@ -90,9 +92,9 @@ fn surface_point(shape: &SerpentKnot, s: f64, t: f64, angle: f64) -> DVec3 {
     skin + outward * lift - tangent * (shape.relief * sweep)
 }
 
-/// Places along the centre line by length: the knot's own parameter runs almost twice as fast on the outside.
+/// Maps arc length along the centre line to the knot's parameter, which runs almost twice as fast on the outside.
 struct ArcLength {
-    /// Share of the length up to each of equal steps of the parameter, from 0 to 1.
+    /// Fraction of the length up to each of equal steps of the parameter, from 0 to 1.
     shares: Vec<f64>,
 }
 
@@ -116,10 +118,11 @@ impl ArcLength {
     }
 }
 
-/// The centre line at parameter `s`, and its frame: along the body, to its back, to its side; tangent × side is back.
+/// Returns the centre line at parameter `s`, and its frame: along the body, towards its back, towards its side; tangent
+/// × side is back.
 fn body_frame(s: f64) -> (DVec3, DVec3, DVec3, DVec3) {
-    // A (2, 3) torus knot: twice around the axis, three times around the tube. The torus's own normal is a frame
-    // that closes on itself, and it turns every fin outwards.
+    // A (2, 3) torus knot: twice around the axis, three times around the tube. The torus's own normal gives a frame
+    // that is periodic and orients every fin outwards.
     let (axis_angle, tube_angle) = (2.0 * TAU * s, 3.0 * TAU * s);
     let (sin_a, cos_a) = axis_angle.sin_cos();
     let (sin_t, cos_t) = tube_angle.sin_cos();
@@ -132,7 +135,7 @@ fn body_frame(s: f64) -> (DVec3, DVec3, DVec3, DVec3) {
     (center, tangent, back, back.cross(tangent))
 }
 
-/// Overlapping scales, 0..1: each rises towards its free rounded end and carries a keel.
+/// Height of overlapping scales, 0..1: each rises towards its rounded free end and carries a keel.
 fn scale_relief(s: f64, angle: f64) -> f64 {
     let at = dvec2(s * f64::from(SCALE_ROWS), angle / TAU * SCALES_AROUND);
     let row = at.x.floor() as i64;
@@ -147,7 +150,9 @@ fn scale_relief(s: f64, angle: f64) -> f64 {
     highest
 }
 
-/// - `p`: the scale is the unit disc, its free end at −x.
+/// Height of one scale.
+///
+/// - `p`: position in the scale, which is the unit disc with its free end at −x.
 fn one_scale(p: DVec2) -> f64 {
     let edge = p.length_squared();
     if edge >= 1.0 {
@@ -159,17 +164,17 @@ fn one_scale(p: DVec2) -> f64 {
     rim * slope + keel
 }
 
-/// Broad plates across the belly, 0..1, each overlapping the next; `x` counts plates.
+/// Height of broad plates across the belly, 0..1, each overlapping the next; `x` counts plates.
 fn plate_relief(x: f64) -> f64 {
     let u = x - x.floor();
     (1.0 - 0.75 * u) * (1.0 - (1.0 - u).powi(14))
 }
 
-/// Height of the crest's fins and how far they lean back, metres.
+/// Returns the height of the crest's fins and the distance by which they lean back, metres.
 fn fin(s: f64, from_back: f64) -> (f64, f64) {
     let across = (-(from_back / 0.11).powi(2)).exp();
     let u = s * FINS - (s * FINS).floor();
-    // Every third fin is the largest, so that the crest has a rhythm.
+    // Every third fin is the largest, which gives the crest a rhythm.
     let rhythm = 0.8 + 0.2 * (TAU * s * FINS / 3.0).cos();
     let blade = (0.5 - 0.5 * (TAU * u).cos()).powf(1.5);
     let base = 0.18;
@@ -177,7 +182,7 @@ fn fin(s: f64, from_back: f64) -> (f64, f64) {
     (height, 0.6 * height * blade)
 }
 
-/// 0 below `from`, 1 above `to`, with level ends.
+/// Smooth step: 0 below `from`, 1 above `to`, with zero slope at the ends.
 fn smooth_step(from: f64, to: f64, x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -225,7 +230,7 @@ mod tests {
         let gap = p.distance(q) + t.distance(u) + b.distance(c) + n.distance(m);
         assert!(gap < 1e-12, "{gap}");
         assert!((t.cross(n).dot(b) - 1.0).abs() < 1e-12 && t.dot(b).abs() < 1e-12);
-        // Against a difference quotient.
+        // Compared with a difference quotient.
         let step = (body_frame(0.3001).0 - body_frame(0.2999).0).normalize();
         assert!(step.distance(body_frame(0.3).1) < 1e-5);
     }

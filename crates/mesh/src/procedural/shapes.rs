@@ -1,4 +1,4 @@
-//! Plain shapes with known volumes.
+//! Simple shapes with known volumes.
 
 use super::{built, open_grid};
 use crate::Mesh;
@@ -16,12 +16,12 @@ pub fn cuboid(size: DVec3) -> Mesh {
     built(&(0..8).map(corner).collect::<Vec<_>>(), triangles)
 }
 
-/// A ring about the y axis of `nu` segments around the axis and `nv` around the tube, each at least 3.
+/// A torus about the y axis of `nu` segments around the axis and `nv` around the tube, each at least 3.
 ///
-/// Texture coordinates run 0..1 around both; the seams are doubled vertices.
+/// Texture coordinates run 0..1 around both; vertices are duplicated at the seams.
 ///
 /// # Panics
-/// With fewer than 3 segments around either.
+/// If there are fewer than 3 segments around either.
 pub fn torus(radius: f64, tube_radius: f64, nu: u32, nv: u32) -> Mesh {
     assert!(nu >= 3 && nv >= 3, "a torus needs 3 segments each way, not {nu} and {nv}");
     let mut positions = Vec::new();
@@ -38,13 +38,13 @@ pub fn torus(radius: f64, tube_radius: f64, nu: u32, nv: u32) -> Mesh {
     Mesh { uvs, ..built(&positions, open_grid(nu, nv)) }
 }
 
-/// A square block (2 × 2, 1 high) with a round hole of diameter 1 along the y axis, as a CAD program writes it:
-/// long needles along the bore, fans of thin triangles on the faces.
+/// A square block (2 × 2, 1 high) with a round hole of diameter 1 along the y axis, as exported by CAD programs: long
+/// needles along the bore, fans of thin triangles on the faces.
 ///
 /// - `segments`: of the hole, a multiple of 4.
 ///
 /// # Panics
-/// When `segments` is 0 or no multiple of 4.
+/// If `segments` is 0 or not a multiple of 4.
 pub fn bored_block(segments: u32) -> Mesh {
     assert!(segments >= 4 && segments.is_multiple_of(4), "segments must be a multiple of 4, not {segments}");
     let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
@@ -61,7 +61,7 @@ pub fn bored_block(segments: u32) -> Mesh {
     let quarter = segments / 4;
     let mut triangles = Vec::new();
     for q in 0..4 {
-        // Corner q owns the arc of the quarter around it; the two corners meet in one triangle at the arc's end.
+        // Corner q is connected to the arc of the quarter around it; two corners meet in one triangle at the arc's end.
         for i in q * quarter..(q + 1) * quarter {
             triangles.push([q, rim(i), rim(i + 1)]);
             triangles.push([level + q, level + rim(i + 1), level + rim(i)]);
@@ -75,7 +75,7 @@ pub fn bored_block(segments: u32) -> Mesh {
         let (a, b) = (rim(i), rim(i + 1));
         triangles.extend([[b, a, level + a], [b, level + a, level + b]]);
     }
-    // Written above as seen from inside.
+    // The triangles above are oriented as seen from inside.
     triangles.iter_mut().for_each(|t| t.swap(1, 2));
     built(&positions, triangles)
 }

@@ -1,4 +1,4 @@
-//! Spheres of triangles, smooth and carved.
+//! Triangulated spheres, smooth and displaced.
 
 use super::built;
 use super::noise::{fractal_noise, ridged_noise};
@@ -6,7 +6,7 @@ use crate::Mesh;
 use glam::{DVec3, dvec3};
 use std::collections::HashMap;
 
-/// A unit sphere: each face of an icosahedron cut into `frequency`² triangles, so `20 · frequency²` in all.
+/// A unit sphere: each face of an icosahedron subdivided into `frequency`² triangles, so `20 · frequency²` in all.
 pub fn icosphere(frequency: u32) -> Mesh {
     let (positions, triangles) = sphere_grid(frequency);
     built(&positions, triangles)
@@ -17,9 +17,9 @@ pub fn icosphere(frequency: u32) -> Mesh {
 pub struct DisplacedSphere {
     /// `20 · frequency²` triangles.
     pub frequency: u32,
-    /// Height of the largest hills as a share of the radius, `[0, 0.5]`.
+    /// Height of the largest hills relative to the radius, `[0, 0.5]`.
     pub amplitude: f64,
-    /// Hills across the radius, about.
+    /// Approximate number of hills across the radius.
     pub hills: f64,
     /// 0: rounded hills; 1: sharp ridges.
     pub ridged: f64,
@@ -34,7 +34,7 @@ impl Default for DisplacedSphere {
     }
 }
 
-/// A sphere of mean radius about 1, pushed in and out by noise; star-shaped, so it never meets itself.
+/// A sphere of mean radius about 1, displaced radially by noise; star-shaped, so it never intersects itself.
 pub fn displaced_sphere(shape: &DisplacedSphere) -> Mesh {
     let (mut positions, triangles) = sphere_grid(shape.frequency);
     for p in &mut positions {
@@ -46,7 +46,7 @@ pub fn displaced_sphere(shape: &DisplacedSphere) -> Mesh {
     built(&positions, triangles)
 }
 
-/// Points on the unit sphere, shared between faces, and their triangles facing outwards.
+/// Returns points on the unit sphere, shared between faces, and their outward-facing triangles.
 fn sphere_grid(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     assert!(frequency >= 1, "a sphere needs a frequency of at least 1");
     let golden = 0.5 * (1.0 + 5.0_f64.sqrt());
@@ -59,11 +59,11 @@ fn sphere_grid(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut triangles = Vec::with_capacity(20 * (frequency * frequency) as usize);
     for [a, b, c] in icosahedron_faces(&corners) {
         let mut vertex = |i: u32, j: u32| -> u32 {
-            // Weights of the three corners; a vertex on an edge is shared, so it is named by that edge.
+            // Weights of the three corners; a vertex on an edge is shared, so its key is that edge.
             let parts = [(a, frequency - i - j), (b, i), (c, j)];
             let mut used: Vec<(u32, u32)> = parts.into_iter().filter(|&(_, weight)| weight > 0).collect();
             used.sort_unstable();
-            // The sum goes in sorted order too, so that both faces of an edge compute the same bits.
+            // The sum uses the sorted order too, so that both faces at an edge compute the same bits.
             let sum: DVec3 = used.iter().map(|&(k, weight)| f64::from(weight) * corners[k as usize]).sum();
             let mut push = || {
                 positions.push(sum.normalize());
@@ -89,7 +89,7 @@ fn sphere_grid(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     (positions, triangles)
 }
 
-/// All triples of corners at edge length from each other, facing outwards.
+/// Returns all triples of corners at edge length from each other, facing outwards.
 fn icosahedron_faces(corners: &[DVec3]) -> Vec<[u32; 3]> {
     let near = |i: usize, j: usize| corners[i].distance(corners[j]) < 2.1;
     let mut faces = Vec::with_capacity(20);

@@ -1,4 +1,4 @@
-//! Landscapes: one height for each point of a square.
+//! Height-field terrain over a square.
 
 use super::noise::{fractal_noise, ridged_noise};
 use super::{built, open_grid};
@@ -12,9 +12,9 @@ pub struct Terrain {
     pub cells: u32,
     /// Side of the square, metres.
     pub size: f64,
-    /// Height between the valleys and the highest crests, metres, about.
+    /// Approximate height between the valleys and the highest crests, metres.
     pub height: f64,
-    /// Mountains along a side, about.
+    /// Approximate number of mountains along a side.
     pub mountains: f64,
     /// Seed of the noise that shapes mountains and ground.
     pub seed: u32,
@@ -27,10 +27,10 @@ impl Default for Terrain {
     }
 }
 
-/// Ridged mountains over rolling ground, with texture coordinates 0..1 along x and −z.
+/// Builds ridged mountains over rolling ground, with texture coordinates 0..1 along x and −z.
 ///
 /// # Panics
-/// Without cells.
+/// If there are no cells.
 pub fn terrain(shape: &Terrain) -> Mesh {
     assert!(shape.cells >= 1, "a terrain needs at least one cell");
     let n = f64::from(shape.cells);
@@ -41,7 +41,7 @@ pub fn terrain(shape: &Terrain) -> Mesh {
             let (u, v) = (f64::from(i) / n, f64::from(j) / n);
             // The offset keeps the lattice planes of the noise, where it is zero, off the ground plane.
             let at = DVec3::new(u, 0.0, v) * shape.mountains + dvec3(0.0, 0.37, 0.0);
-            // Bending the map a little breaks up the straight valleys of gradient noise.
+            // A slight domain warp breaks up the straight valleys of gradient noise.
             let bend = dvec3(fractal_noise(at, 3, shape.seed ^ 0x68bc), 0.0, fractal_noise(at, 3, shape.seed ^ 0x02e5));
             let ridges = ridged_noise(at + 0.35 * bend, 8, shape.seed);
             let plain = 0.5 + 0.5 * fractal_noise(at * 0.5, 4, shape.seed ^ 0xb529);
@@ -50,7 +50,7 @@ pub fn terrain(shape: &Terrain) -> Mesh {
             uvs.push(Vec2::new(u as f32, 1.0 - v as f32));
         }
     }
-    // The grid's own front would be below: x × z is −y.
+    // The grid's own front faces down: x × z is −y.
     let triangles = open_grid(shape.cells, shape.cells).into_iter().map(|[a, b, c]| [a, c, b]).collect();
     Mesh { uvs, ..built(&positions, triangles) }
 }

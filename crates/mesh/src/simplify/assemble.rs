@@ -1,11 +1,11 @@
-//! What is left of a mesh, put together again.
+//! Assembly of a mesh from the triangles that remain after simplification.
 
 use super::surface::Wedge;
 use crate::Mesh;
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
-/// Triangles that are left: vertices, the mesh's triangle each was, and wedges if there are any.
+/// Remaining triangles: vertices, the index of each in the original mesh, and wedges if there are any.
 #[derive(Debug, Default)]
 pub(super) struct Remaining {
     pub triangles: Vec<[u32; 3]>,
@@ -13,7 +13,7 @@ pub(super) struct Remaining {
     pub corner_wedges: Vec<u32>,
 }
 
-/// How the mesh was, as far as its remains need to know.
+/// Properties of the original mesh that the result needs.
 #[derive(Debug)]
 pub(super) struct Original<'a> {
     pub scale: f32,
@@ -23,9 +23,9 @@ pub(super) struct Original<'a> {
     pub has_uvs: bool,
 }
 
-/// Triangles in the order of the mesh they come from, vertices in the order of their use.
+/// Assembles a mesh with triangles in their original order and vertices in order of use.
 pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedge], original: &Original) -> Mesh {
-    // Each source is there once, so that a table of all of them is a sort.
+    // Each source occurs at most once, so a table over all of them sorts the triangles.
     let sources = remaining.sources.iter().max().map_or(0, |&last| last as usize + 1);
     let mut place_of = vec![Numbers::NONE; sources];
     remaining.sources.iter().zip(0..).for_each(|(&source, t)| place_of[source as usize] = t);
@@ -63,7 +63,7 @@ pub(super) fn assemble(remaining: &Remaining, positions: &[Vec3], wedges: &[Wedg
     mesh
 }
 
-/// New numbers of vertices: one a place, or one a wedge, and wedges that differ only in their slot share one.
+/// New vertex indices: one per position, or one per wedge, where wedges that differ only in their slot share one.
 struct Numbers {
     of: Vec<u32>,
     by_data: HashMap<(u32, [u32; 5]), u32>,

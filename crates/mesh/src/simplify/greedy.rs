@@ -1,29 +1,29 @@
-//! The quadric simplifier: always the cheapest edge that is left.
+//! The quadric simplifier: always collapses the cheapest remaining edge.
 //!
-//! An edge costs the sum of its ends' quadrics at their common minimum. Adding quadrics never makes an edge cheaper,
-//! so a queued cost is a lower bound: it is checked when the edge comes up, and an edge whose ends have changed goes
-//! back with its true cost, unless that is of the same level. This gives the order of an eager priority queue, but for
-//! the order within a level, for a fraction of the evaluations.
+//! The cost of an edge is the sum of its ends' quadrics at their common minimum. Adding quadrics never makes an edge
+//! cheaper, so a queued cost is a lower bound: it is checked when the edge is popped, and an edge whose ends have
+//! changed is pushed back with its true cost, unless that is in the same level. This gives the order of an eager
+//! priority queue, except within a level, for a fraction of the evaluations.
 
 use super::quadric::Quadric;
 use super::queue::LevelQueue;
 use super::surface::{Kind, NONE, Surface, WedgeJoin};
 use glam::Vec3;
 
-/// One step: vertex `from` goes into `to`, and both are then at `position`.
+/// One step: vertex `from` is merged into `to`, which moves to `position`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Collapse {
     pub cost: f32,
     pub from: u32,
     pub to: u32,
     pub position: Vec3,
-    /// Triangles that died.
+    /// Number of triangles removed.
     pub died: u32,
-    /// How many entries of the log's wedge joins belong to this step.
+    /// Number of the log's wedge joins that belong to this step.
     pub joins: u32,
 }
 
-/// What was done, in order.
+/// All steps, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Log {
     pub collapses: Vec<Collapse>,
@@ -42,12 +42,12 @@ struct Edge {
     ends: [u32; 2],
     /// Sum of the ends' versions when the cost was computed.
     version: u32,
-    /// See the flags below.
+    /// A combination of the flags below.
     state: u32,
 }
 const _: () = assert!(size_of::<Edge>() == 16);
 
-/// Not in the queue: it was refused, and waits for its ends to change.
+/// Not in the queue: the collapse was rejected, and the edge waits for a change of its ends.
 const ASLEEP: u32 = 1;
 /// The edge is in the waiting list of its first, second end.
 const LISTED: [u32; 2] = [2, 4];
@@ -58,26 +58,26 @@ pub(super) struct Greedy {
     pub quadrics: Vec<Quadric>,
     queue: LevelQueue,
     edges: Vec<Edge>,
-    /// Where a vertex went; itself while alive.
-    went_to: Vec<u32>,
+    /// The vertex that each vertex was merged into; itself while alive.
+    merged_into: Vec<u32>,
     versions: Vec<u32>,
     /// Head of each vertex's list of sleeping edges; entry 2e + i is edge e at its end i.
     sleepers: Vec<u32>,
     next_sleeper: Vec<u32>,
     last_key: f32,
-    /// By a hash of its ends, the edge that was last put back: see [`Self::is_twin`].
+    /// The edge that was last pushed back, by a hash of its ends: see [`Self::is_twin`].
     seen: Vec<u32>,
     pub log: Log,
 }
 
-/// When to stop, besides the face count.
+/// Conditions for stopping.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CollapseLimits {
-    /// Stop when no more than this many triangles are left.
+    /// Stops when at most this many triangles are left.
     pub faces: usize,
-    /// Stop when the cheapest edge costs more.
+    /// Stops when the cheapest edge costs more.
     pub cost: f32,
-    /// Refuse edges whose mean squared distance to the planes exceeds this.
+    /// Rejects edges whose mean squared distance to the planes exceeds this.
     pub mean_square: f64,
 }
 
@@ -89,7 +89,7 @@ impl Greedy {
             surface,
             quadrics,
             queue: LevelQueue::new(edges.len()),
-            went_to: (0..count as u32).collect(),
+            merged_into: (0..count as u32).collect(),
             versions: vec![0; count],
             sleepers: vec![NONE; count],
             next_sleeper: vec![NONE; 2 * edges.len()],
@@ -132,7 +132,7 @@ impl Greedy {
                 }
             }
             if self.surface.kinds[from as usize] == Kind::Fixed {
-                // Two corners of lines have come together; neither may move, ever.
+                // Two corners of lines have met; neither may ever move.
                 continue;
             }
             let near_enough = limits.mean_square == f64::INFINITY || {
@@ -148,13 +148,13 @@ impl Greedy {
         }
     }
 
-    /// A lower bound on the cost of the next collapse, if any edge is left.
+    /// Returns a lower bound on the cost of the next collapse, if any edge is left.
     pub fn next_cost(&mut self) -> Option<f32> {
         self.queue.least_key()
     }
 
-    /// Whether another edge between the same ends is up to date already. A collapse makes two such pairs; to search
-    /// for them there would cost more than to meet them here. A missed twin costs time and nothing else.
+    /// Whether another edge between the same ends is already up to date. A collapse creates two such pairs; searching
+    /// for them at that time would cost more than detecting them here. A missed twin costs only time.
     fn is_twin(&mut self, e: u32, [p, q]: [u32; 2], version: u32) -> bool {
         let (low, high) = (p.min(q), p.max(q));
         let hash = (low.wrapping_mul(0x9e37_79b1) ^ high).wrapping_mul(0x85eb_ca77);
@@ -170,12 +170,12 @@ impl Greedy {
         twin
     }
 
-    /// The cost that half of the edges do not exceed before any collapse; 0 without edges.
+    /// Returns the cost that half of the edges do not exceed before any collapse; 0 without edges.
     pub fn median_cost(&self) -> f32 {
         self.queue.median_key().unwrap_or(0.0)
     }
 
-    /// Which end goes, which stays, where the survivor will be, and the cost.
+    /// Returns the end to remove, the end to keep, the new position of the latter, and the cost.
     #[inline]
     fn plan(&self, ends: [u32; 2]) -> (u32, u32, Vec3, f32) {
         let [p, q] = ends;
@@ -202,8 +202,8 @@ impl Greedy {
         let died = self.surface.collapse(from, to, position, t, &mut self.log.joins);
         let gone = self.quadrics[from as usize];
         self.quadrics[to as usize] += gone;
-        self.went_to[from as usize] = to;
-        // Both old versions go in, so that no sum of two versions can repeat.
+        self.merged_into[from as usize] = to;
+        // Both old versions are included, so that no sum of two versions can repeat.
         self.versions[to as usize] =
             self.versions[to as usize].wrapping_add(self.versions[from as usize]).wrapping_add(1);
         let joins = (self.log.joins.len() - joins_before) as u32;
@@ -216,7 +216,7 @@ impl Greedy {
         let edge = &mut self.edges[e as usize];
         edge.state |= ASLEEP;
         for (i, end) in ends.into_iter().enumerate() {
-            // Still listed at an end that has not changed since.
+            // It may still be listed at an end that has not changed since.
             if edge.state & LISTED[i] == 0 {
                 edge.state |= LISTED[i];
                 let entry = 2 * e + i as u32;
@@ -226,7 +226,7 @@ impl Greedy {
         }
     }
 
-    /// Sends the edges that wait at `vertex` back to the queue.
+    /// Pushes the edges that wait at `vertex` back to the queue.
     fn wake(&mut self, vertex: u32) {
         let mut entry = std::mem::replace(&mut self.sleepers[vertex as usize], NONE);
         while entry != NONE {
@@ -234,7 +234,7 @@ impl Greedy {
             edge.state &= !LISTED[entry as usize % 2];
             if edge.state & ASLEEP != 0 {
                 edge.state &= !ASLEEP;
-                // Its cost has changed; the last key bounds it, and the queue finds out.
+                // Its cost has changed; the last key is a lower bound, and the check when it is popped does the rest.
                 self.queue.push(self.last_key, entry / 2);
             }
             entry = self.next_sleeper[entry as usize];
@@ -242,22 +242,23 @@ impl Greedy {
     }
 
     fn find(&mut self, mut vertex: u32) -> u32 {
-        while self.went_to[vertex as usize] != vertex {
-            let above = self.went_to[self.went_to[vertex as usize] as usize];
-            self.went_to[vertex as usize] = above;
+        while self.merged_into[vertex as usize] != vertex {
+            let above = self.merged_into[self.merged_into[vertex as usize] as usize];
+            self.merged_into[vertex as usize] = above;
             vertex = above;
         }
         vertex
     }
 }
 
-/// Every edge that can ever collapse, those on lines perhaps twice.
+/// Returns every edge that can ever collapse; those on lines may occur twice.
 fn edges_of(surface: &Surface) -> Vec<Edge> {
     let mut edges = Vec::with_capacity(surface.face_count * 3 / 2 + 16);
     for (_, [a, b, c], _) in surface.live_triangles() {
         for [p, q] in [[a, b], [b, c], [c, a]] {
             let (kind, other) = (surface.kinds[p as usize], surface.kinds[q as usize]);
-            // Inside the surface the neighbour runs along the edge the other way; on a line there may be none.
+            // Inside the surface the neighbour has the edge in the opposite direction; on a line there may be no
+            // neighbour.
             let once = p < q || kind.min(other) >= Kind::Curve;
             if once && kind.max(other) != Kind::Frozen && kind.min(other) != Kind::Fixed {
                 edges.push(Edge { ends: [p, q], version: 0, state: 0 });

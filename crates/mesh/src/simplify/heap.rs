@@ -1,10 +1,10 @@
-//! A priority queue over 0..n whose keys may change both ways.
+//! A priority queue over the items 0..n whose keys may increase and decrease.
 
-/// Indexed binary heap: least key first, equal keys by the smaller item.
+/// Indexed binary heap: least key first, ties by the smaller item.
 #[derive(Debug)]
 pub(super) struct IndexedHeap {
     heap: Vec<u32>,
-    /// Where each item stands in `heap`, or `ABSENT`.
+    /// Index of each item in `heap`, or `ABSENT`.
     place: Vec<u32>,
     keys: Vec<f32>,
 }
@@ -16,7 +16,7 @@ impl IndexedHeap {
         Self { heap: Vec::new(), place: vec![ABSENT; items], keys: vec![0.0; items] }
     }
 
-    /// Puts `item` in, or changes its key. The key must not be NaN.
+    /// Inserts `item` or changes its key. The key must not be NaN.
     pub fn set(&mut self, item: u32, key: f32) {
         self.keys[item as usize] = key;
         if self.place[item as usize] == ABSENT {
@@ -28,7 +28,7 @@ impl IndexedHeap {
         self.sift_down(self.place[item as usize] as usize);
     }
 
-    /// Takes `item` out if it is in.
+    /// Removes `item` if present.
     pub fn remove(&mut self, item: u32) {
         let at = std::mem::replace(&mut self.place[item as usize], ABSENT);
         if at == ABSENT {

@@ -1,8 +1,8 @@
 //! Melax's simplifier: half-edge collapses in order of edge length times bend.
 //!
-//! Source: Melax 1998, "A Simple, Fast, and Effective Polygon Reduction Algorithm"; the 2013 program used it. Here
-//! the queue is a true one, costs are renewed wherever they can have changed, lines bend too, and the guards of
-//! [`Surface`] hold.
+//! Source: Melax 1998, "A Simple, Fast, and Effective Polygon Reduction Algorithm"; the 2013 program used it. Here the
+//! queue is exact, costs are updated wherever they can have changed, lines bend too, and the checks of [`Surface`]
+//! apply.
 
 use super::greedy::{Collapse, Log};
 use super::heap::IndexedHeap;
@@ -10,7 +10,7 @@ use super::prepare::PreparedMesh;
 use super::surface::{Kind, Surface};
 use glam::DVec3;
 
-/// Simplifies in place until `faces` are left or no collapse is allowed; vertices keep their numbers and places.
+/// Simplifies in place until `faces` are left or no collapse is allowed; vertices keep their indices and positions.
 pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32) -> Log {
     let mut melax = Melax::new(prepared);
     let mut log = Log::default();
@@ -20,7 +20,7 @@ pub(super) fn simplify(prepared: &mut PreparedMesh, faces: usize, max_cost: f32)
             break;
         }
         match melax.allowed_target(from) {
-            // A cheaper neighbour is out of bounds: what is left may cost more than other vertices do.
+            // The cheaper neighbour is not allowed: the next one may cost more than other vertices do.
             Some((to, true_cost)) if true_cost <= cost => melax.collapse(from, to, cost, &mut log),
             Some((_, true_cost)) => melax.heap.set(from, true_cost),
             None => melax.heap.remove(from),
@@ -57,13 +57,13 @@ impl Melax {
         let count = surface.positions.len();
         let mut melax = Self { surface, heap: IndexedHeap::new(count), neighbors: Vec::new(), normals: Vec::new() };
         for vertex in 0..count as u32 {
-            melax.renew(vertex);
+            melax.update(vertex);
         }
         melax
     }
 
-    /// Puts the cost of the vertex's cheapest edge into the queue.
-    fn renew(&mut self, vertex: u32) {
+    /// Updates the queue with the cost of the vertex's cheapest edge.
+    fn update(&mut self, vertex: u32) {
         let cheapest = self.candidates(vertex).first().copied();
         match cheapest {
             Some((cost, _)) => self.heap.set(vertex, cost),
@@ -71,7 +71,7 @@ impl Melax {
         }
     }
 
-    /// The cheapest neighbour that `from` may go into.
+    /// Returns the cheapest neighbour that `from` may be merged into.
     fn allowed_target(&mut self, from: u32) -> Option<(u32, f32)> {
         let candidates = self.candidates(from);
         candidates.into_iter().find_map(|(cost, to)| {
@@ -80,10 +80,10 @@ impl Melax {
         })
     }
 
-    /// Neighbours that a vertex's kind lets it go into, cheapest first.
+    /// Returns the neighbours that a vertex's kind allows as targets, cheapest first.
     fn candidates(&mut self, from: u32) -> Vec<(f32, u32)> {
         let kind = self.surface.kinds[from as usize];
-        // A hub may not collapse anyway, and to weigh all its edges against each other takes quadratic time.
+        // A hub may not collapse anyway, and comparing all of its edges takes quadratic time.
         if kind >= Kind::Fixed || self.surface.is_hub(from) {
             return Vec::new();
         }
@@ -99,7 +99,8 @@ impl Melax {
                 .fan(from)
                 .map(|(_, b, c)| ((place(b) - here).cross(place(c) - here).normalize_or_zero(), b, c)),
         );
-        // On a border or seam the bend of the line counts as well: in a flat sheet nothing else would hold a corner.
+        // On a border or seam the bend of the line counts as well: in a flat sheet nothing else would preserve a
+        // corner.
         let on_line = |to: u32| {
             let shared = normals.iter().filter(|(_, b, c)| *b == to || *c == to).count() as u32;
             self.surface.is_constraint(from, to, shared)
@@ -130,16 +131,17 @@ impl Melax {
         let joins = (log.joins.len() - joins_before) as u32;
         log.collapses.push(Collapse { cost, from, to, position, died, joins });
         self.heap.remove(from);
-        // The triangles that have changed are those around `to`: their vertices see a new bend.
+        // The triangles that have changed are those around `to`: the bend at their vertices changes.
         let mut changed = vec![to];
         self.surface.for_each_neighbor(to, |other| changed.push(other));
         for vertex in changed {
-            self.renew(vertex);
+            self.update(vertex);
         }
     }
 }
 
-/// Largest over the triangles around a vertex of the least turn against a triangle at the edge to `to`, 0 to 1.
+/// Returns the maximum over the triangles around a vertex of the minimum turn against a triangle at the edge to `to`, 0
+/// to 1.
 fn bend(normals: &[(DVec3, u32, u32)], to: u32) -> f64 {
     let sides: Vec<DVec3> = normals.iter().filter(|(_, b, c)| *b == to || *c == to).map(|side| side.0).collect();
     normals

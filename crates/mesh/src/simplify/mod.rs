@@ -1,17 +1,17 @@
-//! Fewer triangles for almost the same surface.
+//! Mesh simplification by edge collapses.
 //!
-//! Both methods collapse edges one after another, cheapest first, under the same guards: a closed manifold stays
-//! one, borders, texture seams, creases and material edges stay lines, no triangle folds over or loses its area,
-//! normals and texture coordinates travel along. Parts of a mesh that are not manifold are left as they are.
+//! Both methods collapse edges one after another, cheapest first, under the same checks: a closed manifold remains one;
+//! borders, texture seams, creases and material edges remain lines; no triangle folds over or loses its area; normals
+//! and texture coordinates are kept. Parts of a mesh that are not manifold are left unchanged.
 //!
 //! | file | what it does |
 //! |---|---|
-//! | `prepare` | welds the mesh, finds out what each vertex may do, sums its quadrics |
-//! | `surface` | connectivity, guards, the collapse itself |
+//! | `prepare` | welds the mesh, determines the kind of each vertex, sums its quadrics |
+//! | `surface` | connectivity, checks, the collapse itself |
 //! | `greedy`, `queue`, `quadric` | the quadric method on one thread |
 //! | `parts` | the quadric method on all threads |
 //! | `melax`, `heap` | Melax's method |
-//! | `order`, `assemble` | meshes from the steps taken |
+//! | `order`, `assemble` | meshes from the recorded steps |
 //!
 //! Start reading at [`simplify`].
 
@@ -33,28 +33,28 @@ use assemble::{Original, Remaining, assemble};
 use greedy::{CollapseLimits, Log};
 use prepare::PreparedMesh;
 
-/// What an edge costs.
+/// The cost of an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Quadric error metric with optimal places (Garland and Heckbert 1997): the most accurate, and parallel.
+    /// Quadric error metric with optimal positions (Garland and Heckbert 1997): the most accurate, and parallel.
     #[default]
     Quadric,
-    /// Edge length times bend (Melax 1998): vertices stay where they are; on one thread.
+    /// Edge length times bend (Melax 1998): vertices keep their positions; single-threaded.
     Melax,
 }
 
-/// How far to go.
+/// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
     /// Keep at most this share of the triangles, `(0, 1]`.
     Ratio(f64),
     /// Keep at most this many triangles, at least 1.
     Faces(usize),
-    /// Keep as few triangles as the largest distance between the two surfaces allows, metres, above 0.
+    /// Keep as few triangles as possible within this largest distance between the two surfaces, metres, above 0.
     Error(f64),
 }
 
-/// Why a mesh cannot be simplified as asked.
+/// Reasons why a mesh cannot be simplified.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SimplifyError {
     /// [`Target::Ratio`] is outside `(0, 1]` or NaN.
@@ -66,12 +66,12 @@ pub enum SimplifyError {
     /// [`Target::Error`] is not above 0, or not finite.
     #[error("the largest error must be a length above 0, not {0}")]
     Error(f64),
-    /// No triangle has three corners at different places.
+    /// No triangle has three corners at different positions.
     #[error("the mesh has no triangle with three different corners")]
     Degenerate,
 }
 
-/// Samples for each direction of the measured error.
+/// Sample points per direction for measuring the error.
 const ERROR_SAMPLES: usize = 100_000;
 
 /// Collapses edges until the target is reached or no further collapse is allowed.
@@ -94,10 +94,10 @@ pub fn simplify(mesh: &Mesh, method: Method, target: Target) -> Result<Mesh, Sim
     Ok(finish(mesh, prepared))
 }
 
-/// Whether the target means anything, whatever the mesh.
+/// Checks that the target is in range, independent of a mesh.
 ///
 /// # Errors
-/// When the target is outside of its range.
+/// If the target is out of range.
 pub fn check_target(target: Target) -> Result<(), SimplifyError> {
     match target {
         Target::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => Err(SimplifyError::Ratio(ratio)),
@@ -110,7 +110,7 @@ pub fn check_target(target: Target) -> Result<(), SimplifyError> {
 /// Records all collapses down to as few triangles as `faces`, for a slider: see [`CollapseOrder::mesh_with`].
 ///
 /// # Errors
-/// When no triangle has three different corners.
+/// If no triangle has three different corners.
 pub fn collapse_order(mesh: &Mesh, method: Method, faces: usize) -> Result<CollapseOrder, SimplifyError> {
     let start = prepare(mesh, method)?;
     let mut work = start.clone();
@@ -123,8 +123,10 @@ fn prepare(mesh: &Mesh, method: Method) -> Result<PreparedMesh, SimplifyError> {
     if prepared.triangles.is_empty() { Err(SimplifyError::Degenerate) } else { Ok(prepared) }
 }
 
-/// - `error`: metres; what it limits is an estimate, the root of an edge's mean squared distance (quadric) or its
-///   cost (Melax).
+/// Runs a method on a prepared mesh.
+///
+/// - `error`: metres; it limits an estimate, which is the root of an edge's mean squared distance (quadric) or its cost
+///   (Melax).
 fn run(prepared: &mut PreparedMesh, method: Method, faces: usize, error: f64, keep_log: bool) -> Log {
     let error = error * f64::from(prepared.scale);
     match method {
@@ -149,7 +151,8 @@ fn finish(mesh: &Mesh, prepared: PreparedMesh) -> Mesh {
     assemble(&Remaining { triangles, sources, corner_wedges }, &positions, &wedges, &original)
 }
 
-/// Tries limits on the estimate until the measured error obeys; the estimate is a mean, so the first may not.
+/// Varies the limit on the estimate until the measured error is within `error`. The estimate is a mean, so the first
+/// limit may be too large.
 fn within_error(mesh: &Mesh, method: Method, error: f64) -> Result<Mesh, SimplifyError> {
     let start = prepare(mesh, method)?;
     let (mut best, mut limit) = (mesh.clone(), error);
@@ -167,7 +170,7 @@ fn within_error(mesh: &Mesh, method: Method, error: f64) -> Result<Mesh, Simplif
         } else {
             fails = limit;
         }
-        // Between a limit that works and one that does not lies the best one; before both are known, aim.
+        // The best limit lies between one that works and one that fails; until both are known, extrapolate.
         limit = match (works, fails) {
             (0.0, _) => limit * (0.9 * error / measured).min(0.5),
             (_, f64::INFINITY) => 2.0 * limit,

@@ -1,4 +1,4 @@
-//! The steps of a simplification, kept: any number of triangles in between at the cost of a copy.
+//! The recorded steps of a simplification, from which a mesh of any intermediate size can be made in linear time.
 
 use super::assemble::{Original, Remaining, assemble};
 use super::greedy::Log;
@@ -6,7 +6,7 @@ use super::prepare::PreparedMesh;
 use crate::Mesh;
 use glam::DVec3;
 
-/// A mesh and the order in which its edges collapse. A slider is a prefix of it.
+/// A mesh and the order in which its edges collapse. A position of a slider is a prefix of it.
 #[derive(Debug)]
 pub struct CollapseOrder {
     start: PreparedMesh,
@@ -23,42 +23,42 @@ impl CollapseOrder {
         Self { start, log, center: mesh.center, has_normals, has_uvs, slots: mesh.slots.clone() }
     }
 
-    /// The most and the fewest triangles to be had.
+    /// The largest and the smallest possible number of triangles.
     pub fn face_range(&self) -> (usize, usize) {
         let died: usize = self.log.collapses.iter().map(|c| c.died as usize).sum();
         (self.start.triangles.len(), self.start.triangles.len() - died)
     }
 
-    /// The mesh with at most `faces` triangles, or as few as there can be. Linear in the size of the full mesh.
+    /// Returns the mesh with at most `faces` triangles, or as few as possible. Linear in the size of the full mesh.
     pub fn mesh_with(&self, faces: usize) -> Mesh {
         let count = self.start.positions.len();
         let mut positions = self.start.positions.clone();
         let mut wedges = self.start.wedges.clone();
-        let mut went_to: Vec<u32> = (0..count as u32).collect();
-        let mut wedge_went_to: Vec<u32> = (0..wedges.len() as u32).collect();
+        let mut merged_into: Vec<u32> = (0..count as u32).collect();
+        let mut wedge_merged_into: Vec<u32> = (0..wedges.len() as u32).collect();
         let (mut left, mut joins) = (self.start.triangles.len(), self.log.joins.iter());
         for collapse in &self.log.collapses {
             if left <= faces {
                 break;
             }
             left -= collapse.died as usize;
-            went_to[collapse.from as usize] = collapse.to;
+            merged_into[collapse.from as usize] = collapse.to;
             positions[collapse.to as usize] = collapse.position;
             for join in joins.by_ref().take(collapse.joins as usize) {
-                wedge_went_to[join.from as usize] = join.to;
+                wedge_merged_into[join.from as usize] = join.to;
                 wedges[join.to as usize] = join.wedge;
             }
         }
-        let end = |went_to: &mut [u32], mut item: u32| {
-            while went_to[item as usize] != item {
-                went_to[item as usize] = went_to[went_to[item as usize] as usize];
-                item = went_to[item as usize];
+        let end = |merged_into: &mut [u32], mut item: u32| {
+            while merged_into[item as usize] != item {
+                merged_into[item as usize] = merged_into[merged_into[item as usize] as usize];
+                item = merged_into[item as usize];
             }
             item
         };
         let mut remaining = Remaining::default();
         for (t, corners) in self.start.triangles.iter().enumerate() {
-            let [a, b, c] = corners.map(|v| end(&mut went_to, v));
+            let [a, b, c] = corners.map(|v| end(&mut merged_into, v));
             if a == b || b == c || c == a {
                 continue;
             }
@@ -66,7 +66,7 @@ impl CollapseOrder {
             remaining.sources.push(self.start.sources[t]);
             if !wedges.is_empty() {
                 let corner_wedges = &self.start.corner_wedges[3 * t..3 * t + 3];
-                remaining.corner_wedges.extend(corner_wedges.iter().map(|&w| end(&mut wedge_went_to, w)));
+                remaining.corner_wedges.extend(corner_wedges.iter().map(|&w| end(&mut wedge_merged_into, w)));
             }
         }
         let original = Original {

@@ -1,9 +1,9 @@
 //! The quadric simplifier on many threads.
 //!
-//! The mesh is cut into parts along a space-filling curve. Each part is simplified alone, its rim frozen, and all
-//! parts follow one cost threshold that rises until little is left to do. Then what is left is cut anew, elsewhere, so
-//! that the first rims lie inside of parts, and these finish. Parts depend on the mesh alone, so any number of threads
-//! gives the same result.
+//! The mesh is cut into parts along a space-filling curve. Each part is simplified separately with its rim frozen, and
+//! all parts follow one cost threshold that rises until little is left to do. Then the remaining mesh is cut again in
+//! other places, so that the first rims lie inside of parts, and these finish. Parts depend on the mesh alone, so any
+//! number of threads gives the same result.
 
 use super::greedy::{Collapse, CollapseLimits, Greedy, Log};
 use super::prepare::PreparedMesh;
@@ -13,18 +13,20 @@ use firstlight_kdtree::geometry::Aabb;
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 
-/// About this many triangles a part: a core works on it within its second-level cache, and few lie at its rim.
+/// Approximate number of triangles per part: small enough for a core's second-level cache, large enough that few lie at
+/// the rim.
 const PART_TRIANGLES: usize = 8_192;
-/// The first cut leaves this share of the work, and all at its rims, to the second, which puts the parts on a level.
-const LEFT_TO_SECOND: usize = 64;
+/// The first cut leaves this fraction of the work, in addition to that at its rims, to the second, which evens out the
+/// parts.
+const LEFT_FOR_SECOND_CUT: usize = 64;
 
-/// Simplifies in place: afterwards `prepared` holds what is left, and vertices keep their numbers.
+/// Simplifies in place: afterwards `prepared` holds the remaining mesh, and vertices keep their indices.
 pub(super) fn simplify(prepared: &mut PreparedMesh, limits: CollapseLimits, keep_log: bool) -> Log {
     simplify_in(PART_TRIANGLES, prepared, limits, keep_log)
 }
 
-/// With as many triangles a part as the mesh has, this is the plain method with one queue, against which the other is
-/// tested.
+/// Like [`simplify`], with a given part size. With parts as large as the mesh this is the plain method with one queue,
+/// the reference of tests.
 pub(super) fn simplify_in(
     part_triangles: usize,
     prepared: &mut PreparedMesh,
@@ -40,10 +42,10 @@ pub(super) fn simplify_in(
             break;
         }
         let mut parts = split(prepared, count, cut);
-        threshold = Some(run_together(&mut parts, limits, total, cut, threshold));
+        threshold = Some(run_all(&mut parts, limits, total, cut, threshold));
         log.append(join(prepared, parts, keep_log));
     }
-    // Small meshes, and what rims have kept from being done.
+    // Handles small meshes, and work that rims have prevented.
     if prepared.triangles.len() > limits.faces {
         let whole: Vec<u32> = (0..prepared.triangles.len() as u32).collect();
         let mut part = MeshPart::new(prepared, whole, &prepared.valences(), &mut Numbering::of(prepared));
@@ -53,23 +55,23 @@ pub(super) fn simplify_in(
     log
 }
 
-/// Where rims run, and how far parts go.
+/// Position of the cuts, and how far parts are simplified.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Cut {
     First,
     Second,
 }
 
-/// Some triangles with a numbering of their own.
+/// A subset of the triangles with local indices.
 struct MeshPart {
     greedy: Greedy,
-    /// The whole mesh's numbers of triangles, vertices, wedges.
+    /// Indices of triangles, vertices and wedges in the whole mesh.
     triangles: Vec<u32>,
     vertices: Vec<u32>,
     wedges: Vec<u32>,
 }
 
-/// A part's numbers of the whole mesh's vertices and wedges, `NONE` elsewhere: memory for one part after another.
+/// Local indices of the whole mesh's vertices and wedges, `NONE` elsewhere: memory reused for one part after another.
 struct Numbering {
     vertices: Vec<u32>,
     wedges: Vec<u32>,
@@ -82,9 +84,11 @@ impl Numbering {
 }
 
 impl MeshPart {
-    /// - `valences`: how many triangles of the whole mesh each vertex has.
+    /// Creates a part.
+    ///
+    /// - `valences`: triangles per vertex in the whole mesh.
     fn new(prepared: &PreparedMesh, triangles: Vec<u32>, valences: &[u32], numbering: &mut Numbering) -> Self {
-        // In the order in which the triangles use them: neighbours lie together in memory.
+        // Vertices in order of use by the triangles: neighbours are close in memory.
         let mut vertices = Vec::with_capacity(triangles.len() * 3 / 4);
         let numbers = &mut numbering.vertices;
         let corners: Vec<[u32; 3]> = triangles
@@ -104,7 +108,7 @@ impl MeshPart {
         let wedge_data = wedges.iter().map(|&w| prepared.wedges[w as usize]).collect();
         let quadrics: Vec<Quadric> = vertices.iter().map(|&v| prepared.quadrics[v as usize]).collect();
         let mut surface = Surface::new(&corners, positions, kinds, corner_wedges, wedge_data);
-        // A vertex that has triangles elsewhere is on the rim.
+        // A vertex that has triangles in other parts is on the rim.
         for (i, &vertex) in vertices.iter().enumerate() {
             if surface.valence(i) != valences[vertex as usize] {
                 surface.kinds[i] = Kind::Frozen;
@@ -114,7 +118,7 @@ impl MeshPart {
     }
 }
 
-/// The number of `item` in `items`, which it joins if it is new there.
+/// Returns the index of `item` in `items`, appending it if it is new.
 #[inline]
 fn number(item: u32, numbers: &mut [u32], items: &mut Vec<u32>) -> u32 {
     let number = &mut numbers[item as usize];
@@ -147,24 +151,18 @@ fn split(prepared: &PreparedMesh, count: usize, cut: Cut) -> Vec<MeshPart> {
         .collect()
 }
 
-/// Raises the threshold, and lets every part follow it, until the whole is near the wanted count, or after the second
-/// cut at it. Returns the threshold.
+/// Raises the threshold, to which all parts are simplified, until the whole is near the target count, or after the
+/// second cut exactly there. Returns the threshold.
 ///
-/// - `threshold`: where to begin; without it at what half of the edges cost.
-fn run_together(
-    parts: &mut [MeshPart],
-    limits: CollapseLimits,
-    triangles: usize,
-    cut: Cut,
-    threshold: Option<f32>,
-) -> f32 {
+/// - `threshold`: initial value; by default the median cost of the edges.
+fn run_all(parts: &mut [MeshPart], limits: CollapseLimits, triangles: usize, cut: Cut, threshold: Option<f32>) -> f32 {
     let excess = triangles - limits.faces;
     let done_at = match cut {
         Cut::First => {
-            // Triangles at rims stay whole for now; the others must not pay for them.
+            // Triangles at rims cannot collapse yet; the others must not make up for them.
             let at_rims: usize = parts.iter().map(|part| part.greedy.surface.faces_at(Kind::Frozen)).sum();
             let share = at_rims as u128 * excess as u128 / triangles as u128;
-            limits.faces + excess / LEFT_TO_SECOND + share as usize
+            limits.faces + excess / LEFT_FOR_SECOND_CUT + share as usize
         }
         Cut::Second => limits.faces,
     };
@@ -176,15 +174,15 @@ fn run_together(
     });
     while total > done_at && threshold < limits.cost {
         let excess = total - limits.faces;
-        // How many parts were stopped by their share, not by the threshold.
+        // Number of parts stopped by their share, not by the threshold.
         let stopped: usize = parts
             .par_iter_mut()
             .with_max_len(1)
             .map(|part| {
                 let faces = part.greedy.surface.face_count;
-                // Its share of what is too much: however cheap one part is, the whole cannot fall below the limit.
+                // The part's share of the excess: however cheap one part is, the whole cannot fall below the limit.
                 let share = (excess as u128 * faces as u128 / total as u128) as usize;
-                // A step takes two triangles: one less, so that it cannot take more than the share.
+                // A step removes two triangles: one less, so that it cannot exceed the share.
                 let least = faces - share.saturating_sub(1);
                 part.greedy.run(CollapseLimits { faces: least, cost: threshold, ..limits });
                 usize::from(part.greedy.surface.face_count <= least)
@@ -192,13 +190,13 @@ fn run_together(
             .sum();
         let now: usize = parts.iter().map(|part| part.greedy.surface.face_count).sum();
         if now == total && stopped * 2 > parts.len() {
-            // Shares too small to be worth a round.
+            // The shares are too small to be worth another round.
             break;
         }
-        // Parts that cost little come first: only when most have nothing left below it does the threshold rise.
+        // Cheap parts come first: the threshold rises only when most parts have nothing left below it.
         if stopped * 2 <= parts.len() {
             let next = parts.iter_mut().filter_map(|part| part.greedy.next_cost()).min_by(f32::total_cmp);
-            // In a desert of costs larger strides: each round fetches every part's memory anew.
+            // Where few edges are near the threshold, larger strides pay: each round fetches every part's memory again.
             let stride = if (total - now) * 16 < excess { 8.0 } else { 2.0 };
             match next {
                 Some(next) => threshold = (stride * threshold).max(next).min(limits.cost),
@@ -213,7 +211,7 @@ fn run_together(
     threshold
 }
 
-/// The last few steps, which are fewer than parts to share them, wherever they cost least.
+/// Does the last few steps, fewer than there are parts, in order of cost.
 fn finish_one_by_one(parts: &mut [MeshPart], limits: CollapseLimits) {
     loop {
         let total: usize = parts.iter().map(|part| part.greedy.surface.face_count).sum();
@@ -222,7 +220,7 @@ fn finish_one_by_one(parts: &mut [MeshPart], limits: CollapseLimits) {
         match cheapest {
             Some((cost, p)) if total > limits.faces && cost <= limits.cost => {
                 let faces = parts[p].greedy.surface.face_count - 1;
-                // Another part's turn, when this one's next would cost more.
+                // Stops when the next step of this part would cost more, to let another part continue.
                 parts[p].greedy.run(CollapseLimits { faces, cost, ..limits });
             }
             _ => break,
@@ -230,7 +228,7 @@ fn finish_one_by_one(parts: &mut [MeshPart], limits: CollapseLimits) {
     }
 }
 
-/// Brings the parts' results back into the whole, and their steps into one order.
+/// Writes the parts' results back into the whole mesh, and merges their logs.
 fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>, keep_log: bool) -> Log {
     let left: Vec<(Vec<[u32; 3]>, Vec<u32>, Vec<u32>)> = parts
         .par_iter()
@@ -258,7 +256,7 @@ fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>, keep_log: bool) -> Lo
     for part in &parts {
         let surface = &part.greedy.surface;
         for (i, &vertex) in part.vertices.iter().enumerate() {
-            // What is gone is asked for by nobody, and what is frozen has not changed.
+            // Removed vertices are never read again, and frozen ones have not changed.
             if surface.valence(i) > 0 && surface.kinds[i] != Kind::Frozen {
                 prepared.positions[vertex as usize] = surface.positions[i];
                 prepared.quadrics[vertex as usize] = part.greedy.quadrics[i];
@@ -272,8 +270,8 @@ fn join(prepared: &mut PreparedMesh, parts: Vec<MeshPart>, keep_log: bool) -> Lo
     if keep_log { merge_logs(parts) } else { Log::default() }
 }
 
-/// Steps by cost; each part's own are in order of cost already, and parts do not touch each other. Of equal cost, as
-/// whole levels of the queue are, parts take turns.
+/// Merges steps by cost. Those of each part are in order of cost already, and parts do not interact. Among equal costs,
+/// as in whole levels of the queue, parts alternate.
 fn merge_logs(parts: Vec<MeshPart>) -> Log {
     let mut steps: Vec<(u32, usize, usize, usize, usize)> = Vec::new();
     for (p, part) in parts.iter().enumerate() {
@@ -299,11 +297,11 @@ fn merge_logs(parts: Vec<MeshPart>) -> Log {
     log
 }
 
-/// Where a point lies along a curve that fills the box, 21 bits: near points have near numbers, mostly.
+/// Returns the position of a point along a curve that fills the box, 21 bits: near points mostly have near codes.
 fn morton_code(point: Vec3, bounds: &Aabb, cut: Cut) -> u32 {
     let size = bounds.size().max_element().max(f32::MIN_POSITIVE);
     let place = (point - bounds.min) / size;
-    // The curve's longest jumps are where halves and quarters of the box meet: those must not be at the same places.
+    // The curve's longest jumps are at the halves and quarters of the box: those of the two cuts must not coincide.
     let place = if cut == Cut::First { place } else { 0.7 * place + 0.3 };
     let cell = (place * 127.0).clamp(Vec3::ZERO, Vec3::splat(127.0)).as_uvec3();
     let spread = |v: UVec3| {
@@ -315,7 +313,7 @@ fn morton_code(point: Vec3, bounds: &Aabb, cut: Cut) -> u32 {
     x | y << 1 | z << 2
 }
 
-/// By the first number, which has 22 bits at most, and in the old order where it is the same.
+/// Stable sort by the first number, which has at most 22 bits.
 fn sorted_by_code(mut items: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
     const BITS: u32 = 11;
     let mut sorted = vec![(0, 0); items.len()];

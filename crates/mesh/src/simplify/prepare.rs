@@ -1,4 +1,4 @@
-//! From a mesh to what the simplifiers work on: welded vertices, their kinds, their quadrics, their wedges.
+//! Conversion of a mesh to the simplifiers' form: welded vertices, their kinds, quadrics and wedges.
 
 use super::quadric::Quadric;
 use super::surface::{Kind, Wedge};
@@ -7,29 +7,31 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// A mesh taken apart. Vertices here are places: seams are welded and live on as wedges.
+/// A mesh in the simplifiers' form. Vertices are welded positions; seams are represented by wedges.
 #[derive(Clone, Debug)]
 pub(super) struct PreparedMesh {
     /// Relative to the mesh's centre, times `scale`.
     pub positions: Vec<Vec3>,
     pub kinds: Vec<Kind>,
     pub quadrics: Vec<Quadric>,
-    /// Three different vertices each; triangles that used one twice, or all of an earlier one, are gone.
+    /// Three different vertices each; triangles that used one twice, or all of an earlier triangle, are removed.
     pub triangles: Vec<[u32; 3]>,
-    /// The mesh's triangle that each one was.
+    /// Index of each triangle in the original mesh.
     pub sources: Vec<u32>,
-    /// One a corner, or empty when the mesh has neither shading data nor slots.
+    /// One per corner, or empty if the mesh has neither shading data nor slots.
     pub corner_wedges: Vec<u32>,
     pub wedges: Vec<Wedge>,
-    /// A power of two, so that scaling is exact: the largest side of the box is then between 1 and 2.
+    /// A power of two, so that scaling is exact; it makes the largest side of the bounds lie between 1 and 2.
     pub scale: f32,
 }
 
-/// Triangles at a vertex that are looked through one by one.
-const FEW: usize = 32;
+/// Triangles at a vertex up to which linear search is used.
+const MAX_LINEAR: usize = 32;
 
 impl PreparedMesh {
-    /// - `with_quadrics`: false leaves them empty.
+    /// Prepares a mesh.
+    ///
+    /// - `with_quadrics`: false leaves the quadrics empty.
     pub fn of(mesh: &Mesh, with_quadrics: bool) -> Self {
         let size = mesh.bounds().size().max_element();
         let scale = if size.is_normal() { size.log2().floor().exp2().recip() } else { 1.0 };
@@ -67,14 +69,14 @@ impl PreparedMesh {
         prepared
     }
 
-    /// How many triangles each vertex has.
+    /// Number of triangles at each vertex.
     pub fn valences(&self) -> Vec<u32> {
         let mut valences = vec![0; self.positions.len()];
         self.triangles.as_flattened().iter().for_each(|&vertex| valences[vertex as usize] += 1);
         valences
     }
 
-    /// A wedge is a vertex of the mesh; with slots, a vertex as one slot's triangles see it.
+    /// Adds wedges. A wedge is a vertex of the mesh; with slots, a vertex in combination with one slot.
     fn add_wedges(&mut self, mesh: &Mesh) {
         if mesh.normals.is_empty() && mesh.uvs.is_empty() && mesh.slots.is_empty() {
             return;
@@ -101,7 +103,7 @@ impl PreparedMesh {
         }
     }
 
-    /// The kind of each vertex, and whether any triangle is there twice.
+    /// Returns the kind of each vertex, and whether any triangle is duplicated.
     fn find_kinds(&self, around: &Neighborhood) -> (Vec<Kind>, bool) {
         let found: Vec<(Kind, bool)> = (0..self.positions.len())
             .into_par_iter()
@@ -111,9 +113,9 @@ impl PreparedMesh {
         (found.into_iter().map(|f| f.0).collect(), has_duplicates)
     }
 
-    /// Also whether two of the triangles are the same.
+    /// Returns the kind of one vertex, and whether two of its triangles coincide.
     ///
-    /// - `memory`: to work in.
+    /// - `memory`: working memory.
     fn kind_of(&self, corners: &[u32], (spokes, pairs): &mut (Vec<Spoke>, Vec<[u32; 2]>)) -> (Kind, bool) {
         if self.is_inside(corners) {
             return (Kind::Free, false);
@@ -154,8 +156,8 @@ impl PreparedMesh {
         (kind, has_duplicates)
     }
 
-    /// Whether the corners are one or more closed fans without a seam, none of them one triangle and its back; by far
-    /// the most common case, done fast.
+    /// Whether the corners form one or more closed fans without a seam, none of them a triangle and its back: a fast
+    /// path for by far the most common case.
     fn is_inside(&self, corners: &[u32]) -> bool {
         const MAX: usize = 16;
         let count = corners.len();
@@ -174,7 +176,7 @@ impl PreparedMesh {
             && (self.corner_wedges.is_empty() || self.has_one_wedge_an_edge(corners, &next, &after))
     }
 
-    /// For corners of a closed fan: whether at each edge both triangles have the same wedges.
+    /// For corners of a closed fan: whether both triangles at each edge have the same wedges.
     fn has_one_wedge_an_edge(&self, corners: &[u32], next: &[u32], after: &[u32]) -> bool {
         let here = self.corner_wedges[corners[0] as usize];
         corners.iter().enumerate().all(|(i, &corner)| {
@@ -184,7 +186,7 @@ impl PreparedMesh {
         })
     }
 
-    /// Whether any triangle on the same three vertices as an earlier one was found; they are gone then.
+    /// Removes triangles on the same three vertices as an earlier one; returns whether any were found.
     fn drop_duplicates(&mut self) -> bool {
         let mut keys: Vec<([u32; 3], u32)> = self
             .triangles
@@ -216,7 +218,8 @@ impl PreparedMesh {
         self.triangles.len() < count
     }
 
-    /// The planes of the triangles around each vertex, and at borders and seams planes that stand on the edge.
+    /// Sums the planes of the triangles around each vertex, and at borders and seams planes perpendicular to the
+    /// surface through the edge.
     fn find_quadrics(&self, around: &Neighborhood) -> Vec<Quadric> {
         let normals: Vec<(DVec3, f64)> = self
             .triangles
@@ -244,12 +247,12 @@ impl PreparedMesh {
             .collect()
     }
 
-    /// For each triangle side at `vertex` that ends at another vertex on a line, and is itself border or seam, the
-    /// line through it: the triangle's plane and the one that stands on it there.
+    /// Adds line constraints: for each triangle side at `vertex` that ends at another vertex on a line, and is itself a
+    /// border or seam, the triangle's plane and the plane perpendicular to it through the side.
     fn add_edge_planes(&self, around: &Neighborhood, vertex: usize, normals: &[(DVec3, f64)], sum: &mut Quadric) {
         let here = self.positions[vertex].as_dvec3();
-        // To look for each side among all others would take quadratic time at a hub.
-        let sides = (around.corners(vertex).len() > FEW).then(|| self.sorted_sides(around.corners(vertex)));
+        // Searching for each side among all others would take quadratic time at a hub.
+        let sides = (around.corners(vertex).len() > MAX_LINEAR).then(|| self.sorted_sides(around.corners(vertex)));
         let is_line = |corner: u32, other: u32| match &sides {
             Some(sides) => self.is_line_among(sides, corner, other),
             None => self.is_line(around, corner, other),
@@ -263,8 +266,9 @@ impl PreparedMesh {
                 let along = self.positions[end as usize].as_dvec3() - here;
                 let face_normal = normals[corner as usize / 3].0;
                 if let Some(normal) = along.cross(face_normal).try_normalize() {
-                    // Both planes through the edge alike, so that the distance to its line counts and nothing pulls
-                    // to one side; heavy, because a border that moves is seen against what lies behind.
+                    // Both planes through the edge get equal weights, so that the distance to its line counts and
+                    // neither side is preferred. The weight is large, because a moving border is visible against the
+                    // background.
                     let weight = 10.0 * along.length_squared();
                     *sum += Quadric::of_plane(here, normal, weight);
                     *sum += Quadric::of_plane(here, face_normal, weight);
@@ -273,7 +277,7 @@ impl PreparedMesh {
         }
     }
 
-    /// Whether the side from `corner` to `other` (corners of one triangle) is border, seam or non-manifold.
+    /// Whether the side from `corner` to `other` (corners of one triangle) is a border, a seam or non-manifold.
     fn is_line(&self, around: &Neighborhood, corner: u32, other: u32) -> bool {
         let vertex_of = |c: u32| self.triangles[c as usize / 3][c as usize % 3];
         let end = vertex_of(other);
@@ -290,7 +294,7 @@ impl PreparedMesh {
         matching != 2
     }
 
-    /// The sides of triangles at the vertex of these corners: the other end, and the wedges at both.
+    /// Returns the sides of triangles at the vertex of these corners: the other end, and the wedges at both.
     fn sorted_sides(&self, corners: &[u32]) -> Vec<(u32, [u32; 2])> {
         let pairs = corners.iter().flat_map(|&corner| ring(corner).map(|other| (corner, other)));
         let mut sides: Vec<_> = pairs.map(|(corner, other)| self.side(corner, other)).collect();
@@ -303,11 +307,11 @@ impl PreparedMesh {
         (end, [corner, other].map(|c| self.corner_wedges.get(c as usize).copied().unwrap_or(0)))
     }
 
-    /// The same as [`Self::is_line`] by a search in what [`Self::sorted_sides`] gave.
+    /// Like [`Self::is_line`], by a search in the result of [`Self::sorted_sides`].
     fn is_line_among(&self, sides: &[(u32, [u32; 2])], corner: u32, other: u32) -> bool {
         let side = self.side(corner, other);
         let first = sides.partition_point(|s| s.0 < side.0);
-        // Two alike and no more, and none that differs.
+        // Exactly two equal sides, and none that differs.
         let [a, b] = [first, first + 1].map(|i| sides.get(i) == Some(&side));
         let more = sides.get(first + 2).is_some_and(|s| s.0 == side.0);
         !(a && b && !more)
@@ -319,7 +323,7 @@ impl PreparedMesh {
     }
 }
 
-/// One end of a triangle side as its vertex sees it.
+/// One end of a triangle side, as seen from its vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Spoke {
     vertex: u32,
@@ -328,7 +332,7 @@ struct Spoke {
     wedges: [u32; 2],
 }
 
-/// The other two corners of a corner's triangle, in order.
+/// Returns the other two corners of a corner's triangle, in order.
 fn ring(corner: u32) -> [u32; 2] {
     let (base, k) = (corner - corner % 3, corner % 3);
     [base + (k + 1) % 3, base + (k + 2) % 3]

@@ -1,9 +1,9 @@
-//! Quadric error metric: the sum of squared distances to planes, as a function of the place.
+//! Quadric error metric: the sum of squared distances to planes, as a function of position.
 
 use glam::DVec3;
 use std::ops::AddAssign;
 
-/// Q(p) = pᵀA p + 2 b·p + c, each plane weighted by the area it stands for; symmetric A, stored as six numbers.
+/// Q(p) = pᵀA p + 2 b·p + c, each plane weighted by the area it represents; symmetric A, stored as six numbers.
 ///
 /// Source: Garland and Heckbert 1997, "Surface Simplification Using Quadric Error Metrics".
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,7 +17,7 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
-    /// The plane through `point` with a unit `normal`.
+    /// Creates the quadric of the plane through `point` with a unit `normal`.
     pub fn of_plane(point: DVec3, normal: DVec3, weight: f64) -> Self {
         let scaled = weight * normal;
         let offset = -normal.dot(point);
@@ -36,7 +36,7 @@ impl Quadric {
         }
     }
 
-    /// Never negative: rounding can take a sum of squares below zero.
+    /// Evaluates the quadric; never negative, although rounding can make a sum of squares negative.
     #[inline]
     pub fn at(&self, p: DVec3) -> f64 {
         let ap = self.times(p);
@@ -54,16 +54,17 @@ impl Quadric {
         if self.weight > 0.0 { self.at(p) / self.weight } else { 0.0 }
     }
 
-    /// The place of least error near `guess`.
+    /// Returns the position of least error near `guess`.
     ///
-    /// Where planes are all but parallel their common point lies far away or nowhere; a pull towards `guess`, a
-    /// hundred-millionth of the weight, decides what they leave open and moves nothing that they determine.
+    /// Where planes are nearly parallel their common point lies far away or does not exist. A regularisation towards
+    /// `guess`, with a hundred-millionth of the weight, decides what the planes leave undetermined and does not affect
+    /// the rest.
     #[inline]
     pub fn minimum_near(&self, guess: DVec3) -> DVec3 {
         let pull = 1e-8 * self.weight;
         let [xx, yy, zz, xy, xz, yz] = self.a;
         let (xx, yy, zz) = (xx + pull, yy + pull, zz + pull);
-        // Solves for the step away from the guess: (A + pull) step = −gradient / 2, by Cramer's rule.
+        // Solves for the step from the guess: (A + pull) step = −gradient / 2, by Cramer's rule.
         let r = -(self.times(guess) + self.b);
         let (c0, c1, c2) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
         let determinant = xx * c0 + xy * c1 + xz * c2;

@@ -1,19 +1,20 @@
-//! A priority queue by levels of cost, for keys that do not fall below the last one taken out.
+//! A priority queue by levels of cost, for keys that are not below the last one popped.
 
 use super::surface::NONE;
 
-/// A level is an octave: of two keys in one, the larger is less than twice the smaller. For squared distances that is a
-/// factor of √2, and narrower levels cost more time than their lower error is worth (docs/simplification.md).
+/// A queue by levels. A level is an octave: of two keys in one level, the larger is less than twice the smaller. For
+/// squared distances that is a factor of √2; narrower levels cost more time than their lower error is worth
+/// (docs/simplification.md).
 ///
-/// An item is in at most once, so lists through an array of links do: two writes an entry, and no search. Those of a
-/// level come out in the order in which they went in, which also spreads steps of equal cost over the surface.
+/// An item is in the queue at most once, so lists through an array of links suffice: two writes per entry, and no
+/// search. A level is first in, first out, which also spreads steps of equal cost over the surface.
 #[derive(Debug)]
 pub(super) struct LevelQueue {
     /// First and last item of each level.
     ends: Vec<[u32; 2]>,
-    /// The item behind each item in its level.
+    /// The next item of each item in its level.
     next: Vec<u32>,
-    /// All levels below are empty.
+    /// All lower levels are empty.
     level: usize,
 }
 
@@ -22,20 +23,20 @@ const DROPPED_BITS: u32 = 23;
 const LEVELS: usize = (f32::INFINITY.to_bits() >> DROPPED_BITS) as usize + 1;
 
 impl LevelQueue {
-    /// For items below `items`.
+    /// Creates a queue for items below `items`.
     pub fn new(items: usize) -> Self {
         Self { ends: vec![[NONE; 2]; LEVELS], next: vec![NONE; items], level: 0 }
     }
 
-    /// The least key of the level of `key`, which must be a number and not negative.
+    /// Returns the least key of the level of `key`, which must be a non-negative number.
     #[inline]
     pub fn floor(key: f32) -> f32 {
         floor_of(level_of(key))
     }
 
-    /// Keys below the level of the last one taken out count as of that level.
+    /// Adds an item. A key below the level of the last one popped counts as of that level.
     ///
-    /// - `item`: not in the queue.
+    /// - `item`: must not be in the queue.
     #[inline]
     pub fn push(&mut self, key: f32, item: u32) {
         debug_assert!(key >= 0.0, "keys must not be negative or NaN: {key}");
@@ -48,7 +49,7 @@ impl LevelQueue {
         ends[1] = item;
     }
 
-    /// An item of the lowest level, and the least key of that level.
+    /// Removes an item of the lowest level; returns it with the least key of that level.
     #[inline]
     pub fn pop(&mut self) -> Option<(f32, u32)> {
         let key = self.least_key()?;
@@ -58,14 +59,14 @@ impl LevelQueue {
         Some((key, item))
     }
 
-    /// The key that [`Self::pop`] would give.
+    /// The key that [`Self::pop`] would return.
     #[inline]
     pub fn least_key(&mut self) -> Option<f32> {
         self.level = (self.level..LEVELS).find(|&level| self.ends[level][0] != NONE)?;
         Some(floor_of(self.level))
     }
 
-    /// The least key of the level in which the item in the middle is.
+    /// The least key of the level of the median item.
     pub fn median_key(&self) -> Option<f32> {
         let counts: Vec<usize> = self.ends.iter().map(|ends| self.items_from(ends[0]).count()).collect();
         let middle = counts.iter().sum::<usize>() / 2;
@@ -109,7 +110,7 @@ mod tests {
                 queue.push(key, i);
                 plain.push((LevelQueue::floor(key).to_bits(), i as usize, i));
             } else {
-                // Least level first, and in it the one that came first.
+                // Least level first, and within it first in, first out.
                 let expected = plain.iter().min().copied();
                 plain.retain(|entry| Some(*entry) != expected);
                 let found = queue.pop();

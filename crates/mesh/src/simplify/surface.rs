@@ -1,20 +1,20 @@
-//! Triangles that can lose edges: who touches whom, which collapses are allowed, and doing them.
+//! A triangle surface for edge collapses: connectivity, checks, and the collapse itself.
 //!
-//! Each vertex has a ring list of its corners (corner 3t + k is corner k of triangle t). Corners of dead triangles
+//! Each vertex has a ring list of its corners (corner 3t + k is corner k of triangle t). Corners of removed triangles
 //! stay in the lists of vertices that were not collapsed and are skipped.
 
 use glam::{Vec2, Vec3};
 
-/// What a vertex may do.
+/// How a vertex may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
-    /// Inside a smooth sheet: goes anywhere.
+    /// Inside a smooth sheet: moves freely.
     Free,
     /// On one border, seam or material edge: slides along it.
     Curve,
-    /// Where such lines end or meet, and wherever the surface is not a manifold: stays.
+    /// Where such lines end or meet, and wherever the surface is not manifold: stays.
     Fixed,
-    /// On the rim of a part that is worked on alone: not touched, not even by its neighbours.
+    /// On the rim of a part that is processed separately: neither it nor its edges change.
     Frozen,
 }
 
@@ -32,11 +32,11 @@ impl Wedge {
     }
 }
 
-/// More triangles than this around a new vertex are not allowed: it bounds the work on meshes with a hub.
+/// Limit on the triangles around a merged vertex: it bounds the work on meshes with a hub.
 const MAX_VALENCE: u32 = 256;
-/// Cosine of the largest turn of a triangle, about 75°.
-const MIN_TURN: f64 = 0.25;
-/// Corners of dead triangles that a ring list may hold beyond its live ones.
+/// Cosine of the largest rotation of a triangle, about 75°.
+const MIN_TURN_COS: f64 = 0.25;
+/// Corners of removed triangles that a ring list may hold beyond its live ones.
 const MANY_DEAD: usize = 64;
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -44,12 +44,12 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct Surface {
     pub positions: Vec<Vec3>,
     pub kinds: Vec<Kind>,
-    /// The vertex of each corner; `NONE` in the first corner of a dead triangle.
+    /// The vertex of each corner; `NONE` in the first corner of a removed triangle.
     corner_vertex: Vec<u32>,
     next_corner: Vec<u32>,
     first_corner: Vec<u32>,
     valence: Vec<u32>,
-    /// Empty when nothing but position matters; else the wedge of each corner.
+    /// The wedge of each corner; empty if the mesh has positions only.
     corner_wedge: Vec<u32>,
     pub wedges: Vec<Wedge>,
     pub face_count: usize,
@@ -62,7 +62,7 @@ pub(super) struct Surface {
     scratch: Vec<u32>,
 }
 
-/// A wedge that takes another one in, and what it is then.
+/// A wedge that absorbs another one, and its data afterwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WedgeJoin {
     pub from: u32,
@@ -71,8 +71,10 @@ pub(super) struct WedgeJoin {
 }
 
 impl Surface {
+    /// Creates a surface.
+    ///
     /// - `triangles`: three different vertices each.
-    /// - `corner_wedges`: empty, or one a corner, indices into `wedges`.
+    /// - `corner_wedges`: empty, or one per corner, indices into `wedges`.
     pub fn new(
         triangles: &[[u32; 3]],
         positions: Vec<Vec3>,
@@ -114,14 +116,14 @@ impl Surface {
         }
     }
 
-    /// Live triangles: number, vertices, and wedges when there are any.
+    /// Iterates over live triangles: index, vertices, and wedges if there are any.
     pub fn live_triangles(&self) -> impl Iterator<Item = (usize, [u32; 3], Option<[u32; 3]>)> {
         let wedges = self.corner_wedge.as_chunks::<3>().0;
         let live = self.corner_vertex.as_chunks::<3>().0.iter().enumerate().filter(|(_, t)| t[0] != NONE);
         live.map(|(t, &vertices)| (t, vertices, wedges.get(t).copied()))
     }
 
-    /// How many live triangles a vertex has.
+    /// Number of live triangles at a vertex.
     pub fn valence(&self, vertex: usize) -> u32 {
         self.valence[vertex]
     }
@@ -131,20 +133,20 @@ impl Surface {
         self.valence[vertex as usize] > MAX_VALENCE
     }
 
-    /// How many live triangles have a vertex of this kind.
+    /// Number of live triangles with a vertex of this kind.
     pub fn faces_at(&self, kind: Kind) -> usize {
         self.live_triangles().filter(|(_, t, _)| t.iter().any(|&v| self.kinds[v as usize] == kind)).count()
     }
 
-    /// The live triangles around a vertex, as (vertex's corner, next vertex, one after).
+    /// Iterates over the live triangles around a vertex, as (vertex's corner, next vertex, the one after).
     #[inline]
     pub fn fan(&self, vertex: u32) -> Fan<'_> {
         let first = self.first_corner[vertex as usize];
         Fan { surface: self, first, corner: first, dead: 0 }
     }
 
-    /// The list of [`Self::fan`]. A ring list that is mostly dead corners is rid of them: around what was a hub, every
-    /// walk would go along all that it ever had.
+    /// Collects [`Self::fan`] in a list. If most corners of the ring list are dead, they are removed: otherwise every
+    /// walk around a former hub would visit all corners it ever had.
     #[inline]
     fn fill_fan(&mut self, vertex: u32, fan: &mut Vec<(u32, u32, u32)>) {
         fan.clear();
@@ -176,9 +178,9 @@ impl Surface {
         self.fans[0] = fan;
     }
 
-    /// Whether `from` may go into `to` and both be at `position`; keeps what [`Self::collapse`] needs to know.
+    /// Whether `from` may be merged into `to` at `position`; stores what [`Self::collapse`] needs.
     ///
-    /// Refused: what would change the topology (Dey et al. 1999, link condition), move a border or seam off its
+    /// Rejected: collapses that change the topology (Dey et al. 1999, link condition), move a border or seam off its
     /// line, fold or flatten a triangle, or tear shading data apart.
     pub fn may_collapse(&mut self, from: u32, to: u32, position: Vec3) -> bool {
         let (kind, kept) = (self.kinds[from as usize], self.kinds[to as usize]);
@@ -186,7 +188,7 @@ impl Surface {
         if self.valence[from as usize] + self.valence[to as usize] > MAX_VALENCE {
             return false;
         }
-        // Walked once: all else goes along these lists.
+        // The rings are walked once; all checks use these lists.
         let mut fans = std::mem::take(&mut self.fans);
         for (fan, vertex) in fans.iter_mut().zip([from, to]) {
             self.fill_fan(vertex, fan);
@@ -202,7 +204,7 @@ impl Surface {
         allowed && self.plan_wedges(from, to)
     }
 
-    /// How many triangles lie at the edge, if the link condition holds.
+    /// Returns the number of triangles at the edge, if the link condition holds.
     fn shared_if_linked(&mut self, from: u32, to: u32, fans: &[Vec<(u32, u32, u32)>; 2]) -> Option<u32> {
         // Marks: `near` for neighbours of `from`, `common` for those of both.
         let near = self.new_stamps(2);
@@ -223,7 +225,7 @@ impl Surface {
                 }
             }
         }
-        // A triangle opposite the edge on both sides would become the same triangle twice.
+        // A triangle opposite the edge on both sides would become a duplicate.
         let opposite = |fan: &[(u32, u32, u32)], end: u32| {
             fan.iter()
                 .any(|&(_, b, c)| marks[b as usize] == common && marks[c as usize] == common && b != end && c != end)
@@ -232,7 +234,7 @@ impl Surface {
         (linked && !(shared == 2 && opposite(&fans[0], to) && opposite(&fans[1], from))).then_some(shared)
     }
 
-    /// Whether the edge itself is border, seam or material edge; `shared` triangles lie at it.
+    /// Whether the edge itself is a border, seam or material edge; `shared` is the number of triangles at it.
     pub fn is_constraint(&self, from: u32, to: u32, shared: u32) -> bool {
         if shared == 1 {
             return true;
@@ -245,7 +247,7 @@ impl Surface {
         first.0 != second.0 || first.1 != second.1
     }
 
-    /// For each triangle at the edge the wedges at its two ends.
+    /// Iterates over the triangles at the edge: the wedges at its two ends.
     fn edge_wedges(&self, from: u32, to: u32) -> impl Iterator<Item = (u32, u32)> {
         self.fan(from).filter(move |&(_, b, c)| b == to || c == to).map(move |(corner, b, _)| {
             let other = if b == to { next_in_triangle(corner) } else { next_in_triangle(next_in_triangle(corner)) };
@@ -253,7 +255,7 @@ impl Surface {
         })
     }
 
-    /// Whether the triangles around `vertex` that are not at `other` keep an area and roughly their direction.
+    /// Whether the triangles around `vertex` that are not at `other` keep an area and roughly their orientation.
     fn keeps_orientation(&self, fan: &[(u32, u32, u32)], vertex: u32, other: u32, position: Vec3) -> bool {
         let old = self.positions[vertex as usize].as_dvec3();
         let new = position.as_dvec3();
@@ -264,12 +266,13 @@ impl Surface {
             let (before, after) = (side.cross(old - b), side.cross(new - b));
             let (length2, scale2) = (after.length_squared(), before.length_squared());
             let turn = before.dot(after);
-            length2 > 0.0 && (scale2 == 0.0 || (turn > 0.0 && turn * turn >= MIN_TURN * MIN_TURN * scale2 * length2))
+            length2 > 0.0
+                && (scale2 == 0.0 || (turn > 0.0 && turn * turn >= MIN_TURN_COS * MIN_TURN_COS * scale2 * length2))
         })
     }
 
-    /// Pairs the wedges of the two ends over the triangles that vanish. Fails when one at `from` has no partner or
-    /// two of them.
+    /// Pairs the wedges of the two ends over the triangles that vanish. Fails if a wedge at `from` has no partner or
+    /// two.
     fn plan_wedges(&mut self, from: u32, to: u32) -> bool {
         if self.corner_wedge.is_empty() {
             return true;
@@ -279,7 +282,7 @@ impl Surface {
         joins.extend(self.edge_wedges(from, to));
         joins.sort_unstable();
         joins.dedup();
-        // Both ways: a wedge of `to` that took two in would glue them together.
+        // Unique in both directions: a wedge of `to` that absorbed two would join them.
         let unique = joins.windows(2).all(|pair| pair[0].0 != pair[1].0)
             && joins.iter().enumerate().all(|(i, p)| joins[i + 1..].iter().all(|q| p.1 != q.1));
         let complete =
@@ -288,12 +291,12 @@ impl Surface {
         unique && complete
     }
 
-    /// Moves `to` to `position` and hands it all triangles of `from` but those at the edge, which die.
+    /// Moves `to` to `position` and gives it all triangles of `from` except those at the edge, which are removed.
     ///
-    /// - `t`: where between `from` (0) and `to` (1) the place lies, for shading data.
+    /// - `t`: parameter of the position between `from` (0) and `to` (1), for shading data.
     ///
-    /// Call it only after [`Self::may_collapse`] has allowed the very same. Appends wedge joins to `joins`; returns
-    /// how many triangles died.
+    /// Call it only directly after [`Self::may_collapse`] has allowed the same collapse. Appends wedge joins to
+    /// `joins`; returns the number of triangles removed.
     pub fn collapse(&mut self, from: u32, to: u32, position: Vec3, t: f32, joins: &mut Vec<WedgeJoin>) -> usize {
         if !self.corner_wedge.is_empty() {
             for &(gone, kept) in &self.joins {
@@ -349,12 +352,12 @@ fn next_in_triangle(corner: u32) -> u32 {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 
-/// See [`Surface::fan`].
+/// Iterator of [`Surface::fan`].
 pub(super) struct Fan<'a> {
     surface: &'a Surface,
     first: u32,
     corner: u32,
-    /// Corners of dead triangles that were skipped.
+    /// Number of corners of removed triangles skipped so far.
     dead: u32,
 }
 
