@@ -1,20 +1,20 @@
-//! One scene at 1, 2, 4 … samples per pixel: what each step took, and how far from the truth it was.
+//! Convergence curve: one scene at 1, 2, 4 … samples per pixel, with the cost and the error of each step.
 
 use super::curve::{Seconds, seconds_at, seconds_to, slope};
 use super::{Distance, LinearPicture};
 use crate::render::{Display, ErrorEstimate, Film, Prepared, RayCounts, RenderSettings, advance};
 use std::time::{Duration, Instant};
 
-/// Where a curve ends: at the last power of two that both allow, but never before the first step.
+/// Where a curve ends: at the last power of two within both limits, but never before the first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurveLimits {
     /// Samples per pixel.
     pub spp: u32,
-    /// Wall time; a step that would go past it is not begun.
+    /// Wall time; a step that would exceed it is not started.
     pub seconds: Option<f64>,
 }
 
-/// What was rendered up to a number of samples.
+/// The image of one step, and its cost.
 #[derive(Clone, Debug)]
 pub struct CurveStep {
     pub spp: u32,
@@ -23,11 +23,11 @@ pub struct CurveStep {
     pub picture: LinearPicture,
 }
 
-/// What the samples so far have cost; rendering alone, without loading, building or comparing.
+/// Cost of the samples so far: rendering alone, without loading, building or comparing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spent {
     pub wall_seconds: f64,
-    /// All threads together; `None` where the system does not tell.
+    /// Sum over all threads; `None` if the system does not report it.
     pub cpu_seconds: Option<f64>,
     pub threads: usize,
     pub camera_paths: u64,
@@ -35,7 +35,7 @@ pub struct Spent {
 }
 
 impl Spent {
-    /// CPU seconds a thread: what the wall clock would show on a quiet machine. Wall time where there is no CPU time.
+    /// CPU seconds per thread: an estimate of the wall time on an idle machine. Wall time if there is no CPU time.
     pub fn seconds(&self) -> f64 {
         self.cpu_seconds.map_or(self.wall_seconds, |cpu| cpu / self.threads as f64)
     }
@@ -49,9 +49,9 @@ impl Spent {
     }
 }
 
-/// Renders `snapshot` on the current rayon pool until `limits`. `progress` is told the share that is done, 0..1.
+/// Renders `prepared` on the current rayon pool until `limits`. `progress` receives the completed fraction, 0..1.
 ///
-/// When `stop` says so, the step in hand is given up, and those before it are the answer: none, perhaps.
+/// If `stop` returns true, the current step is discarded and the completed steps are returned, possibly none.
 pub fn measure_curve(
     prepared: &Prepared,
     settings: &RenderSettings,
@@ -90,7 +90,7 @@ pub fn measure_curve(
             rays: rays.total(),
         };
         steps.push(CurveStep { spp, spent, estimate: film.error_estimate(), picture: LinearPicture::of(&film) });
-        // The next step takes as long as all before it.
+        // The next step takes as long as all steps before it.
         let too_long = limits.seconds.is_some_and(|seconds| 2.0 * spent.wall_seconds > seconds);
         match spp.checked_mul(2) {
             Some(next) if next <= limits.spp && !too_long => spp = next,
@@ -101,7 +101,7 @@ pub fn measure_curve(
     steps
 }
 
-/// How many samples to ask for at once, so that progress is told a few times a second.
+/// Chooses the number of samples per call, so that progress is reported a few times per second.
 #[derive(Default)]
 struct Pace {
     seconds_per_sample: f64,
@@ -110,7 +110,7 @@ struct Pace {
 impl Pace {
     fn spp(&self) -> u32 {
         const SLICE: f64 = 0.25;
-        // Whole waves hold several samples: few of them at once would leave the kernel half empty.
+        // Waves hold several samples of each pixel: with few samples per call the kernel would be half empty.
         if self.seconds_per_sample > 0.0 { (SLICE / self.seconds_per_sample).clamp(4.0, 4096.0) as u32 } else { 4 }
     }
 
@@ -119,42 +119,42 @@ impl Pace {
     }
 }
 
-/// One step, measured.
+/// One step compared with the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     pub spp: u32,
     pub spent: Spent,
     pub distance: Distance,
-    /// What the renderer itself believed.
+    /// The renderer's own error estimate.
     pub estimate: Option<ErrorEstimate>,
 }
 
 impl Step {
-    /// Root of relMSE: the relative error of the picture.
+    /// Root of relMSE: the relative error of the image.
     pub fn error(&self) -> f64 {
         self.distance.relative_mse.sqrt()
     }
 
-    /// What the renderer believed over what is true; 1 is perfect. `None` where nothing is wrong.
+    /// Estimated over measured error; 1 is perfect. `None` if the error is 0.
     pub fn calibration(&self) -> Option<f64> {
         let estimate = self.estimate.filter(|_| self.error() > 0.0);
         estimate.map(|estimate| estimate.relative / self.error())
     }
 
-    /// relMSE times seconds: with independent samples the same at every step; smaller is better.
+    /// relMSE times seconds: constant for independent samples; smaller is better.
     pub fn inefficiency(&self) -> f64 {
         self.distance.relative_mse * self.spent.seconds()
     }
 }
 
-/// All steps of one scene with one choice of techniques.
+/// All steps of one scene with one set of techniques.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvergenceCurve {
     pub steps: Vec<Step>,
 }
 
 impl ConvergenceCurve {
-    /// At least one step, all of the size of `reference`.
+    /// Compares each step with `reference`, which must have the same size; needs at least one step.
     pub fn measure(steps: &[CurveStep], reference: &LinearPicture, display: &Display) -> Self {
         assert!(!steps.is_empty(), "a curve has at least one step");
         let measured = |step: &CurveStep| Step {
@@ -175,10 +175,11 @@ impl ConvergenceCurve {
         self.steps.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect()
     }
 
-    /// Fitted slope of log relMSE on log seconds over the later half of the steps; −1 is that of independent samples.
+    /// Slope of log relMSE over log seconds, fitted to the later half of the steps; −1 for independent samples.
     ///
-    /// The first steps take longer a sample than later ones (tables and caches are filled, waves are not full), and errors
-    /// fall faster at first than later on: with them the line would be steeper than what the curve goes on with.
+    /// The first steps take longer per sample than later ones (tables and caches are filled, waves are not full), and
+    /// errors fall faster at first than later: including them would make the line steeper than the continuation of the
+    /// curve.
     pub fn slope(&self) -> Option<f64> {
         let later = &self.steps[self.steps.len() / 2..];
         // A line needs two points.
@@ -186,8 +187,8 @@ impl ConvergenceCurve {
         slope(&later.iter().map(|step| (step.spent.seconds(), step.distance.relative_mse)).collect::<Vec<_>>())
     }
 
-    /// Seconds that the renderer foretold for the error that it tells in the end, over those that it took; 1 is perfect.
-    /// Foretold at the first step behind a tenth of the time; `None` where that is the last, or nothing was told.
+    /// Predicted over actual seconds to the final estimated error; 1 is perfect. The prediction is made at the first
+    /// step after a tenth of the time; `None` if that is the last step, or there is no estimate.
     pub fn foresight(&self) -> Option<f64> {
         let (last, _) = self.steps.split_last()?;
         let is_early = |step: &&Step| step.spent.seconds() >= 0.1 * last.spent.seconds() && step.spp < last.spp;
@@ -197,13 +198,13 @@ impl ConvergenceCurve {
         Some(seconds_at(&times.collect::<Vec<_>>(), f64::from(spp)) / last.spent.seconds())
     }
 
-    /// Seconds until the relative error is down to `error`; `None` where the curve does not lead there.
+    /// Seconds until the relative error is down to `error`; `None` if the curve does not reach it.
     pub fn seconds_to(&self, error: f64) -> Option<Seconds> {
         seconds_to(&self.points(), self.slope(), error * error)
     }
 }
 
-/// CPU seconds that this process has used so far, all threads together; `None` where the system does not tell.
+/// CPU seconds of this process so far, summed over all threads; `None` if the system does not report them.
 pub fn cpu_seconds() -> Option<f64> {
     #[cfg(unix)]
     {

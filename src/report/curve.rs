@@ -1,11 +1,11 @@
-//! Error against time, where both are straight lines on logarithmic axes.
+//! Interpolation and extrapolation of error over time, which are straight lines on logarithmic axes.
 
-/// A time that was measured, or one that the fitted line promises.
+/// A time that was measured, or extrapolated along the fitted line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Seconds {
     /// Between two measured steps.
     Interpolated(f64),
-    /// Beyond the first or the last one.
+    /// Beyond the first or the last step.
     Extrapolated(f64),
 }
 
@@ -17,8 +17,8 @@ impl Seconds {
     }
 }
 
-/// relMSE of independent samples falls with slope −1. One that falls by less than this does not fall by samples, but keeps a
-/// distance from a reference that shows something else, and its line promises nothing.
+/// relMSE of independent samples falls with slope −1. A curve that falls more slowly than this is limited by its
+/// distance to a reference of something else, so its line is not extrapolated.
 pub const STUCK: f64 = -0.25;
 
 /// Slope of the least-squares line through (log x, log y); `None` with fewer than two usable points.
@@ -32,25 +32,25 @@ pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     (logs.len() >= 2 && spread > 0.0).then(|| common / spread)
 }
 
-/// Seconds that `spp` samples a pixel will take, after (samples, seconds) of some steps, each twice the samples of the one
-/// before it; at least one step.
+/// Predicts the seconds for `spp` samples per pixel from the (samples, seconds) of at least one step, each with twice
+/// the samples of the one before.
 ///
-/// The first samples take longer: each step pays for what is done once a doubling, whatever its size, and for what is done
-/// once. The two latest differences tell both apart from what a sample takes: t(n) = a·n + b·log₂ n + c.
+/// The first samples take longer: each step pays for work done once per doubling, whatever its size, and for work done
+/// once. The two latest differences separate both from the cost of a sample: t(n) = a·n + b·log₂ n + c.
 pub fn seconds_at(steps: &[(f64, f64)], spp: f64) -> f64 {
     let (n, seconds) = *steps.last().expect("at least one step");
     let [.., (n_first, t_first), (n_before, t_before), _] = *steps else { return seconds * spp / n };
     let (earlier, later) = (t_before - t_first, seconds - t_before);
-    // Noise must make neither of them negative: a sample takes between half and all of what it took last.
+    // Noise must make neither of them negative: the cost per sample is between half and all of that in the last step.
     let whole = later / (n - n_before);
     let sample = ((later - earlier) / ((n - n_before) - (n_before - n_first))).clamp(0.5 * whole, whole);
     let doubling = later - sample * (n - n_before);
     seconds + sample * (spp - n) + doubling * (spp / n).log2()
 }
 
-/// When `points` (seconds, error), rising in seconds, come down to `target`, and stay there.
+/// Returns when `points` (seconds, error), rising in seconds, fall below `target` for good.
 ///
-/// Between two points along the line that joins them, beyond them along `slope`; `None` where that hardly falls (`STUCK`).
+/// Interpolates between two points, extrapolates beyond them along `slope`; `None` if that hardly falls (`STUCK`).
 pub fn seconds_to(points: &[(f64, f64)], slope: Option<f64>, target: f64) -> Option<Seconds> {
     let along = |(seconds, error): (f64, f64), slope: f64| seconds * (target / error).powf(1.0 / slope);
     let falling = slope.filter(|slope| *slope < STUCK);
@@ -94,7 +94,7 @@ mod tests {
             assert!((seconds_at(&steps, n) / time(n) - 1.0).abs() < 1e-9, "{n}: {}", seconds_at(&steps, n));
         }
         assert_eq!(seconds_at(&steps[..1], 2.0), 2.0 * time(1.0));
-        // A late step that was held up does not turn time around.
+        // A late step that was delayed does not make time negative.
         assert!(seconds_at(&[(1.0, 1.0), (2.0, 9.0), (4.0, 10.0)], 64.0) > 10.0);
     }
 

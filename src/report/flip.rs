@@ -1,24 +1,24 @@
-//! LDR-FLIP: how much of a difference a person sees who flips between two pictures.
+//! LDR-FLIP: the perceived difference when flipping between two images.
 //!
-//! Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images". Two pipelines: colours are blurred as
-//! the camera blurs them and compared in a perceptual space; edges and points are compared where they stand; where
-//! features differ, the colour difference weighs more. All filters are sums of products of a row and a column.
+//! Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images". Two pipelines: colours are filtered
+//! with the contrast sensitivity of the eye and compared in a perceptual space; edges and points are compared by
+//! position. Where features differ, the colour difference is amplified. All filters are sums of separable products.
 
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Pixels a degree of the visual field: a 0.7 m wide screen of 3840 pixels, seen from 0.7 m (the paper's choice).
+/// Pixels per degree of the visual field: a 0.7 m wide screen of 3840 pixels, seen from 0.7 m (the paper's choice).
 const PIXELS_PER_DEGREE: f32 = 67.020_64;
 
-/// Mean FLIP of two pictures of the same size, `width` pixels wide, in linear Rec. 709 display light, 0..1.
+/// Mean FLIP of two images of the same size, `width` pixels wide, in linear Rec. 709 display light, 0..1.
 pub fn flip(reference: &[Vec3], test: &[Vec3], width: usize) -> f64 {
     assert!(width > 0 && reference.len() == test.len() && reference.len().is_multiple_of(width), "sizes differ");
     let map = flip_map(reference, test, width);
     map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64
 }
 
-/// FLIP a pixel, 0..1.
+/// FLIP per pixel, 0..1.
 fn flip_map(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
     let opponent = |picture: &[Vec3]| picture.iter().map(|&rgb| opponent_from_linear(rgb)).collect::<Vec<_>>();
     let (reference, test) = (opponent(reference), opponent(test));
@@ -27,7 +27,7 @@ fn flip_map(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
     color.iter().zip(&feature).map(|(&color, &feature)| color.powf(1.0 - feature)).collect()
 }
 
-/// Columns are the CIE XYZ of the Rec. 709 primaries, scaled so that white has Y = 1 (D65).
+/// Matrix whose columns are the CIE XYZ of the Rec. 709 primaries, scaled so that white has Y = 1 (D65).
 fn xyz_from_rgb() -> Mat3 {
     Mat3::from_cols(
         Vec3::new(10_135_552.0 / 24_577_794.0, 2_613_072.0 / 12_288_897.0, 1_425_312.0 / 73_733_382.0),
@@ -51,7 +51,7 @@ fn linear_from_opponent(c: Vec3) -> Vec3 {
     xyz_from_rgb().inverse() * (Vec3::new(y + c.y / 500.0, y, y - c.z / 200.0) * white())
 }
 
-/// CIE L*a*b*, a* and b* scaled with lightness (Hunt: dark colours look less colourful).
+/// CIE L*a*b*, with a* and b* scaled by lightness (Hunt effect: dark colours look less colourful).
 fn hunt_lab(rgb: Vec3) -> Vec3 {
     let delta = 6.0 / 29.0_f32;
     let curve = |t: f32| if t > delta.powi(3) { t.cbrt() } else { t / (3.0 * delta * delta) + 4.0 / 29.0 };
@@ -61,15 +61,15 @@ fn hunt_lab(rgb: Vec3) -> Vec3 {
     Vec3::new(lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z))
 }
 
-/// Abasi, Amani Tehran and Fairchild 2020: city block in lightness, Euclidean in colour.
+/// HyAB distance (Abasi, Amani Tehran and Fairchild 2020): city block in lightness, Euclidean in colour.
 fn hyab(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + d.y.hypot(d.z)
 }
 
-/// Difference of the colours that the camera makes out, 0..1.
+/// Difference of the colours that the eye resolves, 0..1.
 fn color_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
-    // Most of the visible differences take most of the range; the rest is squeezed into what is left (section 4.1.2).
+    // Most visible differences take most of the range; the rest is compressed into the remainder (section 4.1.2).
     const EXPONENT: f32 = 0.7;
     const KNEE_IN: f32 = 0.4;
     const KNEE_OUT: f32 = 0.95;
@@ -87,9 +87,10 @@ fn color_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32>
     reference.par_iter().zip(&test).map(mapped).collect()
 }
 
-/// Blurred as the camera blurs each opponent channel (Johnson and Fairchild 2003), then to perceptual colours.
+/// Filters each opponent channel with the contrast sensitivity of the eye (Johnson and Fairchild 2003), then converts
+/// to perceptual colours.
 fn as_seen(opponent: &[Vec3], width: usize) -> Vec<Vec3> {
-    // Amplitude and width of one or two Gaussians a channel, in degrees.
+    // Amplitude and width of one or two Gaussians per channel, in degrees.
     const ACHROMATIC: &[(f32, f32)] = &[(1.0, 0.0047)];
     const RED_GREEN: &[(f32, f32)] = &[(1.0, 0.0053)];
     const BLUE_YELLOW: &[(f32, f32)] = &[(34.1, 0.04), (13.5, 0.025)];
@@ -121,7 +122,7 @@ fn as_seen(opponent: &[Vec3], width: usize) -> Vec<Vec3> {
 
 /// Difference of edges or of points, whichever is larger, 0..1.
 fn feature_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f32> {
-    /// Width of the filters in degrees: how far apart peaks of the eye's sensitivity to edges are.
+    /// Width of the filters in degrees: the distance between peaks of the eye's sensitivity to edges.
     const FEATURE_WIDTH: f32 = 0.082;
     let sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * sigma).ceil() as i32;
@@ -147,7 +148,7 @@ fn feature_difference(reference: &[Vec3], test: &[Vec3], width: usize) -> Vec<f3
     (0..reference.len()).map(difference).collect()
 }
 
-/// Scales what is positive to a sum of 1 and what is negative to −1.
+/// Scales the positive values to a sum of 1 and the negative ones to −1.
 fn scaled_by_sign(mut row: Vec<f32>) -> Vec<f32> {
     let positive: f32 = row.iter().filter(|w| **w > 0.0).sum();
     let negative: f32 = row.iter().filter(|w| **w < 0.0).sum();
@@ -155,7 +156,7 @@ fn scaled_by_sign(mut row: Vec<f32>) -> Vec<f32> {
     row
 }
 
-/// Correlates with `row` along x and `column` along y, both of odd length; beyond the border its pixels repeat.
+/// Correlates with `row` along x and `column` along y, both of odd length; border pixels are repeated.
 fn convolve(plane: &[f32], width: usize, row: &[f32], column: &[f32]) -> Vec<f32> {
     let height = plane.len() / width;
     let tap = |at: usize, k: usize, n: usize, len: usize| {
@@ -196,9 +197,9 @@ mod tests {
         let (width, n) = (8, 64);
         let black = vec![Vec3::ZERO; n];
         assert_eq!(flip(&black, &black, width), 0.0);
-        // Black to white is 100 in L* and nothing in colour, no feature differs: 100^0.7 = 25.1189. Green to blue,
-        // from their L*a*b*: (87.735, −86.183, 83.180) and (32.299, 79.190, −107.861), scaled with lightness
-        // (−75.61, 72.98) and (25.58, −34.84): 55.436 + √(101.19² + 107.82²) = 203.30, ^0.7 = 41.27; knee 16.51.
+        // Black to white is 100 in L* and nothing in colour, no feature differs: 100^0.7 = 25.1189. Green to blue, from
+        // their L*a*b*: (87.735, −86.183, 83.180) and (32.299, 79.190, −107.861), scaled by lightness (−75.61, 72.98)
+        // and (25.58, −34.84): 55.436 + √(101.19² + 107.82²) = 203.30, ^0.7 = 41.27; knee 16.51.
         let expected = 0.95 + (25.1189 - 16.51) / (41.27 - 16.51) * 0.05;
         let found = flip(&black, &vec![Vec3::ONE; n], width);
         assert!((found - expected).abs() < 1e-4, "{found} for {expected}");
@@ -209,7 +210,7 @@ mod tests {
     }
 
     /// A ramp with a checkered blue channel, a red spot, a green cast and a bright line. The expected values are those
-    /// of the authors' own program (flip-evaluator 1.7) for the same pictures.
+    /// of the authors' own program (flip-evaluator 1.7) for the same images.
     #[test]
     fn a_picture_with_everything_agrees_with_the_authors_program() {
         let (width, height) = (24, 16);

@@ -1,26 +1,26 @@
-//! How far a picture is from another that is taken for the truth.
+//! Error metrics of an image against a reference.
 
 use super::LinearPicture;
 use super::flip::flip;
 use crate::render::Display;
 use glam::DVec3;
 
-/// Added to the square of the reference, so that black pixels do not decide the whole: the field's usual 0.01.
+/// Added to the square of the reference, so that black pixels do not dominate: the usual 0.01.
 pub const RELATIVE_FLOOR: f64 = 0.01;
 
-/// The distances of one picture from its reference.
+/// The errors of one image against its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
     /// Mean over pixels and channels of (x − ref)² / (ref² + 0.01).
     pub relative_mse: f64,
     /// Root of the mean over pixels and channels of (x − ref)², W·m⁻²·sr⁻¹.
     pub rmse: f64,
-    /// Mean of FLIP over the developed pictures, 0 (nobody sees a difference) to 1.
+    /// Mean of FLIP over the developed images, 0 (no visible difference) to 1.
     pub flip: f64,
 }
 
 impl Distance {
-    /// Both pictures have the same size; `display` decides how they are developed for the perceptual error.
+    /// Compares two images of the same size; `display` determines how they are developed for the perceptual error.
     pub fn between(picture: &LinearPicture, reference: &LinearPicture, display: &Display) -> Self {
         assert_eq!(
             (picture.width, picture.height),

@@ -1,11 +1,11 @@
-//! Is a reference that was given a picture of this scene at all?
+//! Detects references that do not show the scene.
 //!
-//! Where it is, the difference of the two pictures is noise of either, zero on average. In a square of many pixels noise
-//! adds up slowly: for differences that are independent from pixel to pixel and as often too large as too small,
-//! whatever their size, P(|Σd| > k √Σd²) ≤ 2 exp(−k²/2) (Efron 1969, from Hoeffding's inequality for random signs). What belongs to another scene,
-//! camera, exposure or light adds up in full, and more samples do not take it away. A square whose sum is beyond that
-//! and beyond a tenth of its own light counts as foreign; pictures of one scene that are told apart by this are as good
-//! as impossible, and noisy references, which raise √Σd² as well, are safe.
+//! If they show the same scene, the difference of two images is noise of either, with mean zero. Over a square of many
+//! pixels noise adds up slowly: for differences that are independent between pixels and symmetric, of any size, P(|Σd|
+//! > k √Σd²) ≤ 2 exp(−k²/2) (Efron 1969, from Hoeffding's inequality for random signs). Differences due to another
+//! scene, camera, exposure or light add up in full, and more samples do not remove them. A square counts as foreign if
+//! its sum exceeds that bound and a tenth of its own light. Images of the same scene almost never fail this test, and
+//! noisy references, which raise √Σd² as well, are safe.
 
 use super::{LinearPicture, RELATIVE_FLOOR};
 use glam::DVec3;
@@ -13,22 +13,22 @@ use glam::DVec3;
 /// Pixels along a square.
 const SIDE: usize = 16;
 
-/// Times √Σd²: 2 exp(−32) is one square in 4·10¹³, and where the noise of ten neighbours is one (wide filters), one in a
-/// hundred.
-const K: f64 = 8.0;
+/// Factor of √Σd²: 2 exp(−32) is one square in 4·10¹³; if the noise of ten neighbours is correlated (wide filters), one
+/// in a hundred.
+const SIGMAS: f64 = 8.0;
 
-/// Share of its light by which a foreign square is off at least: less is nothing that anyone would see.
-const OFF: f64 = 0.1;
+/// Least relative difference of a foreign square: smaller differences are invisible.
+const MIN_DIFFERENCE: f64 = 0.1;
 
-/// Smaller pieces of squares, at the border, tell nothing: √Σd² alone is as large as what would be foreign.
-const FEWEST: f64 = 2.0 * K * K;
+/// Fewest pixels of a square: for smaller pieces, at the border, √Σd² alone is as large as a foreign difference.
+const MIN_PIXELS: f64 = 2.0 * SIGMAS * SIGMAS;
 
-/// Share of foreign squares from which a reference is said to be of something else.
-const MANY: f64 = 0.05;
+/// Share of foreign squares from which a reference is reported as showing something else.
+const MIN_FOREIGN_SHARE: f64 = 0.05;
 
-/// The share of the squares of 16 pixels a side where `picture` differs from `reference` by more than noise can, 0..1.
+/// The share of squares of 16 × 16 pixels in which `picture` differs from `reference` by more than noise can, 0..1.
 ///
-/// Both have the same size; 0 where that is less than half a square.
+/// Both have the same size; 0 for images smaller than half a square.
 pub fn foreign_share(picture: &LinearPicture, reference: &LinearPicture) -> f64 {
     let (width, height) = (picture.width as usize, picture.height as usize);
     let (mut squares, mut foreign) = (0_u32, 0_u32);
@@ -45,11 +45,12 @@ pub fn foreign_share(picture: &LinearPicture, reference: &LinearPicture) -> f64 
                     n += 1.0;
                 }
             }
-            if n < FEWEST {
+            if n < MIN_PIXELS {
                 continue;
             }
             let level = ((light / n) * (light / n) + RELATIVE_FLOOR).map(f64::sqrt);
-            let is_foreign = sum.abs().cmpgt(K * squared.map(f64::sqrt)) & (sum.abs() / n).cmpgt(OFF * level);
+            let is_foreign =
+                sum.abs().cmpgt(SIGMAS * squared.map(f64::sqrt)) & (sum.abs() / n).cmpgt(MIN_DIFFERENCE * level);
             squares += 1;
             foreign += u32::from(is_foreign.any());
         }
@@ -57,9 +58,9 @@ pub fn foreign_share(picture: &LinearPicture, reference: &LinearPicture) -> f64 
     f64::from(foreign) / f64::from(squares.max(1))
 }
 
-/// Whether so many foreign squares mean that the reference shows something else.
+/// Whether the share of foreign squares means that the reference shows something else.
 pub fn is_another_scene(foreign_share: f64) -> bool {
-    foreign_share >= MANY
+    foreign_share >= MIN_FOREIGN_SHARE
 }
 
 #[cfg(test)]
@@ -67,7 +68,7 @@ mod tests {
     use super::*;
     use glam::Vec3;
 
-    /// A number in 0..1 that looks random.
+    /// Pseudo-random number in 0..1.
     fn random(i: u32, seed: u32) -> f32 {
         let mut x = i.wrapping_mul(0x9e37_79b9) ^ seed.wrapping_mul(0x85eb_ca6b);
         x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
@@ -91,7 +92,7 @@ mod tests {
     #[test]
     fn noise_of_any_size_is_no_other_scene() {
         for seed in 0..20 {
-            // Even noise, much of it, and noise of which one pixel in fifty has nearly all.
+            // Uniform noise, small and large, and noise concentrated in one pixel of fifty.
             for (size, rarity) in [(0.01, 1.0), (1.0, 1.0), (0.4, 0.02)] {
                 let noisy = |seed: u32| {
                     picture(|x, y, i| {

@@ -1,8 +1,8 @@
-//! Speed against error: how fast a picture gets right, what each technique is worth, and whether the renderer's own
-//! estimate of its error can be believed.
+//! Convergence reports: error over time, the value of each technique, and the accuracy of the renderer's own error
+//! estimate.
 //!
-//! [`measure_curve`] renders one scene at 1, 2, 4 … samples per pixel; a [`ReferenceStore`] has the picture to measure
-//! against; [`ConvergenceCurve::measure`] brings the two together; [`page()`] and [`csv`] say what came of it.
+//! [`measure_curve`] renders one scene at 1, 2, 4 … samples per pixel; a [`ReferenceStore`] supplies the reference
+//! image; [`ConvergenceCurve::measure`] compares them; [`page()`] and [`csv`] format the results.
 
 mod convergence;
 mod curve;

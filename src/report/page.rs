@@ -1,4 +1,4 @@
-//! The report as one HTML page that needs nothing else: plots, tables and pictures are inside it.
+//! The report as one self-contained HTML page with plots, tables and images.
 
 use super::curve::Seconds;
 use super::outcome::{Ablation, SceneOutcome};
@@ -10,14 +10,14 @@ use base64::Engine;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::fmt::Write;
 
-/// The errors whose times are told.
+/// The errors for which times are reported.
 const TARGETS: [f64; 3] = [0.10, 0.03, 0.01];
 
-/// How far an estimate may be off before the page says so.
+/// Factor by which an estimate may be off before the page highlights it.
 const CALIBRATION: f64 = 1.25;
 
-/// The page; `command` is what was asked for, so that it can be asked for again. `interrupted` says what is missing where
-/// the report was stopped before its end.
+/// Builds the page. `command` is the command line, so that the report can be repeated. `interrupted` describes what is
+/// missing if the report was stopped early.
 pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>) -> String {
     let threads = outcomes.first().map_or(0, |outcome| outcome.curve.last().spent.threads);
     let mut html = format!(
@@ -46,7 +46,7 @@ pub fn page(outcomes: &[SceneOutcome], command: &str, interrupted: Option<&str>)
     html
 }
 
-/// The most important figures of each scene, as plain text.
+/// The key figures of each scene as plain text.
 pub fn summary_text(outcomes: &[SceneOutcome]) -> String {
     let width =
         outcomes.iter().map(|outcome| printable::name(&outcome.title).chars().count()).max().unwrap_or(0).max(5);
@@ -225,7 +225,7 @@ fn steps_table(curve: &ConvergenceCurve) -> String {
         let estimate = step.estimate.map_or("<td>–</td><td>–</td>".to_owned(), |e| {
             let interval = format!("{} ({} – {})", percent(e.relative), percent(e.low), percent(e.high));
             let Some(ratio) = step.calibration() else { return format!("<td>{interval}</td><td>–</td>") };
-            // Below 16 samples nothing is promised.
+            // Below 16 samples no accuracy is promised.
             let class = match (step.spp >= 16, (1.0 / CALIBRATION..=CALIBRATION).contains(&ratio)) {
                 (false, _) => "soft",
                 (true, true) => "good",
@@ -298,7 +298,7 @@ fn anchor(title: &str) -> String {
     title.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }
 
-/// A developed picture as a PNG inside a URL.
+/// A developed image as a PNG in a data URL.
 fn png_url(picture: &LinearPicture, display: &Display) -> String {
     let rgb: Vec<u8> = picture.pixels.iter().flat_map(|&light| develop_pixel(light, display)).collect();
     let mut png = Vec::new();

@@ -1,11 +1,11 @@
-//! Linear pictures in memory and as OpenEXR files.
+//! Linear images in memory and as OpenEXR files.
 
 use crate::render::Film;
 use crate::scene::{Limits, decode_picture, picture_reader};
 use glam::Vec3;
 use std::path::Path;
 
-/// Mean radiance a pixel, row by row from the top; linear Rec. 709.
+/// Mean radiance per pixel, row by row from the top; linear Rec. 709.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearPicture {
     pub width: u32,
@@ -18,10 +18,10 @@ impl LinearPicture {
         Self { width: film.width(), height: film.height(), pixels: film.means() }
     }
 
-    /// Reads an OpenEXR picture with red, green and blue.
+    /// Reads an OpenEXR image with red, green and blue.
     ///
     /// # Errors
-    /// When the file cannot be read, is no such picture, or holds a number that is not finite.
+    /// If the file cannot be read, is not such an image, or holds a number that is not finite.
     pub fn read_exr(path: &Path) -> Result<Self, String> {
         let fail = |reason: String| format!("{}: {reason}", path.display());
         let limits = Limits::of_this_process();

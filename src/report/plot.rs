@@ -1,12 +1,12 @@
-//! Curves on logarithmic axes, as SVG text that takes its colours from the page around it.
+//! Plots of curves on logarithmic axes, as SVG that takes its colours from the surrounding page.
 
 use std::fmt::Write;
 
-/// One curve. Colours are those of the page: `var(--c0)` and so on.
+/// One curve. Its colours are those of the page: `var(--c0)` and so on.
 #[derive(Clone, Debug)]
 pub struct Series {
     pub label: String,
-    /// Which of the page's colours; counts from 0.
+    /// Index into the page's colours, from 0.
     pub color: usize,
     pub style: Style,
     pub points: Vec<(f64, f64)>,
@@ -14,11 +14,11 @@ pub struct Series {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// What was measured: a line with a dot at each step.
+    /// Measured values: a line with a dot at each step.
     Measured,
-    /// What is said or expected: dashes.
+    /// Estimated or expected values: dashes.
     Dashed,
-    /// Thin, without dots: to compare with.
+    /// Values for comparison: a thin line without dots.
     Thin,
 }
 
@@ -30,7 +30,7 @@ pub struct Band {
     pub points: Vec<(f64, f64, f64)>,
 }
 
-/// Both axes are logarithmic; what is not positive is left out.
+/// A plot with two logarithmic axes; points that are not positive are omitted.
 #[derive(Clone, Debug)]
 pub struct Plot {
     pub title: String,
@@ -38,7 +38,7 @@ pub struct Plot {
     pub y_label: String,
     pub series: Vec<Series>,
     pub band: Option<Band>,
-    /// Horizontal lines: height and name.
+    /// Horizontal lines: height and label.
     pub levels: Vec<(f64, String)>,
 }
 
@@ -82,7 +82,7 @@ impl Plot {
         svg
     }
 
-    /// Names and colours of the curves, for beside the plot.
+    /// Labels and colours of the curves, to be placed beside the plot.
     pub fn legend(&self) -> String {
         let entry = |series: &Series| {
             let class = match series.style {
@@ -164,7 +164,7 @@ impl Series {
     }
 }
 
-/// A logarithmic axis between two places of the picture.
+/// A logarithmic axis between two positions of the plot.
 struct Axis {
     low: f64,
     high: f64,
@@ -177,7 +177,7 @@ impl Axis {
         let (low, high) = values
             .filter(|value| *value > 0.0 && value.is_finite())
             .fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
-        // An axis needs some length, and curves do not touch its ends.
+        // An axis needs a length, and curves must not touch its ends.
         let (low, high) = if low <= high { (low, high.max(low * 1.5)) } else { (1.0, 10.0) };
         let margin = (high / low).powf(0.04);
         Self { low: (low / margin).log10(), high: (high * margin).log10(), start, end }
@@ -187,7 +187,7 @@ impl Axis {
         self.start + (value.log10() - self.low) / (self.high - self.low) * (self.end - self.start)
     }
 
-    /// Lines of the grid, and whether each is named: at least three are.
+    /// Grid lines, and whether each is labelled: at least three are.
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = self.high - self.low;
         let all = (self.low.floor() as i32..=self.high.ceil() as i32)
@@ -201,7 +201,7 @@ impl Axis {
         }
     }
 
-    /// Where the axis is so short that it is nearly even: from three lines on, at 1, 2 or 5 times a power of ten.
+    /// Ticks of a very short axis, which is nearly linear: at least three lines, at 1, 2 or 5 times a power of ten.
     fn even_ticks(&self) -> Vec<f64> {
         let (low, high) = (10f64.powf(self.low), 10f64.powf(self.high));
         let power = 10f64.powf((high - low).log10().ceil());
@@ -224,7 +224,7 @@ fn path(points: impl Iterator<Item = (f64, f64)>, x: &Axis, y: &Axis) -> String 
     points.enumerate().map(step).collect()
 }
 
-/// A number with about three digits, as short as it can be written.
+/// Formats a number with about three digits, as short as possible.
 pub fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -239,7 +239,7 @@ pub fn number(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Text as HTML and SVG want it.
+/// Escapes text for HTML and SVG.
 pub fn escape(text: &str) -> String {
     text.chars().fold(String::new(), |mut out, c| {
         match c {
@@ -306,7 +306,7 @@ mod tests {
                 ticks.iter().all(|tick| (LEFT..=WIDTH - RIGHT).contains(&axis.at(tick.0))),
                 "{low}..{high}: {ticks:?}"
             );
-            // Names that are told apart.
+            // Labels must be distinct.
             let texts: std::collections::HashSet<String> = named.iter().map(|value| number(*value)).collect();
             assert_eq!(texts.len(), named.len(), "{low}..{high}: {texts:?}");
         }

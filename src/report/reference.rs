@@ -1,7 +1,7 @@
-//! The picture that others are measured against: a given file, or a long render of our own with another seed.
+//! References for error measurements: a given file, or an own long render with another seed.
 //!
-//! Own renders are kept in a folder, by scene, size and settings, so that the next report starts at once. A file is
-//! used again if it has at least the samples that are asked for.
+//! Own renders are stored in a folder, by scene, size and settings, so that the next report starts at once. A stored
+//! file is reused if it has at least the required samples.
 
 use super::LinearPicture;
 use crate::frame::write_film;
@@ -12,13 +12,13 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A picture taken for the truth.
+/// An image that serves as ground truth.
 #[derive(Clone, Debug)]
 pub struct Reference {
     pub picture: LinearPicture,
-    /// Of an own render.
+    /// How an own render was made; `None` for a given file.
     pub made: Option<Made>,
-    /// Where it lies, if it lies anywhere.
+    /// Path of the file, if there is one.
     pub path: Option<PathBuf>,
 }
 
@@ -26,17 +26,17 @@ pub struct Reference {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Made {
     pub spp: u32,
-    /// Root of its own relMSE, as it estimated it.
+    /// Root of its own relMSE, as estimated by the renderer.
     pub relative_error: Option<f64>,
 }
 
-/// Own renders on disk.
+/// Store of own renders on disk.
 #[derive(Clone, Debug)]
 pub struct ReferenceStore {
     folder: Option<PathBuf>,
 }
 
-/// What a kept render is a picture of.
+/// Identity of a stored render.
 #[derive(Clone, Debug)]
 pub struct Key {
     name: String,
@@ -44,13 +44,15 @@ pub struct Key {
 }
 
 impl Key {
-    /// - `title`: of the scene, so that a person finds the file.
-    /// - `settings`: without their seed and techniques, which do not change what is true.
+    /// Computes the key.
+    ///
+    /// - `title`: of the scene, for readable file names.
+    /// - `settings`: seed and techniques are ignored, because they do not change the expected image.
     pub fn new(title: &str, scene: Fingerprint, settings: &RenderSettings, size: (u32, u32)) -> Self {
         let stem = Path::new(title).file_stem().map_or(title.into(), |stem| stem.to_string_lossy());
         let plain: String =
             stem.chars().take(40).map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
-        // Another version may have mended what was wrong.
+        // Includes the version, because another one may have fixed errors.
         let settings = RenderSettings { seed: 0, techniques: Default::default(), ..*settings };
         let rest = format!("{settings:?} {}", env!("CARGO_PKG_VERSION"));
         let hash = Fingerprint::default().with(scene.0.to_le_bytes()).with(rest.bytes());
@@ -59,7 +61,7 @@ impl Key {
 }
 
 impl ReferenceStore {
-    /// In the cache folder of the platform; keeps nothing where there is none.
+    /// Store in the cache folder of the platform; stores nothing if there is none.
     pub fn of_platform() -> Self {
         let folders = directories::ProjectDirs::from("", "", "firstlight");
         Self { folder: folders.map(|folders| folders.cache_dir().join("references")) }
@@ -69,7 +71,7 @@ impl ReferenceStore {
         Self { folder: Some(folder.to_path_buf()) }
     }
 
-    /// A render with at least `min_spp` samples a pixel, if one was kept and can be read.
+    /// Returns a render with at least `min_spp` samples per pixel, if a readable one is stored.
     pub fn find(&self, key: &Key, min_spp: u32) -> Option<Reference> {
         let path = self.folder.as_ref()?.join(format!("{}.exr", key.name));
         let note = InputFile::open(&path.with_extension("json"), FileKind::Settings).ok()?.bytes().ok()?;
@@ -79,10 +81,10 @@ impl ReferenceStore {
         fits.then_some(Reference { picture, made: Some(made), path: Some(path) })
     }
 
-    /// Renders with `spp` samples a pixel and keeps the picture; `progress` is told the share that is done.
+    /// Renders with `spp` samples per pixel and stores the image; `progress` receives the completed fraction.
     ///
-    /// The second part of the answer says why the picture could not be kept, if so. When `stop` says so, the samples so
-    /// far are the answer, and not kept; `None` before the first.
+    /// The second part of the result is the reason why the image could not be stored, if so. If `stop` returns true,
+    /// the samples so far are returned, and not stored; `None` before the first sample.
     pub fn make(
         &self,
         key: &Key,
@@ -92,7 +94,7 @@ impl ReferenceStore {
         progress: &mut dyn FnMut(f64),
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Reference, Option<String>)> {
-        // Any seed but the one that is measured: a picture agrees too well with itself.
+        // Any seed other than the measured one: an image agrees too well with itself.
         let settings = RenderSettings { seed: !settings.seed, techniques: Default::default(), ..*settings };
         let mut film = Film::new(key.size.0, key.size.1);
         let mut slice = 4;
@@ -121,7 +123,7 @@ impl ReferenceStore {
         std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         let path = folder.join(format!("{}.exr", key.name));
         let note = path.with_extension("json");
-        // The note comes last and goes first: a picture without one counts as none.
+        // The note is written last and removed first: an image without one is ignored.
         if note.exists() {
             std::fs::remove_file(&note).map_err(|error| format!("{}: {error}", note.display()))?;
         }
@@ -133,15 +135,15 @@ impl ReferenceStore {
 }
 
 impl Reference {
-    /// A picture that somebody else made.
+    /// Reads a reference made by another program.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// If it cannot be read.
     pub fn read(path: &Path) -> Result<Self, String> {
         Ok(Self { picture: LinearPicture::read_exr(path)?, made: None, path: Some(path.to_path_buf()) })
     }
 
-    /// relMSE of the reference itself, if it is known.
+    /// relMSE of the reference itself, if known.
     pub fn relative_mse(&self) -> Option<f64> {
         self.made.and_then(|made| made.relative_error).map(|error| error * error)
     }

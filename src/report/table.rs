@@ -1,4 +1,4 @@
-//! All steps of all scenes as one CSV file (RFC 4180), for those who draw their own conclusions.
+//! All steps of all scenes as one CSV file (RFC 4180), for further analysis.
 
 use super::{ConvergenceCurve, SceneOutcome};
 use std::fmt::Write;
@@ -6,20 +6,20 @@ use std::fmt::Write;
 const HEADER: &str = "scene,width,height,without,spp,wall_s,cpu_s,threads,camera_paths,rays,relmse,rmse,flip,\
     estimated_error,estimated_low,estimated_high,reference_differs\n";
 
-/// One row a step; `without` names the technique that is switched off, `reference_differs` is the share of the picture
-/// that differs from a given reference by more than noise can. Empty fields are not known.
+/// One row per step; `without` is the technique that is switched off, `reference_differs` the share of the image that
+/// differs from a given reference by more than noise can. Fields are empty if unknown.
 pub fn csv(outcomes: &[SceneOutcome]) -> String {
     let mut text = HEADER.to_owned();
     for outcome in outcomes {
-        write_ladder(&mut text, outcome, "", &outcome.curve);
+        write_curve(&mut text, outcome, "", &outcome.curve);
         for ablation in &outcome.ablations {
-            write_ladder(&mut text, outcome, ablation.technique, &ablation.curve);
+            write_curve(&mut text, outcome, ablation.technique, &ablation.curve);
         }
     }
     text
 }
 
-fn write_ladder(text: &mut String, outcome: &SceneOutcome, without: &str, curve: &ConvergenceCurve) {
+fn write_curve(text: &mut String, outcome: &SceneOutcome, without: &str, curve: &ConvergenceCurve) {
     let optional = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value}"));
     for step in &curve.steps {
         let (spent, distance, estimate) = (step.spent, step.distance, step.estimate);

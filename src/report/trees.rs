@@ -1,11 +1,11 @@
-//! One mesh under many trees: what each costs to build, and what its rays cost then.
+//! Tree report: build time and ray cost of different kd-trees over one mesh.
 //!
 //! The views are those of the 2013 program's tree test: the model over a reflecting checkered floor under two point
-//! lights in the classic light model, at 500 × 500 pixels and one sample each, then four times nearer by a factor of
-//! 1.2. Every row shows the very same pictures, for the tree decides how long an answer takes and never which.
+//! lights in the classic light model, at 500 × 500 pixels with one sample each, then four times nearer by a factor of
+//! 1.2. Every row has the same images, because the tree affects the time of a query and never its result.
 //!
-//! Where thousands of triangles meet in one point every ray tests all of them, in any tree: there fewer pixels stand for the
-//! picture ([`LONGEST_VIEW`]), and fewer rays for the means ([`MOST_BLOCKS`]).
+//! If thousands of triangles meet in one point, every ray tests all of them, in any tree. Such views are rendered with
+//! fewer pixels ([`LONGEST_VIEW`]) and their means taken over fewer rays ([`MOST_BLOCKS`]).
 //!
 //! Start reading at [`TreeTable::measure`].
 
@@ -22,25 +22,26 @@ use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// How many views, and pixels along a side of each.
+/// Number of views, and pixels along a side of each.
 pub const VIEWS: usize = 5;
 pub const SIDE: u32 = 500;
 
-/// How a tree is split, and which leaves are not split any further.
+/// Build preset and leaf limit of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TreePlan {
     pub preset: BuildPreset,
-    /// Triangles; `None` leaves it to the preset.
+    /// Triangles; `None` for the preset's own limit.
     pub leaf_limit: Option<usize>,
 }
 
-/// Seconds: a view that would take longer is shown in fewer pixels, and its time and its rays are multiplied.
+/// Longest time of a view, seconds: a view that would take longer is rendered with fewer pixels, and its time and rays
+/// are extrapolated.
 pub const LONGEST_VIEW: f64 = 0.5;
 
-/// Blocks of triangles that the rays of one kind look at in one tree; the means are of the rays that come before that.
+/// Limit on the blocks that the rays of one kind test in one tree; means are taken over the rays before that.
 pub const MOST_BLOCKS: usize = 1 << 20;
 
-/// All rows of the table.
+/// Plans of all rows of the table.
 pub fn tree_plans() -> Vec<TreePlan> {
     let with = |preset, limits: &'static [Option<usize>]| {
         limits.iter().map(move |&leaf_limit| TreePlan { preset, leaf_limit })
@@ -51,48 +52,48 @@ pub fn tree_plans() -> Vec<TreePlan> {
         .collect()
 }
 
-/// What rays of one kind looked at, on average.
+/// Mean visits per ray, for rays of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeanVisits {
     pub inner: f64,
-    /// Leaves with something in them.
+    /// Leaves with at least one triangle.
     pub leaves: f64,
     /// Blocks of 16 triangles.
     pub blocks: f64,
 }
 
-/// Visits a ray, of rays that meet the box of the mesh.
+/// Mean visits per ray, for rays that enter the bounds of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CountedVisits {
-    /// Lines in all directions, which nothing stops: what the expected figures speak of.
+    /// Unobstructed lines in all directions, to which the expected figures refer.
     pub lines: MeanVisits,
-    /// From the camera of view 1 to the first hit.
+    /// Rays from the camera of view 1 to the first hit.
     pub camera: MeanVisits,
-    /// From these hits into the hemisphere above, by the cosine, to the next.
+    /// Cosine-distributed rays from these hits into the hemisphere above, to the next hit.
     pub bounce: MeanVisits,
 }
 
-/// One tree.
+/// Results for one tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeRow {
     pub plan: TreePlan,
-    /// Wall time on the current rayon pool, the least of two.
+    /// Wall time on the current rayon pool, the minimum of two.
     pub build_seconds: f64,
-    /// The same of the pictures.
+    /// Wall time of each view, the minimum of two.
     pub view_seconds: [f64; VIEWS],
     pub stats: KdTreeStats,
     pub visits: CountedVisits,
 }
 
 impl TreeRow {
-    /// What the area of the cells says of a line that nothing stops.
+    /// Expected visits of an unobstructed line, computed from the areas of the cells.
     pub fn expected(&self) -> MeanVisits {
         let KdTreeStats { expected_inner_visits, expected_leaf_visits, expected_block_tests, .. } = self.stats;
         MeanVisits { inner: expected_inner_visits, leaves: expected_leaf_visits, blocks: expected_block_tests }
     }
 }
 
-/// All trees over one mesh.
+/// Results for all trees over one mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeTable {
     pub triangles: usize,
@@ -100,16 +101,16 @@ pub struct TreeTable {
     pub rows: Vec<TreeRow>,
     /// Rays of view 1.
     pub rays: RayCounts,
-    /// Seconds in which one thread tries every triangle for one ray.
+    /// Seconds in which one thread tests every triangle for one ray.
     pub no_tree_seconds_per_ray: f64,
 }
 
 impl TreeTable {
-    /// Builds and tries every plan of `plans`, one after the other, on the current rayon pool.
+    /// Builds and measures every plan of `plans`, one after the other, on the current rayon pool.
     ///
-    /// - `mesh`: of at least one triangle with an area.
-    /// - `world_from_mesh`: how it stands; Y is up in the views.
-    /// - `before`: is told the plan that comes next.
+    /// - `mesh`: with at least one triangle with an area.
+    /// - `world_from_mesh`: placement of the mesh; Y is up in the views.
+    /// - `before`: called with each plan before it is measured.
     pub fn measure(
         mesh: &Arc<Mesh>,
         world_from_mesh: Affine3A,
@@ -143,7 +144,7 @@ impl TreeTable {
                     (table.rays, sharpest) = (rays, side);
                 }
             }
-            // The same for all trees.
+            // The rays are the same for all trees.
             let rays = sample_rays.get_or_insert_with(|| SampleRays::of(&tree, &stage, world_from_mesh));
             if table.rows.is_empty() {
                 table.no_tree_seconds_per_ray = no_tree_seconds(rays);
@@ -154,13 +155,13 @@ impl TreeTable {
         table
     }
 
-    /// What view 1 would take if every ray tried every triangle, on as many threads as the rest.
+    /// Time of view 1 if every ray tested every triangle, on as many threads as the rest.
     pub fn no_tree_seconds(&self) -> f64 {
         self.no_tree_seconds_per_ray * self.rays.total() as f64 / self.threads as f64
     }
 }
 
-/// The result and the least wall time of two runs, which is nearest to that of an idle machine.
+/// Returns the result and the minimum wall time of two runs, which is closest to that of an idle machine.
 fn least_seconds<T>(mut work: impl FnMut() -> T) -> (T, f64) {
     let mut timed = || {
         let start = Instant::now();
@@ -172,9 +173,9 @@ fn least_seconds<T>(mut work: impl FnMut() -> T) -> (T, f64) {
     (result, first.min(second))
 }
 
-/// Pixels along a side of what was traced, and the rays and the least seconds of a whole picture.
+/// Returns the pixels along a side of the traced image, and the rays and the least seconds of a full image.
 fn timed_view(prepared: &Prepared) -> (u32, RayCounts, f64) {
-    /// Whole pictures, a sixteenth of their pixels, and a first guess at what those take.
+    /// Sides of the full image, of one with a sixteenth of its pixels, and of one for a first estimate of the time.
     const SIDES: [u32; 3] = [SIDE, SIDE / 4, SIDE / 16];
     let whole = |side: u32| f64::from(SIDE * SIDE) / f64::from(side * side);
     let (mut side, mut seconds, mut rays) = (SIDES[2], 0.0, RayCounts::default());
@@ -194,7 +195,7 @@ fn timed_view(prepared: &Prepared) -> (u32, RayCounts, f64) {
     (side, rays, seconds)
 }
 
-/// One sample a pixel in the classic light model.
+/// Renders one sample per pixel in the classic light model.
 fn picture(prepared: &Prepared, side: u32) -> (Film, RayCounts) {
     let settings = RenderSettings { integrator: Integrator::Phong, ..RenderSettings::default() };
     let mut film = Film::new(side, side);
@@ -202,7 +203,7 @@ fn picture(prepared: &Prepared, side: u32) -> (Film, RayCounts) {
     (film, report.rays)
 }
 
-/// The model, the floor, the lights.
+/// The model, the floor and the lights.
 struct ModelScene {
     prepared: Prepared,
     center: Vec3,
@@ -233,7 +234,7 @@ impl ModelScene {
         let objects =
             vec![Object { materials: vec![MODEL; n_slots], ..model }, Object::plain(FLOOR), emitter.clone(), emitter];
         let geometry = Geometry::build(shapes, objects);
-        // Five squares along the model. At two sizes away the lights bring an irradiance of about 3.
+        // Five squares along the model. At two model sizes the lights give an irradiance of about 3.
         let squares = Texture {
             uv_matrix: Mat2::from_diagonal(Vec2::splat(5.0 / size)),
             ..Texture::new(TexturePattern::Checker { a: Vec3::splat(0.8), b: Vec3::splat(0.02) })
@@ -271,7 +272,8 @@ fn phong(diffuse: ColorInput, specular: f32) -> Material {
     }
 }
 
-/// Two sizes away, with the model over a third of the picture; each view 1.2 times nearer than the one before.
+/// Camera at two model sizes, with the model over a third of the image; each view is 1.2 times nearer than the one
+/// before.
 fn camera(center: Vec3, size: f32, view: usize) -> Camera {
     let distance = 2.0 * size / 1.2_f32.powi(view as i32);
     let forward = -Vec3::new(0.35, 0.55, 1.0).normalize();
@@ -289,7 +291,7 @@ fn camera(center: Vec3, size: f32, view: usize) -> Camera {
     }
 }
 
-/// Rays in the space of the mesh, of three kinds.
+/// Three kinds of rays in the space of the mesh.
 struct SampleRays {
     scene: SceneTree,
     lines: Vec<Ray>,
@@ -297,7 +299,7 @@ struct SampleRays {
     bounce: Vec<Ray>,
 }
 
-/// How many of each kind are tried; those that miss the box do not count.
+/// Number of samples of each kind; those that miss the bounds are not counted.
 const SAMPLES: u32 = 1 << 14;
 
 impl SampleRays {
@@ -332,7 +334,7 @@ impl SampleRays {
     }
 }
 
-/// A line of the uniform density through a sphere: all directions alike, all places across them alike.
+/// A line of the uniform density through a sphere: isotropic directions, uniform positions across them.
 fn line(middle: Vec3, radius: f32, sampler: &Sampler) -> Ray {
     let (u, v) = (sampler.pair(0), sampler.pair(1));
     let z = 1.0 - 2.0 * u.x;
@@ -354,7 +356,7 @@ fn bounce(scene: &SceneTree, ray: &Ray, number: u32) -> Option<Ray> {
     Some(Ray::new(offset_ray_origin(point.position, point.error, point.geometric_normal, dir), dir))
 }
 
-/// Over the first of `rays` that look at [`MOST_BLOCKS`] blocks, at least one.
+/// Mean over the first of `rays` that test [`MOST_BLOCKS`] blocks, at least one ray.
 fn mean_visits(rays: &[Ray], count: impl Fn(&Ray) -> Visits) -> MeanVisits {
     let mut left = MOST_BLOCKS;
     let mut counted: Vec<Visits> = Vec::new();
@@ -371,13 +373,14 @@ fn mean_visits(rays: &[Ray], count: impl Fn(&Ray) -> Visits) -> MeanVisits {
     MeanVisits { inner: mean(|v| v.inner), leaves: mean(|v| v.leaves), blocks: mean(|v| v.blocks) }
 }
 
-/// Whether there is something left.
+/// Takes blocks from the budget; returns whether some is left.
 fn spend(left: &mut usize, blocks: usize) -> bool {
     *left = left.saturating_sub(blocks);
     *left > 0
 }
 
-/// Tries every triangle for as many camera rays as fit into a fifth of a second, at least four.
+/// Tests every triangle for as many camera rays as fit into a fifth of a second, at least four; returns seconds per
+/// ray.
 fn no_tree_seconds(rays: &SampleRays) -> f64 {
     let start = Instant::now();
     let mut tried = 0;
@@ -432,7 +435,7 @@ mod tests {
         }
     }
 
-    /// Every ray through the middle tests thousands of blocks, so no machine shows such a view in full in time.
+    /// Every ray through the centre tests thousands of blocks, so no machine renders such a view in full in time.
     #[test]
     fn a_view_that_takes_too_long_is_shown_in_fewer_pixels() {
         let n = 400_000_u32;
@@ -445,7 +448,7 @@ mod tests {
         let stage = ModelScene::new(&Arc::new(tree), &Arc::new(mesh), Affine3A::IDENTITY);
         let (side, rays, seconds) = timed_view(&stage.seen_from(0));
         assert!(side < SIDE && seconds > LONGEST_VIEW, "{side}: {seconds} s");
-        // As many rays as a whole picture has, about.
+        // About as many rays as in a full image.
         let of_eye = f64::from(SIDE * SIDE);
         assert!((rays.camera as f64 / of_eye - 1.0).abs() < 0.01, "{rays:?}");
     }
@@ -463,7 +466,7 @@ mod tests {
             {
                 assert!((counted / expected - 1.0).abs() < 0.03, "{counted} for {expected}");
             }
-            // A ray that is stopped sees less.
+            // A ray that hits something visits less.
             assert!(row.visits.camera.leaves < counted.leaves && row.visits.camera.leaves >= 1.0);
             assert!(row.stats.references >= mesh.triangles.len() && row.stats.bytes > 0);
         }

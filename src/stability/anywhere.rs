@@ -1,8 +1,9 @@
-//! The same scene elsewhere: moved, scaled, in map coordinates. It goes the whole way, from the text of the scene file.
+//! Translation and scale invariance: one scene at the origin and elsewhere, scaled and in map coordinates, loaded from
+//! the text of the scene file.
 
 use super::random::Random;
 use super::tally::{Energy, Tally};
-use super::test_scene::{tell, towards};
+use super::test_scene::{describe, towards};
 use crate::kdtree::Hit;
 use crate::mesh::procedural;
 use crate::render::{Film, Prepared, RenderSettings, advance};
@@ -11,8 +12,8 @@ use bevy_ecs::world::World;
 use glam::{DVec3, dvec3};
 use std::fmt::Write;
 
-/// A room with diffuse, rough, clear and shining things, some of them meshes; all lengths times `scale`, all places
-/// moved by `shift`.
+/// Text of a room with diffuse, rough, transparent and glossy objects, some of them meshes; all lengths are multiplied
+/// by `scale`, all positions moved by `shift`.
 fn scene_text(scale: f64, shift: DVec3) -> String {
     let at = |x: f64, y: f64, z: f64| {
         let p = shift + scale * dvec3(x, y, z);
@@ -58,7 +59,7 @@ fn scene_text(scale: f64, shift: DVec3) -> String {
     )
 }
 
-/// Writes the files, loads the first one, and makes a snapshot of it.
+/// Writes the files, loads the first one, and prepares it for rendering.
 fn prepared(files: &[(&str, String)]) -> Result<Prepared, String> {
     let folder = tempfile::tempdir().map_err(|error| format!("a folder for scenes cannot be made: {error}"))?;
     for (name, text) in files {
@@ -75,20 +76,20 @@ fn prepared(files: &[(&str, String)]) -> Result<Prepared, String> {
     }
 }
 
-/// A case that could not even begin is a finding.
+/// The tally of a case that cannot start, which counts as a finding.
 fn failed(message: String) -> Tally {
     let mut tally = Tally { energy: Some(Energy { error: f64::NAN, allowed: 1.0 }), ..Tally::default() };
     tally.offer(f64::INFINITY, 0, 0, || message);
     tally
 }
 
-/// Pictures with seeds of their own, by which the noise is known.
+/// Number of renders with different seeds, from which the noise is estimated.
 const SEEDS: u32 = 8;
 const SIDE: u32 = 32;
 /// Pixels along a side of the blocks that are compared.
 const BLOCK: u32 = 4;
 
-/// Means of all blocks under each seed.
+/// Returns the means of all blocks for each seed.
 fn blocks(scene: &Prepared, first_seed: u32, spp: u32) -> (Vec<Vec<f64>>, u64) {
     let mut n_bad = 0;
     let of_seed = |seed: u32| {
@@ -105,7 +106,7 @@ fn blocks(scene: &Prepared, first_seed: u32, spp: u32) -> (Vec<Vec<f64>>, u64) {
     ((0..SEEDS).map(of_seed).collect(), n_bad)
 }
 
-/// Largest |t| of Welch's test over all blocks, and over the mean of the picture.
+/// Returns the largest |t| of Welch's test over all blocks, and that of the mean of the image.
 fn largest_t(a: &[Vec<f64>], b: &[Vec<f64>]) -> (f64, f64) {
     let n = a.len() as f64;
     let t_of = |value: &dyn Fn(&[f64]) -> f64| {
@@ -116,15 +117,15 @@ fn largest_t(a: &[Vec<f64>], b: &[Vec<f64>]) -> (f64, f64) {
         };
         let ((mean_a, var_a), (mean_b, var_b)) = (moments(a), moments(b));
         let difference = (mean_a - mean_b).abs();
-        // Without any noise the rounding of f32 is left.
+        // Without noise only the rounding of f32 remains.
         difference / (var_a + var_b).sqrt().max(1e-6 * mean_a.abs()).max(f64::MIN_POSITIVE)
     };
     let of_blocks = (0..a[0].len()).map(|block| t_of(&|picture: &[f64]| picture[block])).fold(0.0, f64::max);
     (of_blocks, t_of(&|picture: &[f64]| picture.iter().sum()))
 }
 
-/// Renders the scene at the origin and elsewhere, and compares by |t|: with 14 degrees of freedom, 64 blocks and ten places,
-/// 7.5 is passed once in a thousand sets of equal pictures.
+/// Renders the scene at the origin and elsewhere, and compares by |t|: with 14 degrees of freedom, 64 blocks and ten
+/// positions, 7.5 is exceeded once in a thousand sets of equal images.
 pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     let places = [
         (1.0, DVec3::X * 1e6),
@@ -167,7 +168,7 @@ pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     tally
 }
 
-/// A stone in map coordinates, with the digits that surveyors give: millimetres.
+/// A stone in map coordinates, with the precision of a survey: millimetres.
 fn survey(shift: DVec3) -> String {
     let stone = procedural::icosphere(12);
     let mut text = String::new();
@@ -184,8 +185,8 @@ fn survey(shift: DVec3) -> String {
     text
 }
 
-/// Loads the model at the origin and at (500000, 4500000, 120), and asks both the same rays: from inside none may get out, and
-/// depths may differ by no more than the rounding of coordinates about the camera.
+/// Loads the model at the origin and at (500000, 4500000, 120), and traces the same rays in both: from inside none may
+/// escape, and depths may differ by at most the rounding of coordinates relative to the camera.
 pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     let shift = dvec3(500_000.0, 4_500_000.0, 120.0);
     let load_at = |shift: DVec3| {
@@ -204,7 +205,7 @@ pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     let mut tally = Tally { rays: 2 * n, ..Tally::default() };
     for i in 0..n {
         let mut random = Random::new(0x6E0, i);
-        // Relative to the camera, which the origin of a snapshot may be a little away from.
+        // Relative to the camera, because the origin of a snapshot may be slightly away from it.
         let center = glam::vec3(0.0, 0.0, -90.0);
         let (from, to) = (center + random.point() * 10.0, center + random.direction() * 100.0);
         let trace = |scene: &Prepared| -> (crate::geometry::Ray, Option<Hit>) {
@@ -215,14 +216,14 @@ pub fn georeferenced(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         for (ray, hit) in [(ray_a, a), (ray_b, b)] {
             if hit.is_none() {
                 tally.leaks += 1;
-                tally.offer(1e9, 0, i, || tell(&ray, &hit));
+                tally.offer(1e9, 0, i, || describe(&ray, &hit));
             }
         }
         if let (Some(a), Some(b)) = (a, b) {
-            // What `scene::origin_for` promises: 887 · 2⁻²⁴ of the viewing distance.
+            // The bound stated by `scene::origin_for`: 887 · 2⁻²⁴ of the viewing distance.
             let off = f64::from((a.t - b.t).abs()) / (887.0 * 90.0 / f64::from(1 << 24));
             tally.wrong_t += u64::from(off > 1.0);
-            tally.offer(off, 0, i, || format!("{} against {}", tell(&ray_b, &Some(b)), tell(&ray_a, &Some(a))));
+            tally.offer(off, 0, i, || format!("{} against {}", describe(&ray_b, &Some(b)), describe(&ray_a, &Some(a))));
         }
     }
     tick(2 * n);

@@ -1,8 +1,8 @@
-//! Rays that bounce about in a closed white box for ever: none may get out, not even in a corner.
+//! Long paths of diffuse bounces in closed boxes: none may escape, not even in a corner.
 
 use super::random::Random;
 use super::tally::Tally;
-use super::test_scene::tell;
+use super::test_scene::describe;
 use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{BuildPreset, HitBatch, MeshTree, RayBatch, RayClass, SceneTree, Shape};
 use crate::mesh::procedural;
@@ -10,7 +10,7 @@ use glam::{Affine3A, DVec3, Quat, Vec3, vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Closed boxes of side 2 about the origin.
+/// Returns closed boxes of side 2 about the origin.
 fn boxes() -> Vec<(&'static str, SceneTree)> {
     let (o, s) = (Vec3::splat(-1.0), 2.0);
     let (x, y, z) = (Vec3::X * s, Vec3::Y * s, Vec3::Z * s);
@@ -41,7 +41,7 @@ fn boxes() -> Vec<(&'static str, SceneTree)> {
 /// Bounces of each path.
 pub const BOUNCES: u64 = 100_000;
 
-/// Paths of [`BOUNCES`] diffuse bounces in every box, `n` rays in all; counts those that got out.
+/// Traces paths of [`BOUNCES`] diffuse bounces in every box, `n` rays in all; counts those that escaped.
 pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
     let boxes = boxes();
     let paths = (n / BOUNCES / boxes.len() as u64).clamp(1, 1 << 20);
@@ -57,7 +57,7 @@ pub fn run(n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         .reduce(Tally::default, Tally::merged)
 }
 
-/// Paths that go together.
+/// Paths per batch.
 const PATHS: u64 = 256;
 
 fn bounce(stage: usize, name: &str, scene: &SceneTree, first: u64, count: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
@@ -73,13 +73,15 @@ fn bounce(stage: usize, name: &str, scene: &SceneTree, first: u64, count: u64, t
             let ray = rays.get(i);
             let Some(hit) = hits.get(i) else {
                 tally.leaks += 1;
-                tally.offer(1e9, stage, first + i as u64, || format!("{name}, bounce {depth}: {}", tell(&ray, &None)));
+                tally.offer(1e9, stage, first + i as u64, || {
+                    format!("{name}, bounce {depth}: {}", describe(&ray, &None))
+                });
                 next.push(&start(random));
                 continue;
             };
             let point = scene.surface_point(&ray, &hit);
             let inwards = if point.geometric_normal.dot(ray.dir) > 0.0 { -1.0 } else { 1.0 } * point.geometric_normal;
-            // Now and then straight for an edge or a corner of the box.
+            // Sometimes aimed exactly at an edge or a corner of the box.
             let dir = match random.below(8) {
                 0 => {
                     let mut at = random.point();

@@ -1,8 +1,8 @@
-//! White furnaces: in an evenly bright world no lossless thing can be seen, whatever it is inside of.
+//! White furnaces: in a uniform environment no lossless object is visible, whatever it is inside of.
 //!
-//! What a camera inside of glass of index n sees is n² as bright. [`nested`] has the cases on which bookkeeping of media
-//! breaks: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at every
-//! level, both integrators, with and without SIMD. [`random`] has scenes that nobody thought of.
+//! A camera inside glass of index n sees n² times the radiance. [`nested`] has the cases on which tracking of media
+//! fails: many shells, equal and alternating indices, bodies that overlap, touch or share their walls, a camera at
+//! every level, both integrators, with and without SIMD. [`random`] has randomly generated scenes.
 
 use super::light::{LightCase, camera, diffuse, grey, prepared};
 use super::random::Random;
@@ -12,11 +12,11 @@ use crate::render::{Camera, Environment, Fresnel, Integrator, Material, Object, 
 use glam::{Affine3A, Quat, Vec3, vec3};
 use std::sync::Arc;
 
-/// A shape, its material and its mesh, if it is one.
-type Thing = (Shape, u32, Option<Arc<Mesh>>);
+/// A shape, its material, and its mesh if it is one.
+type PlacedShape = (Shape, u32, Option<Arc<Mesh>>);
 
-/// How a scene is rendered.
-const WAYS: [(Integrator, bool); 3] = [(Integrator::Path, true), (Integrator::Path, false), (Integrator::Phong, true)];
+/// Combinations of integrator and SIMD.
+const MODES: [(Integrator, bool); 3] = [(Integrator::Path, true), (Integrator::Path, false), (Integrator::Phong, true)];
 
 pub fn glass(ior: f32) -> Material {
     Material::Glass { ior, absorption: Vec3::ZERO }
@@ -43,51 +43,53 @@ fn classic(specular: f32, transparency: f32, ior: f32) -> Material {
     }
 }
 
-fn ball(center: Vec3, radius: f32, material: u32) -> Thing {
+fn ball(center: Vec3, radius: f32, material: u32) -> PlacedShape {
     (Shape::Sphere { center, radius }, material, None)
 }
 
-fn mesh(mesh: Mesh, world_from_object: Affine3A, material: u32) -> Thing {
+fn mesh(mesh: Mesh, world_from_object: Affine3A, material: u32) -> PlacedShape {
     let tree = Arc::new(MeshTree::build(&mesh.positions, &mesh.triangles, BuildPreset::Quick));
     (Shape::Mesh { tree, world_from_object }, material, Some(Arc::new(mesh)))
 }
 
-/// A box of six quads that face outwards.
-fn quad_box(center: Vec3, half: Vec3, material: u32) -> Vec<Thing> {
+/// A box of six outward-facing quads.
+fn quad_box(center: Vec3, half: Vec3, material: u32) -> Vec<PlacedShape> {
     let (o, x, y, z) = (center - half, 2.0 * half.x * Vec3::X, 2.0 * half.y * Vec3::Y, 2.0 * half.z * Vec3::Z);
     let faces = [(o, y, x), (o + z, x, y), (o, z, y), (o + x, y, z), (o, x, z), (o + y, z, x)];
     faces.map(|(corner, edge_u, edge_v)| (Shape::Quad { corner, edge_u, edge_v }, material, None)).into()
 }
 
-/// - `index`: of the medium that the camera is in.
+/// Makes a case.
+///
+/// - `index`: of the medium that contains the camera.
 fn furnace(
     name: String,
-    things: Vec<Thing>,
+    shapes: Vec<PlacedShape>,
     materials: Vec<Material>,
     view: Camera,
     index: f32,
     (integrator, simd): (Integrator, bool),
 ) -> LightCase {
     let (shapes, objects) =
-        things.into_iter().map(|(shape, material, mesh)| (shape, Object { mesh, ..Object::plain(material) })).unzip();
+        shapes.into_iter().map(|(shape, material, mesh)| (shape, Object { mesh, ..Object::plain(material) })).unzip();
     let mut settings = RenderSettings { integrator, ..RenderSettings::default() };
     if !simd {
         settings.simd = None;
     }
-    let way = match (integrator, simd) {
+    let mode = match (integrator, simd) {
         (Integrator::Phong, _) => ", phong",
         (_, true) => "",
         (_, false) => ", one path at a time",
     };
     LightCase {
-        name: name + way,
+        name: name + mode,
         scene: prepared(shapes, objects, materials, Environment::Constant(Vec3::ONE), view),
         settings,
         width: 16,
         height: 16,
         spp: 16,
         expected: f64::from(index * index),
-        // Of the mean, besides its noise: paths that are ended by chance make whole samples of it.
+        // Of the mean, in addition to its noise: paths ended by Russian roulette contribute whole samples.
         allowed: 1e-3,
         allowed_loss: 1e-3,
         every_pixel: false,
@@ -98,7 +100,7 @@ fn outside() -> Camera {
     camera(vec3(0.0, 0.4, 4.0), Vec3::ZERO, 40.0)
 }
 
-/// Index of shell `i`, outermost first.
+/// Index of refraction of shell `i`, outermost first.
 type Indices = (&'static str, fn(usize) -> f32);
 
 const INDICES: [Indices; 3] = [
@@ -107,43 +109,43 @@ const INDICES: [Indices; 3] = [
     ("rising", |i| 1.0 + 0.03 * (i % 40 + 1) as f32),
 ];
 
-/// Spheres within each other.
-fn shells(n: usize, index: fn(usize) -> f32) -> (Vec<Thing>, Vec<Material>) {
-    let things = (0..n).map(|i| ball(Vec3::ZERO, 1.0 - i as f32 / (n + 1) as f32, i as u32)).collect();
-    (things, (0..n).map(|i| glass(index(i))).collect())
+/// Nested spheres.
+fn shells(n: usize, index: fn(usize) -> f32) -> (Vec<PlacedShape>, Vec<Material>) {
+    let shapes = (0..n).map(|i| ball(Vec3::ZERO, 1.0 - i as f32 / (n + 1) as f32, i as u32)).collect();
+    (shapes, (0..n).map(|i| glass(index(i))).collect())
 }
 
-/// See the [module](self).
+/// Returns the fixed cases; see the [module](self).
 pub fn nested() -> Vec<LightCase> {
     let mut pictures = Vec::new();
-    for way in WAYS {
+    for mode in MODES {
         for n in [1, 2, 3, 4, 5, 6, 8, 12, 20, 50, 100] {
             for (which, index) in INDICES {
-                // Rays of the classic model go both ways at each surface.
-                if way.0 == Integrator::Phong && n > 12 && which != "equal" {
+                // In the classic model rays split at each surface.
+                if mode.0 == Integrator::Phong && n > 12 && which != "equal" {
                     continue;
                 }
-                let (things, materials) = shells(n, index);
-                pictures.push(furnace(format!("{n} shells, {which}"), things, materials, outside(), 1.0, way));
+                let (shapes, materials) = shells(n, index);
+                pictures.push(furnace(format!("{n} shells, {which}"), shapes, materials, outside(), 1.0, mode));
             }
         }
-        // One material for all: what is the same on both sides cannot be seen.
-        let things = (0..30).map(|i| ball(Vec3::ZERO, 1.0 - 0.03 * i as f32, 0)).collect();
-        pictures.push(furnace("30 shells of one material".into(), things, vec![glass(1.5)], outside(), 1.0, way));
-        let things = (0..30).map(|i| ball(Vec3::ZERO, 1.0 - 0.03 * i as f32, i % 2)).collect();
+        // One material for all: a boundary between equal media is invisible.
+        let shapes = (0..30).map(|i| ball(Vec3::ZERO, 1.0 - 0.03 * i as f32, 0)).collect();
+        pictures.push(furnace("30 shells of one material".into(), shapes, vec![glass(1.5)], outside(), 1.0, mode));
+        let shapes = (0..30).map(|i| ball(Vec3::ZERO, 1.0 - 0.03 * i as f32, i % 2)).collect();
         let two = vec![glass(1.5), glass(1.33)];
-        pictures.push(furnace("30 shells of two materials".into(), things, two, outside(), 1.0, way));
+        pictures.push(furnace("30 shells of two materials".into(), shapes, two, outside(), 1.0, mode));
         // A camera in the middle of every layer.
         for level in 0..6 {
-            let (things, materials) = shells(6, INDICES[2].1);
+            let (shapes, materials) = shells(6, INDICES[2].1);
             let eye = vec3(0.02, 0.01, 1.0 - (level as f32 + 0.5) / 7.0);
             let view = camera(eye, vec3(0.3, 0.2, -1.0), 90.0);
             let name = format!("a camera inside of {} of 6 shells", level + 1);
-            pictures.push(furnace(name, things, materials, view, INDICES[2].1(level), way));
+            pictures.push(furnace(name, shapes, materials, view, INDICES[2].1(level), mode));
         }
-        let two = |outer: Thing, inner: Thing| vec![outer, inner];
+        let two = |outer: PlacedShape, inner: PlacedShape| vec![outer, inner];
         let (o, r) = (Vec3::ZERO, 0.9);
-        let cases: Vec<(&str, Vec<Thing>)> = vec![
+        let cases: Vec<(&str, Vec<PlacedShape>)> = vec![
             ("overlapping spheres", two(ball(Vec3::X * 0.4, 0.7, 0), ball(Vec3::X * -0.3, 0.6, 1))),
             ("touching spheres", two(ball(Vec3::X * 0.5, 0.5, 0), ball(Vec3::X * -0.5, 0.5, 1))),
             ("a shared surface", two(ball(o, r, 0), ball(o, r, 1))),
@@ -173,15 +175,15 @@ pub fn nested() -> Vec<LightCase> {
             ("an open sheet from behind", vec![sheet(Vec3::NEG_Z)]),
             ("a half-space", vec![(Shape::Plane { point: Vec3::ZERO, normal: Vec3::Y }, 0, None)]),
         ];
-        for (name, things) in cases {
-            pictures.push(furnace(name.into(), things, vec![glass(1.5), glass(1.2)], outside(), 1.0, way));
+        for (name, shapes) in cases {
+            pictures.push(furnace(name.into(), shapes, vec![glass(1.5), glass(1.2)], outside(), 1.0, mode));
         }
-        // What is inside of a blend with glass is that glass.
+        // The medium inside a blend with glass is that glass.
         let others = [diffuse(1.0), Material::Mirror { reflectance: grey(1.0) }, glass(1.7), metal(0.3)];
         for (name, other) in ["diffuse", "mirror", "a second glass", "metal"].into_iter().zip(others) {
             let materials = vec![glass(1.5), glass(1.3), other, blend(0.5, 1, 2)];
             let alone = vec![ball(o, 0.6, 3)];
-            pictures.push(furnace(format!("glass and {name}"), alone, materials.clone(), outside(), 1.0, way));
+            pictures.push(furnace(format!("glass and {name}"), alone, materials.clone(), outside(), 1.0, mode));
             let inside = two(ball(o, r, 0), ball(o, 0.6, 3));
             pictures.push(furnace(
                 format!("glass and {name}, in glass"),
@@ -189,21 +191,21 @@ pub fn nested() -> Vec<LightCase> {
                 materials.clone(),
                 outside(),
                 1.0,
-                way,
+                mode,
             ));
             let around = two(ball(o, r, 3), ball(o, 0.6, 0));
-            pictures.push(furnace(format!("glass and {name}, around glass"), around, materials, outside(), 1.0, way));
+            pictures.push(furnace(format!("glass and {name}, around glass"), around, materials, outside(), 1.0, mode));
         }
     }
     pictures
 }
 
-fn sheet(normal: Vec3) -> Thing {
+fn sheet(normal: Vec3) -> PlacedShape {
     let edge_u = 1.6 * Vec3::X * normal.z;
     (Shape::Quad { corner: -0.5 * edge_u - 0.8 * Vec3::Y, edge_u, edge_v: 1.6 * Vec3::Y }, 0, None)
 }
 
-/// How many scenes [`random`] makes.
+/// Number of scenes that [`random`] makes.
 pub const N_RANDOM: u64 = 2000;
 
 /// Random lossless scenes: spheres, clouds, meshes and boxes, nested, overlapping and apart, of every material.
@@ -211,10 +213,10 @@ pub fn random() -> Vec<LightCase> {
     (0..N_RANDOM).map(random_scene).collect()
 }
 
-/// A closed body that can tell what is inside of it.
+/// A closed body with an inside test.
 struct Body {
     center: Vec3,
-    /// Of the sphere, or half the sides of the box.
+    /// Radius of the sphere, or half the sides of the box.
     half: Vec3,
     is_box: bool,
     material: usize,
@@ -226,7 +228,7 @@ impl Body {
         if self.is_box { d.abs().cmplt(self.half).all() } else { d.length() < self.half.x }
     }
 
-    /// Whether a point lies so near its surface that a mesh in its place may tell otherwise.
+    /// Whether a point is so close to the surface that the inside test of a mesh of this body may differ.
     fn is_near(&self, point: Vec3) -> bool {
         let d = (point - self.center).abs();
         let distance = if self.is_box { (d - self.half).max_element() } else { d.length() - self.half.x };
@@ -255,7 +257,7 @@ fn random_scene(seed: u64) -> LightCase {
             _ => classic(random.unit(), random.unit(), ior),
         });
     }
-    // Drawn by itself, so that scenes without it stay what they are.
+    // Drawn from a separate generator, so that scenes without rough glass do not change.
     let mut roughening = Random::new(0x20_0676, seed);
     let mut is_lossy = false;
     for material in &mut materials {
@@ -270,7 +272,7 @@ fn random_scene(seed: u64) -> LightCase {
     }
     for _ in 0..3 {
         let parts = materials.len();
-        // A blend of blends comes to eight lobes at most, of which each classic material has three.
+        // A blend of blends has at most eight lobes, and each classic material has three.
         let (a, b) = (random.below(4.min(parts)) as u32, random.below(4) as u32);
         materials.push(blend([0.02, 0.3, 0.5, 0.9][random.below(4)], a, b));
     }
@@ -287,19 +289,19 @@ fn random_scene(seed: u64) -> LightCase {
         let half = if is_box { Vec3::splat(size * 0.57) } else { Vec3::splat(size) };
         bodies.push(Body { center, half, is_box, material: random.below(materials.len()) });
     }
-    let mut things = Vec::new();
+    let mut shapes = Vec::new();
     for body in &bodies {
         let Body { center, half, material, .. } = *body;
         let id = material as u32;
         match (body.is_box, random.below(4)) {
             (true, 0..=1) => {
                 let place = Affine3A::from_translation(center);
-                things.push(mesh(procedural::cuboid((2.0 * half).as_dvec3()), place, id));
+                shapes.push(mesh(procedural::cuboid((2.0 * half).as_dvec3()), place, id));
             }
             (true, _) => {
-                // Boxes of quads with one material are one body together: each gets a copy of its own.
+                // Boxes of quads with one material form one body: each box gets its own copy of the material.
                 materials.push(materials[material].clone());
-                things.extend(quad_box(center, half, materials.len() as u32 - 1));
+                shapes.extend(quad_box(center, half, materials.len() as u32 - 1));
             }
             (false, 0) => {
                 let place = Affine3A::from_scale_rotation_translation(
@@ -307,27 +309,28 @@ fn random_scene(seed: u64) -> LightCase {
                     Quat::from_axis_angle(random.direction(), 3.0 * random.unit()),
                     center,
                 );
-                things.push(mesh(procedural::icosphere(3).flat(), place, id));
+                shapes.push(mesh(procedural::icosphere(3).flat(), place, id));
             }
             (false, 1) => {
                 let (far, tiny) = (vec3(50.0, 0.0, 0.0), 1e-3);
                 let tree = Arc::new(SphereTree::build(&[center, far], &[half.x, tiny]));
-                things.push((Shape::Spheres { tree, world_from_object: Affine3A::IDENTITY }, id, None));
+                shapes.push((Shape::Spheres { tree, world_from_object: Affine3A::IDENTITY }, id, None));
             }
-            (false, _) => things.push(ball(center, half.x, id)),
+            (false, _) => shapes.push(ball(center, half.x, id)),
         }
     }
     let (view, index, is_inside) = random_camera(&mut random, &bodies, &materials);
-    let way = WAYS[random.below(3)];
-    let mut picture = furnace(format!("scene {seed}"), things, materials, view, index, way);
+    let mode = MODES[random.below(3)];
+    let mut picture = furnace(format!("scene {seed}"), shapes, materials, view, index, mode);
     (picture.width, picture.height, picture.spp) = (12, 12, 8);
-    // Dense glass of many corners holds some paths for longer than they live; seen from inside, some never get out.
-    // What bounces more than once between microfacets is lost.
+    // Dense glass with many corners traps some paths beyond their longest life; from inside, some never escape. Light
+    // that bounces more than once between microfacets is lost.
     picture.allowed_loss = if is_inside || is_lossy { 1.0 } else { 0.05 };
     picture
 }
 
-/// Outside, or inside of transparent bodies; the index there, which the smallest of them has; and whether it is inside.
+/// Returns a camera outside, or inside of transparent bodies; the index at its position, which is that of the smallest
+/// body; and whether it is inside.
 fn random_camera(random: &mut Random, bodies: &[Body], materials: &[Material]) -> (Camera, f32, bool) {
     let towards = 0.3 * random.point();
     for _ in 0..20 {
@@ -349,7 +352,7 @@ fn random_camera(random: &mut Random, bodies: &[Body], materials: &[Material]) -
     (camera(towards + 4.0 * random.direction(), towards, 40.0), 1.0, false)
 }
 
-/// Of the first transparent part of a material; `None` if it has none.
+/// Index of the first transparent part of a material; `None` if it has none.
 fn first_ior(materials: &[Material], id: usize) -> Option<f32> {
     match &materials[id] {
         Material::Glass { ior, .. } | Material::RoughGlass { ior, .. } => Some(*ior),

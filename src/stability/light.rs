@@ -1,6 +1,6 @@
-//! Cases that render: hard materials, lights, lenses and long runs in scenes whose light is known on paper.
+//! Cases that render: difficult materials, lights, lenses and long sums in scenes with a known radiance.
 
-use super::replay::{Replay, Told};
+use super::replay::{Replay, ReplayValue};
 use super::tally::{Energy, Tally};
 use crate::kdtree::Shape;
 use crate::render::{
@@ -9,7 +9,7 @@ use crate::render::{
 };
 use glam::{UVec2, Vec3, vec3};
 
-/// One small scene with a known picture.
+/// One small scene with a known image.
 pub struct LightCase {
     pub name: String,
     pub scene: Prepared,
@@ -17,18 +17,18 @@ pub struct LightCase {
     pub width: u32,
     pub height: u32,
     pub spp: u32,
-    /// Of every pixel, or of the mean of all.
+    /// Expected radiance of every pixel, or of the mean of all.
     pub expected: f64,
-    /// Relative error that is allowed, besides the noise.
+    /// Allowed relative error, in addition to the noise.
     pub allowed: f64,
-    /// The same for light that is lost: more where paths may be held for longer than they live.
+    /// Allowed relative loss: larger where paths may be trapped beyond their longest life.
     pub allowed_loss: f64,
-    /// Whether each pixel must have the expected value, not only their mean.
+    /// Whether each pixel must have the expected value, or only their mean.
     pub every_pixel: bool,
 }
 
 impl LightCase {
-    /// Renders it, and counts samples that are not finite, and how far the light is off.
+    /// Renders the case; counts samples that are not finite, and measures the error of the radiance.
     pub fn run(&self, index: usize, spp: u32, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         let mut film = Film::new(self.width, self.height);
         let report = advance(&self.scene, &self.settings, &mut film, spp, &|| false);
@@ -39,7 +39,7 @@ impl LightCase {
         let mean = means.iter().sum::<f64>() / n;
         let variance = means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n * (n - 1.0).max(1.0));
         let error = if self.every_pixel {
-            // Not `max`, which would lose a NaN.
+            // Unlike `max`, keeps a NaN.
             means
                 .iter()
                 .map(|value| (value - self.expected).abs())
@@ -121,7 +121,7 @@ fn floor() -> Shape {
     Shape::Plane { point: Vec3::ZERO, normal: Vec3::Y }
 }
 
-/// In an evenly bright world, things that lose no light cannot be seen.
+/// A white furnace: in a uniform environment, lossless objects are invisible.
 fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Material>, allowed: f64) -> LightCase {
     let eye = camera(vec3(0.0, 0.4, 4.0), Vec3::ZERO, 40.0);
     LightCase {
@@ -138,7 +138,7 @@ fn furnace(name: impl Into<String>, shapes: Vec<(Shape, u32)>, materials: Vec<Ma
     }
 }
 
-/// Nested glass, glass on glass, indices next to 1, and angles about that of total reflection.
+/// Nested glass, coincident surfaces, indices next to 1, and angles close to total reflection.
 pub fn glass() -> Vec<LightCase> {
     let glass = |ior: f32| Material::Glass { ior, absorption: Vec3::ZERO };
     let mut pictures = vec![
@@ -167,7 +167,7 @@ pub fn glass() -> Vec<LightCase> {
             1e-4,
         ),
     ];
-    // Between several skins a few paths go around for dozens of bounces; roulette, from the 64th on, ends them by whole
+    // Between several shells a few paths bounce dozens of times; roulette, from the 64th bounce on, ends them as whole
     // samples. Only the mean is free of that noise.
     pictures
         .iter_mut()
@@ -175,14 +175,14 @@ pub fn glass() -> Vec<LightCase> {
     for ior in [1.0, 1.0 + 1e-6, 1.0 - 1e-6, 1.0 + 1e-4, 1e-3, 0.5, 1.5, 10.0] {
         pictures.push(furnace(format!("index {ior}"), vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(ior)], 2e-4));
     }
-    // Four in a thousand paths get in, and hardly one of them out again before roulette: the mean has their noise.
+    // Four in a thousand paths enter, and hardly one of them leaves before roulette: the mean has their noise.
     let mut dense = furnace("index 1000", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1e3)], 5e-3);
     dense.every_pixel = false;
     pictures.push(dense);
-    // From inside a sphere, at the radius where the flattest rays all but reach the angle of total reflection. What comes from
-    // outside is n² as bright there.
+    // From inside a sphere, at the radius where the most oblique rays just reach the angle of total reflection.
+    // Radiance from outside is multiplied by n² there.
     let mut inside = furnace("inside a sphere of glass", vec![(ball(Vec3::ZERO, 1.0), 0)], vec![glass(1.5)], 1e-3);
-    // Total reflection keeps some paths for longer than roulette lets them live.
+    // Total reflection traps some paths until roulette ends them.
     inside.every_pixel = false;
     inside.scene = inside.scene.with_camera(camera(vec3(0.666_66, 0.0, 0.0), vec3(0.7, 1.0, 0.0), 150.0));
     inside.expected = 2.25;
@@ -190,7 +190,7 @@ pub fn glass() -> Vec<LightCase> {
     pictures
 }
 
-/// Microfacets from a mirror to as rough as can be: none may win light, and with compensation none may lose any.
+/// Microfacets from a mirror to maximal roughness: none may gain energy, and with compensation none may lose any.
 pub fn metal() -> Vec<LightCase> {
     let mut pictures = Vec::new();
     for alpha in [0.0, 1e-20, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0] {
@@ -208,8 +208,8 @@ pub fn metal() -> Vec<LightCase> {
     pictures
 }
 
-/// Sphere lights over a floor: tiny and bright, huge, and touching it. A floor point at distance d from the centre of a sphere of
-/// radius r sees albedo · L · (r/d)² · cos θ while all of the sphere is above its horizon.
+/// Sphere lights over a floor: tiny and bright, huge, and touching it. A floor point at distance d from the centre of a
+/// sphere of radius r has radiance albedo · L · (r/d)² · cos θ if the whole sphere is above its horizon.
 pub fn lights() -> Vec<LightCase> {
     let cases: [(&str, f32, f32, f32); 9] = [
         ("a sphere of 1 µm", 1e-6, 1.0, 0.3),
@@ -227,9 +227,10 @@ pub fn lights() -> Vec<LightCase> {
         .map(|(name, radius, height, x)| {
             let d2 = f64::from(x).powi(2) + f64::from(height).powi(2);
             let share = f64::from(radius).powi(2) / d2 * f64::from(height) / d2.sqrt();
-            // As bright as it takes for the floor to have a radiance of about 1.
+            // Emission for a floor radiance of about 1.
             let radiance = (2.0 / share) as f32;
-            // Grazing, so that the sphere is not in the way; a small view, so that all pixels see the same.
+            // A grazing view, so that the sphere does not block it; a small field of view, so that all pixels have
+            // equal radiance.
             let eye_height = (1e-3 * x).min(0.1);
             let eye = vec3(x, eye_height, eye_height);
             let materials = vec![diffuse(0.5), emissive(radiance)];
@@ -251,8 +252,8 @@ pub fn lights() -> Vec<LightCase> {
         .collect()
 }
 
-/// Fields of view of 1° … 170°, focus from 0⁺ to ∞, and lenses larger than the scene: in a world of one colour, whatever
-/// a ray meets has radiance 1.
+/// Fields of view of 1° … 170°, focus from 0⁺ to ∞, and lenses larger than the scene: in a uniform environment every
+/// ray has radiance 1.
 pub fn cameras() -> Vec<LightCase> {
     let mut pictures = Vec::new();
     for vfov in [1e-3, 1.0, 30.0, 120.0, 170.0, 179.9] {
@@ -277,18 +278,18 @@ pub fn cameras() -> Vec<LightCase> {
             }
         }
     }
-    // The back of a sphere that shines is dark: a lens that reaches into it would see that.
+    // The back of an emissive sphere is black: a lens that reaches into it would see that.
     pictures.iter_mut().filter(|p| p.scene.camera.lens_radius >= 1e3).for_each(|p| p.every_pixel = false);
     pictures
 }
 
-/// 10⁶ samples in one pixel of a room whose walls emit 1 − ρ and reflect ρ: its radiance is 1 everywhere, and a sum
-/// that loses digits drifts away from it.
+/// 10⁶ samples in one pixel of a room whose walls emit 1 − ρ and reflect ρ: the radiance is 1 everywhere, and a sum
+/// that loses precision drifts away from it.
 pub fn long_sums() -> Vec<LightCase> {
     [0.0f32, 0.5, 0.9]
         .into_iter()
         .map(|albedo| {
-            // A blend has the share w of a black body of radiance 1, and 1 − w of a white surface.
+            // The blend consists of a black body of radiance 1 with weight w and a white surface with weight 1 − w.
             let blend = Material::Blend { weight: ScalarInput::Constant(1.0 - albedo), a: 0, b: 1 };
             let materials = vec![diffuse(1.0), emissive(1.0), blend];
             let shapes = vec![
@@ -308,7 +309,7 @@ pub fn long_sums() -> Vec<LightCase> {
                 height: 1,
                 spp: 1_000_000,
                 expected: 1.0,
-                // Of the exact kind where there is no noise; else about 6 standard errors at a million samples.
+                // Without noise the result is exact; otherwise about 6 standard errors at a million samples.
                 allowed: if albedo == 0.0 { 1e-12 } else { 0.05 },
                 allowed_loss: 0.05,
                 every_pixel: true,
@@ -318,25 +319,25 @@ pub fn long_sums() -> Vec<LightCase> {
 }
 
 impl LightCase {
-    /// How many samples it has with `spp` of each pixel.
+    /// Number of samples of the image at `spp` samples per pixel.
     pub fn samples(&self, spp: u32) -> u64 {
         u64::from(self.width) * u64::from(self.height) * u64::from(spp)
     }
 
-    /// One sample, by its number as [`Self::run`] tells it.
+    /// Replays one sample by the index that [`Self::run`] reports.
     pub fn replay(&self, ray: u64) -> Replay {
         let (x, row) = (ray % u64::from(self.width), ray / u64::from(self.width));
         let (y, sample) = (row % u64::from(self.height), row / u64::from(self.height));
         let at = BadSample { x: x as u32, y: y as u32, sample: sample as u32 };
         let size = UVec2::new(self.width, self.height);
         let radiance = replay_sample(&self.scene, &self.settings, size, at);
-        let mut told = Replay::default();
-        told.push("picture", Told::Text(self.name.clone()));
-        told.push("pixel_x", Told::Count(x));
-        told.push("pixel_y", Told::Count(y));
-        told.push("sample", Told::Count(sample));
-        told.push("radiance", Told::Vector(radiance));
-        told.push("expected_mean", Told::Double(self.expected));
-        told
+        let mut replay = Replay::default();
+        replay.push("picture", ReplayValue::Text(self.name.clone()));
+        replay.push("pixel_x", ReplayValue::Count(x));
+        replay.push("pixel_y", ReplayValue::Count(y));
+        replay.push("sample", ReplayValue::Count(sample));
+        replay.push("radiance", ReplayValue::Vector(radiance));
+        replay.push("expected_mean", ReplayValue::Double(self.expected));
+        replay
     }
 }

@@ -1,9 +1,9 @@
-//! The hard cases, counted: what other renderers are asked to mend, tried here by the million, with findings that can
-//! be replayed.
+//! Stability tests: cases that are known to break renderers, run by the million, with findings that can be replayed.
 //!
-//! Rays are held against an `f64` reference that knows no tree (`reference`), light against answers on paper (`light`), and the
-//! same scene elsewhere against itself (`anywhere`). Every ray is a function of case, stage and index alone: the
-//! counts do not depend on threads, and the worst ray can be had again ([`Case::replay`]). Start reading at [`CASES`].
+//! Rays are checked against an `f64` reference without a tree (`reference`), radiance against closed forms (`light`),
+//! and scenes against their transformed copies (`anywhere`). Every ray is a function of case, test scene and index
+//! alone: the counts do not depend on threads, and the worst ray can be replayed ([`Case::replay`]). Start reading at
+//! [`CASES`].
 
 mod anywhere;
 mod bounces;
@@ -17,18 +17,18 @@ mod tally;
 mod test_scene;
 
 pub use reference::{CheckResult, ReferenceIntersector, TEST_ERROR};
-pub use replay::{Replay, ReplayError, Told};
+pub use replay::{Replay, ReplayError, ReplayValue};
 pub use tally::{Energy, Tally, Worst};
 
 use light::LightCase;
 use surfaces::Plan;
 
-/// One hard case.
+/// One stability case.
 #[derive(Clone, Copy)]
 pub struct Case {
     pub name: &'static str,
     pub about: &'static str,
-    /// Rays of this case over those that were asked for.
+    /// Ratio of the rays of this case to the requested rays.
     share: f64,
     kind: Kind,
 }
@@ -146,12 +146,13 @@ impl Case {
         CASES.iter().find(|case| case.name == name)
     }
 
-    /// About how many rays this case traces when `rays` are asked for.
+    /// Approximate number of rays that this case traces for a request of `rays`.
     pub fn rays(&self, rays: u64) -> u64 {
         (rays as f64 * self.share) as u64
     }
 
-    /// Runs the case with about [`Self::rays`] of `rays`; `tick` is told how many more were traced.
+    /// Runs the case with about [`Self::rays`] of `rays`; `tick` receives the number of rays traced since the last
+    /// call.
     pub fn run(&self, rays: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         let n = self.rays(rays);
         match self.kind {
@@ -172,14 +173,14 @@ impl Case {
         }
     }
 
-    /// Whether [`Self::replay`] knows the rays that a tally names.
+    /// Whether [`Self::replay`] supports the rays that the tally of this case reports.
     pub fn can_replay(&self) -> bool {
         matches!(self.kind, Kind::RaySet(_) | Kind::Pictures(_))
     }
 
-    /// Everything about one ray of the case.
+    /// Returns all details of one ray of the case.
     ///
-    /// - `rays`: as for [`Self::run`]: how many rays each stage has depends on it, which ray is which does not.
+    /// - `rays`: as for [`Self::run`]: it determines how many rays each test scene has, but not which ray an index is.
     pub fn replay(&self, stage: usize, ray: u64, rays: u64) -> Result<Replay, ReplayError> {
         let n = self.rays(rays);
         let no_stage = |count: usize| ReplayError::NoStage { stage, last: count - 1 };
@@ -203,15 +204,15 @@ impl Case {
     }
 }
 
-/// Of `n` rays of the case, those of each stage.
+/// Number of rays per test scene, for `n` rays of the case.
 fn rays_of_plan(n: u64, plans: &[Plan]) -> u64 {
     n.div_ceil(plans.len() as u64).max(64)
 }
 
-/// Of `n` samples of the case, those of each pixel of a picture.
+/// Samples per pixel of image `i`, for `n` samples of the case.
 fn spp_of_picture(n: u64, pictures: &[LightCase], i: usize) -> u32 {
     let usual: u64 = pictures.iter().map(|picture| picture.samples(picture.spp)).sum();
-    // More rays make the noise smaller; fewer than the usual number would let it decide.
+    // More rays reduce the noise; fewer than the default would make noise dominate.
     let spp = f64::from(pictures[i].spp);
     (spp * (n as f64 / usual as f64)).clamp(spp, 1e8) as u32
 }

@@ -1,8 +1,8 @@
-//! Numbers that depend on a case and the index of a ray alone, so that each ray can be asked for again.
+//! Random numbers that depend only on a case and the index of a ray, so that each ray can be replayed.
 
 use glam::Vec3;
 
-/// SplitMix64 (Steele, Lea and Flood 2014), started from a hash of stage and index.
+/// SplitMix64 (Steele, Lea and Flood 2014), seeded with a hash of test scene and index.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
@@ -19,27 +19,27 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In `0..n`.
+    /// A number in `0..n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n as u64) as usize
     }
 
-    /// In `[0, 1)`.
+    /// A number in `[0, 1)`.
     pub fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// In `[-1, 1)`.
+    /// A number in `[-1, 1)`.
     pub fn signed(&mut self) -> f32 {
         2.0 * self.unit() - 1.0
     }
 
-    /// In the cube of side 2 about the origin.
+    /// A point in the cube of side 2 about the origin.
     pub fn point(&mut self) -> Vec3 {
         Vec3::new(self.signed(), self.signed(), self.signed())
     }
 
-    /// Unit, all directions alike.
+    /// A uniformly distributed unit direction.
     pub fn direction(&mut self) -> Vec3 {
         let z = self.signed();
         let (sin, cos) = (std::f32::consts::PI * self.signed()).sin_cos();
@@ -47,7 +47,7 @@ impl Random {
         Vec3::new(r * cos, r * sin, z).normalize()
     }
 
-    /// Unit, on the side of `normal`; every other one within 10⁻¹ to 10⁻⁴ rad of the surface.
+    /// A unit direction on the side of `normal`; every second one within 10⁻¹ to 10⁻⁴ rad of the surface.
     pub fn leaving(&mut self, normal: Vec3) -> Vec3 {
         let dir = self.direction();
         let dir = if dir.dot(normal) < 0.0 { -dir } else { dir };

@@ -1,11 +1,12 @@
-//! Who is right? Every primitive of a scene in `f64`, tried one by one, and the bounds that answers in `f32` must keep.
+//! The reference intersector: brute force over every primitive in `f64`, and the error bounds that results in `f32`
+//! must satisfy.
 //!
-//! The geometry is what the `f32` input says, taken exactly. A hit at `t` is **right** if the point `origin + t · dir` lies
+//! The geometry is the `f32` input, taken exactly. A hit at `t` is **right** if the point `origin + t · dir` lies
 //! within the stated bound of the primitive that it names: [`TEST_ERROR`] of the distance to its farthest corner, which
-//! is what the watertight test may move a triangle by (`kdtree::ray` derives 5 + 8 units of roundoff an axis). A hit of the exact
-//! geometry is **sure** if no movement within that bound could make it a miss; a scene that answers with nothing, or with
-//! something farther away, has missed it. Between the two, at exact edges, either neighbour is right, and only the
-//! promise of closed surfaces decides.
+//! covers the distance by which the watertight test may move a triangle (`kdtree::ray` derives 5 + 8 units of roundoff
+//! per axis). A hit of the exact geometry is **sure** if no movement within that bound could make it a miss; a scene
+//! that reports no hit, or a farther one, has missed it. Between the two, at exact edges, either neighbour is right,
+//! and only the requirement of watertightness decides.
 
 use crate::geometry::{Ray, quad_corners};
 use crate::kdtree::{Hit, SceneTree, Shape};
@@ -14,7 +15,7 @@ use glam::{Affine3A, DAffine3, DVec3, Vec3};
 /// Half the distance from 1 to the next `f32`.
 const U: f64 = f32::EPSILON as f64 / 2.0;
 
-/// Bound on the movement of a triangle by its test, as a share of the distance to its farthest corner.
+/// Bound on the movement of a triangle by its test, relative to the distance to its farthest corner.
 pub const TEST_ERROR: f64 = 32.0 * U;
 
 #[derive(Clone, Copy, Debug)]
@@ -28,8 +29,8 @@ pub enum Solid {
 #[derive(Clone, Copy, Debug)]
 struct Item {
     solid: Solid,
-    /// Growth of relative errors on the way into the space of an instance, and the size of its translations there and
-    /// back; 0 for what lies in the world.
+    /// Growth of relative errors by the transform into the space of an instance, and the size of its translations there
+    /// and back; 0 for primitives in world space.
     condition: f64,
     reach: f64,
 }
@@ -38,18 +39,18 @@ struct Item {
 #[derive(Debug)]
 pub struct ReferenceIntersector {
     items: Vec<Item>,
-    /// Of each object, in `items`.
+    /// Start of each object in `items`.
     starts: Vec<usize>,
 }
 
-/// What the judge says of one answer.
+/// Result of checking one hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CheckResult {
     /// Distance from the named primitive over its bound: at most 1.
     Right(f64),
-    /// The same, beyond 1; or how far a nearer sure hit lies in front.
+    /// The same ratio above 1, or the distance by which a nearer sure hit lies in front.
     WrongT(f64),
-    /// Nothing was found, but a sure hit is there.
+    /// No hit was reported, but there is a sure hit.
     Missed,
 }
 
@@ -102,11 +103,12 @@ impl ReferenceIntersector {
         &self.items[self.starts[hit.object as usize] + hit.prim as usize]
     }
 
-    /// Whether the hit lies where it says: takes the same time in every scene.
+    /// Checks whether the hit lies on its primitive, in constant time.
     pub fn check_hit(&self, ray: &Ray, hit: &Hit) -> CheckResult {
         let item = self.item(hit);
         let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-        // About the origin of the ray: differences of `f32` numbers are exact in `f64`, sums far from zero are not.
+        // Relative to the origin of the ray: differences of `f32` numbers are exact in `f64`, sums far from zero are
+        // not.
         let way = f64::from(hit.t) * dir;
         let ratio = item.seen_from(origin).distance(way) / item.bound(origin, way.length());
         // NaN is wrong as well.
@@ -117,7 +119,7 @@ impl ReferenceIntersector {
         }
     }
 
-    /// The same, and whether there is anything in front, by trying every primitive.
+    /// Like [`check_hit`](Self::check_hit), and checks by brute force whether there is anything in front.
     pub fn check(&self, ray: &Ray, hit: Option<&Hit>) -> CheckResult {
         let found = hit.map_or(f64::INFINITY, |hit| f64::from(hit.t));
         let length = ray.dir.as_dvec3().length();
@@ -135,7 +137,7 @@ impl ReferenceIntersector {
         hit.map_or(CheckResult::Right(0.0), |hit| self.check_hit(ray, hit))
     }
 
-    /// How often the closed surface around `point` winds about it: ±1 inside, 0 outside (van Oosterom and Strackee 1983).
+    /// Winding number of the closed surface around `point`: ±1 inside, 0 outside (van Oosterom and Strackee 1983).
     pub fn winding(&self, point: Vec3) -> f64 {
         let point = point.as_dvec3();
         let solid_angle = |[a, b, c]: [DVec3; 3]| {
@@ -154,7 +156,7 @@ impl ReferenceIntersector {
         total / (4.0 * std::f64::consts::PI)
     }
 
-    /// Whether `point` is clear of all surfaces by more than a test from there may move them.
+    /// Whether `point` is farther from all surfaces than a test from there may move them.
     pub fn is_clear(&self, point: Vec3) -> bool {
         let point = point.as_dvec3();
         self.items.iter().all(|item| item.distance(point) > 2.0 * item.bound(point, 0.0))
@@ -172,7 +174,7 @@ impl Item {
         Self { solid, ..*self }
     }
 
-    /// From the surface.
+    /// Distance from the surface.
     fn distance(&self, point: DVec3) -> f64 {
         match self.solid {
             Solid::Triangle(corners) => (closest_on_triangle(point, &corners) - point).length(),
@@ -185,14 +187,14 @@ impl Item {
         }
     }
 
-    /// How far the surface that a ray from `origin` sees may lie from the true one.
+    /// Bound on the distance between the surface as seen by a ray from `origin` and the true one.
     ///
-    /// - `travelled`: to the hit, metres.
+    /// - `travelled`: distance to the hit, metres.
     fn bound(&self, origin: DVec3, travelled: f64) -> f64 {
         let reach = match self.solid {
             Solid::Triangle(corners) => farthest(origin, &corners) * TEST_ERROR,
             Solid::Quad(corners) => farthest(origin, &corners) * TEST_ERROR,
-            // Found in f64 and rounded once, along the ray; the second part is the rounding of f64.
+            // Computed in f64 and rounded once, along the ray; the second term is the rounding of f64.
             Solid::Sphere { center, radius } => 2.0 * U * travelled + 1e-13 * ((center - origin).length() + radius),
             Solid::Plane { point, .. } => 2.0 * U * travelled + 1e-13 * (point - origin).length(),
         };
@@ -200,8 +202,8 @@ impl Item {
         reach + 16.0 * U * self.condition * size + f64::from(f32::MIN_POSITIVE)
     }
 
-    /// `t` of the first crossing in front that is there however the surface is moved within its bound, and by how much
-    /// `t` may be off.
+    /// Returns `t` of the first intersection in front that exists under every movement of the surface within its bound,
+    /// and the bound on the error of `t`.
     fn sure_hit(&self, ray: &Ray) -> Option<(f64, f64)> {
         let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
         match self.solid {
@@ -215,7 +217,7 @@ impl Item {
                 let middle = to_center.dot(unit);
                 let half_squared = radius * radius - (to_center - middle * unit).length_squared();
                 let bound = self.bound(origin, to_center.length() + radius);
-                // Moved by the bound, the sphere is met still.
+                // Moved by the bound, the sphere is still hit.
                 if half_squared <= 4.0 * radius * bound {
                     return None;
                 }
@@ -261,7 +263,7 @@ fn widened(map: &Affine3A) -> DAffine3 {
     DAffine3::from_mat3_translation(map.matrix3.as_dmat3(), map.translation.as_dvec3())
 }
 
-/// Condition of the matrix, and the size of the translation there and back, in the world's measure.
+/// Returns the condition number of the matrix, and the size of the translation there and back, in world units.
 fn cost_of_map(map: &Affine3A) -> (f64, f64) {
     let there = widened(map);
     let back = there.inverse();
@@ -273,7 +275,7 @@ fn cost_of_map(map: &Affine3A) -> (f64, f64) {
     (size(&there) * size(&back), reach)
 }
 
-/// Source: Ericson 2005, "Real-Time Collision Detection", section 5.1.5.
+/// The closest point of a triangle. Source: Ericson 2005, "Real-Time Collision Detection", section 5.1.5.
 fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -302,7 +304,7 @@ fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
         return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
     }
-    // Inside: the plane alone counts, and its normal says it without the cancellation of the areas of a needle.
+    // Inside: only the plane matters, and its normal avoids the cancellation of areas of a needle.
     let normal = ab.cross(ac).normalize_or_zero();
     p - normal * ap.dot(normal)
 }

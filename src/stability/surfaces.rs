@@ -1,4 +1,4 @@
-//! Cases that ask the kernel: rays against closed meshes, needles, flat things, and the surfaces that they leave.
+//! Cases for intersection: rays against closed meshes, needles, flat objects, and the surfaces that rays leave.
 
 use super::random::Random;
 use super::reference::ReferenceIntersector;
@@ -9,7 +9,7 @@ use crate::mesh::{Mesh, procedural};
 use glam::{Affine3A, DVec3, EulerRot, Quat, Vec3, vec3};
 use std::sync::Arc;
 
-/// A stage that is built when its turn comes; `None` if nothing is left of it at its place.
+/// A test scene that is built on demand; `None` if nothing remains of it at its position.
 pub struct Plan {
     pub build: Box<dyn Fn() -> Option<TestScene> + Send + Sync>,
 }
@@ -43,7 +43,7 @@ impl SurfaceCase {
     }
 }
 
-/// Triangles with their corners.
+/// An indexed triangle soup.
 #[derive(Clone, Default)]
 struct Soup {
     positions: Vec<Vec3>,
@@ -82,8 +82,8 @@ impl Soup {
 
 fn stage(name: String, shapes: Vec<Shape>, brute_every: u64, rays: RaySet) -> TestScene {
     let scene = SceneTree::build(shapes);
-    let judge = ReferenceIntersector::of(&scene);
-    TestScene { name, scene, judge, rays, brute_every }
+    let reference = ReferenceIntersector::of(&scene);
+    TestScene { name, scene, reference, rays, brute_every }
 }
 
 fn mesh_shape(tree: &Arc<MeshTree>, world_from_object: Affine3A) -> Shape {
@@ -115,7 +115,7 @@ fn slit_cube() -> Soup {
             Vec3::from(p)
         };
         let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-        // Outside is the front.
+        // The front faces outwards.
         let turned = |[a, b, c]: [Vec3; 3]| if level > 0.0 { [a, b, c] } else { [a, c, b] };
         soup.push(turned([a, b, c]));
         soup.push(turned([a, c, d]));
@@ -123,15 +123,15 @@ fn slit_cube() -> Soup {
     soup
 }
 
-/// Points well inside a closed surface, within `bounds` of its corners.
-fn insides(judge: &ReferenceIntersector, soup: &Soup, seed: u64) -> Vec<Vec3> {
+/// Returns points well inside a closed surface, within the bounds of its corners.
+fn insides(reference: &ReferenceIntersector, soup: &Soup, seed: u64) -> Vec<Vec3> {
     let bounds = crate::geometry::Aabb::from_points(soup.positions.iter().copied());
     let mut random = Random::new(seed, 0x1251DE);
     let candidates = (0..60).map(|_| bounds.center() + 0.5 * random.point() * bounds.size());
-    candidates.filter(|&p| judge.winding(p).abs() > 0.5 && judge.is_clear(p)).take(8).collect()
+    candidates.filter(|&p| reference.winding(p).abs() > 0.5 && reference.is_clear(p)).take(8).collect()
 }
 
-/// Rays from inside a closed mesh at its corners, its edges, its faces and anywhere.
+/// Rays from inside a closed mesh at its corners, its edges, its faces and in random directions.
 fn rays_from_inside(soup: Soup, origins: Vec<Vec3>) -> RaySet {
     Box::new(move |random| {
         let origin = *random.pick(&origins);
@@ -148,7 +148,7 @@ fn rays_from_inside(soup: Soup, origins: Vec<Vec3>) -> RaySet {
     })
 }
 
-/// Rays from inside closed meshes, with the corners at their place in `f32` or in a space of their own.
+/// Rays from inside closed meshes, with vertices in world space in `f32` or in the mesh's own space.
 pub fn closed() -> Vec<Plan> {
     let mut plans = Vec::new();
     for place in SurfaceCase::all() {
@@ -159,7 +159,7 @@ pub fn closed() -> Vec<Plan> {
 
                 let build = move || {
                     let soup = closed_meshes().swap_remove(index).1;
-                    // What the rays aim at lies in the world either way.
+                    // The targets of the rays are in world space in both cases.
                     let world = soup.clone().mapped(|p| place.apply(p));
                     let shape = if placed {
                         let turn = Affine3A::from_scale(Vec3::splat(place.scale));
@@ -167,8 +167,8 @@ pub fn closed() -> Vec<Plan> {
                     } else {
                         mesh_shape(&world.tree(), Affine3A::IDENTITY)
                     };
-                    let judge = ReferenceIntersector::of(&SceneTree::build(vec![shape.clone()]));
-                    let origins = insides(&judge, &world, index as u64);
+                    let reference = ReferenceIntersector::of(&SceneTree::build(vec![shape.clone()]));
+                    let origins = insides(&reference, &world, index as u64);
                     let rays = rays_from_inside(world, origins.clone());
                     (!origins.is_empty()).then(|| stage(name.clone(), vec![shape], 4096, rays))
                 };
@@ -179,7 +179,8 @@ pub fn closed() -> Vec<Plan> {
     plans
 }
 
-/// Rays at corners, along edges and axes, from corners and from afar, with both zeros, denormal and extreme directions.
+/// Rays at corners, along edges and axes, from corners and from afar, with zeros of both signs, denormal and extreme
+/// directions.
 fn awkward_rays(soup: Soup) -> RaySet {
     let size = soup.size();
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z, vec3(-0.0, 1.0, -0.0), vec3(-0.0, -0.0, -1.0)];
@@ -198,7 +199,7 @@ fn awkward_rays(soup: Soup) -> RaySet {
             6 => Ray::new(p.lerp(q, 0.5), random.direction()),
             7 => Ray::new(p + (b - a), a - b),
             8 => {
-                // Almost along an axis: the other components are denormal, or as good as nothing.
+                // Almost along an axis: the other components are denormal or negligible.
                 let tiny = random.point() * 10f32.powi(-44 + random.below(30) as i32);
                 Ray::new(p - axis * size + 0.01 * size * random.point(), axis + tiny)
             }
@@ -246,7 +247,7 @@ pub fn slivers() -> Vec<Plan> {
     })
 }
 
-/// Triangles without area, the same one again and again, and many in one plane.
+/// Triangles without area, duplicates of one triangle, and many triangles in one plane.
 pub fn degenerate() -> Vec<Plan> {
     plans_of_soup(|| {
         let mut random = Random::new(2, 1);
@@ -266,7 +267,7 @@ pub fn degenerate() -> Vec<Plan> {
     })
 }
 
-/// A lattice of boxes and sheets whose faces are where the tree splits.
+/// A lattice of boxes and sheets whose faces lie in split planes of the tree.
 pub fn split_planes() -> Vec<Plan> {
     plans_of_soup(|| {
         let mut soup = Soup::default();
@@ -290,7 +291,7 @@ pub fn split_planes() -> Vec<Plan> {
     })
 }
 
-/// One of each shape, at a place.
+/// One of each shape at a position.
 fn shapes_at(place: SurfaceCase) -> Vec<(&'static str, Shape)> {
     let (a, b, c) = (vec3(-0.7, -0.2, 0.3), vec3(0.9, 0.1, -0.4), vec3(0.2, 0.8, 0.5));
     let SurfaceCase { scale, .. } = place;
@@ -321,7 +322,7 @@ fn shapes_at(place: SurfaceCase) -> Vec<(&'static str, Shape)> {
     ]
 }
 
-/// Rays that leave a surface, half of them within 10⁻¹ to 10⁻⁴ rad of it, do not meet it again.
+/// Rays that leave a surface, half of them within 10⁻¹ to 10⁻⁴ rad of it, must not hit it again.
 pub fn leaving() -> Vec<Plan> {
     let plan = |(place, index): (SurfaceCase, usize)| {
         let shape = shapes_at(place).swap_remove(index);
@@ -343,7 +344,8 @@ pub fn leaving() -> Vec<Plan> {
     SurfaceCase::all().flat_map(|place| (0..n).map(move |index| (place, index))).map(plan).collect()
 }
 
-/// Spheres that touch: the floor, each other, and a floor that is a sphere of 10 km; seen from all around the contact.
+/// Tangent spheres: on a floor, on each other, and on a floor that is a sphere of 10 km; seen from all around the
+/// contact.
 pub fn tangent() -> Vec<Plan> {
     let kinds: [(&str, fn(SurfaceCase) -> Vec<Shape>); 4] = [
         ("sphere on a plane", |place| {

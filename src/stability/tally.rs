@@ -1,4 +1,4 @@
-//! What was counted, and the worst of it.
+//! Counts of findings, and the worst ray.
 
 use glam::Vec3;
 
@@ -9,44 +9,44 @@ pub struct Tally {
     pub rays: u64,
     /// Rays that went through a closed surface.
     pub leaks: u64,
-    /// Rays that met the surface that they had just left.
+    /// Rays that hit the surface that they had just left.
     pub acne: u64,
     /// Sure hits that were not found.
     pub missed: u64,
-    /// Hits that are not where they say they are, or that hide a nearer one.
+    /// Hits that are not on their primitive, or that hide a nearer one.
     pub wrong_t: u64,
     /// Samples that were not finite.
     pub non_finite: u64,
-    /// Samples brighter than anything in the scene can be.
+    /// Samples brighter than the largest radiance of the scene.
     pub above: u64,
-    /// Largest error of light against the known answer, over what is allowed; above 1 is a finding.
+    /// Largest error of radiance against the known value, relative to the allowed error; above 1 is a finding.
     pub energy: Option<Energy>,
     /// The worst ray.
     pub worst: Option<Worst>,
 }
 
-/// Light found against light expected.
+/// Error of the measured radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy {
-    /// Relative to the right answer.
+    /// Relative to the expected radiance.
     pub error: f64,
     pub allowed: f64,
 }
 
 impl Energy {
     pub fn is_finding(&self) -> bool {
-        // NaN is one as well.
+        // NaN is a finding as well.
         !(self.error <= self.allowed)
     }
 }
 
-/// One ray or sample, and how to have it again.
+/// One ray or sample, and the indices to replay it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worst {
-    /// How bad, to compare by: at most 1 is within the bounds.
+    /// Ratio for comparison: at most 1 is within the bounds.
     pub severity: f64,
     pub what: String,
-    /// Index of the stage within its case, and of the ray within the stage.
+    /// Index of the test scene within its case, and of the ray within the test scene.
     pub stage: usize,
     pub ray: u64,
 }
@@ -57,7 +57,7 @@ impl Tally {
         self.leaks + self.acne + self.missed + self.wrong_t + self.non_finite + self.above + energy
     }
 
-    /// The sum does not depend on the order: of equally bad rays the first one counts.
+    /// Adds two tallies. The sum does not depend on the order: of equally bad rays the first one is kept.
     pub fn merged(mut self, other: Self) -> Self {
         self.rays += other.rays;
         self.leaks += other.leaks;
@@ -80,7 +80,7 @@ impl Tally {
         self
     }
 
-    /// Remembers a ray if it is worse than the worst so far.
+    /// Keeps a ray if it is worse than the worst so far.
     pub fn offer(&mut self, severity: f64, stage: usize, ray: u64, what: impl FnOnce() -> String) {
         let severity = if severity.is_nan() { f64::INFINITY } else { severity };
         if self.worst.as_ref().is_none_or(|worst| severity > worst.severity) {
@@ -89,7 +89,7 @@ impl Tally {
     }
 }
 
-/// A number with all its bits, as C writes them: `0x1.8p+1` is 3.
+/// Formats a number with all its bits in the hexadecimal notation of C: `0x1.8p+1` is 3.
 pub fn hex(x: f32) -> String {
     let bits = x.to_bits();
     let (sign, exponent, fraction) = (if x.is_sign_negative() { "-" } else { "" }, bits >> 23 & 0xff, bits & 0x7f_ffff);

@@ -1,8 +1,8 @@
-//! A scene, the rays that are hard on it, and what must be true of the answers.
+//! A test scene: geometry, difficult rays, and checks of the hits.
 
 use super::random::Random;
 use super::reference::{CheckResult, ReferenceIntersector, Solid};
-use super::replay::{Replay, Told};
+use super::replay::{Replay, ReplayValue};
 use super::tally::{Tally, hex, hex3};
 use crate::geometry::{Ray, robust::offset_ray_origin};
 use crate::kdtree::{Hit, HitBatch, RayBatch, RayClass, SceneTree};
@@ -13,28 +13,28 @@ use rayon::prelude::*;
 pub struct TestScene {
     pub name: String,
     pub scene: SceneTree,
-    pub judge: ReferenceIntersector,
-    /// The ray of an index.
+    pub reference: ReferenceIntersector,
+    /// Generates the ray of an index.
     pub rays: RaySet,
-    /// Of so many rays one is held against every primitive; 1 for all.
+    /// One of so many rays is checked against every primitive; 1 for all.
     pub brute_every: u64,
 }
 
 pub type RaySet = Box<dyn Fn(&mut Random) -> Probe + Send + Sync>;
 
-/// One ray, and what is known of it beforehand.
+/// One ray and its expected properties.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
     pub ray: Ray,
-    /// It starts inside a closed surface, so it cannot get away.
+    /// Whether it starts inside a closed surface, so that it cannot escape.
     pub must_hit: bool,
 }
 
-/// Rays that are handed to the kernel together.
+/// Rays per batch query.
 const BATCH: u64 = 2048;
 
 impl TestScene {
-    /// Traces rays `0..n` and counts what is wrong.
+    /// Traces rays `0..n` and counts findings.
     pub fn run(&self, index: usize, n: u64, tick: &(dyn Fn(u64) + Sync)) -> Tally {
         (0..n.div_ceil(BATCH))
             .into_par_iter()
@@ -56,7 +56,7 @@ impl TestScene {
         let mut tally = Tally { rays: end - first, ..Tally::default() };
         let (probes, mut randoms): (Vec<Probe>, Vec<Random>) = (first..end).map(|i| self.probe(stage, i)).unzip();
         let rays: RayBatch = probes.iter().map(|probe| &probe.ray).collect();
-        // Both traversals have their turn.
+        // Alternates between both traversals.
         let class = if (first / BATCH).is_multiple_of(2) { RayClass::Incoherent } else { RayClass::Coherent };
         let (mut hits, mut occluded) = (HitBatch::default(), Vec::new());
         self.scene.closest_hits(&rays, class, &mut hits);
@@ -67,16 +67,16 @@ impl TestScene {
             let hit = hits.get(k);
             if occluded[k] != hit.is_some() {
                 tally.missed += 1;
-                tally.offer(1e9, stage, index, || format!("any-hit says {}: {}", occluded[k], tell(ray, &hit)));
+                tally.offer(1e9, stage, index, || format!("any-hit says {}: {}", occluded[k], describe(ray, &hit)));
             }
             match &hit {
                 None if probe.must_hit => {
                     tally.leaks += 1;
-                    tally.offer(1e9, stage, index, || format!("leak: {}", tell(ray, &hit)));
+                    tally.offer(1e9, stage, index, || format!("leak: {}", describe(ray, &hit)));
                 }
-                _ => self.judge_ray(&mut tally, stage, index, ray, &hit),
+                _ => self.check_ray(&mut tally, stage, index, ray, &hit),
             }
-            // Rays that leave do not meet the same flat primitive again, nor a sphere from outside.
+            // Rays that leave must not hit the same flat primitive again, nor a sphere from outside.
             if let Some(hit) = hit {
                 let next = self.leaving(ray, &hit, &mut randoms[k]);
                 second.push(&next);
@@ -90,19 +90,19 @@ impl TestScene {
             if let Some(found) = self.self_hit(ray, from, &next, &again) {
                 let count = if found == "leak" { &mut tally.leaks } else { &mut tally.acne };
                 *count += 1;
-                tally.offer(1e9, stage, *index, || format!("{found}: {}", tell(&next, &again)));
+                tally.offer(1e9, stage, *index, || format!("{found}: {}", describe(&next, &again)));
             }
         }
         tally
     }
 
-    fn judge_ray(&self, tally: &mut Tally, stage: usize, index: u64, ray: &Ray, hit: &Option<Hit>) {
-        let verdict = if index.is_multiple_of(self.brute_every) {
-            self.judge.check(ray, hit.as_ref())
+    fn check_ray(&self, tally: &mut Tally, stage: usize, index: u64, ray: &Ray, hit: &Option<Hit>) {
+        let check = if index.is_multiple_of(self.brute_every) {
+            self.reference.check(ray, hit.as_ref())
         } else {
-            hit.as_ref().map_or(CheckResult::Right(0.0), |hit| self.judge.check_hit(ray, hit))
+            hit.as_ref().map_or(CheckResult::Right(0.0), |hit| self.reference.check_hit(ray, hit))
         };
-        let severity = match verdict {
+        let severity = match check {
             CheckResult::Right(ratio) => ratio,
             CheckResult::WrongT(ratio) => {
                 tally.wrong_t += 1;
@@ -113,10 +113,10 @@ impl TestScene {
                 1e9
             }
         };
-        tally.offer(severity, stage, index, || tell(ray, hit));
+        tally.offer(severity, stage, index, || describe(ray, hit));
     }
 
-    /// A ray that leaves the hit to either side.
+    /// Returns a ray that leaves the hit on either side.
     fn leaving(&self, ray: &Ray, hit: &Hit, random: &mut Random) -> Ray {
         let point = self.scene.surface_point(ray, hit);
         let side = if random.below(2) == 0 { 1.0 } else { -1.0 };
@@ -124,12 +124,12 @@ impl TestScene {
         Ray::new(offset_ray_origin(point.position, point.error, point.geometric_normal, dir), dir)
     }
 
-    /// What is wrong with the answer to a ray that has just left `from`.
+    /// Returns the finding for a ray that has just left `from`, if any.
     fn self_hit(&self, ray: &Ray, from: &Hit, next: &Ray, again: &Option<Hit>) -> Option<&'static str> {
         let is_same = again.is_some_and(|again| (again.object, again.prim) == (from.object, from.prim));
-        match self.judge.solid(from) {
+        match self.reference.solid(from) {
             Solid::Sphere { radius, .. } => {
-                // From inside, the far side is one chord away, and must be met.
+                // From inside, the far side is one chord away and must be hit.
                 let point = self.scene.surface_point(ray, from);
                 let cos = f64::from(-next.dir.dot(point.geometric_normal));
                 let chord = 2.0 * radius * cos;
@@ -138,7 +138,7 @@ impl TestScene {
                 }
                 let error = f64::from(point.geometric_normal.abs().dot(point.error));
                 match again {
-                    // Where the chord drowns in the rounding of the origin nothing can be said.
+                    // If the chord is within the rounding of the origin, no check is possible.
                     _ if chord * cos < 64.0 * error => None,
                     None => Some("leak"),
                     Some(again) if is_same && f64::from(again.t) < 0.5 * chord => Some("acne"),
@@ -149,33 +149,33 @@ impl TestScene {
         }
     }
 
-    /// Everything about one ray.
+    /// Returns all details of one ray.
     pub fn replay(&self, stage: usize, index: u64) -> Replay {
         let (Probe { ray, must_hit }, mut random) = self.probe(stage, index);
         let hit = self.scene.closest_hit(&ray);
-        let mut told = Replay::default();
-        told.push("stage", Told::Text(self.name.clone()));
-        told.push_ray("", &ray);
-        told.push("must_hit", Told::Flag(must_hit));
-        told.push("any_hit", Told::Flag(self.scene.any_hit(&ray)));
-        told.push_hit("", hit.as_ref());
-        told.push_hit("naive_", self.scene.closest_hit_naive(&ray).as_ref());
-        told.push_verdict(self.judge.check(&ray, hit.as_ref()));
+        let mut replay = Replay::default();
+        replay.push("stage", ReplayValue::Text(self.name.clone()));
+        replay.push_ray("", &ray);
+        replay.push("must_hit", ReplayValue::Flag(must_hit));
+        replay.push("any_hit", ReplayValue::Flag(self.scene.any_hit(&ray)));
+        replay.push_hit("", hit.as_ref());
+        replay.push_hit("naive_", self.scene.closest_hit_naive(&ray).as_ref());
+        replay.push_check(self.reference.check(&ray, hit.as_ref()));
         if let Some(hit) = &hit {
             let point = self.scene.surface_point(&ray, hit);
-            told.push("point", Told::Vector(point.position));
-            told.push("point_error", Told::Vector(point.error));
-            told.push("normal", Told::Vector(point.geometric_normal));
+            replay.push("point", ReplayValue::Vector(point.position));
+            replay.push("point_error", ReplayValue::Vector(point.error));
+            replay.push("normal", ReplayValue::Vector(point.geometric_normal));
             let next = self.leaving(&ray, hit, &mut random);
-            told.push_ray("next_", &next);
-            told.push_hit("next_", self.scene.closest_hit(&next).as_ref());
+            replay.push_ray("next_", &next);
+            replay.push_hit("next_", self.scene.closest_hit(&next).as_ref());
         }
-        told
+        replay
     }
 }
 
-/// A ray with all its bits, and what it met.
-pub fn tell(ray: &Ray, hit: &Option<Hit>) -> String {
+/// Describes a ray with all its bits, and its hit.
+pub fn describe(ray: &Ray, hit: &Option<Hit>) -> String {
     let met = match hit {
         Some(hit) => format!("t {} ({}), object {}, primitive {}", hex(hit.t), hit.t, hit.object, hit.prim),
         None => "nothing".to_owned(),
@@ -183,7 +183,7 @@ pub fn tell(ray: &Ray, hit: &Option<Hit>) -> String {
     format!("origin {} dir {} t_max {} -> {met}", hex3(ray.origin), hex3(ray.dir), hex(ray.t_max))
 }
 
-/// A ray from `origin` towards `target`, of unit length, or along x if they are the same.
+/// Returns a ray from `origin` towards `target` with unit direction, along x if they coincide.
 pub fn towards(origin: Vec3, target: Vec3) -> Ray {
     Ray::new(origin, (target - origin).as_dvec3().normalize_or(glam::DVec3::X).as_vec3())
 }

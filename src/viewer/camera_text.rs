@@ -1,9 +1,9 @@
-//! A view as text: the camera block of a scene file.
+//! A view as the camera block of a scene file.
 
 use crate::frame::navigation::Rig;
 use crate::scene::file::CameraPart;
 
-/// What a scene file says to be seen from here; the pivot becomes `look_at`.
+/// Returns the camera block of this view; the pivot becomes `look_at`.
 pub fn camera_text(rig: &Rig) -> String {
     let Rig { view, projection, lens } = rig;
     let radius = lens.effective_radius();
@@ -23,17 +23,17 @@ pub fn camera_text(rig: &Rig) -> String {
         .indentor("    ")
         .extensions(ron::extensions::Extensions::IMPLICIT_SOME)
         .compact_arrays(true);
-    // Without the line that switches the extension on: a scene file has it switched on already.
+    // Without the line that enables the extension, because a scene file has it already.
     let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
     let text = options.to_string_pretty(&part, style).expect("numbers can be written");
     format!("camera: {text},")
 }
 
-/// To a millionth of `scale`, in as few digits as that takes.
+/// Rounds to a millionth of `scale`, in as few digits as possible.
 fn rounded(value: f64, scale: f64) -> f64 {
     let step = 10f64.powf(6.0 - scale.abs().log10().floor());
     let rounded = (value * step).round() / step;
-    // Without the sign of a negative zero; what has no such rounding, next to a scale of 0, stays as it is.
+    // Adding 0 removes a negative zero. If rounding fails, for a scale near 0, the value is unchanged.
     if rounded.is_finite() { rounded + 0.0 } else { value }
 }
 

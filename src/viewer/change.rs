@@ -1,7 +1,8 @@
-//! What simplifying a mesh does to the picture: the difference between the one with the whole mesh and the one now.
+//! The effect of mesh simplification on the image: the difference between the images with the whole and with the
+//! simplified mesh.
 //!
-//! Both are taken as they are seen, with the noise that they have, from one view and with one display; another view
-//! has no difference to tell until the mesh has been whole in it.
+//! Both images are compared as displayed, including their noise, from one view with one display setting. For another
+//! view there is no difference to report until the whole mesh has been seen from it.
 
 use crate::frame::navigation::Rig;
 use crate::frame::{Picture, Session, ViewMode, ViewOptions};
@@ -12,11 +13,11 @@ use bevy_ecs::prelude::Entity;
 pub struct PictureChange {
     before: Option<Before>,
     measured: Option<Difference>,
-    /// The picture that was compared last.
+    /// Number of the image compared last.
     seen: u64,
 }
 
-/// The picture with the whole mesh.
+/// The image with the whole mesh.
 struct Before {
     entity: Entity,
     rig: Rig,
@@ -24,19 +25,19 @@ struct Before {
     picture: Picture,
 }
 
-/// Of two pictures of one size.
+/// Difference of two images of one size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Of what is shown, as a share of the way from black to white.
+    /// Mean difference of the displayed values, as a fraction of the range from black to white.
     pub mean: f64,
-    /// The share of the pixels in which some channel differs by more than a twentieth of that way.
+    /// Fraction of the pixels in which some channel differs by more than a twentieth of that range.
     pub plain: f64,
-    /// Samples per pixel of the picture before, and of the one now.
+    /// Samples per pixel of the image before, and of the current one.
     pub spp: [u32; 2],
 }
 
 impl PictureChange {
-    /// The mesh of `entity` is about to be made anew; whether it `is_whole` now.
+    /// Records the image before the mesh of `entity` is rebuilt, if the mesh `is_whole`.
     pub fn begin(&mut self, entity: Entity, is_whole: bool, session: &Session) {
         let picture = session.picture();
         if !is_whole || picture.divider != 1 || !is_plain(session) {
@@ -47,7 +48,7 @@ impl PictureChange {
         (self.before, self.measured) = (Some(before), None);
     }
 
-    /// Compares, if there is a new picture and it can be compared.
+    /// Compares, if there is a new image and it is comparable.
     pub fn follow(&mut self, session: &Session) {
         let picture = session.picture();
         let Some(before) = &self.before else { return };
@@ -63,18 +64,18 @@ impl PictureChange {
         }
     }
 
-    /// Of the picture with the whole mesh of `entity`, if that was seen from here.
+    /// The difference to the image with the whole mesh of `entity`, if that was seen from this view.
     pub fn of(&self, entity: Entity) -> Option<Difference> {
         self.measured.filter(|_| self.before.as_ref().is_some_and(|before| before.entity == entity))
     }
 }
 
-/// Nothing is shown in place of the picture, or over it.
+/// Whether the image is shown, without inspection or overlay.
 fn is_plain(session: &Session) -> bool {
     session.world().resource::<ViewMode>().0 == ViewOptions::default()
 }
 
-/// `None` for pictures of different sizes.
+/// Computes the difference; `None` for images of different sizes.
 fn difference(a: &Picture, b: &Picture) -> Option<Difference> {
     let size = (a.width, a.height);
     if size != (b.width, b.height) || a.rgba.len() != b.rgba.len() || a.rgba.is_empty() {
@@ -114,7 +115,7 @@ mod tests {
         assert_eq!(difference(&Picture::default(), &Picture::default()), None);
     }
 
-    /// The more faces go, the more the picture changes; from elsewhere there is nothing to compare.
+    /// The fewer faces, the larger the difference; from another view there is nothing to compare.
     #[test]
     fn a_coarser_mesh_changes_the_picture_more() {
         let target = Target { spp: Some(16), ..Target::default() };

@@ -1,8 +1,8 @@
-//! A file chosen in a dialog of the desktop.
+//! File dialogs of the desktop.
 //!
-//! The dialog is a program of its own, zenity or kdialog, whichever is there: toolkits and message buses would be more
-//! code than the whole window, for something that a drop on the window does as well. It is waited for on a thread, so
-//! the picture goes on.
+//! A dialog is a separate program, zenity or kdialog, whichever is installed: toolkits and message buses would be more
+//! code than the whole window, for something that dropping a file on the window does as well. A thread waits for it, so
+//! that rendering continues.
 
 use crate::frame::{Command, Edit, Id, NewThing, Waker};
 use crate::scene::model::ModelFormat;
@@ -14,12 +14,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-/// What the file is for.
+/// The purpose of the chosen file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DialogPurpose {
     Open,
     AddMesh,
-    /// In the place of the colour of this material.
+    /// As the texture of this material's colour.
     Texture {
         id: Id,
     },
@@ -34,7 +34,7 @@ impl DialogPurpose {
         }
     }
 
-    /// Patterns of names, as shells write them.
+    /// File name patterns in shell syntax.
     fn patterns(self) -> String {
         match self {
             Self::Open => format!("*.ron {} *.png *.exr", ModelFormat::patterns()),
@@ -43,7 +43,7 @@ impl DialogPurpose {
         }
     }
 
-    /// What follows from the choice.
+    /// The command for the chosen file.
     pub fn command(self, path: PathBuf) -> Command {
         match self {
             Self::Open => Command::Open { path },
@@ -63,23 +63,23 @@ type DialogAnswer = Result<(DialogPurpose, PathBuf), String>;
 
 pub struct Dialog {
     waker: Waker,
-    /// One at a time is enough.
+    /// Whether a dialog is open; there is at most one.
     open: Arc<AtomicBool>,
     sender: Sender<DialogAnswer>,
     receiver: Receiver<DialogAnswer>,
 }
 
 impl Dialog {
-    /// `waker` is called when there is an answer.
+    /// Creates the dialogs; `waker` is called when there is an answer.
     pub fn new(waker: Waker) -> Self {
         let (sender, receiver) = channel();
         Self { waker, open: Arc::default(), sender, receiver }
     }
 
-    /// Shows a dialog that begins in `folder`.
+    /// Shows a dialog that starts in `folder`.
     ///
     /// # Errors
-    /// When this system has none, in words for people.
+    /// If this system has no dialog; the message is for users.
     pub fn ask(&self, purpose: DialogPurpose, folder: &Path) -> Result<(), String> {
         let path = std::env::var_os("PATH").unwrap_or_default();
         let found = find(&path).ok_or("no file dialog found (install zenity or kdialog): drop a file on the window")?;
@@ -91,7 +91,7 @@ impl Dialog {
         let work = move || {
             let answer = run(&found.0, &arguments);
             open.store(false, Ordering::Release);
-            // The window may be gone, and then nobody needs the answer.
+            // If the window is gone, the answer is not needed.
             if let Some(answer) = answer.transpose() {
                 let _ = sender.send(answer.map(|path| (purpose, path)));
             }
@@ -104,7 +104,7 @@ impl Dialog {
         })
     }
 
-    /// What was chosen since the last call.
+    /// The answers since the last call.
     pub fn answers(&self) -> Vec<DialogAnswer> {
         self.receiver.try_iter().collect()
     }
@@ -116,7 +116,7 @@ enum DialogKind {
     Kdialog,
 }
 
-/// The first dialog in the folders of `path`.
+/// Returns the first dialog program in the folders of `path`.
 fn find(path: &std::ffi::OsStr) -> Option<(PathBuf, DialogKind)> {
     [("zenity", DialogKind::Zenity), ("kdialog", DialogKind::Kdialog)].into_iter().find_map(|(name, kind)| {
         let file = std::env::split_paths(path).map(|folder| folder.join(name)).find(|file| file.is_file())?;
@@ -125,7 +125,7 @@ fn find(path: &std::ffi::OsStr) -> Option<(PathBuf, DialogKind)> {
 }
 
 fn arguments(kind: DialogKind, purpose: DialogPurpose, folder: &Path) -> Vec<OsString> {
-    // Ends in a separator, or the folder itself would be offered.
+    // Ends in a separator, because otherwise the folder itself would be preselected.
     let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()).join("");
     match kind {
         DialogKind::Zenity => {
@@ -143,7 +143,7 @@ fn arguments(kind: DialogKind, purpose: DialogPurpose, folder: &Path) -> Vec<OsS
     }
 }
 
-/// What was chosen; `None` where nothing was.
+/// Runs a dialog; returns the chosen file, `None` if it was cancelled.
 fn run(program: &Path, arguments: &[OsString]) -> Result<Option<PathBuf>, String> {
     let output = Program::new(program).args(arguments).stdin(Stdio::null()).stderr(Stdio::null()).output();
     let output = output.map_err(|error| format!("{}: {error}", program.display()))?;

@@ -1,42 +1,42 @@
-//! Is there a display, and which? Decided before the event loop is made, because a process can make only one.
+//! Detection of the display server, before the event loop is created, because a process can create only one.
 
 use std::any::Any;
 
-/// What the environment offers.
+/// The display server to use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DisplayServer {
     /// Let the window library choose.
     Default,
-    /// Wayland is announced but nobody listens, and X11 is there too.
+    /// Wayland is announced but does not respond, and X11 is available.
     ForceX11,
     None,
 }
 
-/// Looks for a display.
+/// Detects the display server.
 #[cfg(all(unix, not(target_os = "macos")))]
 pub fn find() -> DisplayServer {
     use std::path::PathBuf;
     let var = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
-    // An absolute name counts as it is; `join` keeps it so.
+    // If the name is absolute, `join` returns it unchanged.
     let wayland = var("WAYLAND_DISPLAY").map(|name| {
         let socket = PathBuf::from(var("XDG_RUNTIME_DIR").unwrap_or_default()).join(name);
         std::os::unix::net::UnixStream::connect(socket).is_ok()
     });
-    // A socket handed over by the parent is open already.
+    // A socket inherited from the parent is already open.
     let wayland = if var("WAYLAND_SOCKET").is_some() { Some(true) } else { wayland };
     choose(wayland, var("DISPLAY").is_some())
 }
 
-/// Every other desktop has a display by being one.
+/// Other desktops always have a display.
 #[cfg(not(all(unix, not(target_os = "macos"))))]
 pub fn find() -> DisplayServer {
     DisplayServer::Default
 }
 
-/// From now on, panics over a lost display print nothing: who catches them tells people what happened.
+/// Silences panics over a lost display; the code that catches them reports the error.
 ///
-/// The window library unwraps the answers of the X server, also in calls that cannot report an error.
-pub(super) fn say_nothing_of_its_loss() {
+/// The window library unwraps the replies of the X server, also in calls that cannot return an error.
+pub(super) fn silence_loss_panics() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         if !is_loss(info.payload()) {
@@ -45,7 +45,7 @@ pub(super) fn say_nothing_of_its_loss() {
     }));
 }
 
-/// Is this what the window library panics with when the display's server no longer answers?
+/// Whether this is a panic of the window library after the display server stopped responding.
 pub(super) fn is_loss(panic: &(dyn Any + Send)) -> bool {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
     text.is_some_and(|text| {
@@ -53,12 +53,12 @@ pub(super) fn is_loss(panic: &(dyn Any + Send)) -> bool {
     })
 }
 
-/// `wayland`: announced, and whether somebody listens; `x11`: announced.
+/// Chooses a server. `wayland`: if announced, whether it responds; `x11`: whether it is announced.
 #[cfg_attr(not(all(unix, not(target_os = "macos"))), allow(dead_code))]
 fn choose(wayland: Option<bool>, x11: bool) -> DisplayServer {
     match (wayland, x11) {
         (Some(true), _) | (None, true) => DisplayServer::Default,
-        // The window library would try Wayland alone and give up.
+        // The window library would only try Wayland and give up.
         (Some(false), true) => DisplayServer::ForceX11,
         (Some(false) | None, false) => DisplayServer::None,
     }

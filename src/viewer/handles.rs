@@ -1,4 +1,4 @@
-//! What is selected, over the picture: its box and its handles, and dragging them.
+//! Overlays of the selection: its bounds and its handles, and dragging them.
 
 use crate::frame::gizmo::{Drag, Gizmo, Handle, Mode};
 use crate::frame::{Command, Edit, OwnBox, Projector, Selection, Session};
@@ -14,7 +14,7 @@ const AXES: [Color32; 3] =
 const MIDDLE: Color32 = Color32::from_gray(235);
 const GRABBED: Color32 = Color32::from_rgb(255, 235, 120);
 
-/// What is to be drawn, found out before drawing.
+/// The overlays to be drawn, computed before drawing.
 #[derive(Default)]
 pub struct Handles {
     boxes: Vec<OwnBox>,
@@ -22,11 +22,12 @@ pub struct Handles {
     projector: Option<Projector>,
     hovered: Option<Handle>,
     grabbed: Option<Grabbed>,
-    /// What is selected and cannot be seen: its name, and its middle.
+    /// The selected object if it is out of view: its name and its centre.
     out_of_view: Option<(String, DVec3)>,
 }
 
-/// A drag under way. The handles stay where they were grabbed, so that the measure does not move with what it measures.
+/// A drag in progress. The handles stay where they were grabbed, so that the drag does not move its own frame of
+/// reference.
 struct Grabbed {
     gizmo: Gizmo,
     handle: Handle,
@@ -35,7 +36,7 @@ struct Grabbed {
 }
 
 impl Handles {
-    /// Looks at what is selected now; `size`: of the window, points.
+    /// Updates to the current selection; `size`: of the window, points.
     pub fn update(&mut self, session: &mut Session, mode: Option<Mode>, size: DVec2) {
         self.boxes.clear();
         let selected = session.world().resource::<Selection>().0.clone();
@@ -62,7 +63,7 @@ impl Handles {
         }
     }
 
-    /// The mouse went down: whether it holds a handle now.
+    /// Handles a mouse press; returns whether it grabbed a handle.
     pub fn grab(&mut self, mouse: DVec2) -> bool {
         let Some((gizmo, projector)) = self.gizmo else { return false };
         let handle = gizmo.handle_at(mouse, &projector);
@@ -70,7 +71,7 @@ impl Handles {
         handle.is_some()
     }
 
-    /// The mouse is here: what follows, or whether other handles are to be drawn.
+    /// Handles a mouse movement; returns the command of a drag, and whether the handles must be redrawn.
     pub fn mouse_at(&mut self, mouse: DVec2, snap: bool) -> (Option<Command>, bool) {
         let Some((gizmo, projector)) = self.gizmo else { return (None, false) };
         if let Some(grabbed) = &mut self.grabbed {
@@ -92,7 +93,7 @@ impl Handles {
         (None, news)
     }
 
-    /// The mouse came up: whether it had held a handle.
+    /// Handles a mouse release; returns whether a handle was grabbed.
     pub fn release(&mut self) -> bool {
         self.grabbed.take().is_some()
     }
@@ -101,7 +102,7 @@ impl Handles {
         self.grabbed.is_some()
     }
 
-    /// An arrow at the edge of `free`, the part of the window that nothing covers, if what is selected is out of view.
+    /// Draws an arrow at the edge of `free`, the uncovered part of the window, if the selection is out of view.
     pub fn draw_hint(&self, context: &Context, free: Rect) {
         let (Some(projector), Some((name, middle))) = (&self.projector, &self.out_of_view) else { return };
         let inner = free.shrink(16.0);
@@ -109,7 +110,7 @@ impl Handles {
             return;
         }
         let center = inner.center();
-        // What is straight behind can be reached by turning either way.
+        // What is exactly behind the camera can be reached in either direction.
         let way = projector.way_to(*middle).map_or(egui::Vec2::DOWN, |way| egui::vec2(way.x as f32, way.y as f32));
         let part = (inner.width() / 2.0 / way.x.abs()).min(inner.height() / 2.0 / way.y.abs());
         let tip = center + part * way;
@@ -119,12 +120,12 @@ impl Handles {
         painter.add(egui::Shape::convex_polygon(arrow, SELECTED, Stroke::new(1.0, Color32::BLACK)));
         let text = format!("{name} is out of view: press F to frame it");
         let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
-        // A window this small shows the arrow alone.
+        // A window this small shows only the arrow.
         if inner.width() < galley.size().x + 8.0 || inner.height() < galley.size().y + 8.0 {
             return;
         }
         let room = inner.shrink2(galley.size() / 2.0 + egui::Vec2::splat(4.0));
-        // Behind the arrow, which nothing hides.
+        // Behind the arrow, which must stay visible.
         let half = 0.5 * (galley.size().x * way.x.abs() + galley.size().y * way.y.abs());
         let at = (tip - (24.0 + half) * way).clamp(room.min, room.max);
         let rect = Rect::from_center_size(at, galley.size());
@@ -186,13 +187,13 @@ impl Handles {
     }
 }
 
-/// Whether any part of the box may be in the window. What has no end is everywhere.
+/// Whether any part of the bounds may be in the window. Unbounded objects are always visible.
 fn is_seen(own: &OwnBox, projector: &Projector, size: DVec2) -> bool {
     if own.min == own.max {
         return true;
     }
     let corners = own.corners();
-    // A box around the camera is seen, or what is in it; one that reaches behind the camera may be.
+    // Bounds around the camera are visible, or what is in them; those that reach behind the camera may be.
     let places: Vec<Option<DVec2>> = corners.iter().map(|&corner| projector.place(corner)).collect();
     let in_front: Vec<DVec2> = places.iter().copied().flatten().collect();
     if in_front.is_empty() {
@@ -211,11 +212,11 @@ fn own_axes(placement: Option<&Placement>) -> [DVec3; 3] {
     [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.try_normalize().unwrap_or(DVec3::X))
 }
 
-/// The corners of a box, drawn in along its edges, so that what is inside stays visible.
+/// Draws only the corners of a box along its edges, so that its content stays visible.
 fn draw_box(painter: &egui::Painter, own: &OwnBox, projector: &Projector, color: Color32) {
     let corners = own.corners();
     if own.min == own.max {
-        // What has no end, or is a point.
+        // Unbounded objects, and points.
         if let Some(place) = projector.place(own.middle()) {
             painter.circle_stroke(pos(place), 9.0, Stroke::new(1.5, color));
         }

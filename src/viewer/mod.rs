@@ -1,26 +1,26 @@
-//! The window: winit for events, pixels for the picture, egui for what is written over it.
+//! The window: winit for events, pixels for the image, egui for overlays.
 //!
-//! It turns keys and mouse into commands for a [`crate::frame::Session`] and shows the pictures that come back; it
-//! knows nothing of how they are made, and never waits for them. Without this room (feature `viewer` off) the library
-//! and the command line need no display code at all.
+//! It translates keys and mouse to commands for a [`crate::frame::Session`] and shows the resulting images. It does not
+//! depend on how they are rendered, and never waits for them. Without this module (feature `viewer` off) the library
+//! and the command line need no display code.
 //!
 //! | file | about |
 //! |---|---|
-//! | `app` | the event loop: what happens when |
-//! | `presenter` | picture and overlays onto the window; the only place that knows the graphics device |
-//! | [`keys`] | the one table of keys and gestures |
-//! | `input` | keys and mouse to commands, independent of the frame rate |
-//! | `panel` | every setting and figure, answered with commands |
-//! | `handles` | what is selected: its box and its handles |
-//! | `story` | why a pixel looks as it does: paths and a table |
-//! | `brush` | the rectangle that gets all samples |
-//! | `change` | what simplifying a mesh does to the picture |
-//! | `reaction` | how long a person waits |
-//! | `overlay`, `status`, `toasts`, `camera_text` | what is written over the picture |
-//! | `saver` | pictures to disk, on the side |
-//! | `dialog` | a file chosen in a dialog of the desktop |
-//! | `question` | what is asked before edits are lost |
-//! | [`display`] | is there a display at all |
+//! | `app` | the event loop |
+//! | `presenter` | drawing of image and overlays; the only file that uses the graphics device |
+//! | [`keys`] | the table of keys and gestures |
+//! | `input` | translation of keys and mouse to commands, independent of the frame rate |
+//! | `panel` | every setting and figure; its results are commands |
+//! | `handles` | bounds and handles of the selection |
+//! | `story` | explanation of a pixel: paths and a table |
+//! | `region_tool` | the rectangle that gets all samples |
+//! | `change` | the effect of mesh simplification on the image |
+//! | `reaction` | input latency |
+//! | `overlay`, `status`, `toasts`, `camera_text` | text over the image |
+//! | `saver` | saving of images in the background |
+//! | `dialog` | file dialogs of the desktop |
+//! | `question` | questions before edits are lost |
+//! | [`display`] | detection of the display server |
 
 mod app;
 mod camera_text;

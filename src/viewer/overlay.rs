@@ -1,4 +1,4 @@
-//! What is written over the picture: the status line, messages, and the list of keys.
+//! Overlays on the image: the status line, messages, and the list of keys.
 
 use super::keys::{Binding, finds, shown};
 use super::toasts::{Toast, Tone};
@@ -7,20 +7,20 @@ use crate::printable;
 use crate::render::{Legend, scale_color};
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Frame, Margin, Order, RichText, Stroke, Vec2};
 
-/// Dark glass, so that text reads on any picture.
-/// Of panels and lists, which are read for longer.
+/// Background of panels and lists, nearly opaque because they are read for longer.
 pub const PANE: Color32 = Color32::from_rgba_premultiplied(19, 20, 23, 246);
+/// Background of other overlays, dark so that text is readable on any image.
 pub const GLASS: Color32 = Color32::from_rgba_premultiplied(9, 10, 12, 225);
 const TEXT: Color32 = Color32::from_gray(228);
 const KEY: Color32 = Color32::from_rgb(250, 205, 125);
 const PROBLEM: Color32 = Color32::from_rgb(255, 140, 120);
 const TEXT_SIZE: f32 = 13.0;
 
-/// Sets up how overlays look, once.
+/// Sets the style of overlays, once.
 pub fn style(context: &Context) {
     context.options_mut(|options| {
         options.theme_preference = egui::ThemePreference::Dark;
-        // Ctrl with + and - belongs to the field of view.
+        // Ctrl with + and - controls the field of view.
         options.zoom_with_keyboard = false;
     });
     context.all_styles_mut(|style| {
@@ -31,7 +31,7 @@ pub fn style(context: &Context) {
     });
 }
 
-/// The line at the lower edge; it takes no mouse.
+/// Draws the status line at the lower edge; it ignores the mouse.
 pub fn status_line(context: &Context, left: &str, right: &str) {
     let (left, right) = (&*printable::line(left), &*printable::line(right));
     let screen = context.content_rect();
@@ -55,7 +55,7 @@ pub fn status_line(context: &Context, left: &str, right: &str) {
             let (rect, _) = ui.allocate_exact_size(Vec2::new(width, height), egui::Sense::hover());
             ui.painter().rect_filled(rect, 0.0, GLASS);
             ui.painter().galley(rect.left_top() + Vec2::new(margin, 4.0), left, TEXT);
-            // What does not fit beside the figures is left out whole: half a word helps nobody.
+            // Settings that do not fit beside the figures are omitted as a whole: a partial word is useless.
             let right = layout(right, Color32::from_gray(165), f32::INFINITY);
             if right.size().x <= room {
                 let at = rect.right_top() + Vec2::new(-margin - right.size().x, 4.0);
@@ -64,12 +64,12 @@ pub fn status_line(context: &Context, left: &str, right: &str) {
         });
 }
 
-/// The name of a key, beside what it does.
+/// Style of a key's name.
 pub fn style_key(key: &str) -> RichText {
     RichText::new(key).size(TEXT_SIZE - 1.0).color(KEY)
 }
 
-/// Messages in the upper left corner; they take no mouse.
+/// Draws messages in the upper left corner; they ignore the mouse.
 pub fn toasts(context: &Context, toasts: &[Toast]) {
     egui::Area::new("toasts".into())
         .order(Order::Foreground)
@@ -85,17 +85,17 @@ pub fn toasts(context: &Context, toasts: &[Toast]) {
         });
 }
 
-/// What the list of keys remembers while it is open.
+/// State of the list of keys while it is open.
 #[derive(Default)]
 pub struct Help {
     pub open: bool,
-    /// Only lines with all of these words are shown.
+    /// Only lines that match all of these words are shown.
     search: String,
-    /// Just opened: the search field takes the keyboard.
+    /// Just opened: the search field takes the focus.
     fresh: bool,
-    /// Somebody has typed into the search field or clicked it: letters are meant for it.
+    /// The user has typed into the search field or clicked it: letters belong to it.
     touched: bool,
-    /// The search field has the keyboard, though perhaps only because the list was opened.
+    /// The search field has the focus, perhaps only because the list was opened.
     focused: bool,
 }
 
@@ -104,23 +104,23 @@ impl Help {
         *self = Self { open: !self.open, search: String::new(), fresh: true, touched: false, focused: false };
     }
 
-    /// Somebody has typed a letter, which the search field gets when it is drawn next.
+    /// Records a typed letter, which the search field gets when it is drawn next.
     pub fn note_letter(&mut self) {
         self.touched |= self.open && (self.fresh || self.focused);
     }
 
-    /// The letter that opened it closes it again, until letters are meant for the search field.
+    /// Whether the letter that opened it closes it: until letters belong to the search field.
     pub fn closes_by_its_letter(&self) -> bool {
         self.open && !self.touched && (self.fresh || self.focused)
     }
 
-    /// It is about to be drawn for the first time.
+    /// Whether it has not been drawn since it was opened.
     pub fn is_fresh(&self) -> bool {
         self.open && self.fresh
     }
 }
 
-/// The list of keys, in the middle, to be searched and scrolled.
+/// Draws the list of keys in the middle, with search field and scroll bar.
 pub fn help(context: &Context, help: &mut Help, navigation: Navigation) {
     let screen = context.content_rect();
     let column_width = 430.0_f32.min(screen.width() - 60.0).max(120.0);
@@ -164,7 +164,7 @@ pub fn help(context: &Context, help: &mut Help, navigation: Navigation) {
         });
 }
 
-/// Splits the groups so that the columns are about as long as each other.
+/// Splits the groups into columns of about equal length.
 fn in_columns<'a>(groups: &'a [(&'a str, Vec<&'a Binding>)], columns: usize) -> Vec<&'a [(&'a str, Vec<&'a Binding>)]> {
     if columns < 2 {
         return vec![groups];
@@ -181,7 +181,7 @@ fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[(&str, Vec<&Binding>)], w
         ui.label(RichText::new(*title).size(TEXT_SIZE + 2.0).strong());
         egui::Grid::new(("keys", id, title)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
             for binding in bindings {
-                // Both sides wrap rather than push each other out.
+                // Both columns wrap rather than displace each other.
                 ui.scope(|ui| {
                     ui.set_width(keys_width);
                     ui.add(egui::Label::new(RichText::new(binding.keys()).size(TEXT_SIZE).color(KEY)).wrap());
@@ -197,9 +197,9 @@ fn groups_grid(ui: &mut egui::Ui, id: usize, groups: &[(&str, Vec<&Binding>)], w
     }
 }
 
-/// What the colours of an inspection mean, in the lower left corner; it takes no mouse.
+/// Draws the legend of an inspection in the lower left corner; it ignores the mouse.
 pub fn legend(context: &Context, title: &str, legend: Option<Legend>) {
-    // Where it stands follows from how high it was when it was drawn last.
+    // Its position depends on its height in the last frame.
     egui::Area::new(egui::Id::new(("legend", legend.is_some())))
         .order(Order::Foreground)
         .interactable(false)
@@ -231,7 +231,7 @@ pub fn legend(context: &Context, title: &str, legend: Option<Legend>) {
         });
 }
 
-/// Three digits that mean something.
+/// Formats with three significant digits.
 fn short(value: f32) -> String {
     match value.abs() {
         v if v >= 100.0 || v.fract() == 0.0 => format!("{value:.0}"),

@@ -1,7 +1,7 @@
-//! Puts a picture and the overlays on a window: the only file that knows pixels and wgpu.
+//! Presents an image and the overlays on a window: the only file that uses pixels and wgpu.
 //!
-//! One graphics device serves both. The picture and the window have sizes of their own; the picture is stretched
-//! over the window, so a coarse one shown while moving fills it too. Nothing here waits for rendering.
+//! One graphics device serves both. The image and the window have separate sizes; the image is stretched over the
+//! window, so a coarse image shown while moving fills it too. Nothing here waits for rendering.
 
 use crate::frame::Picture;
 use pixels::{Pixels, PixelsBuilder, ScalingMode, SurfaceTexture, wgpu};
@@ -11,7 +11,7 @@ use thiserror::Error;
 use winit::event::WindowEvent;
 use winit::window::Window;
 
-/// Why there is nothing to be seen.
+/// Why nothing can be presented.
 #[derive(Debug, Error)]
 pub enum PresentError {
     #[error(
@@ -24,12 +24,12 @@ pub enum PresentError {
     Texture(#[from] pixels::TextureError),
 }
 
-/// What came of presenting.
+/// Result of presenting a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Presented {
-    /// When the overlays want to be drawn again; `Duration::MAX` for never.
+    /// When the overlays are to be repainted; `Duration::MAX` for never.
     pub repaint_after: Duration,
-    /// The window was not ready; draw again at the next chance.
+    /// The window was not ready; draw again at the next opportunity.
     pub again: bool,
 }
 
@@ -54,9 +54,8 @@ impl Presenter {
             }
             other => PresentError::Failed(other),
         };
-        // Bytes are what the screen wants already, and overlays are mixed as bytes: no conversions, which a processor
-        // that stands in for a graphics card would have to make for every pixel. Nor does the picture let anything
-        // through.
+        // The bytes are display values already, and overlays are blended as bytes: no conversions, which a software
+        // renderer would have to do for every pixel. The image is opaque.
         let mut pixels = PixelsBuilder::new(width, height, surface)
             .texture_format(wgpu::TextureFormat::Rgba8Unorm)
             .surface_texture_format(wgpu::TextureFormat::Bgra8Unorm)
@@ -65,13 +64,13 @@ impl Presenter {
             .map_err(no_driver)?;
         let modes = &pixels.context().surface_capabilities.present_modes;
         let can = |mode| modes.contains(&mode);
-        // A frame that waits for the screen keeps the next input waiting. The scheduler makes pictures hardly faster than a
-        // screen shows them, so the ones that are replaced before they are seen are few.
+        // Waiting for vertical sync would delay the next input. The scheduler produces images hardly faster than the
+        // display rate, so few are replaced before they are shown.
         let best = [wgpu::PresentMode::Mailbox, wgpu::PresentMode::Immediate].into_iter().find(|&mode| can(mode));
         if let Some(mode) = best {
             pixels.set_present_mode(mode);
         }
-        // The default handler panics; a frame that failed is followed by another.
+        // The default handler panics; a failed frame is followed by another.
         pixels.device().on_uncaptured_error(Arc::new(|error| log::error!("graphics: {error}")));
         let egui_state = egui_winit::State::new(
             egui::Context::default(),
@@ -93,22 +92,22 @@ impl Presenter {
         self.egui_state.egui_ctx()
     }
 
-    /// Physical pixels of a point, the unit of the overlays.
+    /// Physical pixels per point, the unit of overlays.
     pub fn pixels_per_point(&self) -> f32 {
         self.egui_state.egui_ctx().pixels_per_point()
     }
 
-    /// The largest side of a picture that can be shown.
+    /// The largest side of an image that can be shown.
     pub fn max_side(&self) -> u32 {
         self.pixels.device().limits().max_texture_dimension_2d
     }
 
-    /// Tells the overlays what happened; answers whether they took it, and whether they want to be drawn again.
+    /// Passes an event to the overlays; returns whether they consumed it, and whether they need a repaint.
     pub fn on_window_event(&mut self, event: &WindowEvent) -> egui_winit::EventResponse {
         self.egui_state.on_window_event(&self.window, event)
     }
 
-    /// Takes a picture to show from now on.
+    /// Sets the image to show.
     pub fn set_picture(&mut self, picture: &Picture) -> Result<(), PresentError> {
         let size = (picture.width, picture.height);
         if size.0 == 0 || size.1 == 0 || picture.rgba.len() != size.0 as usize * size.1 as usize * 4 {
@@ -123,22 +122,22 @@ impl Presenter {
         Ok(())
     }
 
-    /// The picture fills the window; where it is as large, its pixels are those of the window, which is cheaper.
+    /// Fits the image to the window; at equal sizes without scaling, which is cheaper.
     fn fit_picture(&mut self) -> Result<(), PresentError> {
         let (width, height) = self.surface_size;
         let is_as_large = self.picture_size == self.surface_size;
         self.pixels.set_scaling_mode(if is_as_large { ScalingMode::PixelPerfect } else { ScalingMode::Fill });
-        // Where the picture lies depends on the mode, and is worked out here.
+        // The position of the image depends on the mode and is recomputed by this call.
         Ok(self.pixels.resize_surface(width, height)?)
     }
 
-    /// Draws the picture with `overlays` over it. A window without pixels is left alone.
+    /// Draws the image with `overlays` over it. Does nothing for a window without pixels.
     pub fn present(&mut self, overlays: impl FnMut(&egui::Context)) -> Result<Presented, PresentError> {
         let context = self.egui_state.egui_ctx().clone();
         let output = context.run(self.egui_state.take_egui_input(&self.window), overlays);
         self.egui_state.handle_platform_output(&self.window, output.platform_output);
         let (device, queue) = (self.pixels.device(), self.pixels.queue());
-        // Told once only, so even if this frame is not shown.
+        // Textures are reported only once, so they are updated even if this frame is not shown.
         for (id, delta) in &output.textures_delta.set {
             self.egui_renderer.update_texture(device, queue, *id, delta);
         }
@@ -152,7 +151,7 @@ impl Presenter {
         Ok(Presented { repaint_after, again: !shown? })
     }
 
-    /// False when the surface was not ready.
+    /// Draws; returns false if the surface was not ready.
     fn draw(&mut self, jobs: &[egui::ClippedPrimitive], pixels_per_point: f32) -> Result<bool, PresentError> {
         let size = self.window.inner_size();
         if size.width == 0 || size.height == 0 {
@@ -163,7 +162,7 @@ impl Presenter {
             self.surface_size = surface_size;
             self.fit_picture()?;
         }
-        // The surface's own size: the window's may be newer already.
+        // Uses the surface's own size: the window's may be newer already.
         let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: [surface_size.0, surface_size.1], pixels_per_point };
         let (egui_renderer, window) = (&mut self.egui_renderer, &self.window);
         let result = self.pixels.render_with(|encoder, view, context| {

@@ -1,30 +1,29 @@
-//! What a person is asked before something is lost: a small dialog in the middle, answered by mouse or by key.
+//! Questions before something is lost: a small modal dialog, answered by mouse or by key.
 
 use super::overlay::style_key;
 use crate::frame::{Command, LeftBehind};
 use egui::{Align, Context, Frame, Id, Layout, Modal, RichText};
 use winit::keyboard::{Key, NamedKey};
 
-/// What is asked.
+/// A question to the user.
 #[derive(Debug)]
 pub enum Question {
-    /// The scene of this name has edits that are not saved, and is about to make room for another, or the window is about to
-    /// close.
+    /// The scene of this name has unsaved edits, and another scene or closing the window is about to replace it.
     ///
-    /// - `file`: what saving writes.
+    /// - `file`: the file that saving writes.
     Leave { title: String, file: String, then: Option<Command> },
-    /// An earlier window ended before its edits were saved.
+    /// An earlier window ended with unsaved edits.
     Restore(LeftBehind),
 }
 
-/// What the person wants.
+/// The user's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// Save and leave; or take back what was left behind.
+    /// Save and leave; or restore the edits.
     Yes,
-    /// Leave without saving; or forget what was left behind.
+    /// Leave without saving; or discard the edits.
     No,
-    /// Go on as if nothing had been asked.
+    /// Cancel the question.
     Later,
 }
 
@@ -53,7 +52,7 @@ impl Question {
         }
     }
 
-    /// What a key that was pressed answers.
+    /// The answer of a pressed key.
     pub fn key(key: &Key) -> Option<Answer> {
         match key {
             Key::Named(NamedKey::Enter) => Some(Answer::Yes),
@@ -63,7 +62,7 @@ impl Question {
         }
     }
 
-    /// Draws it; the answer when a button was pressed.
+    /// Draws the question; returns the answer when a button is pressed.
     pub fn show(&self, context: &Context) -> Option<Answer> {
         let (heading, explanation) = self.text();
         let mut answer = None;

@@ -1,4 +1,4 @@
-//! How long a person waits: from an input that changes the picture to the first new pixels on the window.
+//! Input latency: from an input that changes the image to the first new pixels on the window.
 
 use crate::frame::LatencyHistogram;
 use std::collections::VecDeque;
@@ -6,28 +6,28 @@ use std::time::Instant;
 
 #[derive(Clone, Debug, Default)]
 pub struct Reaction {
-    /// An input that has not reached the session yet.
+    /// Time of the first input that has not reached the session yet.
     input: Option<Instant>,
-    /// Inputs that wait for the picture of a generation.
+    /// Inputs that wait for the image of a generation.
     waiting: VecDeque<(u64, Instant)>,
     waits: LatencyHistogram,
 }
 
 impl Reaction {
-    /// Something that may change the picture was asked for.
+    /// Records an input that may change the image.
     pub fn asked(&mut self, now: Instant) {
         self.input.get_or_insert(now);
     }
 
-    /// The session has carried out what was asked for; the picture of `generation` will be the answer, if it is a new
-    /// one.
+    /// Records that the session has executed the input; `generation` is that of the image that will show it, if there
+    /// is one.
     pub fn carried_out(&mut self, generation: Option<u64>) {
         if let (Some(input), Some(generation)) = (self.input.take(), generation) {
             self.waiting.push_back((generation, input));
         }
     }
 
-    /// A picture of `generation` is on the window.
+    /// Records that an image of `generation` is on the window.
     pub fn shown(&mut self, generation: u64, now: Instant) {
         while let Some((_, input)) = self.waiting.pop_front_if(|(wanted, _)| *wanted <= generation) {
             let wait = now.saturating_duration_since(input);
@@ -36,7 +36,7 @@ impl Reaction {
         }
     }
 
-    /// From input to picture, of the latest inputs.
+    /// Latencies of the latest inputs.
     pub fn waits(&self) -> &LatencyHistogram {
         &self.waits
     }
@@ -56,7 +56,7 @@ mod tests {
         reaction.carried_out(Some(7));
         reaction.shown(6, at(10));
         assert_eq!(reaction.waits.quantile(0.5), None, "that picture was of before");
-        // A newer picture answers an older question too.
+        // A newer image also answers an older input.
         reaction.asked(at(12));
         reaction.carried_out(Some(8));
         reaction.shown(8, at(20));
@@ -64,7 +64,7 @@ mod tests {
             (reaction.waits.len(), reaction.waits.quantile(0.0), reaction.waits.quantile(0.99)),
             (2, Some(Duration::from_millis(8)), Some(Duration::from_millis(20)))
         );
-        // What changes no picture waits for none.
+        // An input that does not change the image has no latency.
         reaction.asked(at(30));
         reaction.carried_out(None);
         reaction.shown(9, at(90));

@@ -1,23 +1,23 @@
-//! The region brush: a rectangle that is dragged over the picture and gets all samples.
+//! The region tool: a rectangle dragged over the image, which gets all samples.
 
 use super::overlay::GLASS;
 use crate::frame::Status;
 use egui::{Align2, Color32, Context, FontId, Pos2, Rect, Stroke, StrokeKind};
 
 const COLOR: Color32 = Color32::from_rgb(120, 220, 255);
-/// Pixels of the window that a rectangle must span to be meant.
-const LEAST: f64 = 4.0;
+/// Smallest side of a rectangle in window pixels; smaller drags are ignored.
+const MIN_SIDE: f64 = 4.0;
 
-/// Places are fractions of the picture from its upper left corner.
+/// Positions are fractions of the image from its upper left corner.
 #[derive(Debug, Default)]
 pub struct RegionTool {
-    /// The next drag is a rectangle.
+    /// Whether the next drag is a rectangle.
     armed: bool,
     drag: Option<[[f64; 2]; 2]>,
 }
 
 impl RegionTool {
-    /// The next drag is a rectangle, or is not after all.
+    /// Arms or disarms the tool.
     pub fn toggle(&mut self) -> bool {
         self.drag = None;
         self.armed = !self.armed;
@@ -32,7 +32,7 @@ impl RegionTool {
         self.drag.is_some()
     }
 
-    /// The mouse went down: whether a rectangle begins.
+    /// Handles a mouse press; returns whether a rectangle begins.
     pub fn press(&mut self, at: [f64; 2]) -> bool {
         if self.armed {
             self.drag = Some([at, at]);
@@ -40,23 +40,24 @@ impl RegionTool {
         self.armed
     }
 
-    /// The mouse is here: whether there is another rectangle to be drawn.
+    /// Handles a mouse movement; returns whether the rectangle must be redrawn.
     pub fn mouse_at(&mut self, at: [f64; 2]) -> bool {
         self.drag.as_mut().is_some_and(|drag| std::mem::replace(&mut drag[1], at) != at)
     }
 
-    /// The mouse came up: whether it had drawn, and the rectangle (left, top, right, bottom), if it was meant.
+    /// Handles a mouse release; returns `None` if nothing was dragged, else the rectangle (left, top, right, bottom),
+    /// if it is large enough.
     ///
     /// - `size`: of the window, pixels.
     pub fn release(&mut self, size: [f64; 2]) -> Option<Option<[f64; 4]>> {
         let [a, b] = self.drag.take()?;
-        let meant = (0..2).all(|axis| (a[axis] - b[axis]).abs() * size[axis] >= LEAST);
+        let meant = (0..2).all(|axis| (a[axis] - b[axis]).abs() * size[axis] >= MIN_SIDE);
         let rectangle = [a[0].min(b[0]), a[1].min(b[1]), a[0].max(b[0]), a[1].max(b[1])];
         self.armed = !meant;
         Some(meant.then_some(rectangle))
     }
 
-    /// The rectangle under way, or the one that gets the samples.
+    /// Draws the rectangle being dragged, or the one that gets the samples.
     pub fn draw(&self, context: &Context, status: &Status) {
         let painter = context.layer_painter(egui::LayerId::background());
         let screen = context.content_rect();

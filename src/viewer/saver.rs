@@ -1,4 +1,4 @@
-//! Saves pictures on threads of their own, so that the window goes on.
+//! Saves images on separate threads, so that the window stays responsive.
 
 use crate::frame::{PictureFormat, Print, Target, Waker, render_offline_until};
 use crate::render::{Display, Film, Prepared, RenderSettings};
@@ -10,29 +10,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
-/// A picture that is now on disk, or why it is not.
+/// A saved image, or the reason why it was not saved.
 pub type Saved = Result<Kept, String>;
 
-/// A picture on disk.
+/// A saved image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
     pub path: PathBuf,
-    /// The view changed before there was a film of full resolution.
+    /// Whether the view changed before there was a film of full resolution.
     pub coarse: bool,
 }
 
-/// A picture to be rendered for itself.
+/// An image that is rendered separately, larger than the window.
 pub struct Larger {
     pub prepared: Prepared,
     pub settings: RenderSettings,
     pub size: (u32, u32),
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub spp: u32,
     pub threads: usize,
 }
 
 pub struct Saver {
-    /// The window has gone: what takes long ends now.
+    /// Whether the window is closed: long renders end early.
     ending: Arc<AtomicBool>,
     folder: PathBuf,
     waker: Waker,
@@ -42,14 +42,15 @@ pub struct Saver {
 }
 
 impl Saver {
-    /// Saves into `folder`; `waker` is called when a picture is done.
+    /// Creates a saver for `folder`; `waker` is called when an image is done.
     pub fn new(folder: &Path, waker: Waker) -> Self {
         let (sender, receiver) = channel();
         let (ending, folder) = (Arc::default(), folder.to_owned());
         Self { ending, folder, waker, sender, receiver, threads: Vec::new() }
     }
 
-    /// Saves the film that will come, with what `draft` says of it, under the name of `scene` and the next free number; a PNG with `size` pixels.
+    /// Saves the film that will arrive, with the metadata of `draft`, under the name of `scene` and the next free
+    /// number; a PNG with `size` pixels.
     pub fn save(
         &mut self,
         film: Receiver<Film>,
@@ -66,8 +67,8 @@ impl Saver {
         });
     }
 
-    /// Renders a picture beside the window, and saves it in the same way; what there is of it when the window goes is
-    /// saved too.
+    /// Renders an image separately from the window, and saves it like [`save`](Self::save); if the window closes, the
+    /// samples so far are saved.
     pub fn save_larger(
         &mut self,
         larger: Larger,
@@ -81,7 +82,7 @@ impl Saver {
             let Larger { prepared, settings, size, spp, threads } = larger;
             let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
             check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
-            // Threads of its own: those of the window belong to what is seen, and must not wait for this.
+            // A separate pool: the window's threads belong to the visible image, and must not wait for this.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
             let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(&error))?;
@@ -97,7 +98,7 @@ impl Saver {
     fn spawn(&mut self, work: impl FnOnce() -> Saved + Send + 'static) {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
-            // The window may be gone, and then nobody needs the news.
+            // If the window is gone, the result is not needed.
             let _ = sender.send(work());
             waker();
         };
@@ -110,12 +111,12 @@ impl Saver {
         self.threads.retain(|thread| !thread.is_finished());
     }
 
-    /// What has been finished since the last call.
+    /// The results since the last call.
     pub fn finished(&self) -> Vec<Saved> {
         self.receiver.try_iter().collect()
     }
 
-    /// Waits for the pictures that are still being written.
+    /// Waits for the images that are still being written.
     pub fn finish(&mut self) -> Vec<Saved> {
         self.ending.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
@@ -126,7 +127,7 @@ impl Saver {
     }
 }
 
-/// Writes a film with its note, under the next free number.
+/// Writes a film with its metadata, under the next free number.
 fn print(
     folder: &Path,
     stem: &str,
@@ -139,13 +140,13 @@ fn print(
     let coarse = (film.width(), film.height()) != size;
     let uneven = coarse || film.max_spp() > film.spp();
     let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven };
-    // Paths in the note count from the folder, whatever the picture will be called.
+    // Paths in the metadata are relative to the folder, whatever the name of the image will be.
     let note = draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into()));
     let print = Print { film, display, size, note: note.as_deref() };
     Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
 }
 
-/// A scene file in `folder` that is not there yet, for what is open: `NAME-0001.ron`.
+/// Returns an unused name of a scene file in `folder` for the open scene: `NAME-0001.ron`.
 pub fn new_scene_file(folder: &Path, scene: &str) -> PathBuf {
     let stem = file_stem(scene);
     let names = (1..=u32::MAX).map(|number| folder.join(format!("{stem}-{number:04}.ron")));
@@ -153,7 +154,7 @@ pub fn new_scene_file(folder: &Path, scene: &str) -> PathBuf {
     free.next().unwrap_or_else(|| folder.join(format!("{stem}.ron")))
 }
 
-/// A file name for pictures of this scene: its own name without folder and extension.
+/// File stem for images of this scene: its own name without folder and extension.
 fn file_stem(scene: &str) -> String {
     let stem = Path::new(scene).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let plain: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_ .".contains(c) { c } else { '-' }).collect();

@@ -1,16 +1,16 @@
-//! The status line in words: what the picture is worth so far, and what is seen.
+//! Text of the status line: quality of the image, and settings.
 
 use crate::frame::{Status, f_number, f_stop};
 use crate::render::{Integrator, ToneCurve};
 use std::fmt::Write as _;
 
-/// The figures: whether it goes on, samples, seconds, speed, resolution, error, and why it last began again.
+/// The figures: state, samples, seconds, speed, resolution, error, and the cause of the last restart.
 pub fn figures(status: &Status) -> String {
     let mut line = String::new();
     if let Some(loading) = &status.loading {
         write!(line, "{loading}…   ").expect("a string takes all");
     }
-    // Who sees the samples stand still wants to know why.
+    // Explains why the sample count does not grow.
     if status.paused {
         line += "paused   ";
     } else if status.done {
@@ -40,7 +40,7 @@ pub fn figures(status: &Status) -> String {
     line
 }
 
-/// What is not as usual: lens, exposure, tone curve, model; and the key that helps.
+/// Settings that differ from the default: lens, exposure, tone curve, model; and the key for help.
 pub fn settings(status: &Status) -> String {
     let mut parts = Vec::new();
     if status.integrator == Integrator::Phong {
@@ -79,7 +79,7 @@ pub fn seconds(s: f64) -> String {
     }
 }
 
-/// Two digits that mean something.
+/// Formats a percentage with about two significant digits.
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
@@ -90,7 +90,7 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// A length with the unit that suits it.
+/// Formats a length with a suitable unit.
 pub fn metres(m: f64) -> String {
     match m {
         m if m.is_infinite() => "∞".to_owned(),
@@ -103,7 +103,7 @@ pub fn metres(m: f64) -> String {
     }
 }
 
-/// A size of memory.
+/// Formats a size of memory.
 pub fn bytes(n: u64) -> String {
     match n as f64 {
         n if n >= 1e9 => format!("{:.2} GB", n / 1e9),
@@ -112,7 +112,7 @@ pub fn bytes(n: u64) -> String {
     }
 }
 
-/// 1234567 as 1,234,567.
+/// Formats 1234567 as 1,234,567.
 pub fn thousands(n: usize) -> String {
     let digits = n.to_string();
     let mut text = String::new();

@@ -1,7 +1,7 @@
-//! The story of a pixel, over the picture: its paths where they ran, and a [`table`] of what each light brought.
+//! Explanation of a pixel, over the image: its paths in the scene, and a [`table`] of the contribution of each light.
 //!
-//! Paths are drawn through everything, since what is behind a wall is often what one is looking for. All of them at
-//! once are a tangle, so the strongest are shown, of one light or of one number of bounces if that is asked for.
+//! Paths are drawn through surfaces, because what is behind a wall is often of interest. All of them at once are
+//! unreadable, so the strongest are shown, optionally of one light or of one number of bounces.
 
 mod table;
 
@@ -9,7 +9,7 @@ use crate::frame::{End, PathRecord, PixelStory, Projector, brightness};
 use egui::{Color32, Context, Pos2, Stroke};
 use glam::{DVec2, DVec3};
 
-/// By segment, from the camera on; the last one is that of all further ones.
+/// Colours by segment, from the camera; the last one is used for all further segments.
 const SEGMENTS: [Color32; 6] = [
     Color32::from_rgb(240, 240, 240),
     Color32::from_rgb(255, 214, 92),
@@ -18,17 +18,17 @@ const SEGMENTS: [Color32; 6] = [
     Color32::from_rgb(190, 100, 230),
     Color32::from_rgb(96, 140, 255),
 ];
-/// From a vertex to the light that it asked.
-const ASKED: Color32 = Color32::from_rgb(140, 230, 150);
+/// Colour of the connection from a vertex to the sampled light.
+const LIGHT_SAMPLE: Color32 = Color32::from_rgb(140, 230, 150);
 
-/// Which paths are drawn.
+/// Selection of the paths that are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaysShown {
-    /// So many of those that bring most; all when not given, also those that bring nothing.
+    /// Number of the strongest paths to draw; `None` for all, including those without contribution.
     strongest: Option<usize>,
-    /// Only light from what is called so.
+    /// Only light of this name.
     light: Option<String>,
-    /// Only light after so many bounces.
+    /// Only light after this number of bounces.
     bounces: Option<usize>,
 }
 
@@ -45,13 +45,13 @@ impl WaysShown {
         self.light.is_some() || self.bounces.is_some()
     }
 
-    /// Forgets a light that this pixel does not know.
+    /// Clears filters that do not apply to this pixel.
     fn fit(&mut self, story: &PixelStory) {
         self.light = self.light.take().filter(|name| story.lights.iter().any(|light| light.name == *name));
         self.bounces = self.bounces.filter(|bounces| *bounces < story.by_bounces.len());
     }
 
-    /// How bright the part of a path is that was asked for.
+    /// Brightness of the part of a path that passes the filters.
     fn strength(&self, way: &PathRecord) -> f64 {
         let is_asked_for = |end: &End, bounces: usize| {
             let light = match end {
@@ -68,7 +68,7 @@ impl WaysShown {
         parts.filter(|(end, bounces, _)| is_asked_for(end, *bounces)).map(|(.., radiance)| brightness(radiance)).sum()
     }
 
-    /// The paths to draw, the strongest last so that nothing hides them.
+    /// Returns the paths to draw, the strongest last so that nothing hides them.
     fn of<'a>(&self, story: &'a PixelStory) -> Vec<&'a PathRecord> {
         let mut ways: Vec<(f64, &PathRecord)> = story.ways.iter().map(|way| (self.strength(way), way)).collect();
         if self.is_filtered() {
@@ -80,7 +80,7 @@ impl WaysShown {
     }
 }
 
-/// Draws both; `reach`: how far a path that leaves the scene is drawn, metres.
+/// Draws paths and table; `reach`: length of a segment that leaves the scene, metres.
 pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown, projector: &Projector, reach: f64) {
     shown.fit(story);
     let painter = context.layer_painter(egui::LayerId::background());
@@ -89,13 +89,13 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown, projec
         for (segment, stop) in way.stops.iter().enumerate() {
             let to = point_of(&stop.end, from, reach);
             let color = SEGMENTS[segment.min(SEGMENTS.len() - 1)];
-            // What brings no light is there, but is faint.
+            // Paths without contribution are drawn faintly.
             let is_dark = way.radiance == DVec3::ZERO;
             line(&painter, projector, from, to, color.gamma_multiply(if is_dark { 0.25 } else { 0.75 }));
             if let Some((light, radiance)) = &stop.asked
                 && brightness(*radiance) > 0.0
             {
-                line(&painter, projector, to, point_of(light, to, reach), ASKED.gamma_multiply(0.45));
+                line(&painter, projector, to, point_of(light, to, reach), LIGHT_SAMPLE.gamma_multiply(0.45));
             }
             if let (End::At { .. }, Some(place)) = (&stop.end, projector.place(to)) {
                 painter.circle_filled(pos(place), 2.0, color);
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::frame::Stop;
 
-    /// A path that runs into `light` after its bounces, with this radiance.
+    /// A path that hits `light` after its bounces, with this radiance.
     fn way(light: &str, bounces: usize, radiance: f64) -> PathRecord {
         let stop = |what: &str, radiance: f64| Stop {
             end: End::At { point: DVec3::ZERO, what: what.to_owned() },

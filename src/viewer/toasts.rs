@@ -1,9 +1,9 @@
-//! Short messages over the picture that go away by themselves. Told the time, so that they can be tested.
+//! Short messages over the image that disappear by themselves. Times are passed in, for tests.
 
 use crate::printable;
 use std::time::{Duration, Instant};
 
-/// News, or something that went wrong.
+/// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     News,
@@ -24,27 +24,27 @@ pub struct Toasts {
 }
 
 impl Toasts {
-    /// More would cover the picture; the oldest goes.
-    const MOST: usize = 5;
+    /// Maximum number of messages; more would cover the image. The oldest is removed.
+    const MAX_SHOWN: usize = 5;
 
     pub fn add(&mut self, tone: Tone, text: impl Into<String>, now: Instant) {
         let text = printable::lines(&text.into());
-        // Long enough to read: a problem is read twice.
+        // Long enough to read; for a problem, to read twice.
         let reading = Duration::from_millis(1500 + 40 * text.len() as u64);
         let until = now + if tone == Tone::Problem { 2 * reading + Duration::from_secs(3) } else { reading };
-        // The first word tells what it is about: news of the same kind replaces the older news.
+        // The first word is the topic: a message replaces an older one of the same topic.
         let topic = |text: &str| text.split_whitespace().next().map(str::to_owned);
         if tone == Tone::News {
             self.shown.retain(|toast| toast.tone != Tone::News || topic(&toast.text) != topic(&text));
         }
         self.shown.retain(|toast| toast.text != text);
         self.shown.push(Toast { text, tone, until });
-        if self.shown.len() > Self::MOST {
+        if self.shown.len() > Self::MAX_SHOWN {
             self.shown.remove(0);
         }
     }
 
-    /// What is still to be seen.
+    /// Returns the messages that are still visible.
     pub fn at(&mut self, now: Instant) -> &[Toast] {
         self.shown.retain(|toast| toast.until > now);
         &self.shown
@@ -54,7 +54,7 @@ impl Toasts {
         self.shown.len()
     }
 
-    /// When the next of them goes.
+    /// When the next message disappears.
     pub fn next_change(&self) -> Option<Instant> {
         self.shown.iter().map(|toast| toast.until).min()
     }
@@ -88,7 +88,7 @@ mod tests {
         for i in 0..50 {
             toasts.add(Tone::Problem, format!("problem {i}"), start);
         }
-        assert_eq!(toasts.at(start).len(), Toasts::MOST);
+        assert_eq!(toasts.at(start).len(), Toasts::MAX_SHOWN);
         assert_eq!(toasts.at(start).last().unwrap().text, "problem 49");
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! `FIRSTLIGHT_RAYS`: rays of the largest case instead of the usual number.
 
-use firstlight::stability::{CASES, Case, ReplayError, Told};
+use firstlight::stability::{CASES, Case, ReplayError, ReplayValue};
 
 fn rays(usual: u64) -> u64 {
     std::env::var("FIRSTLIGHT_RAYS").ok().and_then(|n| n.parse::<f64>().ok()).map_or(usual, |n| n as u64)
@@ -83,9 +83,9 @@ fn names_are_unique_and_rays_can_be_replayed() {
         assert!(CASES[..i].iter().all(|other| other.name != case.name), "{} twice", case.name);
     }
     let closed = Case::find("closed").unwrap();
-    let told = closed.replay(0, 7, 10_000_000).unwrap();
-    assert_eq!(told.get("result"), Some(&Told::Text("right".to_owned())), "{told}");
-    assert_eq!(told, closed.replay(0, 7, 1_000_000_000).unwrap(), "a ray is the same one in a longer run");
+    let replay = closed.replay(0, 7, 10_000_000).unwrap();
+    assert_eq!(replay.get("result"), Some(&ReplayValue::Text("right".to_owned())), "{replay}");
+    assert_eq!(replay, closed.replay(0, 7, 1_000_000_000).unwrap(), "a ray is the same one in a longer run");
 }
 
 #[test]

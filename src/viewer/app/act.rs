@@ -1,4 +1,4 @@
-//! What keys and the panel ask for.
+//! Actions of keys and of the panel.
 
 use super::App;
 use crate::console;
@@ -16,8 +16,8 @@ use std::time::Instant;
 use winit::window::{CursorGrabMode, Fullscreen};
 
 impl App {
-    /// What was asked for in the panel.
-    pub(super) fn carry_out(&mut self, asked: panel::Asked, now: Instant) {
+    /// Executes the requests of the panel.
+    pub(super) fn execute(&mut self, asked: panel::Asked, now: Instant) {
         if !asked.commands.is_empty() {
             self.reaction.asked(now);
             self.stirred = true;
@@ -49,7 +49,7 @@ impl App {
         }
     }
 
-    /// The mouse in points, as overlays count.
+    /// The mouse position in points, the unit of overlays.
     pub(super) fn mouse(&self) -> glam::DVec2 {
         let scale = self.presenter.as_ref().map_or(1.0, |presenter| f64::from(presenter.pixels_per_point()));
         glam::DVec2::from_array(self.input.cursor_place()) / scale
@@ -74,7 +74,7 @@ impl App {
             Action::SaveScene { new } => self.save_scene(new),
             Action::PrintView => {
                 let text = camera_text::camera_text(&self.session.status().rig);
-                // Standard output may be closed; the window goes on.
+                // Standard output may be closed; the window continues.
                 match console::print(console::lines(&text)) {
                     Ok(()) => self.toasts.add(Tone::News, "camera printed to the terminal", now),
                     Err(error) => self.toasts.add(Tone::Problem, format!("cannot print the camera: {error}"), now),
@@ -104,12 +104,12 @@ impl App {
                     None => Some(modes[0]),
                     Some(mode) => modes.into_iter().skip_while(|other| *other != mode).nth(1),
                 };
-                self.tell_handles(now);
+                self.announce_handles(now);
             }
             Action::Gizmo(mode) => {
-                // The same key again takes them away.
+                // The same key again hides them.
                 self.panel.gizmo = mode.filter(|_| self.panel.gizmo != mode);
-                self.tell_handles(now);
+                self.announce_handles(now);
             }
             Action::ToggleSpin => self.input.toggle_spin(now),
             Action::ToggleDrag => self.toggle_drag(now),
@@ -146,7 +146,7 @@ impl App {
         self.repaint_at = Some(now);
     }
 
-    /// To the file that the scene is known by, or to a new one.
+    /// Saves to the scene's own file, or to a new one.
     pub(super) fn save_scene(&mut self, new: bool) {
         let path = self.scene_path(new);
         self.session.send(Command::SaveScene { path });
@@ -157,14 +157,14 @@ impl App {
         known.unwrap_or_else(|| new_scene_file(&self.options.folder, &self.session.status().scene))
     }
 
-    fn tell_handles(&mut self, now: Instant) {
+    fn announce_handles(&mut self, now: Instant) {
         let name = self.panel.gizmo.map_or("none", gizmo::Mode::label);
         let is_empty = self.session.world().resource::<Selection>().0.is_empty();
         let hint = if is_empty && self.panel.gizmo.is_some() { " (click an object)" } else { "" };
         self.toasts.add(Tone::News, format!("handles: {name}{hint}"), now);
     }
 
-    /// Keys and gestures from now on, and in the next window.
+    /// Sets keys and gestures, for this window and later ones.
     fn set_navigation(&mut self, navigation: Navigation, now: Instant) {
         self.input.set_navigation(navigation, now);
         let trouble = self.memory.keep_navigation(navigation);
@@ -179,11 +179,11 @@ impl App {
         self.toasts.add(Tone::News, if orbits { "drag: orbit" } else { "drag: look around" }, now);
     }
 
-    /// The mouse turns the view without a button from now on, or points again.
+    /// Captures the mouse, so that it turns the view without a button, or releases it.
     pub(super) fn capture_mouse(&mut self, wanted: bool, now: Instant) {
         let Some(window) = self.window.clone().filter(|_| wanted != self.input.is_captured()) else { return };
         if !wanted {
-            // A window that cannot let go of it is about to close.
+            // An error does not matter: a window that cannot release the mouse is about to close.
             let _ = window.set_cursor_grab(CursorGrabMode::None);
         } else if let Err(error) =
             window.set_cursor_grab(CursorGrabMode::Locked).or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined))
@@ -198,7 +198,7 @@ impl App {
         }
     }
 
-    /// Shows a dialog; the answer comes to [`Self::take_files`].
+    /// Shows a dialog; [`Self::take_files`] receives the result.
     fn ask_for_file(&mut self, purpose: DialogPurpose, now: Instant) {
         let folder = self.session.scene_file().and_then(|path| path.parent().map(Path::to_path_buf));
         let folder = folder.unwrap_or_else(|| self.options.folder.clone());
@@ -207,7 +207,7 @@ impl App {
         }
     }
 
-    /// Carries out what was chosen in a dialog.
+    /// Executes the results of dialogs.
     pub(super) fn take_files(&mut self, now: Instant) {
         for answer in self.dialog.answers() {
             match answer {
@@ -227,7 +227,7 @@ impl App {
     }
 
     pub(super) fn screenshot(&mut self, linear: bool) {
-        // The film comes when the workers have a moment; that the key was seen is said at once.
+        // The film arrives when the workers have time for it; the key press is acknowledged at once.
         self.toasts.add(Tone::News, "screenshot: saving …", Instant::now());
         if let Some(window) = &self.window {
             window.request_redraw();
@@ -252,14 +252,14 @@ impl App {
         self.saver.save(self.session.keep_film(), draft, display, size, &scene, format);
     }
 
-    pub(super) fn tell_saved(&mut self, saved: Saved) {
+    pub(super) fn report_saved(&mut self, saved: Saved) {
         let now = Instant::now();
         match saved {
             Ok(kept) => {
                 let coarse = if kept.coarse { " (low resolution: the view changed too soon)" } else { "" };
                 let news = format!("saved {}{coarse}", kept.path.display());
                 console::inform(&news);
-                // In place of the word that it is under way.
+                // Replaces the message that saving has started.
                 self.toasts.add(Tone::News, format!("screenshot: {news}"), now);
             }
             Err(error) => {

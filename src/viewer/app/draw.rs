@@ -1,6 +1,6 @@
-//! Picture and overlays onto the window.
+//! Drawing of the image and the overlays to the window.
 
-use super::{App, LIVELY, SETTLED};
+use super::{App, REPAINT_DELAY, WIDGET_REPAINT_DELAY};
 use crate::frame::{Explaining, Projector, SceneBounds, ViewMode};
 use crate::render::Inspection;
 use crate::scene::{FileKind, InputFile};
@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
-/// An inspection that takes longer is told to be under way; until then there is another picture.
+/// An inspection that takes longer is reported as in progress; until it is done another image is shown.
 const SLOW: Duration = Duration::from_millis(150);
 
 impl App {
@@ -99,7 +99,7 @@ impl App {
             let generation = picture.generation;
             self.session.note_seen(picture.number);
             self.reaction.shown(generation, Instant::now());
-            // A movement may have waited for it.
+            // A pending movement may have been waiting for this image.
             self.stirred |= generation > self.seen;
             self.seen = generation;
         }
@@ -107,16 +107,16 @@ impl App {
         if presented.again {
             window.request_redraw();
         }
-        let soonest = if self.has_widgets() { LIVELY } else { SETTLED };
+        let soonest = if self.has_widgets() { WIDGET_REPAINT_DELAY } else { REPAINT_DELAY };
         let repaint_after = Some(presented.repaint_after.max(soonest)).filter(|wait| *wait < Duration::MAX);
         let repaint_at = repaint_after.and_then(|wait| now.checked_add(wait));
         let late_at = self.inspected_since.filter(|_| is_late.is_none()).map(|(_, since)| since + SLOW);
         self.repaint_at = repaint_at.into_iter().chain(late_at).min();
         (self.last_draw, self.unseen_since) = (Some(now), None);
         self.shown_figures = figures;
-        // The overlays may have asked for a time that the last tick did not know.
+        // The overlays may have requested a repaint that the last tick did not know.
         self.wake_at = self.wake_at.into_iter().chain(self.repaint_at).min();
-        self.carry_out(asked, now);
+        self.execute(asked, now);
         if let Some(answer) = answer {
             self.leaving.answer = Some(answer);
             self.stirred = true;
@@ -124,7 +124,8 @@ impl App {
         Ok(())
     }
 
-    /// Draws; if the graphics device is lost, makes a new one; if that fails too, keeps the light and gives up.
+    /// Draws. If the graphics device is lost, creates a new one; if that fails too, saves the film and closes the
+    /// window.
     pub(super) fn draw_or_leave(&mut self, event_loop: &ActiveEventLoop) {
         let now = Instant::now();
         let Err(error) = self.draw(now) else { return };
@@ -149,12 +150,12 @@ impl App {
     }
 }
 
-/// Bytes that the process holds, where the system tells.
+/// Memory of the process in bytes, if the system reports it.
 fn memory_of_process() -> Option<u64> {
     let statm = InputFile::open(Path::new("/proc/self/statm"), FileKind::Settings).ok()?.text().ok()?;
     let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
     Some(pages * PAGE)
 }
 
-/// Linux on the processors that we know counts memory in pages of this many bytes.
+/// Page size in bytes of Linux on the supported processors.
 const PAGE: u64 = 4096;

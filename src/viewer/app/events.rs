@@ -1,4 +1,4 @@
-//! What winit tells: most of it is only noted, and carried out by the next tick.
+//! Window events: most of them are only recorded, and executed by the next tick.
 
 use super::{App, FRAME, Wake};
 use crate::frame::{Command, Edit};
@@ -12,8 +12,8 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{Key, NamedKey};
 use winit::window::WindowId;
 
-/// Pixels of a touchpad that count as a notch of a wheel.
-const PIXELS_A_NOTCH: f64 = 40.0;
+/// Touchpad pixels per wheel notch.
+const PIXELS_PER_NOTCH: f64 = 40.0;
 
 impl ApplicationHandler<Wake> for App {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
@@ -28,7 +28,7 @@ impl ApplicationHandler<Wake> for App {
     fn user_event(&mut self, _: &ActiveEventLoop, _: Wake) {
         self.pending.store(false, Ordering::Release);
         self.stirred = true;
-        // Somebody may be waiting for this picture.
+        // This image may be an awaited response.
         self.last_tick = None;
     }
 
@@ -45,7 +45,7 @@ impl ApplicationHandler<Wake> for App {
         }
         let Some(presenter) = &mut self.presenter else { return };
         let response = presenter.on_window_event(&event);
-        // Overlays take the keyboard only while somebody types into them; they always want Tab, which is ours.
+        // Overlays get the keyboard only during text input; they always want Tab, which the window uses itself.
         let typing = presenter.egui_context().wants_keyboard_input();
         if response.repaint && self.has_widgets() && !self.input.is_dragging() {
             self.repaint_at = Some(now);
@@ -75,8 +75,8 @@ impl ApplicationHandler<Wake> for App {
                     }
                     return;
                 }
-                // Typing into the list of keys must not keep a person in it; and what is typed while it opens, before
-                // its field has the keyboard, is meant for it.
+                // Escape and F1 leave the list of keys even during text input; letters typed while it opens, before its
+                // field has the focus, belong to the field.
                 let leaves = matches!(event.logical_key, Key::Named(NamedKey::Escape | NamedKey::F1));
                 let is_for_help = self.help.is_fresh() && matches!(event.logical_key, Key::Character(_));
                 if pressed && (typing || is_for_help) && !(leaves && self.help.open) {
@@ -138,14 +138,14 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::MouseInput { state, button, .. } if !(state.is_pressed() && response.consumed) => {
                 self.input.button(button, state.is_pressed(), now);
                 self.reaction.asked(now);
-                // What is selected is drawn, and changes no picture.
+                // The selection is an overlay and does not change the image.
                 self.repaint_at = Some(now);
             }
             WindowEvent::MouseWheel { delta, .. } if !response.consumed => {
                 // Shift turns a vertical wheel into a horizontal one on some systems.
                 let notches = match delta {
                     MouseScrollDelta::LineDelta(x, y) => f64::from(x + y),
-                    MouseScrollDelta::PixelDelta(by) => (by.x + by.y) / PIXELS_A_NOTCH,
+                    MouseScrollDelta::PixelDelta(by) => (by.x + by.y) / PIXELS_PER_NOTCH,
                 };
                 if self.input.wheel(notches, now) {
                     self.toasts.add(Tone::News, format!("speed ×{:.2}", self.input.speed()), now);
@@ -184,14 +184,15 @@ impl ApplicationHandler<Wake> for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // The device goes before the display does.
+        // The device must be dropped before the display.
         self.presenter = None;
         self.window = None;
     }
 }
 
 impl App {
-    /// H closes the list that H opened, as long as nobody types into its search field; before overlays see the letter.
+    /// Whether H closes the list that H opened, which it does until letters are typed into its search field; called
+    /// before overlays see the event.
     fn closes_help(&mut self, event: &WindowEvent) -> bool {
         let WindowEvent::KeyboardInput { event, is_synthetic: false, .. } = event else { return false };
         let modifiers = self.input.modifiers();
@@ -199,7 +200,7 @@ impl App {
         let is_letter = matches!(&event.logical_key, Key::Character(text) if text.eq_ignore_ascii_case("h"));
         let closes = event.state.is_pressed() && is_letter && is_plain && self.help.closes_by_its_letter();
         let closes = closes && self.leaving.question.is_none();
-        // A key that is held down neither opens and closes it again and again nor types.
+        // A key that is held down neither toggles the list repeatedly nor types.
         if closes && !event.repeat {
             self.help.toggle();
         }

@@ -1,5 +1,5 @@
-//! Unsaved edits: kept beside the settings some seconds after they are made, asked about when the window closes, and offered at
-//! the next start when it could not ask.
+//! Unsaved edits: stored in the settings folder some seconds after they are made, confirmed when the window closes, and
+//! offered at the next start if the window could not ask.
 
 use super::{App, short_name};
 use crate::frame::Command;
@@ -10,13 +10,13 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
-/// Edits are kept so long after the last of them: not in the middle of a drag.
-const KEPT_AFTER: Duration = Duration::from_secs(2);
+/// Delay after the last edit before edits are stored, so that they are not stored during a drag.
+const STORE_DELAY: Duration = Duration::from_secs(2);
 
 impl App {
-    /// Follows what is edited and saved, asks what is to be asked, and closes the window when nothing keeps it.
+    /// Tracks edits and saving, shows pending questions, and closes the window when nothing prevents it.
     pub(super) fn follow_edits(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
-        if self.told_to_end.load(Ordering::SeqCst) {
+        if self.stop_requested.load(Ordering::SeqCst) {
             return event_loop.exit();
         }
         if let Some(answer) = self.leaving.answer.take() {
@@ -32,7 +32,7 @@ impl App {
             }
         }
         let unsaved = self.session.has_unsaved_edits();
-        // What went wrong has been told, and the window stays.
+        // If saving failed, the error has been shown and the window remains open.
         if let Some(then) = self.leaving.saving.take_if(|_| !self.session.is_saving()).filter(|_| !unsaved) {
             match then {
                 Some(command) => self.open(command, now),
@@ -55,8 +55,7 @@ impl App {
         self.keep_edits(unsaved, now);
     }
 
-    /// Carries out a command that may put another scene in the place of this one: with unsaved edits, once the person has said
-    /// what becomes of them.
+    /// Executes a command that may replace the scene; with unsaved edits, after the user has decided about them.
     pub(super) fn open(&mut self, command: Command, now: Instant) {
         if matches!(command, Command::Open { .. }) && self.session.has_unsaved_edits() {
             return self.ask_to_leave(Some(command), now);
@@ -83,7 +82,7 @@ impl App {
         self.repaint_at = Some(now);
     }
 
-    /// Does what the person wants.
+    /// Executes the user's answer.
     pub(super) fn answer(&mut self, answer: Answer, now: Instant, event_loop: &ActiveEventLoop) {
         let Some(question) = self.leaving.question.take() else { return };
         self.repaint_at = Some(now);
@@ -122,7 +121,7 @@ impl App {
         let revision = self.session.revision();
         if revision != self.leaving.seen {
             self.leaving.seen = revision;
-            self.leaving.keep_at = Some(now + KEPT_AFTER);
+            self.leaving.keep_at = Some(now + STORE_DELAY);
         }
         if self.leaving.keep_at.is_some_and(|at| now >= at) {
             self.leaving.keep_at = None;
@@ -138,7 +137,7 @@ impl App {
         }
     }
 
-    /// At the end, however it came: edits that nobody has saved or given up are there at the next start.
+    /// At exit, for whatever reason: unsaved edits that were not discarded are stored for the next start.
     pub(super) fn keep_or_forget_edits(&mut self) {
         if self.leaving.discarded || !self.session.has_unsaved_edits() {
             return self.leaving.recovery.forget();
@@ -151,7 +150,7 @@ impl App {
         }
     }
 
-    /// What is said of it when the program was told to end.
+    /// The message when the program is stopped from outside.
     pub(super) fn stopped_message(&self) -> String {
         let kept = self.leaving.recovery.has_kept();
         if kept { "stopped: unsaved changes can be restored at the next start" } else { "stopped" }.to_owned()

@@ -1,4 +1,4 @@
-//! Edits that were not saved, and what is asked of them.
+//! State of closing the window and of edits that were not saved.
 
 use crate::frame::{Command, LeftBehind, Recovery, Waker};
 use crate::viewer::question::{Answer, Question};
@@ -8,21 +8,22 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
 
 pub(super) struct Leaving {
-    /// Somebody wants to close the window.
+    /// The window is to be closed.
     pub wanted: bool,
-    /// What is being asked.
+    /// The question that is shown.
     pub question: Option<Question>,
-    /// What a button of it said.
+    /// The answer given by a button of the question.
     pub answer: Option<Answer>,
-    /// What is done once the scene is saved: another is opened, or the window closes.
+    /// What follows once the scene is saved: a command that opens another scene, or closing the window.
     pub saving: Option<Option<Command>>,
-    /// Closed without saving, as the person wants it.
+    /// Closed without saving, as requested by the user.
     pub discarded: bool,
     pub recovery: Recovery,
-    /// Still to be asked about.
+    /// Edits of earlier windows that are still to be asked about.
     pub left_behind: VecDeque<LeftBehind>,
-    /// Edits that were seen, that are to be kept, and that have been kept, by the session's count.
+    /// Revision of the session when edits were last checked.
     pub seen: u64,
+    /// When unsaved edits are to be stored.
     pub keep_at: Option<Instant>,
     pub restored: Receiver<Result<PathBuf, String>>,
     pub sender: Sender<Result<PathBuf, String>>,
@@ -49,16 +50,16 @@ impl Leaving {
         }
     }
 
-    /// When edits are to be kept.
+    /// When edits are to be stored.
     pub fn wake_at(&self) -> Option<Instant> {
         self.keep_at
     }
 
-    /// Takes back what was left behind, on a thread of its own.
+    /// Restores edits of an earlier window on a separate thread.
     pub fn restore(&self, left: LeftBehind, path: PathBuf) -> Result<(), String> {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
-            // The window may be gone, and then it is offered again.
+            // If the window is gone, they are offered again.
             let _ = sender.send(left.restore(&path).map(|()| path));
             waker();
         };

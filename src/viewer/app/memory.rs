@@ -1,16 +1,16 @@
-//! What is kept from one run to the next: the bookmarks of each scene, what was opened lately, the window's size.
+//! State kept between runs: the bookmarks of each scene, recent files, and the window's size.
 
 use crate::frame::{Bookmarks, Command, CurrentScene, Navigation, Recovery, SceneBookmarks, Session, SettingsStore};
 use crate::scene::SceneSource;
 
-/// What the store has, as far as it is known here.
+/// The settings store, and its content as far as it is known here.
 pub struct Memory {
     store: SettingsStore,
-    /// Of what the bookmarks are.
+    /// The scene of the bookmarks.
     scene: Option<SceneSource>,
-    /// How many scenes had taken their place.
+    /// Number of scenes opened so far in the session.
     adopted: u64,
-    /// As they lie in the store.
+    /// As they are in the store.
     bookmarks: Bookmarks,
     recent: Vec<String>,
 }
@@ -25,17 +25,17 @@ impl Memory {
         Self { store, scene: None, adopted: 0, bookmarks: Bookmarks::default(), recent }
     }
 
-    /// Keeps unsaved edits in the same place.
+    /// Returns storage for unsaved edits in the same folder.
     pub fn recovery(&self) -> Recovery {
         Recovery::beside(self.store.folder())
     }
 
-    /// What was opened last comes first: built-in names and paths.
+    /// Recently opened scenes, the latest first: built-in names and paths.
     pub fn recent(&self) -> &[String] {
         &self.recent
     }
 
-    /// Keeps what has changed, and brings what a scene that was opened had; tells what went wrong.
+    /// Stores what has changed, and loads the bookmarks of a scene that was opened; returns errors.
     pub fn follow(&mut self, session: &mut Session) -> Vec<String> {
         let mut troubles = Vec::new();
         let adopted = session.n_adopted();
@@ -51,7 +51,7 @@ impl Memory {
         let saved = session.scene_file().map(SceneSource::Scene);
         let is_renamed = saved.is_some() && saved != self.scene;
         if is_renamed && let Some(saved) = saved {
-            // From the saving on it is known by that file, and takes its views along.
+            // A saved scene is known by its new file and takes its bookmarks along.
             troubles.extend(self.remember(&saved));
             self.scene = Some(saved);
         }
@@ -73,7 +73,7 @@ impl Memory {
             bookmarks.set(slot, rig);
         }
         self.bookmarks = bookmarks;
-        // A command, so that a recording of the session knows them too.
+        // A command, so that a recording of the session contains them too.
         session.send(Command::SetBookmarks(Box::new(bookmarks)));
         *session.world_mut().resource_mut::<Bookmarks>() = bookmarks;
         let troubles = trouble.into_iter().chain(self.remember(&source)).collect();
@@ -81,9 +81,9 @@ impl Memory {
         troubles
     }
 
-    /// Puts it first among what was opened lately.
+    /// Puts the scene first among the recent ones.
     fn remember(&mut self, source: &SceneSource) -> Vec<String> {
-        // The file anew: another window may have written to it.
+        // Reads the file again: another window may have written to it.
         let (mut settings, unreadable) = self.store.settings();
         settings.remember(source);
         let unkept = self.store.keep_settings(&settings).err().map(String::from);
@@ -91,19 +91,19 @@ impl Memory {
         unreadable.into_iter().chain(unkept).collect()
     }
 
-    /// Keys and gestures, as they were chosen last.
+    /// The last chosen keys and gestures.
     pub fn navigation(&self) -> Navigation {
         self.store.settings().0.navigation
     }
 
-    /// For the next window.
+    /// Stores keys and gestures for the next window.
     pub fn keep_navigation(&self, navigation: Navigation) -> Option<String> {
         let mut settings = self.store.settings().0;
         settings.navigation = navigation;
         self.store.keep_settings(&settings).err().map(String::from)
     }
 
-    /// For the next window, logical pixels.
+    /// Stores the window's size for the next window, logical pixels.
     pub fn keep_window(&self, size: (u32, u32)) -> Option<String> {
         let mut settings = self.store.settings().0;
         settings.window = Some(size);
@@ -141,11 +141,11 @@ mod tests {
         follow(&mut session, &mut first);
         let kept = *session.world().resource::<Bookmarks>();
         assert!(kept.get(3).is_some());
-        // Another scene has none of them.
+        // Another scene has no bookmarks.
         opened(&mut session, "ball");
         follow(&mut session, &mut first);
         assert_eq!(*session.world().resource::<Bookmarks>(), Bookmarks::default());
-        // Neither is anything lost by looking at the other one, nor by the next run.
+        // Bookmarks survive opening another scene, and the next run.
         let mut session = Session::new(SessionOptions::default()).unwrap();
         let mut second = memory();
         assert_eq!(second.recent(), ["ball", "cornell"]);
@@ -153,7 +153,7 @@ mod tests {
         follow(&mut session, &mut second);
         assert_eq!(*session.world().resource::<Bookmarks>(), kept);
         assert_eq!(second.recent(), ["cornell", "ball"]);
-        // A scene that is saved takes its views along, and is among what was opened lately.
+        // A saved scene takes its bookmarks along, and is among the recent ones.
         let path = folder.path().join("room.ron");
         session.send(Command::SaveScene { path: path.clone() });
         for _ in 0..2000 {

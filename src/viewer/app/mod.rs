@@ -1,18 +1,18 @@
-//! The event loop: who is asked when, and when to sleep.
+//! The event loop: dispatch of events, ticks and drawing, and when to sleep.
 //!
-//! Three things happen, each as seldom as it may. *Events* only note what a person did. A *tick* hands that to the
-//! session, lets it go on, and finds out whether there is anything new to see; it runs after events, when a worker has
-//! news, and while a key is held. *Drawing* follows a tick that found something new. Nothing else runs, so a finished
-//! picture costs nothing.
+//! There are three kinds of steps, each run as rarely as possible. *Events* only record user input. A *tick* passes it
+//! to the session, advances the session, and checks for anything new to show; it runs after events, when a worker
+//! reports, and while a key is held. *Drawing* follows a tick that found something new. Nothing else runs, so a
+//! finished image costs nothing.
 //!
 //! | file | about |
 //! |---|---|
 //! | here | opening, ticking, going to sleep |
-//! | `events` | what winit tells |
-//! | `draw` | picture and overlays onto the window |
-//! | `act` | what keys and the panel ask for |
-//! | `leave` | unsaved edits: asked about, kept, offered again |
-//! | `memory` | what is kept from one run to the next |
+//! | `events` | window events |
+//! | `draw` | drawing of the image and the overlays |
+//! | `act` | actions of keys and of the panel |
+//! | `leave` | unsaved edits: questions, storage, recovery |
+//! | `memory` | state kept between runs |
 
 mod act;
 mod draw;
@@ -51,27 +51,27 @@ use winit::dpi::LogicalSize;
 use winit::event_loop::{ActiveEventLoop, EventLoop};
 use winit::window::Window;
 
-/// How to open the window.
+/// Options of the window.
 #[derive(Clone, Debug)]
 pub struct ViewerOptions {
     pub source: SceneSource,
-    /// Of the window, logical pixels.
+    /// Width of the window, logical pixels.
     pub width: u32,
     pub height: u32,
-    /// One for each processor when not given.
+    /// `None` for one thread per processor.
     pub threads: Option<usize>,
     pub seed: u32,
-    /// Which axis of models points up; guessed when not given.
+    /// The axis of models that points up; `None` to guess.
     pub up: Option<UpAxis>,
-    /// What of a glTF model is shown.
+    /// The parts of a glTF model that are shown.
     pub choice: ModelChoice,
-    /// An image that takes the place of the scene's own environment.
+    /// An image that replaces the scene's own environment.
     pub environment: Option<PathBuf>,
-    /// Where kept pictures go.
+    /// Folder for saved images.
     pub folder: PathBuf,
-    /// Where to write down what is done.
+    /// File to which the session is recorded.
     pub record: Option<PathBuf>,
-    /// Print at the end how prompt and how fast it was, one JSON object; until then no picture is good enough.
+    /// Whether to print latency and speed at exit, as one JSON object; rendering then never stops by itself.
     pub print_figures: bool,
 }
 
@@ -92,36 +92,36 @@ pub enum ViewerError {
     Session(String),
     #[error("{0}")]
     Scene(String),
-    /// Somebody asked the program to end, by Ctrl+C in the terminal or as systems do.
+    /// The program was stopped from outside, by Ctrl+C in the terminal or by the system.
     #[error("{0}")]
     Stopped(String),
     #[error(transparent)]
     Present(#[from] PresentError),
 }
 
-/// A worker has news.
+/// Event: a worker has something to report.
 #[derive(Clone, Copy, Debug)]
 struct Wake;
 
-/// Ticks and frames come no faster: more would only cost the workers their processors.
+/// Minimum interval of ticks and frames: a higher rate would only take processor time from the workers.
 const FRAME: Duration = Duration::from_micros(4_000);
-/// So long a movement waits for the picture of the one before it, and overlays for the picture that is to come.
-const LATEST: Duration = Duration::from_millis(250);
-/// Overlays that want to be drawn again wait so long, for after every input they do, and a window that is being drawn answers to
-/// no other. With a new picture they are drawn in any case.
-const SETTLED: Duration = Duration::from_millis(100);
-/// The same while there is something to be moved or pressed.
-const LIVELY: Duration = Duration::from_millis(33);
-/// Figures that change by themselves are shown again so often.
-const FIGURES: Duration = Duration::from_millis(250);
-/// So long after the last change of its size a window has come to rest.
-const AT_REST: Duration = Duration::from_millis(500);
-/// The exit status of a program that is told to end twice, as shells count it.
+/// Longest time that a movement waits for the image of the previous one, and overlays for the next image.
+const MAX_WAIT: Duration = Duration::from_millis(250);
+/// Delay of repaints requested by overlays, because they request one after every input, and a window does not react
+/// while it is drawn. With a new image they are drawn in any case.
+const REPAINT_DELAY: Duration = Duration::from_millis(100);
+/// Delay of repaints while there is a widget to be dragged or pressed.
+const WIDGET_REPAINT_DELAY: Duration = Duration::from_millis(33);
+/// Update interval of figures that change by themselves.
+const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
+/// Time after the last resize after which the size is considered final.
+const RESIZE_DELAY: Duration = Duration::from_millis(500);
+/// Exit status of a program that is stopped twice, by the convention of shells.
 const STOPPED: i32 = 130;
-/// What a window stops at by itself, so that nothing runs hot for ever: an error that nobody sees.
-const GOOD_ENOUGH: Target = Target { spp: None, seconds: None, error: Some(0.005) };
+/// Error at which a window stops by itself, so that the machine does not run for ever: it is invisible.
+const DEFAULT_TARGET: Target = Target { spp: None, seconds: None, error: Some(0.005) };
 
-/// Opens a window and stays until it is closed.
+/// Opens a window and returns when it is closed.
 pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
     let mut builder = EventLoop::<Wake>::with_user_event();
     match display::find() {
@@ -140,51 +140,51 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
         Arc::new(move || {
             // One event wakes the window; more would only queue up.
             if !pending.swap(true, Ordering::AcqRel) {
-                // The loop may be over, and then nobody needs waking.
+                // If the loop has ended, nothing needs to be woken.
                 let _ = proxy.send_event(Wake);
             }
         })
     };
-    let told_to_end = Arc::new(AtomicBool::new(false));
-    let (asked, proxy) = (told_to_end.clone(), event_loop.create_proxy());
+    let stop_requested = Arc::new(AtomicBool::new(false));
+    let (asked, proxy) = (stop_requested.clone(), event_loop.create_proxy());
     let taken_over = ctrlc::set_handler(move || {
         if asked.swap(true, Ordering::SeqCst) {
             std::process::exit(STOPPED);
         }
-        // The loop may be over, and then the program ends by itself.
+        // If the loop has ended, the program ends by itself.
         let _ = proxy.send_event(Wake);
     });
     if let Err(error) = taken_over {
         log::warn!("Ctrl+C will not keep unsaved edits: {error}");
     }
-    let mut app = App::new(options, pending, waker, told_to_end)?;
-    display::say_nothing_of_its_loss();
+    let mut app = App::new(options, pending, waker, stop_requested)?;
+    display::silence_loss_panics();
     let ended = match catch_unwind(AssertUnwindSafe(|| event_loop.run_app(&mut app))) {
         Ok(ended) => ended.map_err(ViewerError::EventLoop),
         Err(panic) if display::is_loss(panic.as_ref()) => Err(ViewerError::DisplayLost),
         Err(panic) => {
-            // What can still be said of the scene is said.
+            // Tries to store the edits.
             let _ = catch_unwind(AssertUnwindSafe(|| app.keep_or_forget_edits()));
             resume_unwind(panic)
         }
     };
     app.keep_or_forget_edits();
-    // Also when the display is gone.
+    // Also if the display is gone.
     app.session.end_record();
     app.keep_window_size();
     for saved in app.saver.finish() {
-        app.tell_saved(saved);
+        app.report_saved(saved);
     }
     if app.options.print_figures {
         app.print_figures();
     }
-    if app.told_to_end.load(Ordering::SeqCst) {
+    if app.stop_requested.load(Ordering::SeqCst) {
         let message = app.stopped_message();
         app.failure.get_or_insert(ViewerError::Stopped(message));
     }
     let ended = ended.and(app.failure.take().map_or(Ok(()), Err));
     if matches!(ended, Err(ViewerError::DisplayLost)) {
-        // Its window and surface can no longer be given back.
+        // Its window and surface can no longer be released.
         std::mem::forget(app);
     }
     ended
@@ -192,9 +192,9 @@ pub fn run(options: ViewerOptions) -> Result<(), ViewerError> {
 
 struct App {
     options: ViewerOptions,
-    /// The session's clock counts from here.
+    /// Origin of the session's clock.
     start: Instant,
-    /// A wake-up is on its way.
+    /// A wake event is in the queue.
     pending: Arc<AtomicBool>,
     session: Session,
     saver: Saver,
@@ -205,43 +205,43 @@ struct App {
     panel: PanelState,
     handles: Handles,
     brush: RegionTool,
-    /// Which paths of an explained pixel are drawn.
+    /// The paths of an explained pixel that are drawn.
     ways: WaysShown,
     memory: Memory,
     reaction: Reaction,
     overlays: bool,
-    // Before the window, so that the device goes before the display.
+    // Before the window, so that the device is dropped before the display.
     presenter: Option<Presenter>,
     window: Option<Arc<Window>>,
     title: String,
     /// Logical pixels.
     window_size: (u32, u32),
-    /// When the window's size is to be kept, since it has come to rest.
+    /// When to store the window's size.
     keep_size_at: Option<Instant>,
     occluded: bool,
-    /// Something happened since the last tick.
+    /// Whether anything happened since the last tick.
     stirred: bool,
-    /// Generation of the picture on the window.
+    /// Generation of the image on the window.
     seen: u64,
-    /// Since when, or since the last drawing, there is a change that cannot be seen yet.
+    /// Since when, or since the last drawing, there is a change that is not visible yet.
     unseen_since: Option<Instant>,
-    /// The picture that the window draws.
+    /// Number of the image that the window shows.
     shown_picture: Option<u64>,
     shown_figures: String,
-    /// What is to be shown in place of the picture and is not there yet, and since when.
+    /// An inspection that is to be shown but not ready yet, and since when.
     inspected_since: Option<(Inspection, Instant)>,
     last_tick: Option<Instant>,
-    /// When a movement was last handed over.
+    /// When a movement was last passed to the session.
     steered_at: Instant,
     last_draw: Option<Instant>,
     /// When to tick again even if nothing happens.
     wake_at: Option<Instant>,
-    /// When the overlays want to be drawn again.
+    /// When the overlays are to be repainted.
     repaint_at: Option<Instant>,
     failure: Option<ViewerError>,
     leaving: Leaving,
-    /// By Ctrl+C in the terminal, or by the system.
-    told_to_end: Arc<AtomicBool>,
+    /// The program is to end, by Ctrl+C in the terminal or by the system.
+    stop_requested: Arc<AtomicBool>,
 }
 
 impl App {
@@ -249,15 +249,15 @@ impl App {
         options: ViewerOptions,
         pending: Arc<AtomicBool>,
         waker: Waker,
-        told_to_end: Arc<AtomicBool>,
+        stop_requested: Arc<AtomicBool>,
     ) -> Result<Self, ViewerError> {
         let mut session = Session::new(SessionOptions {
             width: options.width,
             height: options.height,
             threads: options.threads,
             seed: options.seed,
-            // What rests after a second cannot be measured.
-            target: if options.print_figures { Target::default() } else { GOOD_ENOUGH },
+            // A renderer that stops after a second cannot be measured.
+            target: if options.print_figures { Target::default() } else { DEFAULT_TARGET },
             yielding: true,
             up: options.up,
             waker: Some(waker.clone()),
@@ -286,7 +286,7 @@ impl App {
             ways: WaysShown::default(),
             memory,
             leaving,
-            told_to_end,
+            stop_requested,
             reaction: Reaction::default(),
             overlays: true,
             presenter: None,
@@ -323,14 +323,14 @@ impl App {
         Ok(())
     }
 
-    /// The window may have another size, or another scale.
+    /// Adapts to a new size or scale factor of the window.
     fn resized(&mut self) {
         let (Some(window), Some(presenter)) = (&self.window, &self.presenter) else { return };
         let size = window.inner_size();
         let logical = size.to_logical::<u32>(window.scale_factor());
         if logical.width > 0 && logical.height > 0 && window.fullscreen().is_none() {
             self.window_size = (logical.width, logical.height);
-            self.keep_size_at = Some(Instant::now() + AT_REST);
+            self.keep_size_at = Some(Instant::now() + RESIZE_DELAY);
         }
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
         self.input.resize(width, height);
@@ -339,8 +339,8 @@ impl App {
         window.request_redraw();
     }
 
-    /// How long people waited (milliseconds), and the paths of the last picture with the seconds from the restart to the last
-    /// of them, in which the window did all that it does.
+    /// Prints the latencies (milliseconds), and the camera rays of the last image with the seconds from the restart to
+    /// the last of them, including everything else the window does.
     fn print_figures(&self) {
         let milliseconds = |waits: &LatencyHistogram| {
             let of = |share| waits.quantile(share).map(|wait| wait.as_secs_f64() * 1e3);
@@ -356,11 +356,11 @@ impl App {
             "camera_rays": status.rays.camera,
             "seconds": status.elapsed,
         });
-        // Standard output may be closed, and then nobody reads it.
+        // Standard output may be closed.
         let _ = crate::console::print(figures);
     }
 
-    /// The next window is as large. Not only at the end: X11 ends the program itself when the display goes.
+    /// Stores the window's size. Not only at exit: X11 ends the program itself when the display is lost.
     fn keep_window_size(&mut self) {
         self.keep_size_at = None;
         if let Some(trouble) = self.memory.keep_window(self.window_size) {
@@ -368,15 +368,15 @@ impl App {
         }
     }
 
-    /// Hands over what was asked for, lets the session go on, and looks for something new.
+    /// Passes on input, advances the session, and checks for anything new to show.
     fn tick(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
         self.stirred = false;
         self.last_tick = Some(now);
         let clock = now - self.start;
         let restarts = self.session.status().restarts;
         self.session.update(clock);
-        // A movement that came before the last one was seen would only take its place: it waits, and adds up. Nor does it
-        // come faster than frames, though a picture that is ready is looked at sooner.
+        // A movement before the last one is visible would only replace it: it waits, and adds up. Movements are also
+        // limited to the frame rate, although a finished image is checked for more often.
         let answered = self.is_answered(now);
         let soon = Some(self.steered_at + FRAME).filter(|soon| *soon > now);
         if answered && soon.is_none() {
@@ -395,7 +395,7 @@ impl App {
             let tone = if message.kind == MessageKind::Note { Tone::News } else { Tone::Problem };
             self.toasts.add(tone, message.text.clone(), now);
         }
-        // Without a first scene there is nothing to stay for, and the terminal is where the name was typed.
+        // Without a first scene there is no reason to stay open, and the terminal is where the name was typed.
         if status.scene.is_empty()
             && status.loading.is_none()
             && status.messages.iter().any(|message| message.kind == MessageKind::Error)
@@ -407,7 +407,7 @@ impl App {
             return;
         }
         for saved in self.saver.finished() {
-            self.tell_saved(saved);
+            self.report_saved(saved);
         }
         self.take_files(now);
         self.follow_edits(now, event_loop);
@@ -418,27 +418,27 @@ impl App {
         let n_toasts = self.toasts.len();
         self.toasts.at(now);
         let Some(window) = &self.window else { return };
-        // Until the first scene is there, the window is called after what it will show.
+        // Until the first scene is loaded, the title is that of the scene to be shown.
         if title != self.title && !self.session.status().scene.is_empty() {
             window.set_title(&title);
             self.title = title;
         }
         let new_picture = self.shown_picture != Some(self.session.picture().number);
-        let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES);
+        let figures_due = self.last_draw.is_none_or(|then| now >= then + FIGURES_INTERVAL);
         let new_figures = self.overlays && self.figures() != self.shown_figures;
         let repaint = self.repaint_at.is_some_and(|at| now >= at) || self.toasts.len() != n_toasts;
-        // The picture that the last change asked for comes first: drawing an older one would only keep it waiting.
+        // The image for the last change has priority: drawing an older one would only delay it.
         let unseen_since = self.unseen_since.filter(|_| !self.is_rendered());
-        let comes = unseen_since.is_some_and(|since| now < since + LATEST);
+        let comes = unseen_since.is_some_and(|since| now < since + MAX_WAIT);
         if !self.occluded && !comes && (new_picture || repaint || (new_figures && figures_due)) {
             window.request_redraw();
         }
         let moving = match answered {
             true => soon.or_else(|| self.input.is_moving().then(|| now + FRAME)),
-            false => Some(self.steered_at + LATEST),
+            false => Some(self.steered_at + MAX_WAIT),
         };
-        let late = unseen_since.filter(|_| comes).map(|since| since + LATEST);
-        let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES));
+        let late = unseen_since.filter(|_| comes).map(|since| since + MAX_WAIT);
+        let figures = (new_figures && !figures_due).then(|| self.last_draw.map_or(now, |then| then + FIGURES_INTERVAL));
         let repaint_at = self.repaint_at.filter(|at| *at > now);
         let session = self.session.next_wake(clock).map(|at| self.start + at);
         self.wake_at = [
@@ -456,31 +456,31 @@ impl App {
         .min();
     }
 
-    /// Something on the window answers to the mouse.
+    /// Whether there are widgets on the window that react to the mouse.
     fn has_widgets(&self) -> bool {
         let explains = self.session.world().resource::<Explaining>().story.is_some();
         self.help.open || self.leaving.question.is_some() || self.overlays && (self.panel.shown || explains)
     }
 
-    /// What is under the mouse is to be sharp, and the mouse is not in the panel.
+    /// Whether focus follows the mouse, and the mouse is not in the panel.
     fn focus_follows(&self) -> bool {
         let follows = matches!(self.session.world().resource::<Focus>().target, FocusTarget::Cursor(_));
         follows && self.presenter.as_ref().is_some_and(|presenter| !presenter.egui_context().is_pointer_over_area())
     }
 
-    /// The last change of the view can be seen, or that takes too long to wait for. To render the next while this one
-    /// is being drawn would keep both waiting where one processor has to do all.
+    /// Whether the last change of the view is visible, or has taken too long to wait for. Rendering the next image
+    /// while this one is drawn would delay both on a single processor.
     fn is_answered(&self, now: Instant) -> bool {
         let restarts = self.session.status().restarts;
-        self.seen >= restarts || (self.occluded && self.is_rendered()) || now >= self.steered_at + LATEST
+        self.seen >= restarts || (self.occluded && self.is_rendered()) || now >= self.steered_at + MAX_WAIT
     }
 
-    /// There is a picture of what the scene is now.
+    /// Whether there is an image of the current scene.
     fn is_rendered(&self) -> bool {
         self.session.picture().generation >= self.session.status().restarts
     }
 
-    /// Hands over how keys and mouse moved.
+    /// Passes the movement by keys and mouse to the session.
     fn steer(&mut self, now: Instant, clock: Duration) {
         let commands = self.input.take(now);
         if commands.is_empty() {
@@ -494,7 +494,7 @@ impl App {
     }
 }
 
-/// A star stands before what has edits that are not saved.
+/// Returns the window title; an asterisk marks unsaved edits.
 fn title(scene: &str, unsaved: bool) -> String {
     let name = short_name(scene);
     let mark = if unsaved { "*" } else { "" };
@@ -505,7 +505,7 @@ fn title(scene: &str, unsaved: bool) -> String {
     }
 }
 
-/// A scene without its folder.
+/// Returns the name of a scene without its folder.
 fn short_name(scene: &str) -> String {
     Path::new(scene).file_name().map_or(scene.into(), |name| name.to_string_lossy()).into_owned()
 }

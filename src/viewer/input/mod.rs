@@ -1,7 +1,7 @@
-//! From keys and mouse to commands. Knows no window and no clock: it is told what happened and when.
+//! Translation of keys and mouse to commands. Independent of window and clock: events and times are passed in.
 //!
-//! Nothing depends on how often [`Input::take`] is called: a held key moves by the time it was down, a drag by the
-//! distance it went, and whatever happens between two calls is added up into one command of a kind.
+//! The result does not depend on how often [`Input::take`] is called: a held key moves by the time it was down, a drag
+//! by its distance, and all input between two calls is added up into one command per kind.
 
 mod sum;
 #[cfg(test)]
@@ -14,34 +14,34 @@ use sum::{Sum, add};
 use winit::event::MouseButton;
 use winit::keyboard::{Key, ModifiersState, PhysicalKey};
 
-/// Degrees a second while an orbit or roll key is down.
+/// Degrees per second while an orbit or roll key is down.
 const ORBIT_RATE_DEG: f64 = 75.0;
 const ROLL_RATE_DEG: f64 = 45.0;
-/// Once around in 18 seconds.
+/// One turn in 18 seconds.
 const SPIN_RATE_DEG: f64 = 20.0;
-/// Picture heights a second.
+/// Image heights per second.
 const PAN_RATE: f64 = 0.5;
-/// What Shift multiplies the flying speed by.
+/// Factor of Shift on the flying speed.
 const FAST: f64 = 4.0;
-/// A tap that is over within a frame still moves as if the key had been down for so long, seconds.
+/// A tap shorter than a frame moves as if the key had been down for this time, seconds.
 const TAP: f64 = 1.0 / 30.0;
 
-/// Degrees for a drag over the picture's height.
+/// Degrees for a drag over the image's height.
 const LOOK_DRAG_DEG: f64 = 90.0;
 const ORBIT_DRAG_DEG: f64 = 240.0;
-/// A drag over the picture's height divides the distance to the pivot by e to this.
+/// A drag over the image's height divides the distance to the pivot by e to this power.
 const ZOOM_DRAG: f64 = 2.0;
-/// Pixels that a pressed mouse may tremble without turning the view.
-const CLICK_SLACK: f64 = 4.0;
+/// Pixels that a pressed mouse may move without turning the view.
+const CLICK_TOLERANCE: f64 = 4.0;
 const DOUBLE_CLICK: Duration = Duration::from_millis(400);
 
-/// A notch of the wheel multiplies or divides by this.
+/// Factor per notch of the wheel.
 const SPEED_NOTCH: f64 = 1.25;
 const ZOOM_NOTCH: f64 = 1.1;
-/// Flying speed, strides a second; the wheel stays within.
+/// Limits of the flying speed for the wheel, strides per second.
 const SPEED_RANGE: (f64, f64) = (1.0 / 256.0, 256.0);
 
-/// What is being pressed and dragged, and what that adds up to since it was last asked.
+/// The keys and drags in progress, and the accumulated input since the last [`take`](Self::take).
 #[derive(Debug)]
 pub struct Input {
     navigation: Navigation,
@@ -52,15 +52,15 @@ pub struct Input {
     /// Window size and mouse position, physical pixels.
     size: [f64; 2],
     cursor: [f64; 2],
-    /// Strides a second.
+    /// Strides per second.
     speed: f64,
-    /// Since when the camera goes around by itself and has not been counted.
+    /// Start of the part of the turntable rotation that has not been counted.
     spin: Option<Instant>,
-    /// A drag with the left button moves around the pivot, not the camera's direction.
+    /// Whether a drag with the left button orbits the pivot instead of turning the camera.
     orbits: bool,
-    /// The mouse moves the view without a button.
+    /// Whether the mouse moves the view without a button.
     captured: bool,
-    /// What is under the mouse is focused on.
+    /// Whether focus follows the mouse.
     focuses: bool,
     sum: Sum,
 }
@@ -68,7 +68,7 @@ pub struct Input {
 #[derive(Debug)]
 struct Held {
     motion: Motion,
-    /// Up to when it has been counted, and how many seconds that was.
+    /// Time up to which it has been counted, and the seconds counted.
     since: Instant,
     counted: f64,
 }
@@ -76,11 +76,11 @@ struct Held {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DragKind {
     Look,
-    /// Looks about, and letters fly as long as it lasts.
+    /// Looks around, and letters fly for its duration.
     Fly,
     Orbit,
     Pan,
-    /// Nearer to the pivot or farther from it.
+    /// Towards the pivot or away from it.
     Zoom,
     Focus,
 }
@@ -89,15 +89,15 @@ enum DragKind {
 struct Drag {
     kind: DragKind,
     button: MouseButton,
-    /// Where the mouse was last; until it `moved` out of the slack, where it was pressed.
+    /// The last mouse position; until it has `moved` beyond the tolerance, the position of the press.
     last: [f64; 2],
     moved: bool,
-    /// Begun with Ctrl: a click selects beside what is selected, a drag orbits.
+    /// Begun with Ctrl: a click adds to the selection, a drag orbits.
     ctrl: bool,
 }
 
 impl Input {
-    /// For a window of this size, physical pixels.
+    /// Creates the state for a window of this size, physical pixels.
     pub fn new(width: u32, height: u32, navigation: Navigation) -> Self {
         Self {
             navigation,
@@ -121,40 +121,40 @@ impl Input {
     }
 
     pub fn set_modifiers(&mut self, modifiers: ModifiersState, now: Instant) {
-        // What was held so far was held with the old ones.
+        // Keys held so far are counted with the old modifiers.
         self.count(now);
         self.modifiers = modifiers;
     }
 
-    /// Keys and gestures.
+    /// The preset of keys and gestures.
     pub fn navigation(&self) -> Navigation {
         self.navigation
     }
 
-    /// Other keys and gestures from now on.
+    /// Sets the preset of keys and gestures.
     pub fn set_navigation(&mut self, navigation: Navigation, now: Instant) {
         self.release_motions(now, |_| true);
         self.drag = None;
         self.navigation = navigation;
     }
 
-    /// Whether holding this key moves: under a preset, letters fly only while a drag does.
+    /// Whether holding this key moves: under a preset, letters fly only during a fly drag.
     fn moves(&self, motion: Motion) -> bool {
         let flies = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
         self.navigation == Navigation::Firstlight || !motion.flies() || flies
     }
 
-    /// Strides a second.
+    /// Strides per second.
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// A key that moves is down, so time alone changes the view.
+    /// Whether a movement key is down, so that time alone changes the view.
     pub fn is_moving(&self) -> bool {
         !self.held.is_empty() || self.spin.is_some()
     }
 
-    /// The camera goes around by itself from now on, or stops.
+    /// Starts or stops the turntable.
     pub fn toggle_spin(&mut self, now: Instant) {
         self.count(now);
         self.spin = if self.spin.is_some() { None } else { Some(now) };
@@ -164,7 +164,7 @@ impl Input {
         self.spin.is_some()
     }
 
-    /// A plain drag moves around the pivot from now on, or looks about again; true for the first.
+    /// Toggles whether a plain drag orbits the pivot or looks around; returns true for orbiting.
     pub fn toggle_orbits(&mut self) -> bool {
         self.orbits = !self.orbits;
         self.orbits
@@ -174,7 +174,7 @@ impl Input {
         self.orbits
     }
 
-    /// From now on the mouse moves the view by itself, as told by [`Self::mouse_moved`], or only with a button again.
+    /// Sets whether the mouse moves the view without a button, by [`Self::mouse_moved`].
     pub fn set_captured(&mut self, captured: bool) {
         self.captured = captured;
         self.drag = None;
@@ -184,12 +184,12 @@ impl Input {
         self.captured
     }
 
-    /// Whether to focus on what is under the mouse, wherever it goes.
+    /// Sets whether focus follows the mouse.
     pub fn set_focuses(&mut self, focuses: bool) {
         self.focuses = focuses;
     }
 
-    /// A captured mouse was moved, pixels.
+    /// Handles a movement of the captured mouse, pixels.
     pub fn mouse_moved(&mut self, x: f64, y: f64) {
         if self.captured {
             let height = self.size[1].max(1.0);
@@ -197,9 +197,9 @@ impl Input {
         }
     }
 
-    /// Heights of the picture, downwards positive.
+    /// Turns the view by image heights, downwards positive.
     fn turn(&mut self, [dx, dy]: [f64; 2], orbits: bool) {
-        // The view goes where the mouse goes; what is orbited sticks to the mouse.
+        // The view follows the mouse; when orbiting, the object follows the mouse.
         if orbits {
             add(&mut self.sum.orbit, [-dx * ORBIT_DRAG_DEG, dy * ORBIT_DRAG_DEG]);
         } else {
@@ -207,12 +207,12 @@ impl Input {
         }
     }
 
-    /// A mouse button that turns, moves or focuses is down.
+    /// Whether a mouse button is down that turns, moves or focuses.
     pub fn is_dragging(&self) -> bool {
         self.drag.is_some()
     }
 
-    /// Where the mouse is, physical pixels.
+    /// The mouse position, physical pixels.
     pub fn cursor_place(&self) -> [f64; 2] {
         self.cursor
     }
@@ -221,13 +221,13 @@ impl Input {
         self.modifiers
     }
 
-    /// Flying speed, strides a second.
+    /// Sets the flying speed, strides per second.
     pub fn set_speed(&mut self, speed: f64, now: Instant) {
         self.count(now);
         self.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1);
     }
 
-    /// A key went down (again, if `repeat`) or up; answers with what is to be done besides moving.
+    /// Handles a key press (a repeated one if `repeat`) or release; returns an action other than movement.
     pub fn key(
         &mut self,
         physical: PhysicalKey,
@@ -246,7 +246,7 @@ impl Input {
                 let flies = |motion| {
                     !matches!(motion, Motion::OrbitLeft | Motion::OrbitRight | Motion::OrbitUp | Motion::OrbitDown)
                 };
-                // How fast is decided by where the flight begins, not anew at every tree that passes.
+                // The pace is determined where the flight begins, and not again for every object passed.
                 if !repeat && flies(motion) && self.held.is_empty() {
                     self.sum.pace = Some(self.place());
                 }
@@ -257,7 +257,7 @@ impl Input {
             }
         }
         let action = pressed.then(|| action_of(self.navigation, physical, typed, self.modifiers)).flatten()?;
-        // Only steps repeat: a toggle held down would flicker, a screenshot held down would fill the disk.
+        // Only steps repeat: a repeated toggle would flicker, a repeated screenshot would fill the disk.
         let steps = matches!(
             action,
             Action::Send(
@@ -272,7 +272,7 @@ impl Input {
         (steps || !repeat).then_some(action)
     }
 
-    /// The window lost the keyboard: whatever is let go now will not be told.
+    /// Releases everything when the window loses the keyboard, because later releases are not reported.
     pub fn release_all(&mut self, now: Instant) {
         self.release_motions(now, |_| true);
         self.drag = None;
@@ -286,7 +286,7 @@ impl Input {
         }
     }
 
-    /// What a drag with this button does, if anything.
+    /// The kind of a drag with this button, if any.
     fn kind_of_drag(&self, button: MouseButton) -> Option<DragKind> {
         use MouseButton::{Left, Middle, Right};
         let Modifiers { ctrl, shift, alt } = Modifiers::of(self.modifiers);
@@ -307,7 +307,7 @@ impl Input {
         })
     }
 
-    /// A mouse button went down or up.
+    /// Handles a mouse button press or release.
     pub fn button(&mut self, button: MouseButton, pressed: bool, now: Instant) {
         if self.captured {
             return;
@@ -315,7 +315,7 @@ impl Input {
         if !pressed {
             let Some(drag) = self.drag.take_if(|drag| drag.button == button) else { return };
             if drag.kind == DragKind::Look && !drag.moved {
-                // The second click of two focuses, and leaves the selection of the first.
+                // The second click of a double click focuses, and keeps the selection of the first.
                 let second = self.last_press.is_none();
                 self.sum.pick = (!second).then(|| (self.place(), drag.ctrl)).or(self.sum.pick);
             }
@@ -330,20 +330,20 @@ impl Input {
         }
         if kind == DragKind::Look {
             let again = self.last_press.is_some_and(|(then, place)| {
-                now.saturating_duration_since(then) < DOUBLE_CLICK && distance(place, self.cursor) <= CLICK_SLACK
+                now.saturating_duration_since(then) < DOUBLE_CLICK && distance(place, self.cursor) <= CLICK_TOLERANCE
             });
             if again {
                 self.sum.focus = Some(self.place());
                 self.sum.pivot = Some(self.place());
             }
-            // A third press begins anew.
+            // A third press starts a new double click.
             self.last_press = (!again).then_some((now, self.cursor));
         }
         let ctrl = self.modifiers.control_key();
         self.drag = Some(Drag { kind, button, last: self.cursor, moved: false, ctrl });
     }
 
-    /// The mouse is at this place of the window, physical pixels.
+    /// Handles a mouse movement to this position of the window, physical pixels.
     pub fn cursor(&mut self, x: f64, y: f64) {
         let moved = self.cursor != [x, y];
         self.cursor = [x, y];
@@ -354,7 +354,7 @@ impl Input {
         let height = self.size[1].max(1.0);
         let Some(drag) = &mut self.drag else { return };
         if !drag.moved {
-            if distance(drag.last, self.cursor) <= CLICK_SLACK {
+            if distance(drag.last, self.cursor) <= CLICK_TOLERANCE {
                 return;
             }
             drag.moved = true;
@@ -363,19 +363,19 @@ impl Input {
         drag.last = self.cursor;
         let (kind, ctrl) = (drag.kind, drag.ctrl);
         match kind {
-            // Window managers take drags with Alt, and leave those with Ctrl.
+            // Window managers intercept drags with Alt, but not those with Ctrl.
             DragKind::Look => self.turn([dx, dy], self.orbits || ctrl),
             DragKind::Fly => self.turn([dx, dy], false),
-            // Up and to the right is nearer.
+            // Up and to the right moves nearer.
             DragKind::Zoom => self.sum.dolly -= (dx - dy) * ZOOM_DRAG,
             DragKind::Orbit => self.turn([dx, dy], true),
-            // What is panned sticks to the mouse.
+            // When panning, the object follows the mouse.
             DragKind::Pan => add(&mut self.sum.pan, [-dx, dy]),
             DragKind::Focus => self.sum.focus = Some(place),
         }
     }
 
-    /// The wheel turned by so many notches, away from the person positive; true when the flying speed changed.
+    /// Handles a wheel movement in notches, positive away from the user; returns true if the flying speed changed.
     pub fn wheel(&mut self, notches: f64, now: Instant) -> bool {
         let flies = self.drag.as_ref().is_some_and(|drag| drag.kind == DragKind::Fly);
         let zooms = self.navigation != Navigation::Firstlight && !flies && !self.modifiers.shift_key();
@@ -384,7 +384,7 @@ impl Input {
         } else if self.modifiers.shift_key() {
             self.sum.zoom -= notches * ZOOM_NOTCH.ln();
         } else {
-            // What was flown so far was flown at the old speed.
+            // The distance so far is counted with the old speed.
             self.count(now);
             self.speed = (self.speed * SPEED_NOTCH.powf(notches)).clamp(SPEED_RANGE.0, SPEED_RANGE.1);
             return true;
@@ -392,13 +392,13 @@ impl Input {
         false
     }
 
-    /// Everything asked for since the last call, one command of a kind.
+    /// Returns the input since the last call, one command per kind.
     pub fn take(&mut self, now: Instant) -> Vec<Command> {
         self.count(now);
         std::mem::take(&mut self.sum).into_commands()
     }
 
-    /// Adds up what the held keys have moved by now.
+    /// Adds up the movement of held keys until now.
     fn count(&mut self, now: Instant) {
         if let Some(since) = &mut self.spin {
             let since = std::mem::replace(since, now);
@@ -448,18 +448,18 @@ impl Input {
         }
     }
 
-    /// Of the window, physical pixels.
+    /// Size of the window, physical pixels.
     pub fn size(&self) -> [f64; 2] {
         self.size
     }
 
-    /// The mouse as a fraction of the picture.
+    /// The mouse position as a fraction of the image.
     pub fn place(&self) -> [f64; 2] {
         [0, 1].map(|i| (self.cursor[i] / self.size[i].max(1.0)).clamp(0.0, 1.0))
     }
 }
 
-/// Modifier keys that gestures look at.
+/// The modifier keys that gestures use.
 struct Modifiers {
     ctrl: bool,
     shift: bool,

@@ -1,8 +1,8 @@
-//! What keys and mouse add up to between two frames.
+//! Accumulated input between two frames.
 
 use crate::frame::{Command, Edit};
 
-/// Movement not yet sent, and the commands that must keep their order behind it.
+/// Movement not yet sent, and the commands that must follow it in order.
 #[derive(Debug, Default)]
 pub struct Sum {
     pub turn: [f64; 2],
@@ -20,7 +20,7 @@ pub struct Sum {
 }
 
 impl Sum {
-    /// One command of a kind, in an order in which they do not disturb each other.
+    /// Returns one command per kind, in an order in which they do not affect each other.
     pub fn into_commands(self) -> Vec<Command> {
         let mut commands = Vec::new();
         let mut push = |wanted: bool, command| {

@@ -242,7 +242,7 @@ fn a_drag_with_ctrl_orbits_and_a_click_with_ctrl_adds_to_the_selection() {
     }
 }
 
-/// What a drag to the right does with these modifiers.
+/// Returns the commands of a drag to the right with these modifiers.
 fn dragged(navigation: Navigation, button: MouseButton, modifiers: ModifiersState) -> Vec<Command> {
     let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());
     input.set_modifiers(modifiers, start);
@@ -291,12 +291,12 @@ fn under_a_preset_the_wheel_zooms_and_letters_fly_only_with_the_right_button() {
         let (mut input, start) = (Input::new(800, 400, navigation), Instant::now());
         assert!(!input.wheel(1.0, start));
         assert!(matches!(input.take(start)[..], [Command::Dolly { factor }] if factor < 1.0));
-        // A letter alone is a tool, and moves nothing.
+        // A letter alone selects a tool, and moves nothing.
         let (code, text) = if navigation == Navigation::Maya { (KeyCode::KeyW, "w") } else { (KeyCode::KeyS, "s") };
         assert!(matches!(press(&mut input, code, text, true, start), Some(Action::Gizmo(Some(_)))));
         press(&mut input, code, text, false, after(start, 50));
         assert_eq!(input.take(after(start, 100)), []);
-        // With the right button it flies, as fast as the wheel says, until that is let go.
+        // With the right button it flies, at the speed set by the wheel, until the button is released.
         input.button(MouseButton::Right, true, start);
         assert!(input.wheel(1.0, start));
         assert_eq!(press(&mut input, KeyCode::KeyW, "w", true, start), None);
@@ -304,7 +304,7 @@ fn under_a_preset_the_wheel_zooms_and_letters_fly_only_with_the_right_button() {
         let commands = input.take(after(start, 5000));
         let Some(Command::Fly { forward, .. }) = commands.last() else { panic!("{commands:?}") };
         assert!((forward - SPEED_NOTCH).abs() < 1e-9 && !input.is_moving(), "{forward}");
-        // The arrows orbit as ever.
+        // The arrow keys orbit as without a preset.
         press(&mut input, KeyCode::ArrowLeft, "", true, start);
         assert!(input.is_moving());
     }

@@ -1,8 +1,8 @@
 //! Every key and mouse gesture, in one `table`.
 //!
-//! The window obeys [`BINDINGS`] and, before it, the preset that was chosen; the overlay on H shows both, and `docs/keys.md` is written from it, so these
-//! cannot disagree. Keys that move are physical (WASD is the same block of keys on every layout); all others are
-//! what the key types.
+//! The window uses [`BINDINGS`] and, before it, the chosen preset. The overlay on H shows both, and `docs/keys.md` is
+//! generated from them, so they cannot disagree. Movement keys are physical (WASD is the same block of keys on every
+//! layout); all others are identified by the character that the key types.
 
 mod page;
 mod presets;
@@ -18,14 +18,14 @@ use crate::frame::{Command, Navigation, gizmo};
 use crate::render::Inspection;
 use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 
-/// A line of the table: what to press and what it does.
+/// A line of the table: triggers and their effect.
 pub struct Binding {
     pub triggers: &'static [Trigger],
     pub effect: &'static str,
 }
 
 impl Binding {
-    /// All that a search looks at.
+    /// The text that a search looks in.
     pub fn line(&self, title: &str) -> String {
         format!("{title} {} {}", self.keys(), self.effect)
     }
@@ -40,11 +40,11 @@ pub struct KeyGroup {
 pub enum Trigger {
     /// Moves for as long as the key is down.
     Hold(KeyCode, Motion),
-    /// Happens once a press, and again as the keyboard repeats.
+    /// Triggers once per press, and again on keyboard repeat.
     Press(Chord, Action),
     /// One of the keys 1 to 9, whatever it types.
     Digit { ctrl: bool, shift: bool, action: fn(u8) -> Action },
-    /// A gesture, told in words; `input` knows how.
+    /// A gesture, described in words; `input` implements it.
     Mouse(&'static str),
 }
 
@@ -53,18 +53,18 @@ pub enum Trigger {
 pub struct Chord {
     pub key: Typed,
     pub ctrl: bool,
-    /// `None` where typing the character may need Shift or not.
+    /// `None` if typing the character may or may not need Shift.
     pub shift: Option<bool>,
 }
 
-/// What a key types.
+/// The result of typing a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Typed {
     Text(&'static str),
     Named(NamedKey),
 }
 
-/// What a held key does.
+/// The movement of a held key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     Forward,
@@ -81,48 +81,48 @@ pub enum Motion {
     RollRight,
 }
 
-/// What a pressed key does.
+/// The action of a pressed key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     Send(Command),
     TogglePause,
     ToggleIntegrator,
-    /// As seen (PNG), or the linear light (EXR).
+    /// Saves the displayed image (PNG), or linear radiance (EXR).
     Screenshot {
         linear: bool,
     },
-    /// As a scene file: the one that is open, or a new one.
+    /// Saves as a scene file: the open one, or a new one.
     SaveScene {
         new: bool,
     },
     PrintView,
-    /// Shows this in place of the picture, or the picture again.
+    /// Toggles between this inspection and the image.
     Inspect(Inspection),
-    /// Why what is under the mouse looks as it does.
+    /// Explains the pixel under the mouse.
     Explain,
-    /// The next drag is a rectangle that gets all samples.
+    /// The next drag selects a rectangle that gets all samples.
     Brush,
     ClearRegion,
     ToggleSharpZone,
-    /// Moves, turns or scales; then none.
+    /// Cycles through move, rotate, scale and none.
     NextGizmo,
-    /// These handles, or none where they are shown already.
+    /// Shows these handles, or hides them if they are shown already.
     Gizmo(Option<gizmo::Mode>),
-    /// The camera goes around by itself.
+    /// Starts or stops the turntable.
     ToggleSpin,
-    /// A drag looks about, or moves around the pivot.
+    /// Toggles whether a drag looks around or orbits the pivot.
     ToggleDrag,
-    /// The mouse moves the view without a button, or points again.
+    /// Captures the mouse, so that it moves the view without a button, or releases it.
     CaptureMouse,
-    /// What is under the mouse is sharp, wherever it goes; or not any more.
+    /// Toggles whether focus follows the mouse.
     FocusFollows,
-    /// Asks for a file to open.
+    /// Shows a dialog to choose a file to open.
     OpenDialog,
     TogglePanel,
     ToggleHelp,
     ToggleOverlays,
     ToggleFullscreen,
-    /// Closes the help, or lets go of what is selected, or closes the window.
+    /// Closes the help, or clears the selection, or closes the window.
     Leave,
     Quit,
 }
@@ -131,7 +131,7 @@ fn triggers() -> impl Iterator<Item = &'static Trigger> {
     BINDINGS.iter().flat_map(|group| group.bindings).flat_map(|binding| binding.triggers)
 }
 
-/// What holding this key moves.
+/// The movement of a held key.
 pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
     triggers().find_map(|trigger| match trigger {
         Trigger::Hold(code, motion) if key == PhysicalKey::Code(*code) => Some(*motion),
@@ -140,13 +140,13 @@ pub fn motion_of(key: PhysicalKey) -> Option<Motion> {
 }
 
 impl Motion {
-    /// Moves the camera along its own axes.
+    /// Whether it moves the camera along its own axes.
     pub fn flies(self) -> bool {
         matches!(self, Self::Forward | Self::Back | Self::Left | Self::Right | Self::Up | Self::Down)
     }
 }
 
-/// What pressing this key does under a preset; digits count where they are on the keyboard, since Shift types something else there.
+/// The action of a key under a preset; digits are physical, because Shift changes what they type.
 pub fn action_of(
     navigation: Navigation,
     physical: PhysicalKey,
@@ -166,7 +166,7 @@ pub fn action_of(
     })
 }
 
-/// 1 to 9.
+/// The digit of a key, 1 to 9.
 fn digit_of(key: PhysicalKey) -> Option<u8> {
     use KeyCode::{Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7, Digit8, Digit9};
     let keys = [Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7, Digit8, Digit9];
@@ -174,7 +174,7 @@ fn digit_of(key: PhysicalKey) -> Option<u8> {
 }
 
 impl Chord {
-    /// Whether a press may be both.
+    /// Whether one press may match both.
     fn overlaps(&self, other: &Self) -> bool {
         let apart = self.shift.is_some() && other.shift.is_some() && self.shift != other.shift;
         self.key == other.key && self.ctrl == other.ctrl && !apart
@@ -182,7 +182,7 @@ impl Chord {
 
     fn matches(&self, key: &Key, modifiers: ModifiersState) -> bool {
         let same_key = match (self.key, key) {
-            // With Shift or Caps Lock the same letter comes as a capital.
+            // With Shift or Caps Lock the letter is reported as a capital.
             (Typed::Text(text), Key::Character(typed)) => text.eq_ignore_ascii_case(typed),
             (Typed::Named(name), Key::Named(typed)) => name == *typed,
             _ => false,
@@ -221,7 +221,7 @@ mod tests {
                 }
             }
         }
-        // A held letter must not type a command as well.
+        // A held letter must not trigger a command as well.
         for trigger in &all {
             let Trigger::Press(Chord { key: Typed::Text(text), ctrl: false, .. }, _) = trigger else { continue };
             let label = text.to_uppercase();

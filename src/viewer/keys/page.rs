@@ -1,4 +1,4 @@
-//! The table as people read it: names of keys, and `docs/keys.md`.
+//! The table in readable form: names of keys, and `docs/keys.md`.
 
 use super::presets::groups_of;
 use super::{BINDINGS, Binding, Chord, Trigger, Typed};
@@ -22,7 +22,7 @@ impl Chord {
 }
 
 impl Binding {
-    /// The keys as the user reads them.
+    /// The names of the keys for the user.
     pub fn keys(&self) -> String {
         let labels: Vec<String> = self
             .triggers
@@ -44,7 +44,7 @@ impl Binding {
     }
 }
 
-/// The whole of `docs/keys.md`.
+/// The content of `docs/keys.md`.
 pub fn markdown() -> String {
     let mut page = String::from(
         "# Keys and mouse\n\n\

@@ -1,12 +1,12 @@
-//! Keys and gestures of other programs, in front of those of the [`table`](super::table): what a preset names takes the
-//! place of what the table has under the same key, and its first groups that of the table's [`REPLACED`] groups.
+//! Presets with keys and gestures of other programs. The bindings of a preset take precedence over those of the
+//! [`table`](super::table) with the same key, and its first groups replace the table's [`REPLACED`] groups.
 
 use super::table::{BINDINGS, edit, named, send, shifted, text};
 use super::{Action, Binding, KeyGroup, Trigger, Typed};
 use crate::frame::{Command, Edit, Navigation, gizmo};
 use winit::keyboard::NamedKey;
 
-/// Groups of the table that a preset has in its own way.
+/// Groups of the table that presets replace.
 const REPLACED: [&str; 2] = ["Fly", "Orbit"];
 
 const DELETE: Action = Action::Send(Command::Edit(Edit::Delete));
@@ -104,7 +104,7 @@ const FLY: Binding = Binding {
 const FLY_SPEED: Binding =
     Binding { triggers: &[Trigger::Mouse("Right drag + wheel")], effect: "change the flying speed" };
 
-/// What a preset has before the table.
+/// The groups of a preset.
 pub fn groups_of(navigation: Navigation) -> &'static [KeyGroup] {
     match navigation {
         Navigation::Firstlight => &[],
@@ -113,7 +113,7 @@ pub fn groups_of(navigation: Navigation) -> &'static [KeyGroup] {
     }
 }
 
-/// Every key and gesture that counts under a preset, as people read them.
+/// Every key and gesture that is active under a preset, for display.
 pub fn shown(navigation: Navigation) -> Vec<(&'static str, Vec<&'static Binding>)> {
     let own = groups_of(navigation);
     let chords: Vec<_> = own.iter().flat_map(|group| group.bindings).flat_map(chords_of).collect();
@@ -155,7 +155,7 @@ mod tests {
         assert_eq!(pressed(Navigation::Blender, "X", ModifiersState::SHIFT), Some(DELETE));
         assert_eq!(pressed(Navigation::Firstlight, "x", none), Some(Action::Send(Command::Level)));
         assert_eq!(pressed(Navigation::Maya, "x", none), Some(Action::Send(Command::Level)));
-        // The rest is as it was.
+        // Other keys are unchanged.
         for navigation in Navigation::ALL {
             assert_eq!(pressed(navigation, "k", none), Some(Action::Screenshot { linear: false }));
             let undo = Some(Action::Send(Command::Edit(Edit::Undo)));

@@ -41,11 +41,11 @@ pub(super) const fn send(key: &'static str, command: Command) -> Trigger {
     text(key, Action::Send(command))
 }
 
-/// A press of a focus or aperture key multiplies by this or divides.
+/// Factor per press of a focus or aperture key.
 const LENS_STEP: f64 = 1.05;
-/// A press of a dolly or zoom key multiplies by this or divides.
+/// Factor per press of a dolly or zoom key.
 const ZOOM_STEP: f64 = 1.1;
-/// Photographers count exposure in thirds.
+/// Exposure steps in thirds of a stop, as in photography.
 const EXPOSURE_STEP: f32 = 1.0 / 3.0;
 
 const NEARER: Command = Command::ScaleFocus { factor: 1.0 / LENS_STEP };

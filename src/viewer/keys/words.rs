@@ -1,6 +1,6 @@
-//! Which lines of the list a word finds: its own words, and others that people use for the same thing.
+//! Search in the list of keys: by its own words, and by synonyms.
 
-/// What people look for, and the words of the lines that have it.
+/// Search terms, and the words of the lines that they match.
 const SYNONYMS: &[(&str, &[&str])] = &[
     ("animation", &["turntable", "numbered frames"]),
     ("backdrop", &["environment"]),
@@ -80,14 +80,14 @@ const SYNONYMS: &[(&str, &[&str])] = &[
     ("zoom", &["field of view", "nearer"]),
 ];
 
-/// Whether a line has what is looked for: every word of it, or another word for the same.
+/// Whether a line matches a search: each search term, or a synonym of it, must occur.
 pub fn finds(line: &str, search: &str) -> bool {
     let line = line.to_lowercase();
-    search.to_lowercase().split_whitespace().all(|word| line.contains(word) || means(&line, word))
+    search.to_lowercase().split_whitespace().all(|word| line.contains(word) || matches_synonym(&line, word))
 }
 
-/// Words are found as they are typed, from the third letter on.
-fn means(line: &str, word: &str) -> bool {
+/// Whether a synonym matches; prefixes match from the third letter on.
+fn matches_synonym(line: &str, word: &str) -> bool {
     let is_meant = |(said, _): &&(&str, &[&str])| *said == word || word.len() >= 3 && said.starts_with(word);
     SYNONYMS.iter().filter(is_meant).any(|(_, written)| written.iter().any(|written| line.contains(written)))
 }

@@ -1,4 +1,4 @@
-//! Where the camera stands, what its lens makes sharp, and the views that were saved.
+//! Camera pose, lens, and saved views.
 
 use super::widgets::{number, proportional, row, row_with_hint, rows, slider, vector, whole};
 use super::{Around, Asked};
@@ -55,7 +55,7 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
     });
 }
 
-/// The cameras of the scene by name, where it has more than one.
+/// The cameras of the scene by name, if there is more than one.
 fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     let Some(scene) = session.world().get_resource::<CurrentScene>() else { return };
     if scene.0.file.cameras.is_empty() {
@@ -155,7 +155,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
                     if !ui.selectable_label(kind == i, label).on_hover_text(hint).clicked() || kind == i {
                         continue;
                     }
-                    // From one to another by way of the camera.
+                    // Switching between the others goes through the camera.
                     if kind != 0 {
                         asked.send(Command::ToggleFocusLock);
                     }
@@ -189,7 +189,7 @@ pub fn lens(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) 
             })
         });
         row(ui, "blade rotation", |ui| {
-            // A round aperture looks the same however it is turned.
+            // A round aperture does not change when rotated.
             ui.add_enabled_ui(lens.blades >= 3, |ui| {
                 if let Some(turn) = number(ui, lens.blade_rotation_deg, 0.5, -360.0..=360.0, "°") {
                     set(asked, Lens { blade_rotation_deg: turn, ..lens });

@@ -1,4 +1,4 @@
-//! The list of everything that emits light, and the sky.
+//! The list of everything that emits light, and the environment.
 
 use super::list::{Listed, Which, list};
 use super::widgets::{choice, color, number, row, row_with_hint, rows, strength_drag};
@@ -65,7 +65,7 @@ pub fn lights(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mu
     });
 }
 
-/// Colour and strength of a light, to be changed in its row.
+/// Colour and strength of a light, editable in its row.
 fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Asked) {
     let world = session.world();
     ui.spacing_mut().interact_size.x = 30.0;
@@ -89,7 +89,7 @@ fn emission(ui: &mut Ui, session: &Session, entry: &LightEntry, asked: &mut Aske
     }
 }
 
-/// What the strength of a light is called, and what sets it.
+/// Label of a light's strength, and the property that sets it.
 pub fn strength_of(light: &LightKind) -> (&'static str, Property) {
     match light {
         LightKind::Point(_) | LightKind::Spot(_) => ("intensity", Property::Intensity),
@@ -120,7 +120,7 @@ fn one_color(ui: &mut Ui, asked: &mut Asked, name: &str, value: Vec3, property: 
     });
 }
 
-/// The colours of the surroundings one by one, or their picture.
+/// The colours of the environment one by one, or its image.
 pub fn sky(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     let environment = &session.inputs().environment;
     rows(ui, "sky", |ui| match &environment.light {

@@ -1,47 +1,47 @@
-//! A list of what is in the scene: filtered by words, scrolled, made taller by its lower edge.
+//! A filterable, scrollable list of scene items, resizable at its lower edge.
 //!
-//! Only rows that are seen are made, so that ten thousand cost no more than ten. What the words find is kept until
-//! they or the scene change.
+//! Only visible rows are laid out, so ten thousand items cost no more than ten. Search results are kept until the
+//! search or the scene changes.
 
 use bevy_ecs::prelude::Entity;
 use egui::{CursorIcon, Rect, Sense, Ui, vec2};
 
-/// Something that a list can show.
+/// An item that a list can show.
 pub trait Listed {
     fn entity(&self) -> Entity;
     fn label(&self) -> &str;
-    /// More words that find it.
+    /// Additional text for searching.
     fn kind(&self) -> &str;
 }
 
-/// What a list remembers.
+/// State of a list.
 #[derive(Default)]
 pub struct ListState {
     filter: String,
-    /// Of the rows that are seen, points; none before somebody chose it.
+    /// Height of the visible rows in points; `None` until the user resizes the list.
     height: Option<f32>,
-    /// The rows that the filter finds, in which state of the scene, for which words.
+    /// Search results: the revision of the scene, the search, and the rows.
     found: Option<(u64, String, Vec<usize>)>,
-    /// What was chosen when the list was shown last, to notice that something else is.
+    /// The chosen item when the list was last drawn, to detect a change.
     chosen: Option<Entity>,
 }
 
-/// Which list, of which state of the scene, and what in it is to be in view.
+/// Identity of a list, revision of the scene, and the item that is to be in view.
 pub struct Which {
     pub id: &'static str,
     pub revision: u64,
     pub chosen: Option<Entity>,
 }
 
-/// Rows that are seen at first.
+/// Initial number of visible rows.
 const ROWS: f32 = 10.0;
-/// From so many on, a field for words is worth its place.
-const MANY: usize = 9;
+/// Number of rows from which a search field is shown.
+const MIN_SEARCHABLE: usize = 9;
 const GRIP: f32 = 7.0;
-/// What the bar that floats over a long list covers.
+/// Width covered by the bar that floats over a long list.
 const SCROLL_BAR: f32 = 9.0;
 
-/// Shows `items`; `row` fills a row.
+/// Shows `items`; `row` draws the content of a row.
 pub fn list<T: Listed>(
     ui: &mut Ui,
     state: &mut ListState,
@@ -49,7 +49,7 @@ pub fn list<T: Listed>(
     items: &[T],
     mut row: impl FnMut(&mut Ui, &T),
 ) {
-    if items.len() >= MANY {
+    if items.len() >= MIN_SEARCHABLE {
         ui.horizontal(|ui| {
             let field = egui::TextEdit::singleline(&mut state.filter).hint_text("filter by name or kind");
             ui.add(field.desired_width(ui.available_width() - 26.0));
@@ -72,7 +72,7 @@ pub fn list<T: Listed>(
     let full = text + ui.spacing().item_spacing.y;
     let all = found.len() as f32 * full;
     let height = state.height.unwrap_or(ROWS * full).clamp(3.0 * full, all.max(3.0 * full));
-    // Whoever chooses something in the picture wants to see it here.
+    // An item chosen in the image is scrolled into view.
     let news = which.chosen.filter(|_| which.chosen != state.chosen);
     let target = news.and_then(|entity| found.iter().position(|&i| items[i].entity() == entity));
     if target.is_some() || which.chosen.is_none() {
@@ -90,7 +90,7 @@ pub fn list<T: Listed>(
             if let Some(target) = target {
                 let top = ui.max_rect().top() + (target as f32 - range.start as f32) * full;
                 let rect = Rect::from_min_size(egui::pos2(ui.max_rect().left(), top), vec2(1.0, text));
-                // What is seen already stays where it is.
+                // Rows that are visible already are not scrolled.
                 if !ui.clip_rect().y_range().contains(rect.top()) || !ui.clip_rect().y_range().contains(rect.bottom()) {
                     ui.scroll_to_rect(rect, Some(egui::Align::Center));
                 }
@@ -116,7 +116,7 @@ pub fn list<T: Listed>(
     }
 }
 
-/// The lower edge, to be dragged: by how much.
+/// The draggable lower edge; returns the drag distance.
 fn grip(ui: &mut Ui) -> f32 {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), GRIP), Sense::drag());
     let color = ui.style().interact(&response).fg_stroke.color;
@@ -129,7 +129,7 @@ fn grip(ui: &mut Ui) -> f32 {
     response.drag_delta().y
 }
 
-/// The rows whose label or kind has all of the words, in any case of letters.
+/// Returns the rows whose label or kind contains all of the words, ignoring case.
 fn find<T: Listed>(items: &[T], filter: &str) -> Vec<usize> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
     let has = |item: &T| {
@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(find(&items, "plane ball"), Vec::<usize>::new());
     }
 
-    /// A list in a window that nobody sees: which rows it makes.
+    /// Draws a list in a window without a display; returns the rows that it lays out.
     fn rows_made(
         context: &egui::Context,
         state: &mut ListState,
@@ -213,7 +213,7 @@ mod tests {
         assert!((5..30).contains(&first.len()) && first[0] == items[0].0, "{first:?}");
         let there = made(&mut state, Some(7_000));
         assert!(there.contains(&items[7_000].0) && there.len() < 30, "{there:?}");
-        // Scrolled away from, it stays away: only another choice scrolls.
+        // After scrolling away the list stays there: only another choice scrolls.
         assert_eq!(made(&mut state, Some(7_000)), there);
         assert_eq!(made(&mut state, Some(7_001)), there, "what is seen already moves nothing");
         state.filter = "99".to_owned();

@@ -1,7 +1,7 @@
-//! The editor of a material: its kind, its colour or texture, and its numbers.
+//! The editor of a material: its kind, its colour or texture, and its parameters.
 //!
-//! A material belongs to all objects that use it, and so does every change of it; whoever shows the editor says how many
-//! they are ([`shared_by`]).
+//! A material is shared by all objects that use it, and so is every edit. Callers of the editor show the number of
+//! objects ([`shared_by`]).
 
 use super::Asked;
 use super::texture;
@@ -15,7 +15,7 @@ use egui::Ui;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
-/// Which material an object has, and the editor of it.
+/// The material of an object, with its editor.
 pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: &ObjectInput, asked: &mut Asked) {
     let id = object.entity.to_bits();
     let slot = object.slots.first().copied();
@@ -51,7 +51,7 @@ pub fn of_object(ui: &mut Ui, session: &Session, inventory: &Inventory, object: 
     editor(ui, session, inventory, current.entity, asked);
 }
 
-/// Who sees a change of it.
+/// Text that says how many objects an edit affects.
 pub fn shared_by(entry: &MaterialEntry) -> String {
     match entry.users.len() {
         0 => "no object uses it".to_owned(),
@@ -60,7 +60,7 @@ pub fn shared_by(entry: &MaterialEntry) -> String {
     }
 }
 
-/// Kind, colour and numbers of a material, under the rows of the same width.
+/// Draws kind, colour and parameters of a material, aligned with the rows above.
 pub fn editor(ui: &mut Ui, session: &Session, inventory: &Inventory, entity: Entity, asked: &mut Asked) {
     let Some(material) = SurfaceMaterial::of(session.world(), entity) else { return };
     let id = entity.to_bits();
@@ -105,7 +105,7 @@ fn paint(ui: &mut Ui, session: &Session, id: u64, material: &Material, asked: &m
     }
 }
 
-/// A number with the name and the meaning that people know it by.
+/// A scalar parameter with the name and the meaning shown to users.
 struct Scale {
     name: &'static str,
     hint: &'static str,
@@ -114,7 +114,7 @@ struct Scale {
 }
 
 impl Scale {
-    /// `None` for what has no number.
+    /// `None` for properties that are not scalar.
     fn of(property: Property) -> Option<Self> {
         let (name, hint, range) = match property {
             Property::Alpha => {
@@ -145,7 +145,7 @@ impl Scale {
 
     fn show(self, ui: &mut Ui, id: u64, value: f64, asked: &mut Asked) {
         let is_alpha = self.property == Property::Alpha;
-        // What people call roughness is the root of the width of the lobe.
+        // The displayed roughness is the root of the lobe's width.
         let shown = if is_alpha { value.sqrt() } else { value };
         let logarithmic = *self.range.end() > 10.0;
         row_with_hint(ui, self.name, self.hint, |ui| {
@@ -157,7 +157,7 @@ impl Scale {
     }
 }
 
-/// What is on or off: its property, its label and its meaning.
+/// A switch: its property, its label and its hint.
 fn switch(name: &str) -> Option<(Property, &'static str, &'static str)> {
     let property = Property::of_param(name)?;
     Some(match property {
@@ -212,7 +212,7 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
                 });
                 continue;
             }
-            // Colours have a row of their own; textures of numbers and parts are not changed here.
+            // Colours have their own row; textures of scalars and parts are not editable here.
             _ => continue,
         };
         if let Some(scale) = Property::of_param(name).and_then(Scale::of) {

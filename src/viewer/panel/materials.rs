@@ -1,4 +1,4 @@
-//! The list of materials, and below it the editor of the one that was clicked.
+//! The list of materials, with the editor of the chosen one.
 
 use super::list::{Listed, Which, list};
 use super::material::{editor, shared_by};
@@ -53,7 +53,7 @@ pub fn materials(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: 
     }
 }
 
-/// The editor of one, and what can be done with all that use it.
+/// The editor of one material, and actions on the objects that use it.
 fn open(ui: &mut Ui, session: &Session, inventory: &Inventory, entry: &MaterialEntry, asked: &mut Asked) {
     let id = entry.entity.to_bits();
     egui::Frame::group(ui.style()).show(ui, |ui| {

@@ -1,4 +1,4 @@
-//! The mesh of what is selected: its faces, its normals, and how far it is simplified.
+//! The mesh of the selection: faces, normals, and simplification.
 
 use super::widgets::{row, rows};
 use super::{Asked, PanelState};
@@ -33,7 +33,7 @@ pub fn mesh(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &mut 
             let mut percent = 100.0 * ratio;
             let scale = egui::Slider::new(&mut percent, 1.0..=100.0).logarithmic(true).suffix(" %").max_decimals(1);
             let response = ui.add(scale.update_while_editing(false));
-            // The slider rounds to what it shows, which is no wish to change anything.
+            // The slider rounds to the displayed value, which is not an edit.
             let is_another = (10.0 * percent).round() != (1000.0 * ratio).round();
             if response.changed() && is_another {
                 let ratio = (percent / 100.0).clamp(0.01, 1.0);

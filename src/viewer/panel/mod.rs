@@ -1,19 +1,19 @@
-//! The panel: every setting of the session and what it has to tell, at the right edge.
+//! The panel at the right edge: every setting of the session, and its figures.
 //!
-//! It reads a session and answers with commands, as keys and mouse do, so that all of it can be undone, recorded and
-//! done without it. It is drawn when there is a new picture or the mouse is in it, never for its own sake.
+//! It reads a session and returns commands, like keys and mouse, so that everything can be undone, recorded and
+//! scripted. It is drawn with a new image or while the mouse is in it, never on its own.
 //!
 //! | file | about |
 //! |---|---|
-//! | `picture` | rendering, display, what is shown in place of the picture |
+//! | `picture` | rendering, display, inspections |
 //! | `camera` | pose, lens, saved views |
-//! | `selected` | name, place, material and light of what is selected |
-//! | `mesh` | its mesh: normals, simplification |
+//! | `selected` | name, placement, material and light of the selection |
+//! | `mesh` | mesh of the selection: normals, simplification |
 //! | `scene` | the list of objects, adding, opening |
-//! | `materials`, `lights` | the lists of materials and of lights; the sky |
+//! | `materials`, `lights` | the lists of materials and of lights; the environment |
 //! | `material`, `texture` | the editor of a material |
 //! | `statistics` | figures |
-//! | `list`, `swatch`, `widgets` | what the others are made of |
+//! | `list`, `swatch`, `widgets` | building blocks |
 
 mod camera;
 mod lights;
@@ -39,19 +39,19 @@ use egui::{Context, RichText, Ui};
 use list::ListState;
 use std::rc::Rc;
 
-/// What the panel itself remembers.
+/// State of the panel.
 pub struct PanelState {
     pub shown: bool,
-    /// The handles over what is selected.
+    /// The handles over the selection.
     pub gizmo: Option<gizmo::Mode>,
     change: PictureChange,
-    /// A file to be added.
+    /// Path of a file to be added.
     mesh_path: String,
-    /// Pictures that are kept are so many times as wide and high as the window.
+    /// Size of saved images, as a multiple of the window's.
     pub scale: u32,
-    /// The mouse went down in here and has not come up.
+    /// The mouse was pressed in the panel and has not been released.
     pressed: bool,
-    /// Lists of what is in the scene, and of which state of it they are.
+    /// Lists of the scene's items, with the revision of the scene.
     inventory: Option<(u64, Rc<Inventory>)>,
     object_list: ListState,
     material_list: ListState,
@@ -61,7 +61,7 @@ pub struct PanelState {
 }
 
 impl PanelState {
-    /// Made anew only when somebody looks at it and the scene has changed.
+    /// Returns the inventory, rebuilt only if it is shown and the scene has changed.
     fn inventory(&mut self, session: &Session) -> Rc<Inventory> {
         let revision = session.revision();
         let known = self.inventory.take().filter(|(of, _)| *of == revision);
@@ -88,26 +88,26 @@ impl Default for PanelState {
     }
 }
 
-/// What is shown besides the session.
+/// Values shown besides the session.
 pub struct Around<'a> {
     pub reaction: &'a Reaction,
     pub speed: f64,
     pub spinning: bool,
-    /// A drag moves around the pivot.
+    /// Whether a drag orbits the pivot.
     pub orbits: bool,
-    /// Keys and gestures.
+    /// The preset of keys and gestures.
     pub navigation: Navigation,
-    /// The mouse, in fractions of the picture.
+    /// The mouse position as a fraction of the image.
     pub place: [f64; 2],
-    /// Bytes of the process, where that can be known.
+    /// Memory of the process in bytes, if known.
     pub memory: Option<u64>,
-    /// The next drag is a rectangle.
+    /// Whether the next drag selects a rectangle.
     pub brush: bool,
-    /// What was opened last comes first.
+    /// Recent scenes, the latest first.
     pub recent: &'a [String],
 }
 
-/// What a click in the panel asks of the window itself.
+/// Requests of the panel.
 #[derive(Default)]
 pub struct Asked {
     pub commands: Vec<Command>,
@@ -117,7 +117,7 @@ pub struct Asked {
     pub navigation: Option<Navigation>,
     pub screenshot: Option<bool>,
     pub toggle_brush: bool,
-    /// A dialog for a file, and what it is for.
+    /// A file dialog to show, with its purpose.
     pub dialog: Option<DialogPurpose>,
 }
 
@@ -131,7 +131,7 @@ impl Asked {
     }
 }
 
-/// The parts of the panel, from above; the list of keys tells of each.
+/// The sections of the panel, from the top; the list of keys mentions each.
 pub const SECTIONS: [&str; 14] = [
     "Render",
     "Camera",
@@ -150,10 +150,10 @@ pub const SECTIONS: [&str; 14] = [
 ];
 
 const WIDTH: f32 = 288.0;
-/// Room for the status line.
+/// Space for the status line.
 const FOOT: i8 = 30;
 
-/// Draws the panel; `asked` is what came of it.
+/// Draws the panel; requests are added to `asked`.
 pub fn show(context: &Context, state: &mut PanelState, session: &Session, around: &Around, asked: &mut Asked) {
     let frame = egui::Frame::NONE.fill(super::overlay::PANE).inner_margin(egui::Margin {
         left: 10,
@@ -168,7 +168,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
     let response = panel.show(context, |ui| {
         style(ui);
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            // Beside the scroll bar.
+            // Leaves space for the scroll bar.
             ui.set_width((ui.available_width() - 8.0).max(0.0));
             let [render, camera, views, lens, display, add, selected, mesh, ..] = SECTIONS;
             section(ui, render, true, |ui| picture::render(ui, &mut state.scale, session, around, asked));
@@ -176,7 +176,7 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             section(ui, views, false, |ui| camera::views(ui, session, around, asked));
             section(ui, lens, true, |ui| camera::lens(ui, session, around, asked));
             section(ui, display, false, |ui| picture::display(ui, session, asked));
-            // Above what changes with the selection, so that its buttons stay where they are.
+            // Above the sections that change with the selection, so that its buttons do not move.
             section(ui, add, false, |ui| scene::add(ui, &mut state.mesh_path, asked));
             section(ui, selected, true, |ui| selected::selected(ui, state, session, asked));
             section(ui, mesh, true, |ui| mesh::mesh(ui, state, session, asked));
@@ -189,8 +189,8 @@ pub fn show(context: &Context, state: &mut PanelState, session: &Session, around
             section(ui, statistics, true, |ui| statistics::statistics(ui, session, around));
         });
     });
-    // From pressing a button of the mouse to letting go is one step to undo, also where a picker of colours or a menu
-    // hangs out of the panel.
+    // All edits between pressing and releasing a mouse button are one undo step, also if a colour picker or a menu
+    // extends beyond the panel.
     let is_over = context.pointer_latest_pos().is_some_and(|place| {
         let in_panel = response.response.rect.contains(place);
         in_panel || egui::Popup::is_any_open(context) && context.is_pointer_over_area()

@@ -1,4 +1,4 @@
-//! How the picture is made and shown.
+//! Rendering and display settings.
 
 use super::widgets::{number, row, rows, slider, whole};
 use super::{Around, Asked};
@@ -78,7 +78,7 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
     });
 }
 
-/// A limit that can be switched off.
+/// A limit that can be disabled.
 fn limit(ui: &mut Ui, on: bool, value: f64, speed: f64, first: f64, suffix: &str, mut set: impl FnMut(bool, f64)) {
     ui.horizontal(|ui| {
         let mut checked = on;

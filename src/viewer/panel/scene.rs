@@ -1,4 +1,4 @@
-//! What is in the scene: the list of objects, new ones, and other scenes.
+//! The scene: the list of objects, adding objects, and opening other scenes.
 
 use super::list::{Listed, Which, list};
 use super::widgets::choice;
@@ -40,7 +40,7 @@ pub fn objects(ui: &mut Ui, state: &mut PanelState, session: &Session, asked: &m
     });
 }
 
-/// A file by dialog, or what was opened before, which a click opens again.
+/// Opening of a file by dialog, and recent files.
 pub fn open(ui: &mut Ui, session: &Session, recent: &[String], asked: &mut Asked) {
     if ui.button("File …").on_hover_text("open a scene, a model or a saved picture (Ctrl+O)").clicked() {
         asked.dialog = Some(DialogPurpose::Open);

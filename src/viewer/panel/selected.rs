@@ -1,4 +1,4 @@
-//! Name, place, material and light of what is selected.
+//! Name, placement, material and light of the selection.
 
 use super::lights::strength_of;
 use super::widgets::{color, name_field, number, proportional, row, row_with_hint, rows, vector};
@@ -85,7 +85,7 @@ fn light_rows(ui: &mut Ui, id: u64, input: &LightInput, asked: &mut Asked) {
         LightKind::Point(light) => {
             row_with_hint(ui, "radius", "0: a point, which no camera sees", |ui| {
                 let radius = number(ui, light.radius, proportional(light.radius), 0.0..=1e9, " m");
-                // What is too small for a sphere is a point.
+                // A radius too small for a sphere makes a point.
                 edit(Property::Radius, radius.map(|r| DVec3::splat(if r < 1e-9 { 0.0 } else { r })));
             });
         }
@@ -119,7 +119,7 @@ fn place(ui: &mut Ui, id: u64, placement: &Placement, asked: &mut Asked) {
                 });
                 row(ui, "scale", |ui| {
                     let even = scale.x == scale.y && scale.y == scale.z;
-                    // What was even stays even: spheres must be, and most else is meant to be.
+                    // A uniform scale stays uniform: for spheres it must, and for most objects it should.
                     let value = if even {
                         number(ui, scale.x, 0.005 * scale.x.abs(), 1e-6..=1e6, "").map(DVec3::splat)
                     } else {

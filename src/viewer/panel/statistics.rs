@@ -1,4 +1,4 @@
-//! Figures: how fast, how good, how much, how prompt.
+//! Figures: speed, error, sizes, latency.
 
 use super::Around;
 use super::widgets::{row, rows};

@@ -1,16 +1,16 @@
-//! The colour that a material is known by, in a list.
+//! The colours that represent a material in a list.
 
 use crate::scene::{ColorParam, Material, SurfaceMaterial, TextureSource};
 use bevy_ecs::prelude::{Entity, World};
 use egui::{Color32, Sense, Stroke, Ui, vec2};
 use glam::Vec3;
 
-/// As wide and as high as a letter is, points.
+/// Width and height, that of a letter, points.
 const SIDE: f32 = 13.0;
-/// Blends of blends are shown by the parts of the first ones.
+/// Blends nested deeper than this are not followed.
 const MAX_NESTING: usize = 4;
 
-/// Draws it: one colour, or two where a blend or a checker has two.
+/// Draws one colour, or two for a blend or a checker.
 pub fn swatch(ui: &mut Ui, world: &World, material: Entity) {
     let [a, b] = colors(world, material, 0);
     let (rect, _) = ui.allocate_exact_size(vec2(SIDE, SIDE), Sense::hover());
@@ -29,12 +29,12 @@ fn colors(world: &World, entity: Entity, nesting: usize) -> [Vec3; 2] {
         Material::Blend { a, b, .. } if nesting < MAX_NESTING => {
             [colors(world, *a, nesting + 1)[0], colors(world, *b, nesting + 1)[0]]
         }
-        // What a metre of it lets through.
+        // Transmittance over a metre.
         Material::Glass { absorption, .. } | Material::RoughGlass { absorption, .. } => {
             [Vec3::new(0.75, 0.88, 0.92) * (-*absorption).exp(); 2]
         }
         material => match material.color() {
-            // Of a light, the hue.
+            // For an emitter, the hue.
             Some(ColorParam::Rgb(rgb)) => [*rgb / rgb.max_element().max(1.0); 2],
             Some(ColorParam::Texture(texture)) => match &texture.part {
                 TextureSource::Checker { a, b, .. } => [a.0, b.0],

@@ -1,4 +1,4 @@
-//! The texture of a material: which one, and its numbers.
+//! The texture of a material: its source and its parameters.
 
 use super::Asked;
 use super::widgets::{color, number, row};
@@ -9,7 +9,7 @@ use crate::viewer::dialog::DialogPurpose;
 use egui::Ui;
 use glam::{DVec2, DVec3, Vec3};
 
-/// What can take the place of a colour.
+/// A menu of textures that can replace a colour.
 pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: &mut Asked) {
     let mut names: Vec<&str> = (session.inputs().materials.iter())
         .filter_map(|material| match material.material.color()? {
@@ -46,7 +46,7 @@ pub fn menu(ui: &mut Ui, session: &Session, id: u64, paint: &ColorParam, asked: 
     });
 }
 
-/// How the texture lies on the surface, and its colours.
+/// Mapping of the texture to the surface, and its colours.
 pub fn numbers(ui: &mut Ui, id: u64, part: &TextureSource, asked: &mut Asked) {
     let mut new = part.clone();
     match &mut new {

@@ -1,7 +1,7 @@
-//! The widgets of the panel: rows of a name and a value, numbers, vectors, colours.
+//! Widgets of the panel: labelled rows, numbers, vectors, colours.
 //!
-//! Each answers with the new value when a person has changed it, and with nothing otherwise. Typing takes effect at the
-//! end, dragging at once.
+//! Each returns the new value if the user has changed it, and `None` otherwise. Typing takes effect at the end,
+//! dragging at once.
 
 use super::Asked;
 use crate::frame::Edit;
@@ -9,7 +9,7 @@ use crate::printable;
 use egui::{RichText, Ui};
 use glam::{DVec3, Vec3};
 
-/// Rows of a name and what it names, aligned through the panel.
+/// Rows of a label and a widget, aligned throughout the panel.
 pub fn rows<R>(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
     egui::Grid::new(id).num_columns(2).min_col_width(74.0).spacing([8.0, 4.0]).show(ui, contents).inner
 }
@@ -18,7 +18,7 @@ pub fn row<R>(ui: &mut Ui, name: &str, contents: impl FnOnce(&mut Ui) -> R) -> R
     row_with_hint(ui, name, "", contents)
 }
 
-/// The hint comes when the mouse rests on the name.
+/// A row whose hint is shown when the mouse rests on the label.
 pub fn row_with_hint<R>(ui: &mut Ui, name: &str, hint: &str, contents: impl FnOnce(&mut Ui) -> R) -> R {
     let label = ui.label(RichText::new(name).color(egui::Color32::from_gray(170)));
     if !hint.is_empty() {
@@ -29,11 +29,11 @@ pub fn row_with_hint<R>(ui: &mut Ui, name: &str, hint: &str, contents: impl FnOn
     result
 }
 
-/// What an entity is called, to be typed anew; takes effect when the field is left.
+/// An editable name of an entity; takes effect when the field loses the focus.
 pub fn name_field(ui: &mut Ui, id: u64, name: Option<&str>, asked: &mut Asked) {
-    // Left as it is shown, a name stays as it is.
+    // A name is unchanged if its displayed form is not edited.
     let old = &*printable::name(name.unwrap_or_default());
-    // What is being typed is kept by the field.
+    // The text being typed is kept in the field's state.
     let key = ui.id().with(("name", id));
     let mut text = ui.data(|data| data.get_temp::<String>(key)).unwrap_or_else(|| old.to_owned());
     let field = ui.add(egui::TextEdit::singleline(&mut text).hint_text("no name").desired_width(130.0));
@@ -47,7 +47,7 @@ pub fn name_field(ui: &mut Ui, id: u64, name: Option<&str>, asked: &mut Asked) {
     }
 }
 
-/// A row of a list that can be chosen, cut off where there is no more room.
+/// A selectable row of a list, truncated to the available width.
 pub fn choice(ui: &mut Ui, is_chosen: bool, text: &str) -> egui::Response {
     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
         ui.add(egui::Button::selectable(is_chosen, text).truncate())
@@ -55,7 +55,7 @@ pub fn choice(ui: &mut Ui, is_chosen: bool, text: &str) -> egui::Response {
     .inner
 }
 
-/// A number that is dragged or typed. Typing takes effect at the end, dragging at once.
+/// A number that can be dragged or typed. Typing takes effect at the end, dragging at once.
 pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusive<f64>, suffix: &str) -> Option<f64> {
     let mut new = value;
     let drag = egui::DragValue::new(&mut new)
@@ -67,14 +67,14 @@ pub fn number(ui: &mut Ui, value: f64, speed: f64, range: std::ops::RangeInclusi
     ui.add(drag).changed().then_some(new)
 }
 
-/// A whole number, in the same way.
+/// Like [`number`], for integers.
 pub fn whole(ui: &mut Ui, value: u32, range: std::ops::RangeInclusive<u32>) -> Option<u32> {
     let mut new = value;
     let drag = egui::DragValue::new(&mut new).speed(0.05).range(range).update_while_editing(false);
     ui.add(drag).changed().then_some(new)
 }
 
-/// Three numbers; the speed of dragging suits `scale`.
+/// Three numbers; `speed` is the change per pixel of a drag.
 pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
     let mut new = value;
     let mut changed = false;
@@ -89,7 +89,7 @@ pub fn vector(ui: &mut Ui, value: DVec3, speed: f64) -> Option<DVec3> {
     changed.then_some(new)
 }
 
-/// A number on a sliding scale.
+/// A number on a slider.
 pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, logarithmic: bool) -> Option<f64> {
     let mut new = value;
     let slider = egui::Slider::new(&mut new, range)
@@ -100,10 +100,10 @@ pub fn slider(ui: &mut Ui, value: f64, range: std::ops::RangeInclusive<f64>, log
     ui.add(slider).changed().then_some(new)
 }
 
-/// A linear colour. What may be brighter than white is a hue and a strength beside it.
+/// A linear colour. If it may be brighter than white, it is edited as a hue and a strength.
 pub fn color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
     let strength = if bright { value.max_element() } else { 1.0 };
-    // Black has no hue: it will be white once it has a strength.
+    // Black has no hue: it becomes white when its strength is raised.
     let hue = if strength > 0.0 { value / strength } else { Vec3::ONE };
     let mut rgb = hue.to_array();
     let new_hue = egui::color_picker::color_edit_button_rgb(ui, &mut rgb).changed().then(|| Vec3::from(rgb).as_dvec3());
@@ -113,21 +113,22 @@ pub fn color(ui: &mut Ui, value: Vec3, bright: bool) -> Option<DVec3> {
     }
     let strength = match new_strength {
         Some(strength) => strength,
-        // A colour that is chosen for what was black is meant to be seen.
+        // A colour chosen for what was black gets a visible strength.
         None if strength == 0.0 => 1.0,
         None => f64::from(strength),
     };
     Some(new_hue.unwrap_or_else(|| hue.as_dvec3()) * strength)
 }
 
-/// A number that may be of any size: each step of a drag changes it by the same part of itself.
+/// A number of any magnitude: each step of a drag changes it by the same ratio.
 pub fn strength_drag(ui: &mut Ui, value: f64, prefix: &str, suffix: &str) -> Option<f64> {
     let mut new = value;
     let drag = egui::DragValue::new(&mut new).speed(proportional(value)).range(0.0..=1e9).prefix(prefix).suffix(suffix);
     ui.add(drag.max_decimals(4).update_while_editing(false)).changed().then_some(new)
 }
 
-/// Of a drag, a pixel: twice as much takes about 140 pixels at any size. From nothing it gets away slowly.
+/// Drag speed per pixel, proportional to the value: doubling takes about 140 pixels at any magnitude. Starts slowly
+/// from 0.
 pub fn proportional(value: f64) -> f64 {
     0.005 * value.abs().max(1e-3)
 }

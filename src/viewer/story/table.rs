@@ -1,6 +1,6 @@
-//! The table of a pixel: what each light and each number of bounces brought, and which of its paths are drawn.
+//! The table of a pixel: the contribution of each light and each number of bounces, and the selection of paths.
 //!
-//! A table that says luminance is read at a glance; `firstlight explain` has the three channels.
+//! The table shows luminance for readability; `firstlight explain` has the three channels.
 
 use super::{SEGMENTS, WaysShown};
 use crate::frame::{PixelStory, brightness};
@@ -9,12 +9,12 @@ use crate::viewer::status::percent;
 use egui::{Align2, Color32, Context, FontId, Frame, Margin, Order, RichText, Sense, Ui};
 use glam::DVec3;
 
-/// Lights in the table; the others are counted together.
+/// Lights in the table; the others are summed up.
 const LIGHTS_SHOWN: usize = 9;
 const TEXT_SIZE: f32 = 12.5;
 const WEAK: Color32 = Color32::from_gray(165);
 
-/// In the upper left corner, under the messages.
+/// Draws the table in the upper left corner, below the messages.
 pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
     let all = brightness(story.total());
     egui::Area::new("story".into())
@@ -60,11 +60,11 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
         });
 }
 
-/// Whether its name was clicked; `chosen` for what can be.
+/// Draws a row; returns whether its name was clicked. `chosen` is `None` for rows that cannot be chosen.
 fn row(ui: &mut Ui, name: &str, parts: [DVec3; 3], all: f64, chosen: Option<bool>) -> bool {
     let parts = parts.map(brightness);
     let total: f64 = parts.iter().sum();
-    // Names are as long as people like.
+    // Names may be of any length.
     let name: String =
         if name.chars().count() > 24 { name.chars().take(23).chain(['…']).collect() } else { name.into() };
     let clicked = match chosen {
@@ -89,7 +89,7 @@ fn row(ui: &mut Ui, name: &str, parts: [DVec3; 3], all: f64, chosen: Option<bool
     clicked
 }
 
-/// Which paths are drawn.
+/// Controls for the selection of paths.
 fn ways(ui: &mut Ui, shown: &mut WaysShown) {
     ui.horizontal(|ui| {
         text(ui, "paths drawn:".to_owned(), false);
@@ -113,8 +113,8 @@ fn ways(ui: &mut Ui, shown: &mut WaysShown) {
     }
 }
 
-/// What came after how many bounces, as a bar in the colours of the paths: light that the camera sees directly has the
-/// colour of the first segment.
+/// Contributions by number of bounces, as a bar in the colours of the paths: directly visible light has the colour of
+/// the first segment.
 fn bounces(ui: &mut Ui, story: &PixelStory, shown: &mut WaysShown) {
     let parts: Vec<f64> = story.by_bounces.iter().map(|part| brightness(*part).max(0.0)).collect();
     let sum: f64 = parts.iter().sum();
