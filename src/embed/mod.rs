@@ -1,4 +1,4 @@
-//! The short way for a library user: open a scene, render it, save the image.
+//! High-level library interface: open a scene, render it, save the image.
 //!
 //! [`Scene`] owns an ECS world that any code may change between two renderings; [`RenderOptions`] sets the size, the
 //! light model and the target; [`Image`] is the result, as numbers or as a file. What these do not cover is in

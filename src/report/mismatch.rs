@@ -1,11 +1,11 @@
 //! Detects references that do not show the scene.
 //!
 //! If they show the same scene, the difference of two images is noise of either, with mean zero. Over a square of many
-//! pixels noise adds up slowly: for differences that are independent between pixels and symmetric, of any size, P(|Σd|
-//! > k √Σd²) ≤ 2 exp(−k²/2) (Efron 1969, from Hoeffding's inequality for random signs). Differences due to another
-//! scene, camera, exposure or light add up in full, and more samples do not remove them. A square counts as foreign if
-//! its sum exceeds that bound and a tenth of its own light. Images of the same scene almost never fail this test, and
-//! noisy references, which raise √Σd² as well, are safe.
+//! pixels noise adds up slowly: for differences that are independent between pixels and symmetric, of any size,
+//! P(|Σd| > k √Σd²) ≤ 2 exp(−k²/2) (Efron 1969, from Hoeffding's inequality for random signs). Differences due to
+//! another scene, camera, exposure or light add up in full, and more samples do not remove them. A square counts as
+//! foreign if its sum exceeds that bound and a tenth of its own light. Images of the same scene almost never fail this
+//! test, and noisy references, which raise √Σd² as well, are safe.
 
 use super::{LinearPicture, RELATIVE_FLOOR};
 use glam::DVec3;

@@ -334,7 +334,7 @@ impl SampleRays {
     }
 }
 
-/// A line of the uniform density through a sphere: isotropic directions, uniform positions across them.
+/// A uniformly distributed line through a sphere: isotropic directions, uniform positions across them.
 fn line(middle: Vec3, radius: f32, sampler: &Sampler) -> Ray {
     let (u, v) = (sampler.pair(0), sampler.pair(1));
     let z = 1.0 - 2.0 * u.x;

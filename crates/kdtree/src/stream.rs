@@ -97,7 +97,7 @@ impl StreamRay for PreciseRay {
 
 /// Traces all rays of the source; with `ANY` a ray ends at its first hit and traversal starts from its far end.
 ///
-/// A ray that leaves a surface first passes its surroundings, most of which do not block it. An occluder, such as a
+/// A ray that leaves a surface first passes nearby geometry, most of which does not block it. An occluder, such as a
 /// wall of a room, is as likely to be found from the other end.
 #[inline(always)]
 pub(super) fn run<S: KernelSimd, B: LeafBlock, const ANY: bool>(

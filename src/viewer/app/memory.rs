@@ -8,7 +8,7 @@ pub struct Memory {
     store: SettingsStore,
     /// The scene of the bookmarks.
     scene: Option<SceneSource>,
-    /// Number of scenes opened so far in the session.
+    /// Number of scenes that the session had adopted when last checked.
     adopted: u64,
     /// As they are in the store.
     bookmarks: Bookmarks,

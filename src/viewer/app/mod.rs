@@ -118,7 +118,7 @@ const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
 const RESIZE_DELAY: Duration = Duration::from_millis(500);
 /// Exit status of a program that is stopped twice, by the convention of shells.
 const STOPPED: i32 = 130;
-/// Error at which a window stops by itself, so that the machine does not run for ever: it is invisible.
+/// Target at which a window stops by itself, so that the machine does not run for ever: the error is invisible.
 const DEFAULT_TARGET: Target = Target { spp: None, seconds: None, error: Some(0.005) };
 
 /// Opens a window and returns when it is closed.
