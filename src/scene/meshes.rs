@@ -247,8 +247,9 @@ fn read_base(
 fn simplified(mesh: Mesh, ratio: Option<f64>) -> Result<Mesh, SceneError> {
     match ratio {
         Some(ratio) if ratio < 1.0 => {
-            simplify::simplify(&mesh, simplify::Method::default(), simplify::Target::Ratio(ratio))
-                .map_err(|error| SceneError::new(format!("the mesh cannot be simplified: {error}")))
+            let simple = simplify::simplify(&mesh, simplify::Method::default(), simplify::Target::Ratio(ratio))
+                .map_err(|error| SceneError::new(format!("the mesh cannot be simplified: {error}")))?;
+            Ok(simple.with_colors_of(&mesh))
         }
         _ => Ok(mesh),
     }
@@ -290,7 +291,10 @@ impl LoadedMesh {
             },
             _ => {
                 let plain = share(material.diffuse.unwrap_or(Vec3::splat(0.6)));
-                let albedo = self.texture(material.diffuse_texture.as_ref()).unwrap_or(plain);
+                let albedo = match material.vertex_colors {
+                    true => self.vertex_colors(),
+                    false => self.texture(material.diffuse_texture.as_ref()).unwrap_or(plain),
+                };
                 match highlight_of(material) {
                     Some((share, shininess)) => MaterialPart::Phong {
                         diffuse: albedo,
@@ -367,6 +371,13 @@ impl LoadedMesh {
         }
         self.textures.push((name.clone(), part, file.clone()));
         Some(name)
+    }
+
+    fn vertex_colors(&mut self) -> ColorValue {
+        let name = "vertex colors".to_owned();
+        let part = TextureSource::VertexColors { channel: None, tint: Rgb(Vec3::ONE) };
+        self.textures.push((name.clone(), part, PathBuf::new()));
+        ColorValue::Texture(name)
     }
 
     fn texture(&mut self, file: Option<&PathBuf>) -> Option<ColorValue> {

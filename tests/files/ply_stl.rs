@@ -7,7 +7,7 @@ use firstlight::scene::model::{
 use firstlight::scene::ply::PlyProblem;
 use firstlight::scene::stl::StlProblem;
 use firstlight::scene::{LoadOptions, SceneSource, load};
-use glam::{DVec3, Vec2, Vec3, dvec3};
+use glam::{DVec3, Vec2, Vec3, Vec4, dvec3};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -225,7 +225,7 @@ fn double_positions_keep_their_digits_far_from_the_origin() {
 }
 
 #[test]
-fn vertex_colours_that_differ_are_told_and_become_their_mean() {
+fn vertex_colours_that_differ_are_those_of_the_mesh() {
     let of = |kind: &str, [a, b]: [&str; 2]| {
         let text = format!(
             "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
@@ -238,9 +238,14 @@ fn vertex_colours_that_differ_are_told_and_become_their_mean() {
     let (bytes, floats) = (of("uchar", ["255 0 0 255", "0 0 0 255"]), of("float", ["1 0 0 1", "0 0 0 1"]));
     assert_eq!(bytes.materials, floats.materials);
     assert_eq!(bytes.materials[0].diffuse, Some(Vec3::new(0.5, 0.0, 0.0)));
-    assert!(bytes.material_warnings[0].contains("vertex colours are not modelled"), "{:?}", bytes.material_warnings);
+    assert!(bytes.materials[0].vertex_colors && bytes.material_warnings.is_empty());
+    let (red, black) = (Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 0.0, 1.0));
+    assert_eq!(bytes.mesh.colors, [red, red, black, black]);
+    assert_eq!(bytes.mesh.colors, floats.mesh.colors);
     assert!(bytes.warnings[0].contains("vertex property alpha"));
-    let grey = of("uchar", ["188 188 188 255"; 2]).materials[0].diffuse.unwrap();
+    let plain = of("uchar", ["188 188 188 255"; 2]);
+    assert!(plain.mesh.colors.is_empty() && !plain.materials[0].vertex_colors);
+    let grey = plain.materials[0].diffuse.unwrap();
     assert!((grey - Vec3::splat(0.503)).abs().max_element() < 1e-3, "decoded as sRGB: {grey}");
 }
 

@@ -4,6 +4,7 @@
 //! produce only meshes that pass [`Mesh::validate`]. Start reading at [`Mesh`].
 
 mod build;
+mod colors;
 mod deviation;
 mod faults;
 mod measure;

@@ -4,7 +4,7 @@ use super::error::{ModelError, ModelProblem, Place};
 use super::imported::{ModelNormals, ModelOptions, has_area, with_normals};
 use super::warnings::Warnings;
 use crate::mesh::{Mesh, Welding};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::path::Path;
 
 /// Vertices, and triangles that name them; every number is that of a vertex.
@@ -16,6 +16,8 @@ pub(in crate::scene) struct Indexed {
     pub normals: Vec<Vec3>,
     /// Finite; empty, or one a position.
     pub uvs: Vec<Vec2>,
+    /// Linear Rec. 709 with alpha; empty, or one a position.
+    pub colors: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -43,7 +45,7 @@ pub(in crate::scene) fn assemble(
     if !mesh.triangles.iter().any(|&triangle| has_area(&mesh, triangle)) {
         return Err(failed(ModelProblem::NoArea { triangles: before }));
     }
-    mesh.uvs = model.uvs;
+    (mesh.uvs, mesh.colors) = (model.uvs, model.colors);
     let (mesh, from_file) = match options.normals {
         ModelNormals::FileOrComputed { crease_angle } => with_normals(mesh, &model.normals, crease_angle),
         ModelNormals::OfPositions => {
@@ -72,6 +74,7 @@ impl Indexed {
         keep(&mut self.positions, &used);
         keep(&mut self.normals, &used);
         keep(&mut self.uvs, &used);
+        keep(&mut self.colors, &used);
         let mut next = 0;
         let numbers: Vec<u32> = (used.iter())
             .map(|&used| {

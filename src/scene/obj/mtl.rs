@@ -13,6 +13,8 @@ pub struct ImportedMaterial {
     pub name: String,
     /// `Kd`, diffuse colour; treated as linear.
     pub diffuse: Option<Vec3>,
+    /// Whether the colours of the vertices take the place of the diffuse colour, which is their mean.
+    pub vertex_colors: bool,
     /// `Ks`, specular colour.
     pub specular: Option<Vec3>,
     /// `Ns`, exponent of the specular lobe, at least 0.
@@ -191,6 +193,7 @@ fn imported(material: &tobj::Material, folder: &Path, warn: &mut impl FnMut(Stri
     ImportedMaterial {
         name: name.clone(),
         diffuse,
+        vertex_colors: false,
         specular,
         shininess: number("Ns", material.shininess.map(single), 0.0..=1e6),
         emission,

@@ -2,8 +2,8 @@
 //!
 //! The header says what the rows of each element hold (`header`); numbers come one after the other from text or bytes
 //! (`rows`), and those that a mesh is made of are kept: positions, normals, texture coordinates, colours, faces and triangle
-//! strips. Nothing is allocated for what a header declares before the file is known to have room for it. A mesh has no
-//! colours of vertices: their mean becomes its material. Start reading at [`load_ply`].
+//! strips. Nothing is allocated for what a header declares before the file is known to have room for it. Colours that are all
+//! the same become a plain material. Start reading at [`load_ply`].
 
 mod error;
 mod header;
@@ -57,13 +57,6 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         warn(format!("not modelled and ignored: {}", list(&parsed.unused)));
     }
     let material = parsed.colours.material();
-    let mut of_material = Vec::new();
-    if parsed.colours.differ {
-        of_material.push(format!(
-            "{}: vertex colours are not modelled: the material has their mean as its diffuse colour",
-            path.display()
-        ));
-    }
     let polygons = parsed.arities.iter().filter(|&&corners| corners > 3).count();
     let indexed = parsed.triangulated();
     if indexed.triangles.is_empty() {
@@ -77,7 +70,7 @@ pub fn load_ply_with(path: &Path, options: &ModelOptions) -> Result<ImportedMode
         normals_from_file,
         polygons,
         warnings: warnings.into_list(),
-        material_warnings: of_material,
+        material_warnings: Vec::new(),
     })
 }
 
@@ -98,7 +91,7 @@ struct Parsed {
     unused: Vec<String>,
 }
 
-/// Colours of vertices, linear Rec. 709.
+/// What the colours of vertices are together, linear Rec. 709.
 #[derive(Debug, Default)]
 struct Colours {
     first: Option<Vec3>,
@@ -108,8 +101,10 @@ struct Colours {
 }
 
 impl Colours {
+    /// Counts a colour, and decodes it.
+    ///
     /// - `encoded`: sRGB, of which `white` is all.
-    fn add(&mut self, encoded: [f64; 3], white: f64) {
+    fn add(&mut self, encoded: [f64; 3], white: f64) -> Vec3 {
         // Most files have bytes, and the transfer function takes longer than all the rest of a vertex.
         static OF_BYTES: LazyLock<[f64; 256]> =
             LazyLock::new(|| std::array::from_fn(|byte| decode_srgb(byte as f64 / 255.0)));
@@ -122,13 +117,15 @@ impl Colours {
         self.differ |= *self.first.get_or_insert(linear) != linear;
         self.sum += linear.as_dvec3();
         self.count += 1;
+        linear
     }
 
     /// Without a name where there are no colours.
     fn material(&self) -> ImportedMaterial {
         let Some(first) = self.first else { return ImportedMaterial::default() };
-        let diffuse = if self.differ { (self.sum / self.count as f64).as_vec3() } else { first };
-        ImportedMaterial { name: "vertex colours".to_owned(), diffuse: Some(diffuse), ..ImportedMaterial::default() }
+        let diffuse = Some(if self.differ { (self.sum / self.count as f64).as_vec3() } else { first });
+        let (name, vertex_colors) = ("vertex colors".to_owned(), self.differ);
+        ImportedMaterial { name, diffuse, vertex_colors, ..ImportedMaterial::default() }
     }
 }
 
@@ -228,6 +225,7 @@ impl Parsed {
         self.vertices.positions.reserve_exact(count);
         self.vertices.normals.reserve_exact(if has_normals { count } else { 0 });
         self.vertices.uvs.reserve_exact(if has_uvs { count } else { 0 });
+        self.vertices.colors.reserve_exact(if has_colours { count } else { 0 });
         let mut values = [0.0; N_ROLES];
         for row in 0..element.count {
             let missing = |problem, rows: &_| missing(problem, element, row, rows);
@@ -260,8 +258,11 @@ impl Parsed {
                 self.vertices.uvs.push(uv);
             }
             if has_colours {
-                self.colours.add([red, green, blue], white);
+                self.vertices.colors.push(self.colours.add([red, green, blue], white).extend(1.0));
             }
+        }
+        if !self.colours.differ {
+            self.vertices.colors = Vec::new();
         }
         Ok(())
     }
