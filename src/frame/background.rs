@@ -16,6 +16,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub enum Finished {
     Scene {
         source: SceneSource,
+        /// It is the open scene as it is in another way, and not another one.
+        again: bool,
         result: Result<Box<LoadedScene>, SceneError>,
     },
     Trees(Trees),
@@ -77,6 +79,7 @@ impl BackgroundTasks {
     ///
     /// - `how`: which axis of models points up, and the image that takes the place of the environment.
     /// - `choice`: what of a model is shown.
+    /// - `known`: the open scene, if it is read again to be shown in another way.
     pub fn load(
         &self,
         source: SceneSource,
@@ -84,7 +87,9 @@ impl BackgroundTasks {
         choice: ModelChoice,
         aspect: f64,
         pool: Arc<rayon::ThreadPool>,
+        known: Option<Arc<LoadedScene>>,
     ) {
+        let again = known.is_some();
         let (up, environment) = how;
         let number = self.with(|board| {
             board.newest_load += 1;
@@ -107,7 +112,7 @@ impl BackgroundTasks {
                 aspect: Some(aspect),
                 hasty: true,
                 progress: Some(&say),
-                known: None,
+                known: known.as_deref(),
                 choice: Some(&choice),
             };
             let result = guarded(|| {
@@ -120,7 +125,7 @@ impl BackgroundTasks {
             this.with(|board| {
                 if board.newest_load == number {
                     board.progress = None;
-                    board.finished.push(Finished::Scene { source, result: result.map(Box::new) });
+                    board.finished.push(Finished::Scene { source, again, result: result.map(Box::new) });
                 }
             });
             this.wake();
@@ -128,9 +133,8 @@ impl BackgroundTasks {
         self.spawn("firstlight load", work, move |board, error| {
             board.progress = None;
             let error = SceneError::new(error);
-            board
-                .finished
-                .push(Finished::Scene { source: SceneSource::Builtin("scene".to_owned()), result: Err(error) });
+            let source = SceneSource::Builtin("scene".to_owned());
+            board.finished.push(Finished::Scene { source, again, result: Err(error) });
         });
     }
 
@@ -242,6 +246,11 @@ impl BackgroundTasks {
             let building = (board.building > 0).then(|| "building a kd-tree".to_owned());
             board.progress.clone().or_else(|| board.mesh_in_the_making()).or(building)
         })
+    }
+
+    /// Whether a scene is being read.
+    pub fn is_loading(&self) -> bool {
+        self.with(|board| board.progress.is_some())
     }
 
     /// Nothing is under way and nothing waits to be taken.

@@ -54,7 +54,12 @@ fn between(stops: &[Rig], leg: usize, t: f64) -> Rig {
         blades: a.lens.blades,
         blade_rotation_deg: even(a.lens.blade_rotation_deg, b.lens.blade_rotation_deg),
     };
-    let projection = Projection { vfov_deg: by_factor(a.projection.vfov_deg, b.projection.vfov_deg) };
+    let heights = a.projection.orthographic_height.zip(b.projection.orthographic_height);
+    let projection = Projection {
+        vfov_deg: by_factor(a.projection.vfov_deg, b.projection.vfov_deg),
+        // From perspective to parallel rays there is no way between: the first stop counts.
+        orthographic_height: heights.map_or(a.projection.orthographic_height, |(a, b)| Some(by_factor(a, b))),
+    };
     Rig { view: view.orthonormalized(), projection, lens }
 }
 
@@ -76,7 +81,7 @@ mod tests {
 
     fn stop(eye: DVec3, look_at: DVec3) -> Rig {
         let view = View::look_at(eye, look_at, DVec3::Y).unwrap();
-        Rig { view, projection: Projection { vfov_deg: 40.0 }, lens: Lens::pinhole(view.pivot_distance) }
+        Rig { view, projection: Projection::perspective(40.0), lens: Lens::pinhole(view.pivot_distance) }
     }
 
     #[test]

@@ -161,6 +161,11 @@ pub enum Command {
         #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },
+    /// Show the animations of the open glTF model at another moment.
+    SetMoment {
+        /// Seconds; `None` is the pose that the file stores.
+        seconds: Option<f64>,
+    },
     /// When the picture is good enough.
     SetTarget(Target),
     /// Nobody can see the picture: rest, without being paused.
@@ -239,6 +244,10 @@ impl Command {
             // A window without pixels is a minimised one.
             Self::Resize { width, height } => check_film_size((*width).max(1), (*height).max(1)),
             Self::SetTarget(target) => target.check(),
+            Self::SetMoment { seconds: Some(seconds) } if !seconds.is_finite() => {
+                let allowed = "be a finite number of seconds".to_owned();
+                Err(BadValue::OutOfRange { field: "at", value: seconds.to_string(), allowed })
+            }
             _ => Ok(()),
         }
     }

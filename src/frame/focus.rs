@@ -19,11 +19,20 @@ pub struct SharpZone {
 /// Where the circle of confusion is at most one pixel of a picture so many pixels high; `None` without depth of field.
 ///
 /// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane a
-/// metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|.
+/// metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|; by an orthographic camera at
+/// x + o (1 − z/f), in metres.
 pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<SharpZone> {
     let radius = lens.effective_radius();
     if !(radius > 0.0) {
         return None;
+    }
+    if let Some(seen) = projection.orthographic_height {
+        let slack = seen / (2.0 * f64::from(height.max(1)) * radius);
+        let (near, far) = match lens.focus_distance {
+            f64::INFINITY => (0.0, f64::INFINITY),
+            focus => (focus * (1.0 - slack).max(0.0), focus * (1.0 + slack)),
+        };
+        return Some(SharpZone { near, far });
     }
     let pixel = 2.0 * projection.tan_half_vfov() / f64::from(height.max(1));
     let (focus, slack) = (lens.focus_distance.recip(), pixel / (2.0 * radius));
@@ -31,7 +40,7 @@ pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<S
     Some(SharpZone { near: (focus + slack).recip(), far })
 }
 
-/// The number that photographers give an aperture, for a film 24 mm high.
+/// The number that photographers give an aperture, for a film 24 mm high and the field of view in perspective.
 pub fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * lens_radius)
 }
@@ -128,7 +137,7 @@ mod tests {
 
     #[test]
     fn at_the_limits_the_circle_of_confusion_is_one_pixel() {
-        let projection = Projection { vfov_deg: 40.0 };
+        let projection = Projection::perspective(40.0);
         for (radius, focus, height) in [(0.05, 3.0, 720), (0.002, 12.0, 1080), (0.3, 0.5, 90)] {
             let zone = sharp_zone(&Lens::thin(radius, focus), &projection, height).unwrap();
             assert!(zone.near < focus && focus < zone.far);
@@ -148,7 +157,7 @@ mod tests {
     #[test]
     fn f_stops_and_radii_say_the_same() {
         // A lens of 50 mm at f/2 is 25 mm wide.
-        let projection = Projection { vfov_deg: 2.0 * (12.0_f64 / 50.0).atan().to_degrees() };
+        let projection = Projection::perspective(2.0 * (12.0_f64 / 50.0).atan().to_degrees());
         assert!((f_stop(0.0125, &projection) - 2.0).abs() < 1e-12);
         assert!((radius_of_f_stop(2.0, &projection) - 0.0125).abs() < 1e-12);
     }

@@ -158,13 +158,13 @@ impl Gizmo {
     pub fn drag(&self, handle: Handle, from: DVec2, to: DVec2, projector: &Projector, snap: bool) -> Option<Drag> {
         let step = |value: f64, step: f64| if snap { (value / step).round() * step } else { value };
         let grid = 10f64.powf(self.size.log10().floor() - 1.0);
-        let view = (self.center - projector.eye()).try_normalize()?;
+        let view = projector.towards(self.center)?;
         let on_plane = |normal: DVec3, place: DVec2| {
-            let dir = projector.direction(place);
-            let t = (self.center - projector.eye()).dot(normal) / dir.dot(normal);
+            let (from, dir) = projector.line(place);
+            let t = (self.center - from).dot(normal) / dir.dot(normal);
             // Behind the camera, or so flat that a pixel is a mile.
             let flat = dir.dot(normal).abs() < 0.02 * dir.length();
-            (t > 0.0 && t.is_finite() && !flat).then(|| projector.eye() + t * dir)
+            (t > 0.0 && t.is_finite() && !flat).then(|| from + t * dir)
         };
         let along = |axis: DVec3, place: DVec2| {
             // The plane through the axis that faces the camera most.

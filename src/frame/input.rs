@@ -8,6 +8,7 @@ use super::focus::{Focus, FocusTarget};
 use super::navigation::{self, Rig, Turning};
 use super::resources::{
     Clock, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
+    WantedMoment,
 };
 use super::saving::Saving;
 use super::scene_bounds::SceneBounds;
@@ -55,6 +56,7 @@ pub struct CommandParams<'w, 's> {
     status: ResMut<'w, Status>,
     beside: Res<'w, BackgroundTasks>,
     saving: ResMut<'w, Saving>,
+    moment: ResMut<'w, WantedMoment>,
     renderer: Res<'w, Renderer>,
     clock: Res<'w, Clock>,
     up: Res<'w, ModelUp>,
@@ -115,10 +117,12 @@ impl CommandParams<'_, '_> {
             Command::FrameAll => {
                 if let Some(rig) = self.rig() {
                     let points = self.what_to_frame();
-                    let view = navigation::frame_points(&rig.view, &rig.projection, self.size.aspect(), &points);
-                    self.set_rig(Rig { view, lens: navigation::focus_at(&rig.lens, view.pivot_distance), ..rig });
+                    let framed = navigation::frame_rig(&rig, self.size.aspect(), &points);
+                    let lens = navigation::focus_at(&rig.lens, framed.view.pivot_distance);
+                    self.set_rig(Rig { lens, ..framed });
                 }
             }
+            Command::SetMoment { seconds } => self.moment.0 = Some(seconds),
             Command::SetTarget(target) => drop(self.stop_at.set_if_neq(StopAt(target))),
             Command::SetHidden { hidden } => drop(self.hidden.set_if_neq(Hidden(hidden))),
             Command::SetInspection(inspection) => {
@@ -192,7 +196,8 @@ impl CommandParams<'_, '_> {
             Command::Open { path } => match SceneSource::parse(&path) {
                 Ok(source) => {
                     let choice = ModelChoice::default();
-                    self.beside.load(source, (self.up.0, None), choice, self.size.aspect(), self.renderer.0.pool());
+                    let (how, aspect, pool) = ((self.up.0, None), self.size.aspect(), self.renderer.0.pool());
+                    self.beside.load(source, how, choice, aspect, pool, None);
                 }
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },

@@ -12,6 +12,7 @@
 //!
 //! A [`Session`] holds all of it. The workers follow a [`Scheduler`] that knows no threads and no clock.
 
+mod adopt;
 mod background;
 mod camera_path;
 mod command;

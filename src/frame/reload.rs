@@ -1,18 +1,17 @@
 //! Hot reload: when the open scene's file changes on disk, or a mesh, a material library or a picture that it points
 //! at, it is read again beside the old picture, and only what changed is read and built anew. The camera stays, unless
-//! the file says that it has moved. A file that cannot be read is a message, and the old scene stays.
+//! the file says that it has moved. A file that cannot be read is a message, and the old scene stays. Another moment of a
+//! model's animations comes in the same way.
 
 use super::Waker;
+use super::adopt::adopt_again;
+use super::background::BackgroundTasks;
 use super::input::ModelUp;
-use super::resources::{Clock, CurrentScene, RenderState, Renderer};
+use super::resources::{Clock, CurrentScene, PictureSize, Renderer, WantedMoment};
 use super::saving::SavedAs;
 use super::status::{MessageKind, Status};
-use super::systems::adopt;
 use super::watch::Watch;
-use crate::scene::{
-    Description, DisplaySettings, LoadOptions, LoadedScene, Rendering, SceneContent, SceneError, SceneInputs,
-    SceneSource, load,
-};
+use crate::scene::{Description, LoadOptions, LoadedScene, ModelChoice, SceneContent, SceneError, SceneSource, load};
 use bevy_ecs::prelude::{Resource, World};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -59,6 +58,7 @@ pub fn reload(world: &mut World) {
     let saved_as = world.resource::<SavedAs>().path.clone();
     look_after(world, &current, saved_as.clone());
     let now = world.resource::<Clock>().0;
+    show_moment(world, &current, now);
     let reload = world.resource::<HotReload>();
     let finished = lock(&reload.loaded).take();
     if let Some(result) = finished {
@@ -120,6 +120,32 @@ pub fn reload(world: &mut World) {
     }
 }
 
+/// Begins to read the open model at the moment that is asked for, if no scene is being read.
+fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
+    if world.resource::<BackgroundTasks>().is_loading() {
+        return;
+    }
+    let Some(at) = world.resource_mut::<WantedMoment>().0.take() else { return };
+    if at == current.choice.at {
+        return;
+    }
+    let mut problem = None;
+    if current.facts.as_ref().is_none_or(|facts| facts.animation_length.is_none()) {
+        problem = Some("has no animations");
+    } else if has_unsaved_changes(world, current) {
+        problem = Some("has unsaved changes, which another moment would lose: save it as a scene, or undo them");
+    }
+    if let Some(problem) = problem {
+        let text = format!("{} {problem}", current.source.title());
+        return world.resource_mut::<Status>().say(now, MessageKind::Warning, text);
+    }
+    let choice = ModelChoice { at, ..current.choice.clone() };
+    let how = (current.up.or(world.resource::<ModelUp>().0), current.environment.clone());
+    let (aspect, pool) = (world.resource::<PictureSize>().aspect(), world.resource::<Renderer>().0.pool());
+    let known = Some(current.clone());
+    world.resource::<BackgroundTasks>().load(current.source.clone(), how, choice, aspect, pool, known);
+}
+
 /// Watches the files of the open scene, if it is another one.
 fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<PathBuf>) {
     let mut reload = world.resource_mut::<HotReload>();
@@ -162,7 +188,7 @@ fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
 
 fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) {
     let had_failed = std::mem::replace(&mut world.resource_mut::<HotReload>().failed, result.is_err());
-    let mut scene = match result {
+    let scene = match result {
         Ok(Some(scene)) => scene,
         Ok(None) => {
             if had_failed {
@@ -179,30 +205,8 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
             return;
         }
     };
-    // What a person has set stays, unless the file says something new about it.
-    let camera = SceneInputs::of(world).camera.filter(|_| scene.file.camera == old.file.camera);
-    let developing = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
-    let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
-        == (old.file.integrator, old.file.max_depth, old.file.film.filter);
-    let rendering = same_settings.then(|| *world.resource::<Rendering>());
-    scene.shot = None;
-    let trees = scene.trees.clone();
-    adopt(world, scene, now);
     let names = names_of(&world.resource::<HotReload>().reading);
-    let mut shown = world.resource_mut::<RenderState>();
-    shown.trees.extend(trees);
-    shown.adopted = Some(format!("{names} reloaded"));
-    if let Some(camera) = camera
-        && let Some(new) = SceneInputs::of(world).camera
-    {
-        world.entity_mut(new.entity).insert((camera.view, camera.projection, camera.lens));
-    }
-    if let Some(developing) = developing {
-        world.insert_resource(developing);
-    }
-    if let Some(rendering) = rendering {
-        world.insert_resource(rendering);
-    }
+    adopt_again(world, old, scene, format!("{names} reloaded"), now);
     world.resource_mut::<Status>().say(now, MessageKind::Note, format!("reloaded {names} (changed on disk)"));
 }
 

@@ -69,6 +69,10 @@ pub struct Renderer(pub Worker);
 #[derive(Resource, Clone)]
 pub struct CurrentScene(pub Arc<LoadedScene>);
 
+/// The moment of the open model's animations that is asked for, seconds, or the stored pose; until it is being read.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct WantedMoment(pub Option<Option<f64>>);
+
 /// How many scenes have taken their place so far.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SceneGeneration(pub u64);

@@ -6,7 +6,7 @@ use crate::geometry::Ray;
 use crate::render::Camera;
 use crate::scene::{Extraction, LightKind, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
-use glam::{DAffine3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
 /// The selected objects and lights, in the order in which they were chosen; the last one is the active one.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
@@ -64,26 +64,26 @@ pub fn pick_along(
         up: view.up.as_vec3(),
         forward: view.forward.as_vec3(),
         tan_half_vfov: projection.tan_half_vfov() as f32,
+        orthographic: projection.orthographic_height.map(|height| (0.5 * height) as f32),
         ..scene.prepared.camera
     };
     hit(scene, &camera, x, y, aspect)
 }
 
 fn hit(scene: &Extraction, camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Picked> {
-    let dir = direction(camera, x, y, aspect)?;
-    let hit = scene.prepared.geometry.tree.closest_hit(&Ray::new(camera.eye, dir))?;
-    let depth = f64::from(hit.t * dir.dot(camera.forward));
-    let point = scene.origin + (camera.eye + hit.t * dir).as_dvec3();
+    let ray = middle_ray(camera, x, y, aspect)?;
+    let hit = scene.prepared.geometry.tree.closest_hit(&ray)?;
+    let depth = f64::from(hit.t * ray.dir.dot(camera.forward));
+    let point = scene.origin + ray.at(hit.t).as_dvec3();
     let entity = *scene.entities.get(hit.object as usize)?;
     (depth > 0.0 && depth.is_finite()).then_some(Picked { entity, point, depth })
 }
 
-fn direction(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Vec3> {
-    let (across, upwards) = (2.0 * x as f32 - 1.0, 1.0 - 2.0 * y as f32);
-    let dir = camera.forward
-        + camera.right * (across * aspect as f32 * camera.tan_half_vfov)
-        + camera.up * (upwards * camera.tan_half_vfov);
-    if dir.is_finite() { dir.try_normalize() } else { None }
+fn middle_ray(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Ray> {
+    // A film of height 1.
+    let size = Vec2::new(aspect as f32, 1.0);
+    let ray = camera.middle_ray(Vec2::new(x as f32, y as f32) * size, size);
+    (ray.dir.is_finite() && ray.origin.is_finite() && ray.dir != Vec3::ZERO).then_some(ray)
 }
 
 /// The box around a thing, along its own axes.
@@ -125,15 +125,16 @@ pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
     Some(OwnBox { min, max, world_from_box: object.placement.affine() })
 }
 
-/// From the world to the window: a pinhole at the camera of a camera.
+/// From the world to the window: a camera without an aperture.
 #[derive(Clone, Copy, Debug)]
 pub struct Projector {
     eye: DVec3,
     right: DVec3,
     up: DVec3,
     forward: DVec3,
-    /// Units of the window for a metre at a metre.
+    /// Units of the window for a metre at a metre; of an orthographic camera at any distance.
     scale: f64,
+    is_orthographic: bool,
     middle: DVec2,
 }
 
@@ -146,7 +147,8 @@ impl Projector {
             right: view.right(),
             up: view.up,
             forward: view.forward,
-            scale: 0.5 * size.y / projection.tan_half_vfov(),
+            scale: 0.5 * size.y / projection.half_height(1.0),
+            is_orthographic: projection.orthographic_height.is_some(),
             middle: 0.5 * size,
         }
     }
@@ -155,7 +157,7 @@ impl Projector {
     pub fn place(&self, point: DVec3) -> Option<DVec2> {
         let offset = point - self.eye;
         let depth = offset.dot(self.forward);
-        let place = self.middle + DVec2::new(offset.dot(self.right), -offset.dot(self.up)) * (self.scale / depth);
+        let place = self.middle + DVec2::new(offset.dot(self.right), -offset.dot(self.up)) / self.metres(depth);
         (depth > 0.0 && place.is_finite()).then_some(place)
     }
 
@@ -182,21 +184,30 @@ impl Projector {
         DVec2::new(offset.dot(self.right), -offset.dot(self.up)).try_normalize()
     }
 
-    /// The direction, not unit, in which a place of the window is seen.
-    pub fn direction(&self, place: DVec2) -> DVec3 {
+    /// Where the line begins, metres, and the direction, not unit, in which a place of the window is seen.
+    pub fn line(&self, place: DVec2) -> (DVec3, DVec3) {
         let offset = (place - self.middle) / self.scale;
-        self.forward + offset.x * self.right - offset.y * self.up
+        let across = offset.x * self.right - offset.y * self.up;
+        match self.is_orthographic {
+            true => (self.eye + across, self.forward),
+            false => (self.eye, self.forward + across),
+        }
     }
 
-    /// Centre of the lens in the world, metres.
-    pub fn eye(&self) -> DVec3 {
-        self.eye
+    /// The unit direction in which a point is seen; `None` for the place of the camera itself.
+    pub fn towards(&self, point: DVec3) -> Option<DVec3> {
+        if self.is_orthographic { Some(self.forward) } else { (point - self.eye).try_normalize() }
     }
 
     /// How many metres a unit of the window spans where `point` is; `None` for what is not in front of the camera.
     pub fn metres_at(&self, point: DVec3) -> Option<f64> {
         let depth = (point - self.eye).dot(self.forward);
-        (depth > 0.0).then(|| depth / self.scale)
+        (depth > 0.0).then(|| self.metres(depth))
+    }
+
+    /// Metres that a unit of the window spans at a depth.
+    fn metres(&self, depth: f64) -> f64 {
+        if self.is_orthographic { self.scale.recip() } else { depth / self.scale }
     }
 }
 
@@ -224,11 +235,17 @@ mod tests {
     #[test]
     fn a_place_and_its_direction_agree() {
         let view = View::look_at(DVec3::new(3.0, 2.0, 5e6), DVec3::new(0.0, 1.0, 5e6 - 4.0), DVec3::Y).unwrap();
-        let projector = Projector::new(&Rig { view, ..Rig::default() }, DVec2::new(800.0, 600.0));
+        let of = |projection| Projector::new(&Rig { view, projection, ..Rig::default() }, DVec2::new(800.0, 600.0));
+        let projector = of(Projection::default());
+        let parallel = of(Projection { orthographic_height: Some(3.0), ..Projection::default() });
         for place in [DVec2::new(400.0, 300.0), DVec2::new(10.0, 580.0), DVec2::new(799.0, 0.0)] {
-            let point = view.eye + 7.0 * projector.direction(place);
-            assert!((projector.place(point).unwrap() - place).length() < 1e-6);
+            for projector in [projector, parallel] {
+                let (from, along) = projector.line(place);
+                assert!((projector.place(from + 7.0 * along).unwrap() - place).length() < 1e-5);
+            }
+            assert_eq!(parallel.line(place).1, view.forward);
         }
+        assert!((parallel.metres_at(view.pivot()).unwrap() - 3.0 / 600.0).abs() < 1e-12);
         assert_eq!(projector.place(view.eye - view.forward), None);
         // Behind the camera and to its right is to the right.
         let behind = view.eye - 3.0 * view.forward + view.right();

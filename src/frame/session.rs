@@ -1,5 +1,6 @@
 //! One scene, its picture, and everything between: what a window or a script holds on to.
 
+use super::adopt::adopt;
 use super::background::BackgroundTasks;
 use super::edit::{EditQueue, edit_scene};
 use super::explain::{Explaining, explain_pixel};
@@ -11,13 +12,13 @@ use super::recording::{Recorder, record};
 use super::reload::{HotReload, reload};
 use super::resources::{
     Clock, CurrentScene, FrameChanges, Hidden, MAX_THREADS, Paused, PictureSize, RenderRegion, RenderState, Renderer,
-    SceneGeneration, StopAt, Threads, ViewMode,
+    SceneGeneration, StopAt, Threads, ViewMode, WantedMoment,
 };
 use super::saving::{SavedAs, Saving, save};
 use super::scene_bounds::SceneBounds;
 use super::selection::{OwnBox, Selection};
 use super::status::{Picture, Status};
-use super::systems::{accumulate, adopt, develop, edit, present, rebuild, reset};
+use super::systems::{accumulate, develop, edit, present, rebuild, reset};
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, LatencyHistogram, Target};
@@ -141,6 +142,7 @@ impl Session {
         world.init_resource::<Status>();
         world.init_resource::<SceneGeneration>();
         world.init_resource::<SavedAs>();
+        world.init_resource::<WantedMoment>();
         world.init_resource::<Recorder>();
         world.insert_resource(Saving::new(waker.clone()));
         world.insert_resource(HotReload::new(waker));
@@ -198,7 +200,7 @@ impl Session {
         let aspect = self.world.resource::<PictureSize>().aspect();
         let up = self.world.resource::<ModelUp>().0;
         let pool = self.world.resource::<Renderer>().0.pool();
-        self.world.resource::<BackgroundTasks>().load(source, (up, environment), choice, aspect, pool);
+        self.world.resource::<BackgroundTasks>().load(source, (up, environment), choice, aspect, pool, None);
     }
 
     /// Takes over a scene that has been read already.

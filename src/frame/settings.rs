@@ -243,7 +243,7 @@ mod tests {
         let store = SettingsStore::in_folder(folder.path());
         let [a, b] = ["a/room.ron", "b/room.ron"].map(|path| SceneSource::Scene(folder.path().join(path)));
         let lens = Lens { focus_distance: f64::INFINITY, ..Lens::thin(1.0 / 3.0, 0.1) };
-        let bookmark = Rig { view: View::default(), projection: Projection { vfov_deg: 33.3 }, lens };
+        let bookmark = Rig { view: View::default(), projection: Projection::perspective(33.3), lens };
         let mut bookmarks = store.bookmarks(&a).0;
         bookmarks.views.insert(3, bookmark);
         store.keep_bookmarks(&a, &bookmarks).unwrap();

@@ -1,29 +1,23 @@
 //! The systems of a frame, in the order in which they run. Each says what it reads and what it writes.
 
+use super::adopt::{adopt, adopt_moment};
 use super::background::{BackgroundTasks, Finished};
-use super::focus::Focus;
-use super::history::History;
 use super::navigation;
-use super::reset::{Changes, Level, SCENE_OPENED, compare, compare_displays, compare_settings};
+use super::reset::{Changes, Level, compare, compare_displays, compare_settings};
 use super::resources::{
-    Clock, CurrentScene, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer,
-    SceneGeneration, StopAt, Threads, ViewMode,
+    Clock, FrameChanges, Hidden, Paused, PictureSize, RenderRegion, RenderState, Renderer, StopAt, Threads, ViewMode,
 };
-use super::saving::SavedAs;
 use super::scene_bounds::SceneBounds;
 use super::status::{MessageKind, Picture, Status};
-use super::views::ViewTrail;
 use super::worker::{Job, Orders};
 use crate::render::RenderSettings;
 use crate::scene::{
-    CameraInput, DirectionalLight, DisplaySettings, Extraction, Lens, LoadedScene, MaterialSlots, Ordinal, Placement,
-    PointLight, Projection, Rendering, SceneInputs, SceneQueries, Shape, SpotLight, SurfaceMaterial, Trees, View,
+    CameraInput, DirectionalLight, DisplaySettings, Extraction, Lens, MaterialSlots, Ordinal, Placement, PointLight,
+    Projection, Rendering, SceneInputs, SceneQueries, Shape, SpotLight, SurfaceMaterial, Trees, View,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
 use bevy_ecs::system::SystemParam;
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Whether any component that the picture depends on was touched, came or went since the last frame.
 #[derive(SystemParam)]
@@ -98,8 +92,9 @@ pub fn edit(world: &mut World) {
                 shown.better_trees |= shown.trees.hasty().len() < hasty;
                 shown.waiting = true;
             }
+            Finished::Scene { again: true, result: Ok(scene), .. } => adopt_moment(world, *scene, now),
             Finished::Scene { result: Ok(scene), .. } => adopt(world, *scene, now),
-            Finished::Scene { source, result: Err(error) } => {
+            Finished::Scene { source, result: Err(error), .. } => {
                 let mut status = world.resource_mut::<Status>();
                 for problem in &error.problems {
                     status.say(now, MessageKind::Error, problem.to_string());
@@ -108,32 +103,6 @@ pub fn edit(world: &mut World) {
             }
         }
     }
-}
-
-/// Makes `scene` the scene of `world`.
-pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
-    scene.spawn(world);
-    let home = world.query::<(&View, &Projection, &Lens)>().iter(world).next().map_or_else(
-        navigation::Rig::default,
-        |(view, projection, lens)| navigation::Rig { view: *view, projection: *projection, lens: *lens },
-    );
-    world.resource_mut::<SceneBounds>().home = home;
-    world.resource_mut::<History>().forget();
-    world.resource_mut::<ViewTrail>().forget();
-    world.insert_resource(Focus::default());
-    world.insert_resource(super::Selection::default());
-    world.resource_mut::<super::Explaining>().forget();
-    let mut shown = world.resource_mut::<RenderState>();
-    shown.trees.extend(scene.trees.clone());
-    shown.adopted = Some(SCENE_OPENED.to_owned());
-    let mut status = world.resource_mut::<Status>();
-    status.scene = scene.source.title();
-    for warning in &scene.warnings {
-        status.say(now, MessageKind::Warning, warning.clone());
-    }
-    world.insert_resource(CurrentScene(Arc::new(scene)));
-    world.insert_resource(SavedAs::default());
-    world.resource_mut::<SceneGeneration>().0 += 1;
 }
 
 /// Finds out what changed, and makes anew that part of the snapshot and no other.

@@ -284,6 +284,7 @@ fn camera(center: Vec3, size: f32, view: usize) -> Camera {
         up: right.cross(forward),
         forward,
         tan_half_vfov: 0.75,
+        orthographic: None,
         lens_radius: 0.0,
         focus_distance: 1.0,
         blades: 0,

@@ -159,9 +159,10 @@ impl CameraPart {
                 note(check_size("pivot_distance", distance));
             }
         }
-        let projection = Projection { vfov_deg: self.vfov }.check();
+        let projection = Projection::perspective(self.vfov).check();
         let is_open = projection.is_ok();
         note(projection);
+        note(self.orthographic_height.map_or(Ok(()), check_height));
         match (self.lens_radius, self.f_stop) {
             (Some(_), Some(_)) => {
                 let problem = "`lens_radius` and `f_stop` exclude each other: set one of them";
@@ -192,6 +193,10 @@ impl CameraPart {
 fn check_angle(field: &'static str, angle_deg: f64) -> Result<(), BadValue> {
     let good = angle_deg.is_finite();
     if good { Ok(()) } else { Err(BadValue::out_of_range(field, number(angle_deg), "be a finite number of degrees")) }
+}
+
+fn check_height(height: f64) -> Result<(), BadValue> {
+    check_size("orthographic_height", height)
 }
 
 fn check_lens_radius(field: &'static str, radius: f64) -> Result<(), BadValue> {
@@ -230,10 +235,10 @@ impl View {
 
 impl Projection {
     /// # Errors
-    /// When there is no flat picture of this field of view.
+    /// When there is no flat picture of this field of view or height.
     pub fn check(&self) -> Result<(), BadValue> {
         if (LEAST_VFOV_DEG..180.0).contains(&self.vfov_deg) {
-            return Ok(());
+            return self.orthographic_height.map_or(Ok(()), check_height);
         }
         let rule = format!("lie above 0 and below 180 degrees (at least {LEAST_VFOV_DEG:e})");
         Err(BadValue::out_of_range("vfov", number(self.vfov_deg), rule))

@@ -32,7 +32,7 @@ pub(super) fn camera(part: &CameraPart) -> (View, Projection, Lens) {
         blades: part.blades,
         blade_rotation_deg: part.blade_rotation,
     };
-    (view, Projection { vfov_deg: part.vfov }, lens)
+    (view, Projection { vfov_deg: part.vfov, orthographic_height: part.orthographic_height }, lens)
 }
 
 /// What rounding leaves of a length of 1 or a right angle.

@@ -90,6 +90,7 @@ pub fn camera_part(view: &View, projection: &Projection, lens: &Lens, written: O
     let at = CameraPart {
         up: view.up,
         vfov: projection.vfov_deg,
+        orthographic_height: projection.orthographic_height,
         lens_radius: (lens.radius != 0.0).then_some(lens.radius),
         focus_distance: Some(lens.focus_distance),
         depth_of_field: (lens.enabled != (lens.radius > 0.0)).then_some(lens.enabled),

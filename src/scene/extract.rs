@@ -190,6 +190,7 @@ fn camera_in(CameraInput { view, projection, lens, .. }: &CameraInput, origin: D
         up: view.up.as_vec3(),
         forward: view.forward.as_vec3(),
         tan_half_vfov: (0.5 * projection.vfov_deg).to_radians().tan() as f32,
+        orthographic: projection.orthographic_height.map(|height| (0.5 * height) as f32),
         lens_radius: if lens.enabled { lens.radius as f32 } else { 0.0 },
         focus_distance: lens.focus_distance as f32,
         blades: lens.blades,

@@ -9,7 +9,7 @@ use super::default_scene;
 use super::documents::{Documents, Opened};
 use super::error::{SceneError, suggestion};
 use super::file::{CameraPart, FilmPart, LightPart, Named, ObjectPart, SceneFile, TransformPart};
-use super::gltf::{Assembly, BuiltMesh, GltfCamera, GltfFacts, GltfProblem, Lens, LightKind, Located, PlacedLight};
+use super::gltf::{BuiltMesh, GltfCamera, GltfFacts, GltfProblem, Lens, LightKind, Located, PlacedLight};
 use super::own_materials::texture_names;
 use super::sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 use super::value::Rgb;
@@ -138,7 +138,8 @@ impl Maker<'_> {
         }
 
         let center = 0.5 * (bounds.0 + bounds.1);
-        let cameras = self.cameras(&assembly, center, &mut warnings);
+        let of_file = assembly.cameras.iter();
+        let cameras: Vec<_> = of_file.map(|camera| (camera.name.clone(), Self::camera(camera, center))).collect();
         let chosen = self.chosen(&cameras)?;
         let has_light = !assembly.lights.is_empty() || emits;
         let mut file = SceneFile {
@@ -218,25 +219,15 @@ impl Maker<'_> {
         }
     }
 
-    fn cameras(&self, assembly: &Assembly, center: DVec3, warnings: &mut Vec<String>) -> Vec<(String, CameraPart)> {
-        assembly.cameras.iter().map(|camera| (camera.name.clone(), self.camera(camera, center, warnings))).collect()
-    }
-
-    fn camera(&self, camera: &GltfCamera, center: DVec3, warnings: &mut Vec<String>) -> CameraPart {
+    fn camera(camera: &GltfCamera, center: DVec3) -> CameraPart {
         /// Degrees.
         const WIDEST: f64 = 179.0;
         const NARROWEST: f64 = 0.01;
         let depth = (center - camera.eye).dot(camera.forward);
-        let vfov = match camera.lens {
-            Lens::Perspective(yfov) => yfov,
-            Lens::Orthographic(half) => {
-                let name = crate::printable::name(&camera.name);
-                warnings.push(self.told(&format!(
-                    "camera `{name}` is orthographic, which is not modelled: a perspective one takes its place"
-                )));
-                // As high as it is at the middle of the scene.
-                2.0 * (half / depth.max(half)).atan()
-            }
+        let (vfov, orthographic_height) = match camera.lens {
+            Lens::Perspective(yfov) => (yfov, None),
+            // In perspective, as high as it is at the middle of the scene.
+            Lens::Orthographic(half) => (2.0 * (half / depth.max(half)).atan(), Some(2.0 * half)),
         };
         CameraPart {
             look_at: None,
@@ -244,6 +235,7 @@ impl Maker<'_> {
             pivot_distance: (depth > SceneFile::MIN_SIZE && depth < SceneFile::MAX_COORDINATE).then_some(depth),
             up: camera.up,
             vfov: vfov.to_degrees().clamp(NARROWEST, WIDEST),
+            orthographic_height,
             ..CameraPart::looking_at(camera.eye, camera.eye + camera.forward)
         }
     }

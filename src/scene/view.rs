@@ -146,12 +146,26 @@ impl Default for View {
 /// How much of the scene the picture takes in.
 #[derive(Clone, Copy, Debug, PartialEq, Component, Serialize, Deserialize)]
 pub struct Projection {
-    /// Vertical field of view, degrees, in `(0, 180)`.
+    /// Vertical field of view in perspective, degrees, in `(0, 180)`.
     pub vfov_deg: f64,
+    /// Height of what an orthographic camera sees, metres; `None` sees in perspective. Its rays are parallel, and begin in
+    /// the plane through the camera that faces along the view.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orthographic_height: Option<f64>,
 }
 
 impl Projection {
-    /// Tangent of half the vertical field of view: half the picture's height at distance 1.
+    /// In perspective, with a vertical field of view in degrees.
+    pub fn perspective(vfov_deg: f64) -> Self {
+        Self { vfov_deg, orthographic_height: None }
+    }
+
+    /// Half the height of what the picture takes in at a depth along the view; both metres.
+    pub fn half_height(&self, depth: f64) -> f64 {
+        self.orthographic_height.map_or_else(|| self.tan_half_vfov() * depth, |height| 0.5 * height)
+    }
+
+    /// Tangent of half the vertical field of view in perspective: half the picture's height at distance 1.
     pub fn tan_half_vfov(&self) -> f64 {
         (0.5 * self.vfov_deg).to_radians().tan()
     }
@@ -159,7 +173,7 @@ impl Projection {
 
 impl Default for Projection {
     fn default() -> Self {
-        Self { vfov_deg: 40.0 }
+        Self::perspective(40.0)
     }
 }
 

@@ -12,6 +12,7 @@ pub fn camera_text(rig: &Rig) -> String {
     let part = CameraPart {
         up: view.up.map(|value| rounded(value, 1.0)),
         vfov: rounded(projection.vfov_deg, projection.vfov_deg),
+        orthographic_height: projection.orthographic_height.map(|height| rounded(height, height)),
         lens_radius: (radius > 0.0).then_some(rounded(radius, radius)),
         focus_distance: Some(rounded(lens.focus_distance, lens.focus_distance)),
         blades: lens.blades,
@@ -48,7 +49,7 @@ mod tests {
     fn a_printed_camera_is_what_a_scene_file_reads() {
         let view = View::look_at(DVec3::new(0.1, 2.0, -3.0), DVec3::new(1.0 / 3.0, 0.0, 5e6), DVec3::Y).unwrap();
         let lens = Lens { blades: 6, blade_rotation_deg: 15.0, ..Lens::thin(0.025, 1.75) };
-        let rig = Rig { view, projection: Projection { vfov_deg: 33.3 }, lens };
+        let rig = Rig { view, projection: Projection::perspective(33.3), lens };
         let text = format!("(\n{}\n)", camera_text(&rig));
         let camera = SceneFile::parse(&text, "printed").unwrap_or_else(|error| panic!("{error}\n{text}")).camera;
         let near = |a: DVec3, b: DVec3, scale: f64| assert!((a - b).abs().max_element() <= 1e-6 * scale, "{a} for {b}");

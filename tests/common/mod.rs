@@ -39,6 +39,7 @@ pub fn camera(eye: Vec3, look_at: Vec3, vfov: f32) -> Camera {
         up: right.cross(forward),
         forward,
         tan_half_vfov: (0.5 * vfov.to_radians()).tan(),
+        orthographic: None,
         lens_radius: 0.0,
         focus_distance: 1.0,
         blades: 0,

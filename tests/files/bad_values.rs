@@ -175,7 +175,7 @@ fn bad_rigs() -> Vec<(Rig, &'static str)> {
         change(&mut lens);
         Rig { lens, ..good }
     };
-    let vfov = |vfov_deg| Rig { projection: Projection { vfov_deg }, ..good };
+    let vfov = |vfov_deg| Rig { projection: Projection::perspective(vfov_deg), ..good };
     vec![
         (view(|view| view.eye.x = f64::NAN), "`eye` is (NaN, 0, 5)"),
         (view(|view| view.eye.y = 1e13), "`eye` is (0, 1e13, 5)"),

@@ -106,7 +106,7 @@ proptest! {
         prop_assume!(view.is_ok());
         let lens = Lens { radius, focus_distance: focus, enabled, blades, blade_rotation_deg: 0.1 + turned.x };
         let camera = SceneInputs::of(&mut world).camera.unwrap().entity;
-        world.entity_mut(camera).insert((view.unwrap(), Projection { vfov_deg: vfov }, lens));
+        world.entity_mut(camera).insert((view.unwrap(), Projection::perspective(vfov), lens));
         let objects = SceneInputs::of(&mut world).objects;
         for (i, object) in objects.iter().enumerate() {
             let mut placement = world.get_mut::<Placement>(object.entity).unwrap();

@@ -10,6 +10,7 @@ mod features;
 mod filters;
 mod lanes;
 mod light_transport;
+mod orthographic;
 mod phong;
 mod principled;
 mod region;

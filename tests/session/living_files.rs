@@ -1,6 +1,6 @@
 //! Files of a running session: saved, read again when they change, recorded and played.
 
-use firstlight::frame::{Command, MessageKind, Session, SessionOptions, Target};
+use firstlight::frame::{Command, CurrentScene, Edit, MessageKind, Session, SessionOptions, Target};
 use firstlight::scene::{ColorParam, LoadOptions, Material, SceneInputs, SceneSource, Shape, SurfaceMaterial, load};
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -313,4 +313,76 @@ fn a_camera_that_moves_is_rendered_to_numbered_pictures() {
         assert_eq!(status, Some(0), "{said}");
         assert!(read("way-0001.png") == read("still.png") && read("way-0003.png") != read("way-0002.png"));
     }
+}
+
+/// A triangle that goes one metre to the right in two seconds, before a camera.
+fn moving_triangle() -> String {
+    let numbers: [f32; 17] = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 2., 0., 0., 0., 1., 0., 0.];
+    let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+    let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, bytes);
+    format!(
+        r#"{{
+        "asset": {{ "version": "2.0" }},
+        "buffers": [{{ "byteLength": 68, "uri": "data:application/octet-stream;base64,{data}" }}],
+        "bufferViews": [{{ "buffer": 0, "byteLength": 68 }}],
+        "accessors": [
+            {{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }},
+            {{ "bufferView": 0, "byteOffset": 36, "componentType": 5126, "count": 2, "type": "SCALAR" }},
+            {{ "bufferView": 0, "byteOffset": 44, "componentType": 5126, "count": 2, "type": "VEC3" }}
+        ],
+        "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }} }}] }}],
+        "cameras": [{{ "type": "perspective", "perspective": {{ "yfov": 0.6 }} }}],
+        "nodes": [{{ "mesh": 0, "name": "mover" }}, {{ "camera": 0, "translation": [0, 0, 5] }}],
+        "animations": [{{
+            "channels": [{{ "sampler": 0, "target": {{ "node": 0, "path": "translation" }} }}],
+            "samplers": [{{ "input": 1, "output": 2 }}]
+        }}],
+        "scenes": [{{ "nodes": [0, 1] }}]
+    }}"#
+    )
+}
+
+#[test]
+fn another_moment_moves_the_model_and_keeps_the_view() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("moving.gltf");
+    std::fs::write(&path, moving_triangle()).unwrap();
+    let mut driver = Driver::open(SceneSource::Model(path), 1, 2);
+    driver.run_until(|session| session.world().contains_resource::<CurrentScene>() && session.status().spp >= 2);
+    let place = |driver: &mut Driver| {
+        let inputs = SceneInputs::of(driver.session.world_mut());
+        inputs
+            .objects
+            .iter()
+            .find(|object| object.name.as_deref() == Some("mover"))
+            .unwrap()
+            .placement
+            .affine()
+            .translation
+    };
+    assert_eq!(place(&mut driver), DVec3::ZERO);
+    driver.session.send(Command::Orbit { yaw_deg: 20.0, pitch_deg: 5.0 });
+    driver.frame();
+    let view = driver.session.status().rig.view;
+    let at = |session: &Session| session.world().resource::<CurrentScene>().0.choice.at;
+    // The last of several is what counts.
+    for seconds in [0.25, 0.5, 1.0] {
+        driver.session.send(Command::SetMoment { seconds: Some(seconds) });
+    }
+    driver.run_until(|session| at(session) == Some(1.0));
+    assert_eq!(place(&mut driver), DVec3::new(0.5, 0.0, 0.0));
+    assert_eq!(driver.session.status().rig.view, view);
+    driver.session.send(Command::SetMoment { seconds: None });
+    driver.run_until(|session| at(session).is_none());
+    assert_eq!(place(&mut driver), DVec3::ZERO);
+
+    // Edits that are not saved are not lost by it.
+    let id = SceneInputs::of(driver.session.world_mut()).objects[0].entity.to_bits();
+    driver.session.send(Command::Edit(Edit::Select { id, add: false }));
+    driver.session.send(Command::Edit(Edit::Move { by: DVec3::Y }));
+    driver.frame();
+    driver.session.send(Command::SetMoment { seconds: Some(2.0) });
+    let told = |session: &Session| session.status().messages.iter().any(|told| told.text.contains("unsaved changes"));
+    driver.run_until(told);
+    assert_eq!(place(&mut driver), DVec3::Y);
 }

@@ -22,6 +22,7 @@ pub(crate) fn prepared(
         up: Vec3::Y,
         forward: Vec3::NEG_Z,
         tan_half_vfov: 1.0,
+        orthographic: None,
         lens_radius: 0.0,
         focus_distance: 1.0,
         blades: 0,

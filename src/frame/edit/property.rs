@@ -65,12 +65,20 @@ pub enum Property {
     ClearcoatRoughness,
     /// Of a principled material: share that has a thin film, 0..1.
     Iridescence,
+    /// Of a principled material: index of refraction of the film.
+    FilmIor,
     /// Of a principled material: thickness of the film, nanometres.
     FilmThickness,
+    /// Of a principled material: its thickness where the map of it is 0, nanometres.
+    FilmThinnest,
+    /// Of a principled material: factor of the reflectance of its dielectric, which may be above 1.
+    SpecularColor,
     /// Of a principled material: radiance that it adds.
     Emission,
     /// Of a principled material: share of the surface that is there, 0..1.
     Opacity,
+    /// Of a principled material: opacity below which the surface is not there at all; above 1 its opacity is a share.
+    OpacityCutoff,
     /// Of a principled material: factor of the slope of its normal map.
     NormalScale,
     /// Of a principled material: whether its back is a surface; 0 is no.
@@ -113,7 +121,11 @@ impl Property {
             "clearcoat" => Self::Clearcoat,
             "clearcoat_roughness" => Self::ClearcoatRoughness,
             "iridescence" => Self::Iridescence,
+            "iridescence_ior" => Self::FilmIor,
+            "iridescence_min" => Self::FilmThinnest,
             "iridescence_max" => Self::FilmThickness,
+            "specular_color" => Self::SpecularColor,
+            "opacity_cutoff" => Self::OpacityCutoff,
             "emission" => Self::Emission,
             "opacity" => Self::Opacity,
             "normal_scale" => Self::NormalScale,

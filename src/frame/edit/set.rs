@@ -126,7 +126,8 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
         Param::Flag(old) => *old = number != 0.0,
         Param::Reflectance(color) => *color = ColorParam::Rgb(value.clamp(DVec3::ZERO, DVec3::ONE).as_vec3()),
         Param::Radiance(color) | Param::Factor(color) => *color = ColorParam::Rgb(value.max(DVec3::ZERO).as_vec3()),
-        Param::Map(_) | Param::Cutoff(_) | Param::Part(_) => return None,
+        Param::Cutoff(old) => *old = (0.0..=1.0).contains(&number).then_some(number),
+        Param::Map(_) | Param::Part(_) => return None,
     }
     Some(())
 }

@@ -11,7 +11,7 @@ mod lens;
 mod moves;
 
 pub use lens::{focus_at, scale_aperture, scale_focus, set_aperture, toggle_depth_of_field};
-pub use moves::{VERTICAL, dolly, fly, frame_points, level, orbit, pan, roll, turn, zoom};
+pub use moves::{VERTICAL, dolly, fly, frame_points, frame_rig, level, orbit, pan, roll, turn, zoom};
 
 pub use super::rig::{Rig, Turning};
 
@@ -52,6 +52,10 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
             with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
         }
         Command::Pan { right, up } => with_view(pan(&view, &projection, right, up)),
+        // Nearer looks no larger where rays are parallel.
+        Command::Dolly { factor } if projection.orthographic_height.is_some() => {
+            Some(Rig { projection: zoom(&projection, factor), ..*rig })
+        }
         Command::Dolly { factor } => with_view(dolly(&view, factor)),
         Command::Zoom { factor } => Some(Rig { projection: zoom(&projection, factor), ..*rig }),
         Command::Roll { angle_deg } => with_view(roll(&view, angle_deg.to_radians())),

@@ -3,7 +3,7 @@
 //! Two ways of turning: on a turntable, where the horizon keeps its lean and the view stops short of straight up and
 //! down, and freely about the picture's own axes.
 
-use crate::frame::rig::Turning;
+use crate::frame::rig::{Rig, Turning};
 use crate::scene::{Projection, View};
 use glam::{DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;
@@ -16,6 +16,9 @@ const MAX_ELEVATION: f64 = 89.0 * (FRAC_PI_2 / 90.0);
 
 /// The field of view that zooming stays within, degrees: a strong telescope, and the widest flat picture of any use.
 const VFOV_RANGE_DEG: (f64, f64) = (0.1, 150.0);
+
+/// Left free around what is framed, of half the picture.
+const ROOM: f64 = 0.08;
 
 /// Looks about from the camera; radians to the right and upwards in the picture.
 pub fn turn(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
@@ -36,7 +39,7 @@ pub fn fly(view: &View, step: DVec3) -> View {
 
 /// Moves sideways by heights of the picture at the pivot.
 pub fn pan(view: &View, projection: &Projection, right: f64, up: f64) -> View {
-    let height = 2.0 * projection.tan_half_vfov() * view.pivot_distance;
+    let height = 2.0 * projection.half_height(view.pivot_distance);
     fly(view, DVec3::new(right * height, up * height, 0.0))
 }
 
@@ -54,11 +57,15 @@ pub fn zoom(projection: &Projection, factor: f64) -> Projection {
     if !(factor.is_finite() && factor > 0.0) {
         return *projection;
     }
+    if let Some(height) = projection.orthographic_height {
+        let wanted = Projection { orthographic_height: Some(height * factor), ..*projection };
+        return if wanted.check().is_ok() { wanted } else { *projection };
+    }
     let (lowest, highest) = VFOV_RANGE_DEG;
     let wanted = 2.0 * (projection.tan_half_vfov() * factor).atan().to_degrees();
     // A scene may start outside of the limits; then it can only come nearer.
     let vfov_deg = wanted.clamp(lowest.min(projection.vfov_deg), highest.max(projection.vfov_deg));
-    Projection { vfov_deg }
+    Projection { vfov_deg, ..*projection }
 }
 
 /// Leans the head to the right, radians.
@@ -79,12 +86,33 @@ pub fn level(view: &View) -> View {
     View { up: VERTICAL, ..*view }.orthonormalized()
 }
 
+/// What [`frame_points`] does for a camera of either kind: an orthographic one takes the height that the points need, and
+/// stands in front of all of them.
+pub fn frame_rig(rig: &Rig, aspect: f64, points: &[DVec3]) -> Rig {
+    let Rig { view, projection, .. } = *rig;
+    let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
+    let (Some(_), Some((min, max))) = (projection.orthographic_height, around) else {
+        return Rig { view: frame_points(&view, &projection, aspect, points), ..*rig };
+    };
+    let middle = 0.5 * min + 0.5 * max;
+    let span = |axis: DVec3| {
+        let along = points.iter().map(|point| (*point - middle).dot(axis));
+        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+    };
+    let [(left, right), (low, high), (near, _)] = [view.right(), view.up, view.forward].map(span);
+    let height = (high - low).max((right - left) / aspect) / (1.0 - ROOM);
+    let wanted = Projection { orthographic_height: Some(height), ..projection };
+    let projection = if wanted.check().is_ok() { wanted } else { projection };
+    let across = 0.5 * (left + right) * view.right() + 0.5 * (low + high) * view.up;
+    let distance = (height - near).max(view.pivot_distance);
+    let eye = middle + across - distance * view.forward;
+    Rig { view: finite_or(&view, View { eye, pivot_distance: distance, ..view }), projection, ..*rig }
+}
+
 /// Keeps the direction and places the camera as near as all points still are in a picture of this `aspect` (width by
 /// height), with a little room around them; the middle of their box becomes the pivot's depth. One point alone keeps
 /// its distance; without any, the view stays.
 pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &[DVec3]) -> View {
-    /// Of half the picture.
-    const ROOM: f64 = 0.08;
     let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
     let Some((min, max)) = around else { return *view };
     let middle = 0.5 * min + 0.5 * max;
@@ -277,7 +305,7 @@ mod tests {
 
     #[test]
     fn panning_moves_what_is_at_the_pivot_by_the_amount_asked() {
-        let (view, projection) = (start(), Projection { vfov_deg: 50.0 });
+        let (view, projection) = (start(), Projection::perspective(50.0));
         let panned = pan(&view, &projection, 0.25, -0.5);
         let seen = view.pivot() - panned.eye;
         let depth = seen.dot(panned.forward);
@@ -291,7 +319,7 @@ mod tests {
         let points: Vec<DVec3> =
             (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 3.0, f64::from(i >> 2))).collect();
         for (aspect, offset) in [(0.4, 0.0), (1.0, 1e6), (2.5, 0.0)] {
-            let projection = Projection { vfov_deg: 60.0 };
+            let projection = Projection::perspective(60.0);
             let points: Vec<DVec3> = points.iter().map(|point| *point + DVec3::splat(offset)).collect();
             let view = frame_points(&start(), &projection, aspect, &points);
             assert_eq!(view.forward, start().forward);
@@ -312,14 +340,14 @@ mod tests {
 
     #[test]
     fn zoom_scales_the_picture_and_stays_in_range() {
-        let halved = zoom(&Projection { vfov_deg: 40.0 }, 0.5);
+        let halved = zoom(&Projection::perspective(40.0), 0.5);
         assert!((halved.tan_half_vfov() * 2.0 - 20f64.to_radians().tan()).abs() < 1e-15);
         let mut projection = Projection::default();
         for _ in 0..10_000 {
             projection = zoom(&projection, 1.1);
         }
         assert_eq!(projection.vfov_deg, VFOV_RANGE_DEG.1);
-        let fisheye = Projection { vfov_deg: 170.0 };
+        let fisheye = Projection::perspective(170.0);
         assert!((zoom(&fisheye, 2.0).vfov_deg - 170.0).abs() < 1e-9, "outside of the range it does not jump");
     }
 

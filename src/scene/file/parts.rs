@@ -65,9 +65,12 @@ pub struct CameraPart {
     /// What is up in the picture; +Y when not given.
     #[serde(default = "default_up")]
     pub up: DVec3,
-    /// Vertical field of view, degrees.
+    /// Vertical field of view in perspective, degrees.
     #[serde(default = "default_vfov")]
     pub vfov: f64,
+    /// Height of what an orthographic camera sees, metres; in perspective when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orthographic_height: Option<f64>,
     /// Metres; a pinhole when neither this nor `f_stop` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_radius: Option<f64>,
@@ -98,6 +101,7 @@ impl CameraPart {
             pivot_distance: None,
             up: default_up(),
             vfov: default_vfov(),
+            orthographic_height: None,
             lens_radius: None,
             f_stop: None,
             focus_distance: None,

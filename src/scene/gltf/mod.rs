@@ -36,7 +36,7 @@ pub use document::{Document, ReadOptions};
 pub use error::{GltfError, GltfProblem};
 pub use facts::GltfFacts;
 
-pub(in crate::scene) use assembly::{Assembly, MeshKey, PlacedLight, Posed};
+pub(in crate::scene) use assembly::{MeshKey, PlacedLight, Posed};
 pub(in crate::scene) use error::Located;
 pub(in crate::scene) use lights::LightKind;
 pub(in crate::scene) use mesh::BuiltMesh;

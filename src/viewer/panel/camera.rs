@@ -27,11 +27,30 @@ pub fn camera(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked
                 asked.send(Command::SetView(view));
             }
         });
-        row(ui, "field of view", |ui| {
-            if let Some(vfov_deg) = slider(ui, rig.projection.vfov_deg, 5.0..=120.0, false) {
-                asked.send(Command::SetProjection(Projection { vfov_deg }));
-            }
+        row(ui, "projection", |ui| {
+            ui.horizontal(|ui| {
+                let height = 2.0 * rig.projection.half_height(rig.view.pivot_distance);
+                for (label, orthographic_height) in [("perspective", None), ("orthographic", Some(height))] {
+                    let is_chosen = rig.projection.orthographic_height.is_some() == orthographic_height.is_some();
+                    if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
+                        asked.send(Command::SetProjection(Projection { orthographic_height, ..rig.projection }));
+                    }
+                }
+            })
         });
+        match rig.projection.orthographic_height {
+            None => row(ui, "field of view", |ui| {
+                if let Some(vfov_deg) = slider(ui, rig.projection.vfov_deg, 5.0..=120.0, false) {
+                    asked.send(Command::SetProjection(Projection { vfov_deg, ..rig.projection }));
+                }
+            }),
+            Some(height) => row_with_hint(ui, "height", "of what the picture shows, at any distance", |ui| {
+                if let Some(height) = number(ui, height, proportional(height), 1e-6..=1e9, " m") {
+                    let orthographic_height = Some(height);
+                    asked.send(Command::SetProjection(Projection { orthographic_height, ..rig.projection }));
+                }
+            }),
+        };
         row(ui, "fly speed", |ui| asked.speed = slider(ui, around.speed, 1.0 / 64.0..=64.0, true));
         row_with_hint(ui, "drag", "left mouse drag (Space)", |ui| {
             ui.horizontal(|ui| {
@@ -74,6 +93,26 @@ fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     });
 }
 
+/// The moment of the animations, where the open model has any.
+pub fn moment(ui: &mut Ui, session: &Session, asked: &mut Asked) {
+    let Some(scene) = session.world().get_resource::<CurrentScene>() else { return };
+    let Some(length) = scene.0.facts.as_ref().and_then(|facts| facts.animation_length) else { return };
+    let at = scene.0.choice.at;
+    rows(ui, "moment", |ui| {
+        row_with_hint(ui, "moment", "seconds into the animations of the model", |ui| {
+            ui.horizontal(|ui| {
+                if let Some(seconds) = slider(ui, at.unwrap_or(0.0), 0.0..=length.max(1e-3), false) {
+                    asked.send(Command::SetMoment { seconds: Some(seconds) });
+                }
+                let stored = ui.selectable_label(at.is_none(), "stored").on_hover_text("the pose that the file stores");
+                if stored.clicked() && at.is_some() {
+                    asked.send(Command::SetMoment { seconds: None });
+                }
+            })
+        });
+    });
+}
+
 /// Views to go to, and the turntable.
 pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked) {
     ui.horizontal_wrapped(|ui| {
@@ -92,6 +131,7 @@ pub fn views(ui: &mut Ui, session: &Session, around: &Around, asked: &mut Asked)
         asked.toggle_spin |= turntable.on_hover_text("start or stop orbiting the pivot (U)").clicked();
     });
     cameras(ui, session, asked);
+    moment(ui, session, asked);
     let bookmarks = session.world().resource::<Bookmarks>();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;

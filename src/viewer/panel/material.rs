@@ -135,7 +135,9 @@ impl Scale {
             Property::Clearcoat => ("clearcoat", "strength of the coat", 0.0..=1.0),
             Property::ClearcoatRoughness => ("coat roughness", "0: mirror, 1: rough", 0.0..=1.0),
             Property::Iridescence => ("iridescence", "strength of the colours of a thin film", 0.0..=1.0),
+            Property::FilmIor => ("film IOR", "index of refraction of the film", 1.0..=2.5),
             Property::FilmThickness => ("film thickness", "nanometres", 0.0..=1500.0),
+            Property::FilmThinnest => ("film at least", "nanometres, where the map of the film is black", 0.0..=1500.0),
             Property::Opacity => ("opacity", "share of the surface that is there", 0.0..=1.0),
             Property::NormalScale => ("normal scale", "strength of the normal map", -2.0..=2.0),
             _ => return None,
@@ -165,6 +167,30 @@ fn switch(name: &str) -> Option<(Property, &'static str, &'static str)> {
         Property::TwoSided => (property, "two-sided", "off: the back is not there"),
         _ => return None,
     })
+}
+
+/// Whether opacity is a mask, and from which opacity on the surface is there.
+fn cutoff_row(ui: &mut Ui, id: u64, cutoff: Option<f32>, asked: &mut Asked) {
+    /// What glTF has where a file says nothing.
+    const USUAL: f32 = 0.5;
+    /// Out of range: the opacity is a share again.
+    const NONE: f64 = 2.0;
+    let mut set = |value: f64| {
+        asked.edit(Edit::Set { id, property: Property::OpacityCutoff, value: DVec3::splat(value) });
+    };
+    row_with_hint(ui, "cutoff", "where opacity is less, the surface is not there; off: opacity is a share", |ui| {
+        ui.horizontal(|ui| {
+            let mut on = cutoff.is_some();
+            if ui.checkbox(&mut on, "").changed() {
+                set(if on { f64::from(USUAL) } else { NONE });
+            }
+            if let Some(cutoff) = cutoff
+                && let Some(new) = slider(ui, f64::from(cutoff), 0.0..=1.0, false)
+            {
+                set(new);
+            }
+        });
+    });
 }
 
 fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, asked: &mut Asked) {
@@ -202,11 +228,18 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
                 });
                 continue;
             }
-            Param::Reflectance(ColorParam::Rgb(rgb)) | Param::Radiance(ColorParam::Rgb(rgb)) => {
+            Param::Cutoff(cutoff) => {
+                cutoff_row(ui, id, *cutoff, asked);
+                continue;
+            }
+            Param::Reflectance(ColorParam::Rgb(rgb))
+            | Param::Radiance(ColorParam::Rgb(rgb))
+            | Param::Factor(ColorParam::Rgb(rgb)) => {
                 let property = Property::of_param(name);
                 let (Some(property), false) = (property, property == Some(Property::Color)) else { continue };
                 row(ui, &name.replace('_', " "), |ui| {
-                    if let Some(value) = color(ui, *rgb, property == Property::Emission) {
+                    let is_bright = matches!(property, Property::Emission | Property::SpecularColor);
+                    if let Some(value) = color(ui, *rgb, is_bright) {
                         asked.edit(Edit::Set { id, property, value });
                     }
                 });

@@ -1,4 +1,8 @@
 //! Thin-lens camera: from a point on the film and a point on the lens to a ray.
+//!
+//! A perspective camera looks through a lens at one place. An orthographic one has a lens at every point of the film (the
+//! limit of a telecentric lens): without an aperture all of its rays are parallel, with one each point of the film sees a
+//! cone whose tip lies in the focal plane.
 
 use crate::sampling::{polygon_disc, uniform_disc};
 use firstlight_kdtree::geometry::Ray;
@@ -9,7 +13,7 @@ use thiserror::Error;
 /// A thin-lens camera in the space of the snapshot. The focal *plane* is perpendicular to `forward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Centre of the lens, metres.
+    /// Centre of the lens, metres; of an orthographic camera the middle of the plane that its rays begin in.
     pub eye: Vec3,
     /// To the right in the picture. The three axes are unit and mutually perpendicular; `right × up` points at the viewer.
     pub right: Vec3,
@@ -17,8 +21,10 @@ pub struct Camera {
     pub up: Vec3,
     /// Into the picture, along the optical axis.
     pub forward: Vec3,
-    /// Tangent of half the vertical field of view.
+    /// Tangent of half the vertical field of view, in perspective.
     pub tan_half_vfov: f32,
+    /// Half the height of what an orthographic camera sees, metres; `None` sees in perspective.
+    pub orthographic: Option<f32>,
     /// Metres; 0 is a pinhole, which samples no lens.
     pub lens_radius: f32,
     /// Metres along `forward` from the camera to the focal plane, positive; may be infinite.
@@ -51,8 +57,8 @@ impl Camera {
             let value = value.to_string();
             Err(CameraError { field, value, allowed })
         };
-        let Self { eye, right, up, forward, tan_half_vfov, lens_radius, focus_distance, blades: _, blade_rotation } =
-            *self;
+        let Self { eye, right, up, forward, tan_half_vfov, orthographic, .. } = *self;
+        let Self { lens_radius, focus_distance, blades: _, blade_rotation, .. } = *self;
         if !eye.is_finite() {
             return wrong("eye", &eye, "be finite");
         }
@@ -63,6 +69,9 @@ impl Camera {
         }
         if !(tan_half_vfov > 0.0 && tan_half_vfov.is_finite()) {
             return wrong("tan_half_vfov", &tan_half_vfov, "be positive and finite");
+        }
+        if let Some(half) = orthographic.filter(|half| !(*half > 0.0 && half.is_finite())) {
+            return wrong("orthographic", &half, "be positive and finite");
         }
         if !(lens_radius >= 0.0 && lens_radius.is_finite()) {
             return wrong("lens_radius", &lens_radius, "be 0 or positive, and finite");
@@ -82,23 +91,66 @@ impl Camera {
     /// - `lens`: two numbers in `[0, 1)`; unused by a pinhole.
     #[inline]
     pub fn ray(&self, film: Vec2, size: Vec2, lens: Vec2) -> Ray {
-        let direction = self.film_direction(film, size);
-        if self.lens_radius == 0.0 {
-            return Ray::new(self.eye, direction.normalize());
-        }
-        let (origin, dir) = self.through_lens(direction.into(), self.aperture_point(lens).to_array());
+        let aperture = (self.lens_radius != 0.0).then(|| self.aperture_point(lens).to_array());
+        let (origin, dir) = self.rays(film.to_array(), size, aperture);
         Ray::new(origin.into(), dir.into())
+    }
+
+    /// The ray through a point of the film and the middle of the lens, with a unit direction; see [`Self::ray`].
+    #[inline]
+    pub fn middle_ray(&self, film: Vec2, size: Vec2) -> Ray {
+        let (origin, dir) = self.rays(film.to_array(), size, None);
+        Ray::new(origin.into(), dir.into())
+    }
+
+    /// Origin and unit direction of the ray through a point of the film.
+    ///
+    /// - `aperture`: the point of the lens over its radius, along `right` and `up`; `None` for its middle.
+    #[inline(always)]
+    pub(crate) fn rays<R: Real>(&self, film: [R; 2], size: Vec2, aperture: Option<[R; 2]>) -> (Vector3<R>, Vector3<R>) {
+        let eye = Vector3::in_all(film[0], self.eye);
+        let (middle, direction) = match self.orthographic {
+            None => {
+                let [across, above] = self.film_offsets(film, size, self.tan_half_vfov);
+                let (right, up) = (Vector3::in_all(across, self.right), Vector3::in_all(across, self.up));
+                (eye, Vector3::in_all(across, self.forward) + right * across + up * above)
+            }
+            Some(half) => {
+                let offsets = self.film_offsets(film, size, half);
+                (eye + self.across(offsets), Vector3::in_all(film[0], self.forward))
+            }
+        };
+        match aperture {
+            None => (middle, direction.normalize()),
+            Some(aperture) => self.through_lens(middle, direction, aperture),
+        }
+    }
+
+    /// Along `right` and `up`, in units of `half`, which is half the height of the film.
+    #[inline(always)]
+    fn film_offsets<R: Real>(&self, [x, y]: [R; 2], size: Vec2, half: f32) -> [R; 2] {
+        [(x * 2.0 - size.x) / size.y * half, (x.all(size.y) - y * 2.0) / size.y * half]
+    }
+
+    /// - `offsets`: along `right` and `up`, metres.
+    #[inline(always)]
+    fn across<R: Real>(&self, [x, y]: [R; 2]) -> Vector3<R> {
+        Vector3::in_all(x, self.right) * x + Vector3::in_all(x, self.up) * y
     }
 
     /// Origin and unit direction of the ray through a point of the lens.
     ///
-    /// - `direction`: see [`Self::film_directions`]; `aperture`: the point over the radius of the lens, along `right` and `up`.
+    /// - `direction`: to the plane one metre ahead; `aperture`: the point over the radius of the lens, along `right` and `up`.
     #[inline(always)]
-    pub(crate) fn through_lens<R: Real>(&self, direction: Vector3<R>, [x, y]: [R; 2]) -> (Vector3<R>, Vector3<R>) {
-        let (focus, one) = (self.focus_distance, x.all(1.0));
-        let offset =
-            (Vector3::in_all(one, self.right) * x + Vector3::in_all(one, self.up) * y).mul_all(self.lens_radius);
-        let origin = Vector3::in_all(one, self.eye) + offset;
+    fn through_lens<R: Real>(
+        &self,
+        middle: Vector3<R>,
+        direction: Vector3<R>,
+        aperture: [R; 2],
+    ) -> (Vector3<R>, Vector3<R>) {
+        let (focus, one) = (self.focus_distance, aperture[0].all(1.0));
+        let offset = self.across(aperture).mul_all(self.lens_radius);
+        let origin = middle + offset;
         // Both ends divided by the focus distance: right for a plane at infinity, and no cancellation with the camera.
         if focus >= 1.0 {
             return (origin, (direction - offset * (one / one.all(focus))).normalize());
@@ -112,8 +164,17 @@ impl Camera {
     /// picture so many pixels high; the farthest may be infinite, and for a pinhole everything is sharp.
     ///
     /// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane
-    /// a metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|.
+    /// a metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|; by an orthographic camera at
+    /// x + o (1 − z/f), in metres.
     pub fn sharp_zone(&self, height: u32) -> (f32, f32) {
+        if let Some(half) = self.orthographic {
+            let slack = half / (height.max(1) as f32 * self.lens_radius);
+            // Focused at infinity, all rays of a point of the film are one direction.
+            if self.focus_distance.is_infinite() || slack.is_infinite() {
+                return (0.0, f32::INFINITY);
+            }
+            return (self.focus_distance * (1.0 - slack).max(0.0), self.focus_distance * (1.0 + slack));
+        }
         let pixel = 2.0 * self.tan_half_vfov / height.max(1) as f32;
         // For a pinhole infinite, and then nothing is subtracted from it.
         let slack = pixel / (2.0 * self.lens_radius);
@@ -136,52 +197,74 @@ impl Camera {
         if self.blades < 3 { uniform_disc(u) } else { polygon_disc(u, self.blades, self.blade_rotation) }
     }
 
-    /// The point of the lens at an offset from the camera along `right` and `up`, metres; see [`Self::lens_offset`].
-    #[inline]
-    pub fn lens_point(&self, offset: Vec2) -> Vec3 {
-        self.lens_points(offset.to_array()).into()
-    }
-
-    /// See [`Self::lens_point`].
-    #[inline(always)]
-    pub(crate) fn lens_points<R: Real>(&self, [x, y]: [R; 2]) -> Vector3<R> {
-        let across = Vector3::in_all(x, self.right) * x + Vector3::in_all(x, self.up) * y;
-        Vector3::in_all(x, self.eye) + across
-    }
-
-    /// Where in the film light ends that comes to a point of the lens, and the cosine of its way with `forward`: the
-    /// inverse of [`Self::ray`]. `None` for light from behind.
+    /// How light from a point comes through a point of the lens to the film: the inverse of [`Self::ray`]. `None` for light
+    /// from behind.
     ///
-    /// - `offset`: the point of the lens; `way`: from there to where the light comes from, any length.
+    /// - `offset`: the point of the lens; see [`Self::lens_offset`].
     #[inline]
-    pub fn film_point(&self, offset: Vec2, way: Vec3, size: Vec2) -> Option<(Vec2, f32)> {
-        let (film, depth) = self.film_points(offset.to_array(), way.into(), size);
-        (depth > 0.0).then(|| (film.into(), depth / way.length()))
+    pub(crate) fn connection(&self, offset: Vec2, position: Vec3, size: Vec2) -> Option<Connection<f32>> {
+        let connection = self.connections(offset.to_array(), position.into(), size);
+        (connection.depth > 0.0).then_some(connection)
     }
 
-    /// See [`Self::film_point`]; also how far ahead along `forward` the light comes from, metres.
+    /// See [`Self::connection`]; what lies behind has a depth that is not positive.
     #[inline(always)]
-    pub(crate) fn film_points<R: Real>(&self, [x, y]: [R; 2], way: Vector3<R>, size: Vec2) -> ([R; 2], R) {
-        let depth = way.dot(Vector3::in_all(x, self.forward));
-        let across = way.dot(Vector3::in_all(x, self.right)) / depth + x / self.focus_distance;
-        let above = way.dot(Vector3::in_all(x, self.up)) / depth + y / self.focus_distance;
+    pub(crate) fn connections<R: Real>(&self, offset: [R; 2], position: Vector3<R>, size: Vec2) -> Connection<R> {
+        let x = offset[0];
+        let eye = Vector3::in_all(x, self.eye);
+        let forward = Vector3::in_all(x, self.forward);
+        if let Some(half) = self.orthographic {
+            // All light of one point of the lens comes in one direction.
+            let from_eye = position - eye;
+            let depth = from_eye.dot(forward);
+            let part = depth / self.focus_distance;
+            let scale = size.y / half;
+            let across = from_eye.dot(Vector3::in_all(x, self.right)) + offset[0] * (part - 1.0);
+            let above = from_eye.dot(Vector3::in_all(x, self.up)) + offset[1] * (part - 1.0);
+            let way = forward * depth - self.across(offset) * part;
+            return Connection {
+                lens: position - way,
+                film: [(across * scale + size.x) * 0.5, (above * -scale + size.y) * 0.5],
+                depth,
+            };
+        }
+        let lens = eye + self.across(offset);
+        let way = position - lens;
+        let depth = way.dot(forward);
+        let across = way.dot(Vector3::in_all(x, self.right)) / depth + offset[0] / self.focus_distance;
+        let above = way.dot(Vector3::in_all(x, self.up)) / depth + offset[1] / self.focus_distance;
         let scale = size.y / self.tan_half_vfov;
-        ([(across * scale + size.x) * 0.5, (above * -scale + size.y) * 0.5], depth)
+        Connection { lens, film: [(across * scale + size.x) * 0.5, (above * -scale + size.y) * 0.5], depth }
     }
 
-    /// From the camera through a point of the film to the plane one metre ahead; not unit.
-    #[inline]
-    pub fn film_direction(&self, film: Vec2, size: Vec2) -> Vec3 {
-        self.film_directions(film.to_array(), size).into()
-    }
-
-    /// See [`Self::film_direction`].
+    /// Square metres across the way of light that a square metre of the film takes in, for one point of the lens.
+    ///
+    /// The film of a perspective camera is the plane one metre ahead.
+    ///
+    /// - `distance2`: square of the distance to the lens; `cos_lens`: of the light's way with `forward`.
     #[inline(always)]
-    pub(crate) fn film_directions<R: Real>(&self, [x, y]: [R; 2], size: Vec2) -> Vector3<R> {
-        let across = (x * 2.0 - size.x) / size.y * self.tan_half_vfov;
-        let above = (x.all(size.y) - y * 2.0) / size.y * self.tan_half_vfov;
-        Vector3::in_all(x, self.forward) + Vector3::in_all(x, self.right) * across + Vector3::in_all(x, self.up) * above
+    pub(crate) fn spread<R: Real>(&self, distance2: R, cos_lens: R) -> R {
+        if self.orthographic.is_some() {
+            return cos_lens;
+        }
+        distance2 * (cos_lens * cos_lens * cos_lens)
     }
+
+    /// Width and height of a pixel on the film, metres; see [`Self::spread`].
+    pub(crate) fn pixel_size(&self, size: Vec2) -> f32 {
+        2.0 * self.orthographic.unwrap_or(self.tan_half_vfov) / size.y
+    }
+}
+
+/// The way of light through the lens to the film.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Connection<R> {
+    /// The point of the lens, metres.
+    pub lens: Vector3<R>,
+    /// Where in the film the light ends, pixels.
+    pub film: [R; 2],
+    /// How far ahead along `forward` the light comes from, metres.
+    pub depth: R,
 }
 
 #[cfg(test)]
@@ -195,6 +278,7 @@ mod tests {
             up: Vec3::Y,
             forward: Vec3::NEG_Z,
             tan_half_vfov: 0.5,
+            orthographic: None,
             lens_radius,
             focus_distance,
             blades: 0,
@@ -219,6 +303,8 @@ mod tests {
             (Camera { tan_half_vfov: nan, ..good }, "tan_half_vfov"),
             (Camera { lens_radius: -0.1, ..good }, "lens_radius"),
             (Camera { lens_radius: inf, ..good }, "lens_radius"),
+            (Camera { orthographic: Some(0.0), ..good }, "orthographic"),
+            (Camera { orthographic: Some(nan), ..good }, "orthographic"),
             (Camera { focus_distance: 0.0, ..good }, "focus_distance"),
             (Camera { focus_distance: nan, ..good }, "focus_distance"),
             (Camera { blade_rotation: inf, ..good }, "blade_rotation"),
@@ -239,31 +325,66 @@ mod tests {
     fn all_points_of_the_lens_meet_in_the_focal_plane() {
         let camera = camera(0.3, 4.0);
         let (film, size) = (Vec2::new(20.0, 70.0), Vec2::new(200.0, 100.0));
-        let target = camera.eye + 4.0 * camera.film_direction(film, size);
-        for i in 0..64 {
-            let ray = camera.ray(film, size, Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0);
-            let t = (target - ray.origin).dot(ray.dir);
-            assert!((ray.at(t) - target).length() < 1e-5);
-            assert!((ray.origin - camera.eye).length() <= 0.3 * 1.000_001);
+        for camera in [camera, Camera { orthographic: Some(2.0), ..camera }] {
+            let middle = camera.middle_ray(film, size);
+            let target = middle.at(4.0 / middle.dir.dot(camera.forward));
+            for i in 0..64 {
+                let ray = camera.ray(film, size, Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0);
+                let t = (target - ray.origin).dot(ray.dir);
+                assert!((ray.at(t) - target).length() < 1e-5);
+                assert!((ray.origin - middle.origin).length() <= 0.3 * 1.000_001);
+            }
         }
+    }
+
+    #[test]
+    fn parallel_rays_span_the_height() {
+        let camera = Camera { orthographic: Some(1.5), ..camera(0.0, 1.0) };
+        let (size, corner) = (Vec2::new(200.0, 100.0), camera.eye + Vec3::new(-3.0, 1.5, 0.0));
+        let ray = camera.ray(Vec2::ZERO, size, Vec2::ZERO);
+        assert!((ray.origin - corner).length() < 1e-6 && ray.dir == camera.forward, "{ray:?}");
     }
 
     #[test]
     fn light_goes_back_to_where_the_ray_began() {
         let size = Vec2::new(200.0, 100.0);
         for (lens_radius, focus_distance) in [(0.0, 1.0), (0.3, 4.0), (0.3, f32::INFINITY)] {
-            let mut camera = camera(lens_radius, focus_distance);
-            camera.blades = 6;
-            for i in 0..64 {
-                let (lens, film) = (Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0, Vec2::new(3.1 * i as f32, 99.0));
-                let ray = camera.ray(film, size, lens);
-                let offset = camera.lens_offset(lens);
-                assert!((camera.lens_point(offset) - ray.origin).length() < 1e-6);
-                let (found, cos) = camera.film_point(offset, 7.0 * ray.dir, size).unwrap();
-                assert!((found - film).length() < 1e-3, "{found} for {film}");
-                assert!((cos - ray.dir.dot(camera.forward)).abs() < 1e-6);
-                assert_eq!(camera.film_point(offset, -ray.dir, size), None);
+            for orthographic in [None, Some(2.0)] {
+                let camera = Camera { blades: 6, orthographic, ..camera(lens_radius, focus_distance) };
+                for i in 0..64 {
+                    let lens = Vec2::new((i % 8) as f32, (i / 8) as f32) / 8.0;
+                    let film = Vec2::new(3.1 * i as f32, 99.0);
+                    let ray = camera.ray(film, size, lens);
+                    let offset = camera.lens_offset(lens);
+                    let found = camera.connection(offset, ray.at(7.0), size).unwrap();
+                    assert!((Vec3::from(found.lens) - ray.origin).length() < 1e-5, "{found:?} for {ray:?}");
+                    assert!((Vec2::from(found.film) - film).length() < 2e-3, "{found:?} for {film}");
+                    assert!((found.depth - 7.0 * ray.dir.dot(camera.forward)).abs() < 1e-5);
+                    assert!(camera.connection(offset, ray.at(-7.0), size).is_none());
+                }
             }
+        }
+    }
+
+    /// By moving the point: what a square metre across the light's way becomes on the film.
+    #[test]
+    fn the_spread_is_how_the_film_sees_an_area() {
+        let size = Vec2::new(200.0, 100.0);
+        for orthographic in [None, Some(2.0)] {
+            let camera = Camera { orthographic, ..camera(0.3, 4.0) };
+            let (offset, position) = (Vec2::new(0.2, -0.1), camera.eye + Vec3::new(0.4, 0.7, -6.0));
+            let found = camera.connection(offset, position, size).unwrap();
+            let way = position - Vec3::from(found.lens);
+            let (a, b) = (way.normalize().any_orthonormal_vector(), way.normalize());
+            let b = a.cross(b);
+            const STEP: f32 = 1e-2;
+            let film = |d: Vec3| Vec2::from(camera.connection(offset, position + d * STEP, size).unwrap().film);
+            let (du, dv) = (film(a) - film(-a), film(b) - film(-b));
+            let pixels = du.perp_dot(dv).abs() / (2.0 * STEP).powi(2);
+            let cos = way.normalize().dot(camera.forward);
+            let pixel = camera.pixel_size(size);
+            let expected = 1.0 / (camera.spread(way.length_squared(), cos) * pixel * pixel);
+            assert!((pixels / expected - 1.0).abs() < 1e-2, "{pixels} for {expected}");
         }
     }
 

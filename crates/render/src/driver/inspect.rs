@@ -249,7 +249,7 @@ fn camera_rays<T: Send>(
 
 fn middle_ray(snapshot: &Prepared, x: u32, y: u32, size: UVec2) -> Ray {
     let film = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-    Ray::new(snapshot.camera.eye, snapshot.camera.film_direction(film, size.as_vec2()).normalize())
+    snapshot.camera.middle_ray(film, size.as_vec2())
 }
 
 fn film_values(film: &Film, value: impl Fn(&Film, u32, u32) -> f32 + Sync) -> Vec<f32> {

@@ -1,6 +1,5 @@
 //! What of a picture light paths, and paths that are weighed against them, need to know.
 
-use crate::core::camera::Camera;
 use crate::core::filter::PixelFilter;
 use crate::core::settings::{Integrator, RenderSettings};
 use crate::core::techniques::Techniques;
@@ -27,7 +26,7 @@ pub(crate) struct CausticPass<'a> {
     pub filter_norm: f64,
     /// Light paths a sample of the whole picture.
     pub paths_per_sample: f64,
-    /// Of a pixel, on the plane one metre ahead of the camera; square metres.
+    /// Of a pixel on the film; see [`crate::core::camera::Camera::pixel_size`]; square metres.
     pub pixel_area: f32,
     /// See [`crate::prepare::bodies::Bodies::around`].
     pub camera_media: Vec<u32>,
@@ -42,8 +41,7 @@ impl<'a> CausticPass<'a> {
         if !traces_paths || !settings.techniques.caustics || settings.max_depth < 3 {
             return None;
         }
-        let Camera { tan_half_vfov, .. } = scene.camera;
-        let pixel = 2.0 * tan_half_vfov / size.y as f32;
+        let pixel = scene.camera.pixel_size(size.as_vec2());
         Some(Self {
             scene,
             casters,

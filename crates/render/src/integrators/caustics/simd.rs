@@ -3,7 +3,7 @@
 //! Diffuse and rough surfaces are known where the true normal shades, for there the camera and the light see the same surface;
 //! mirrors and glass are known everywhere.
 
-use crate::core::camera::Camera;
+use crate::core::camera::{Camera, Connection};
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, most_kept};
 use crate::integrators::caustics::lens_connections::LensConnections;
 use crate::integrators::caustics::pass::CausticPass;
@@ -144,9 +144,9 @@ impl<S: Simd> LightPathLanes<'_, S> {
             lanes_of(at.mask).for_each(|lane| open &= !(Mask::from(media[lane] != camera) << lane));
         }
         let offsets = self.lens_offsets(s, &scene.camera);
-        let lens = scene.camera.lens_points(offsets);
+        let Connection { lens, film: [film_x, film_y], depth } =
+            scene.camera.connections(offsets, place.position, pass.size);
         let way = place.position - lens;
-        let ([film_x, film_y], depth) = scene.camera.film_points(offsets, way, pass.size);
         open &= depth.is_positive();
         let least = depth.all(0.5 - pass.filter.radius());
         let rim = pass.filter.radius() - 0.5;
@@ -163,7 +163,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let surface = surface_of::<S, KIND>(s, at, &seen, sets, media);
         let (value, pdf) = eval::<S, KIND>(&surface, &seen, place.wo);
         open &= surface.non_specular & cos_o.is_positive() & cos_i.is_positive() & pdf.is_positive();
-        let importance = distance2 * (cos_lens * cos_lens * cos_lens);
+        let importance = scene.camera.spread(distance2, cos_lens);
         // `CausticPass::join_ratio`, rounded in an order of its own.
         let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
         let weight = pass.light_path_weight(ratio);

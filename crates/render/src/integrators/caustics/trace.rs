@@ -328,15 +328,15 @@ impl LightPathStep<'_> {
         } else {
             Vec2::ZERO
         };
-        let origin = camera.lens_point(lens);
-        let (film, cos_lens) = camera.film_point(lens, self.vertex.position - origin, pass.size)?;
+        let found = camera.connection(lens, self.vertex.position, pass.size)?;
+        let (origin, film) = (Vec3::from(found.lens), Vec2::from(found.film));
         if !pass.reaches_film(film) {
             return None;
         }
         let to_light = self.vertex.wo;
         let way = origin - self.vertex.position;
         let distance2 = way.length_squared();
-        let to_camera = way / distance2.sqrt();
+        let (to_camera, cos_lens) = (way / distance2.sqrt(), found.depth / distance2.sqrt());
         let through = surface.through().filter(|_| to_camera.dot(self.vertex.geometric_normal) < 0.0);
         let before = path.media;
         let after = through.map_or(before, |interface| interface.beyond);
@@ -360,7 +360,7 @@ impl LightPathStep<'_> {
         }
         let ratio = path.ratio * etendue_scale(through);
         let weight = pass.light_path_weight(ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
-        let importance = cos_o / (distance2 * cos_lens.powi(3) * pass.pixel_area);
+        let importance = cos_o / (camera.spread(distance2, cos_lens) * pass.pixel_area);
         let mut light = path.throughput * value * (weight * importance / cos_i);
         if light == Vec3::ZERO {
             return None;

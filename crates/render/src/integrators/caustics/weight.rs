@@ -3,7 +3,8 @@
 //! Let a path have vertices x₁ … xₖ from the camera to the light point y. Per unit of film, solid angle and étendue, the
 //! ratio of the densities of the two ways to find it is a product of one factor a vertex:
 //!
-//! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area);
+//! - x₁, which is joined to the lens: cos θᵢ / (G · p_eye), G = cos θₒ / (t² cos³ θ_lens · pixel area), of an orthographic
+//!   camera cos θₒ / (cos θ_lens · pixel area);
 //! - another vertex that scatters: p_lamp · cos θᵢ / (cos θₒ · p_eye), p_lamp and p_eye being its densities towards
 //!   the camera's side (o) and the light's side (i);
 //! - the same for one that scatters through a rough interface, times nᵢ² / nₒ²: étendue is n² times area, solid angle
@@ -82,7 +83,12 @@ impl CausticPass<'_> {
     /// The factor of the vertex that is joined to the lens, and of the number of paths.
     #[inline(always)]
     pub fn join_ratio<R: Real>(&self, distance2: R, cos_lens: R, cos_o: R, cos_i: R, pdf: R) -> R {
-        distance2 * self.density_scale() * (cos_lens * cos_lens * cos_lens) * cos_i / (cos_o * pdf)
+        let spread = match self.scene.camera.orthographic {
+            // `Camera::spread`, rounded in an order of its own.
+            None => distance2 * self.density_scale() * (cos_lens * cos_lens * cos_lens),
+            Some(_) => cos_lens * self.density_scale(),
+        };
+        spread * cos_i / (cos_o * pdf)
     }
 
     /// Of light paths that are joined to a pixel.

@@ -67,12 +67,8 @@ fn start<S: Simd>(s: S, lens: CameraRays, pixels: &Pixels, sample: u32, slot: u3
             SamplerLanes::all_independent(lens.seed, [x, y], sample)
         };
         let [dx, dy] = lens.filter.sample_lanes(sampler.pair(0));
-        let direction = camera.film_directions([x.to_float() + dx, y.to_float() + dy], size);
-        let (origin, dir) = if camera.lens_radius > 0.0 {
-            camera.through_lens(direction, uniform_disc(sampler.pair(1)))
-        } else {
-            (Vector::splat(s, camera.eye), direction.normalize())
-        };
+        let aperture = (camera.lens_radius > 0.0).then(|| uniform_disc(sampler.pair(1)));
+        let (origin, dir) = camera.rays([x.to_float() + dx, y.to_float() + dy], size, aperture);
         let path = PathLanes {
             throughput: Vector::splat(s, Vec3::ONE),
             pdf: one.all(f32::INFINITY),

@@ -1,0 +1,81 @@
+//! A scene that was read takes the place of the old one: another scene, the same as its files are now, or the same model at
+//! another moment of its animations.
+
+use super::focus::Focus;
+use super::history::History;
+use super::navigation;
+use super::reset::SCENE_OPENED;
+use super::resources::{CurrentScene, RenderState, SceneGeneration};
+use super::saving::SavedAs;
+use super::scene_bounds::SceneBounds;
+use super::status::{MessageKind, Status};
+use super::views::ViewTrail;
+use crate::scene::{DisplaySettings, Lens, LoadedScene, Projection, Rendering, SceneInputs, View};
+use bevy_ecs::prelude::World;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Makes `scene` the scene of `world`.
+pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
+    scene.spawn(world);
+    let home = world.query::<(&View, &Projection, &Lens)>().iter(world).next().map_or_else(
+        navigation::Rig::default,
+        |(view, projection, lens)| navigation::Rig { view: *view, projection: *projection, lens: *lens },
+    );
+    world.resource_mut::<SceneBounds>().home = home;
+    world.resource_mut::<History>().forget();
+    world.resource_mut::<ViewTrail>().forget();
+    world.insert_resource(Focus::default());
+    world.insert_resource(super::Selection::default());
+    world.resource_mut::<super::Explaining>().forget();
+    let mut shown = world.resource_mut::<RenderState>();
+    shown.trees.extend(scene.trees.clone());
+    shown.adopted = Some(SCENE_OPENED.to_owned());
+    let mut status = world.resource_mut::<Status>();
+    status.scene = scene.source.title();
+    for warning in &scene.warnings {
+        status.say(now, MessageKind::Warning, warning.clone());
+    }
+    world.insert_resource(CurrentScene(Arc::new(scene)));
+    world.insert_resource(SavedAs::default());
+    world.resource_mut::<SceneGeneration>().0 += 1;
+}
+
+/// Puts a scene into the place of what it was before. What a person has set stays, unless the file says something new
+/// about it.
+///
+/// - `cause`: of the restart, for people.
+pub fn adopt_again(world: &mut World, old: &LoadedScene, mut scene: LoadedScene, cause: String, now: Duration) {
+    let camera = SceneInputs::of(world).camera.filter(|_| scene.file.camera == old.file.camera);
+    let developing = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
+    let same_settings = (scene.file.integrator, scene.file.max_depth, scene.file.film.filter)
+        == (old.file.integrator, old.file.max_depth, old.file.film.filter);
+    let rendering = same_settings.then(|| *world.resource::<Rendering>());
+    scene.shot = None;
+    let trees = scene.trees.clone();
+    adopt(world, scene, now);
+    let mut shown = world.resource_mut::<RenderState>();
+    shown.trees.extend(trees);
+    shown.adopted = Some(cause);
+    if let Some(camera) = camera
+        && let Some(new) = SceneInputs::of(world).camera
+    {
+        world.entity_mut(new.entity).insert((camera.view, camera.projection, camera.lens));
+    }
+    if let Some(developing) = developing {
+        world.insert_resource(developing);
+    }
+    if let Some(rendering) = rendering {
+        world.insert_resource(rendering);
+    }
+}
+
+/// The open model at another moment: what a person has set stays, and what was told is not told again.
+pub fn adopt_moment(world: &mut World, mut scene: LoadedScene, now: Duration) {
+    let Some(old) = world.get_resource::<CurrentScene>().map(|current| current.0.clone()) else {
+        return adopt(world, scene, now);
+    };
+    scene.warnings.retain(|warning| !old.warnings.contains(warning));
+    let at = scene.choice.at.map_or_else(|| "stored pose".to_owned(), |at| format!("moment {at:.3} s"));
+    adopt_again(world, &old, scene, at, now);
+}
