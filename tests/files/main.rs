@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bad_values;
+mod draco;
 mod gltf;
 mod gltf_writer;
 mod input_files;

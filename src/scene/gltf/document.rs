@@ -22,6 +22,7 @@ pub(super) const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -77,7 +78,7 @@ pub struct Document {
     /// Of a fallback without bytes: `None`.
     buffers: Vec<Option<Bytes>>,
     /// Views that were compressed, by index.
-    decoded: HashMap<u32, Vec<u8>>,
+    pub(super) decoded: HashMap<u32, Vec<u8>>,
     /// Every byte of the buffers.
     n_bytes: u64,
     /// The file and those that hold its buffers.
@@ -124,7 +125,8 @@ impl Document {
             n_bytes: 0,
             files: vec![path.to_owned()],
         };
-        document.read_buffers(binary).and_then(|()| document.decode()).map_err(|located| document.error(located))?;
+        let read = document.read_buffers(binary).and_then(|()| document.decode());
+        read.and_then(|()| document.decode_draco()).map_err(|located| document.error(located))?;
         Ok(document)
     }
 
@@ -273,10 +275,6 @@ fn trimmed(json: &[u8]) -> &[u8] {
 
 fn advice_for(extension: &str) -> &'static str {
     match extension {
-        "KHR_draco_mesh_compression" => {
-            "export the file again without Draco compression (Blender: File > Export > glTF, Compression off; \
-             command line: `gltf-transform copy in.glb out.glb` decodes it)"
-        }
         "KHR_texture_basisu" => "export the file again with PNG, JPEG or WebP textures",
         _ => "export the file again without it",
     }

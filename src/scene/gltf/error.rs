@@ -120,6 +120,9 @@ pub enum GltfProblem {
         /// Number of vertices.
         count: usize,
     },
+    /// A stream of compressed triangles is damaged, or holds what glTF has no use for.
+    #[error("the Draco stream cannot be used: {}", name(_0))]
+    Draco(String),
     /// Two lists that belong together have different lengths.
     #[error("{what} has {found} elements: expected {expected}")]
     Length {

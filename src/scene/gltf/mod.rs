@@ -15,6 +15,7 @@ pub(in crate::scene) mod baked;
 mod cameras;
 mod container;
 mod document;
+mod draco;
 pub(in crate::scene) mod error;
 mod facts;
 pub(in crate::scene) mod images;

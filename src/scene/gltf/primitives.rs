@@ -89,10 +89,6 @@ impl Document {
         let mut known: HashMap<(&BTreeMap<String, u32>, &[BTreeMap<String, u32>]), (u32, u32)> = HashMap::new();
         for (i, primitive) in json.primitives.iter().enumerate() {
             let here = || format!("{}.{}", place("meshes", mesh), place("primitives", i));
-            if primitive.extensions.contains_key("KHR_draco_mesh_compression") {
-                let (extension, advice) = ("KHR_draco_mesh_compression".to_owned(), "export it again without Draco");
-                return Err((here(), GltfProblem::Extension { extension, advice }));
-            }
             let mode = primitive.mode.unwrap_or(4);
             if mode < 4 {
                 found.points_or_lines += 1;

@@ -1,0 +1,169 @@
+//! `KHR_draco_mesh_compression`: the triangles and attributes of a primitive in one compressed stream.
+//!
+//! Streams are decoded while the file is read. Their numbers become views and accessors of their own, which take the place of
+//! those that the primitive names: nothing else knows of the compression. The crate `draco-core` reads the streams, within
+//! a limit of memory.
+
+use super::document::Document;
+use super::error::{GltfProblem, Located, place};
+use super::json::{Accessor, BufferView};
+use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
+use rayon::prelude::*;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+pub(super) const NAME: &str = "KHR_draco_mesh_compression";
+
+/// The extension of a primitive.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Compressed {
+    buffer_view: u32,
+    /// The number of each attribute in the stream.
+    attributes: BTreeMap<String, u32>,
+}
+
+/// Where a stream belongs to.
+struct Job {
+    mesh: usize,
+    primitive: usize,
+    compressed: Compressed,
+}
+
+/// Numbers as an accessor has them, side by side.
+struct Values {
+    component_type: u32,
+    kind: &'static str,
+    count: u64,
+    bytes: Vec<u8>,
+}
+
+/// What a stream holds.
+struct Decoded {
+    /// Three numbers a triangle.
+    indices: Values,
+    attributes: Vec<(String, Values)>,
+}
+
+impl Document {
+    /// Decodes all streams, and lets their primitives name what came of them.
+    pub(super) fn decode_draco(&mut self) -> Result<(), Located> {
+        let mut jobs = Vec::new();
+        for (mesh, json) in self.root.meshes.iter_mut().enumerate() {
+            for (primitive, json) in json.primitives.iter_mut().enumerate() {
+                let Some(extension) = json.extensions.remove(NAME) else { continue };
+                let compressed = Compressed::deserialize(extension)
+                    .map_err(|error| (at(mesh, primitive), GltfProblem::Json(format!("{NAME}: {error}"))))?;
+                jobs.push(Job { mesh, primitive, compressed });
+            }
+        }
+        let this = &*self;
+        let decode = |job: &Job| {
+            let bytes = this.view(job.compressed.buffer_view)?.0;
+            decoded(bytes, &job.compressed, this.options.max_bytes)
+                .map_err(|problem| (at(job.mesh, job.primitive), problem))
+        };
+        let all: Vec<Result<Decoded, Located>> = jobs.par_iter().map(decode).collect();
+        let mut room = self.options.max_bytes;
+        for (job, decoded) in jobs.iter().zip(all) {
+            let Decoded { indices, attributes } = decoded?;
+            let bytes: u64 = attributes.iter().map(|(_, values)| values.bytes.len() as u64).sum();
+            room = room.checked_sub(bytes + indices.bytes.len() as u64).ok_or_else(|| {
+                let limit = self.options.max_bytes;
+                (
+                    at(job.mesh, job.primitive),
+                    GltfProblem::Draco(format!("all streams together have more than {limit} bytes")),
+                )
+            })?;
+            let indices = self.add(indices, false);
+            let mut named = self.root.meshes[job.mesh].primitives[job.primitive].attributes.clone();
+            for (name, values) in attributes {
+                let written = named.get(&name).and_then(|&accessor| self.root.accessors.get(accessor as usize));
+                let normalized = written.is_some_and(|accessor| accessor.normalized);
+                let accessor = self.add(values, normalized);
+                named.insert(name, accessor);
+            }
+            let primitive = &mut self.root.meshes[job.mesh].primitives[job.primitive];
+            (primitive.attributes, primitive.indices, primitive.mode) = (named, Some(indices), None);
+        }
+        Ok(())
+    }
+
+    /// As a view and an accessor of their own; the number of the accessor.
+    fn add(&mut self, values: Values, normalized: bool) -> u32 {
+        let Values { component_type, kind, count, bytes } = values;
+        let view = self.root.buffer_views.len() as u32;
+        self.root.buffer_views.push(BufferView { byte_length: bytes.len() as u64, ..BufferView::default() });
+        self.decoded.insert(view, bytes);
+        let kind = kind.to_owned();
+        let buffer_view = Some(view);
+        self.root.accessors.push(Accessor {
+            buffer_view,
+            component_type,
+            normalized,
+            count,
+            kind,
+            ..Accessor::default()
+        });
+        self.root.accessors.len() as u32 - 1
+    }
+}
+
+fn at(mesh: usize, primitive: usize) -> String {
+    format!("{}.{}", place("meshes", mesh), place("primitives", primitive))
+}
+
+/// - `most_bytes`: of the decoded attributes.
+fn decoded(bytes: &[u8], compressed: &Compressed, most_bytes: u64) -> Result<Decoded, GltfProblem> {
+    /// Bytes of a triangle's indices.
+    const FACE: u64 = 12;
+    let limits = DecodeLimits::default()
+        .with_max_points(u64::from(u32::MAX))
+        .with_max_faces(most_bytes / FACE)
+        .with_max_decoded_bytes(most_bytes);
+    let mut mesh = Mesh::new();
+    let mut stream = DecoderBuffer::new(bytes).with_limits(limits);
+    MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| GltfProblem::Draco(error.to_string()))?;
+    let indices = Values {
+        component_type: 5125,
+        kind: "SCALAR",
+        count: 3 * mesh.num_faces() as u64,
+        bytes: mesh.faces().iter().flatten().flat_map(|point| point.0.to_le_bytes()).collect(),
+    };
+    let attributes = compressed.attributes.iter().map(|(name, &id)| {
+        let attribute = mesh.attribute_by_unique_id(id);
+        let attribute = attribute.ok_or_else(|| GltfProblem::Draco(format!("it has no attribute {id}")))?;
+        Ok((name.clone(), values(attribute, mesh.num_points())?))
+    });
+    Ok(Decoded { indices, attributes: attributes.collect::<Result<_, GltfProblem>>()? })
+}
+
+/// One element a point.
+fn values(attribute: &PointAttribute, n_points: usize) -> Result<Values, GltfProblem> {
+    let component_type = match attribute.data_type() {
+        DataType::Int8 => 5120,
+        DataType::Uint8 => 5121,
+        DataType::Int16 => 5122,
+        DataType::Uint16 => 5123,
+        DataType::Uint32 => 5125,
+        DataType::Float32 => 5126,
+        other => return Err(GltfProblem::Draco(format!("an attribute has numbers of the type {other:?}"))),
+    };
+    let n = attribute.num_components();
+    let kind = match n {
+        1 => "SCALAR",
+        2 => "VEC2",
+        3 => "VEC3",
+        4 => "VEC4",
+        n => return Err(GltfProblem::Draco(format!("an attribute has {n} numbers a vertex"))),
+    };
+    let (stride, width) = (attribute.byte_stride() as usize, usize::from(n) * attribute.data_type().byte_length());
+    let data = attribute.buffer().data();
+    let mut bytes = Vec::with_capacity(n_points * width);
+    for point in 0..n_points as u32 {
+        let start = (attribute.mapped_index(PointIndex(point)).0 as usize).checked_mul(stride);
+        let value = start.and_then(|start| data.get(start..start.checked_add(width)?));
+        bytes.extend(value.ok_or_else(|| GltfProblem::Draco(format!("vertex {point} has no value")))?);
+    }
+    Ok(Values { component_type, kind, count: n_points as u64, bytes })
+}
