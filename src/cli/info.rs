@@ -159,7 +159,7 @@ impl Told<'_> {
             "width": film.width,
             "height": film.height,
             "filter": self.filter(),
-            "bytes": { "meshes": meshes, "trees": trees, "film": film_bytes },
+            "bytes": { "meshes": meshes, "trees": trees, "textures": scene.picture_bytes(), "film": film_bytes },
             "load_s": scene.load_seconds,
             "build_s": scene.build_seconds,
             "uses": self.features(true),
