@@ -23,7 +23,7 @@ const LIGHT_SAMPLE: Color32 = Color32::from_rgb(140, 230, 150);
 
 /// Selection of the paths that are drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WaysShown {
+pub struct PathFilter {
     /// Number of the strongest paths to draw; `None` for all, including those without contribution.
     strongest: Option<usize>,
     /// Only light of this name.
@@ -32,13 +32,13 @@ pub struct WaysShown {
     bounces: Option<usize>,
 }
 
-impl Default for WaysShown {
+impl Default for PathFilter {
     fn default() -> Self {
         Self { strongest: Some(Self::STRONGEST[1]), light: None, bounces: None }
     }
 }
 
-impl WaysShown {
+impl PathFilter {
     const STRONGEST: [usize; 3] = [3, 12, 32];
 
     fn is_filtered(&self) -> bool {
@@ -52,7 +52,7 @@ impl WaysShown {
     }
 
     /// Brightness of the part of a path that passes the filters.
-    fn strength(&self, way: &PathRecord) -> f64 {
+    fn strength(&self, path: &PathRecord) -> f64 {
         let is_asked_for = |end: &End, bounces: usize| {
             let light = match end {
                 End::At { what, .. } => what.as_str(),
@@ -60,7 +60,7 @@ impl WaysShown {
             };
             self.light.as_ref().is_none_or(|name| name == light) && self.bounces.is_none_or(|n| n == bounces)
         };
-        let parts = way.stops.iter().enumerate().flat_map(|(i, stop)| {
+        let parts = path.stops.iter().enumerate().flat_map(|(i, stop)| {
             let itself = (&stop.end, i, stop.radiance);
             let asked = stop.asked.as_ref().map(|(light, radiance)| (light, i + 1, *radiance));
             [Some(itself), asked].into_iter().flatten()
@@ -70,27 +70,27 @@ impl WaysShown {
 
     /// Returns the paths to draw, the strongest last so that nothing hides them.
     fn of<'a>(&self, story: &'a PixelStory) -> Vec<&'a PathRecord> {
-        let mut ways: Vec<(f64, &PathRecord)> = story.ways.iter().map(|way| (self.strength(way), way)).collect();
+        let mut paths: Vec<(f64, &PathRecord)> = story.ways.iter().map(|path| (self.strength(path), path)).collect();
         if self.is_filtered() {
-            ways.retain(|(strength, _)| *strength > 0.0);
+            paths.retain(|(strength, _)| *strength > 0.0);
         }
-        ways.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        let n = self.strongest.unwrap_or(ways.len()).min(ways.len());
-        ways.split_off(ways.len() - n).into_iter().map(|(_, way)| way).collect()
+        paths.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let n = self.strongest.unwrap_or(paths.len()).min(paths.len());
+        paths.split_off(paths.len() - n).into_iter().map(|(_, path)| path).collect()
     }
 }
 
 /// Draws paths and table; `reach`: length of a segment that leaves the scene, metres.
-pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown, projector: &Projector, reach: f64) {
+pub fn draw(context: &Context, story: &PixelStory, shown: &mut PathFilter, projector: &Projector, reach: f64) {
     shown.fit(story);
     let painter = context.layer_painter(egui::LayerId::background());
-    for way in shown.of(story) {
-        let mut from = way.origin;
-        for (segment, stop) in way.stops.iter().enumerate() {
+    for path in shown.of(story) {
+        let mut from = path.origin;
+        for (segment, stop) in path.stops.iter().enumerate() {
             let to = point_of(&stop.end, from, reach);
             let color = SEGMENTS[segment.min(SEGMENTS.len() - 1)];
             // Paths without contribution are drawn faintly.
-            let is_dark = way.radiance == DVec3::ZERO;
+            let is_dark = path.radiance == DVec3::ZERO;
             line(&painter, projector, from, to, color.gamma_multiply(if is_dark { 0.25 } else { 0.75 }));
             if let Some((light, radiance)) = &stop.asked
                 && brightness(*radiance) > 0.0
@@ -103,7 +103,8 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown, projec
             from = to;
         }
     }
-    let first = story.ways.iter().find_map(|way| way.stops.first().map(|stop| point_of(&stop.end, way.origin, reach)));
+    let first =
+        story.ways.iter().find_map(|path| path.stops.first().map(|stop| point_of(&stop.end, path.origin, reach)));
     if let Some(place) = first.and_then(|point| projector.place(point)) {
         painter.circle_stroke(pos(place), 7.0, Stroke::new(3.0, Color32::from_black_alpha(140)));
         painter.circle_stroke(pos(place), 7.0, Stroke::new(1.5, Color32::WHITE));
@@ -134,7 +135,7 @@ mod tests {
     use crate::frame::Stop;
 
     /// A path that hits `light` after its bounces, with this radiance.
-    fn way(light: &str, bounces: usize, radiance: f64) -> PathRecord {
+    fn path(light: &str, bounces: usize, radiance: f64) -> PathRecord {
         let stop = |what: &str, radiance: f64| Stop {
             end: End::At { point: DVec3::ZERO, what: what.to_owned() },
             throughput: DVec3::ONE,
@@ -148,21 +149,21 @@ mod tests {
 
     #[test]
     fn the_strongest_paths_of_a_light_or_of_a_bounce_are_shown() {
-        let mut asked = way("sky", 1, 0.0);
+        let mut asked = path("sky", 1, 0.0);
         asked.stops[0].asked = Some((End::Sky { direction: DVec3::Y }, DVec3::splat(7.0)));
         let story = PixelStory {
-            ways: vec![way("light", 1, 2.0), way("light", 2, 5.0), way("bulb", 1, 9.0), way("bulb", 1, 0.0), asked],
+            ways: vec![path("light", 1, 2.0), path("light", 2, 5.0), path("bulb", 1, 9.0), path("bulb", 1, 0.0), asked],
             ..PixelStory::default()
         };
-        let strengths = |shown: &WaysShown| -> Vec<f64> {
-            shown.of(&story).into_iter().map(|way| shown.strength(way).round()).collect()
+        let strengths = |shown: &PathFilter| -> Vec<f64> {
+            shown.of(&story).into_iter().map(|path| shown.strength(path).round()).collect()
         };
-        let all = WaysShown { strongest: None, light: None, bounces: None };
+        let all = PathFilter { strongest: None, light: None, bounces: None };
         assert_eq!(strengths(&all), [0.0, 2.0, 5.0, 7.0, 9.0]);
-        assert_eq!(strengths(&WaysShown { strongest: Some(2), ..all.clone() }), [7.0, 9.0]);
-        let of_light = WaysShown { light: Some("light".to_owned()), ..all.clone() };
+        assert_eq!(strengths(&PathFilter { strongest: Some(2), ..all.clone() }), [7.0, 9.0]);
+        let of_light = PathFilter { light: Some("light".to_owned()), ..all.clone() };
         assert_eq!(strengths(&of_light), [2.0, 5.0]);
-        assert_eq!(strengths(&WaysShown { bounces: Some(1), ..of_light }), [2.0]);
-        assert_eq!(strengths(&WaysShown { light: Some("sky".to_owned()), ..all }), [7.0], "what was asked counts");
+        assert_eq!(strengths(&PathFilter { bounces: Some(1), ..of_light }), [2.0]);
+        assert_eq!(strengths(&PathFilter { light: Some("sky".to_owned()), ..all }), [7.0], "what was asked counts");
     }
 }

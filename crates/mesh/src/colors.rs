@@ -1,4 +1,4 @@
-//! Colours of vertices for a mesh that was made of another one, as simplification does.
+//! Transfer of vertex colours between meshes, for a mesh derived from another one, as by simplification.
 
 use super::Mesh;
 use glam::{DVec3, IVec3, Vec4};
@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 impl Mesh {
-    /// With the colour of the nearest vertex of `original` at each vertex; of those equally near, the first.
+    /// Gives each vertex the colour of the nearest vertex of `original`; of those equally near, the first.
     ///
-    /// Nothing changes where `original` has no colours.
+    /// Without colours in `original` the mesh is returned unchanged.
     pub fn with_colors_of(mut self, original: &Mesh) -> Self {
         if !original.colors.is_empty() {
             let grid = VertexGrid::of(original);
@@ -22,7 +22,7 @@ impl Mesh {
     }
 }
 
-/// The vertices of a mesh by the cells of a grid, about one a cell of those that a surface passes.
+/// A uniform grid over the vertices of a mesh, with about one vertex per cell that the surface crosses.
 struct VertexGrid<'a> {
     mesh: &'a Mesh,
     /// Edge of a cell, metres.
@@ -32,11 +32,11 @@ struct VertexGrid<'a> {
 
 impl<'a> VertexGrid<'a> {
     fn of(mesh: &'a Mesh) -> Self {
-        /// Cells along the longest edge of the box: numbers that an `i32` holds.
-        const MOST_CELLS: f64 = 1e6;
+        /// Limit on the cells along the longest side of the bounds, so that an `i32` holds their indices.
+        const MAX_CELLS: f64 = 1e6;
         let bounds = mesh.bounds();
         let extent = f64::from((bounds.max - bounds.min).max_element());
-        let cell = (extent / (mesh.positions.len() as f64).sqrt().min(MOST_CELLS)).max(f64::MIN_POSITIVE);
+        let cell = (extent / (mesh.positions.len() as f64).sqrt().min(MAX_CELLS)).max(f64::MIN_POSITIVE);
         let mut cells = FxHashMap::<IVec3, Vec<u32>>::default();
         for (position, vertex) in mesh.positions.iter().zip(0..) {
             cells.entry(cell_of(position.as_dvec3(), cell)).or_default().push(vertex);
@@ -45,27 +45,27 @@ impl<'a> VertexGrid<'a> {
     }
 
     fn nearest(&self, point: DVec3) -> u32 {
-        /// Shells of cells that are looked through before all vertices are.
-        const MOST_SHELLS: i32 = 16;
+        /// Shells of cells that are searched before falling back to brute force.
+        const MAX_SHELLS: i32 = 16;
         let middle = cell_of(point, self.cell);
         let mut best = (f64::INFINITY, 0);
-        let look = |best: &mut (f64, u32), vertex: u32| {
+        let visit = |best: &mut (f64, u32), vertex: u32| {
             let away = self.mesh.positions[vertex as usize].as_dvec3().distance_squared(point);
             if (away, vertex) < *best {
                 *best = (away, vertex);
             }
         };
-        for shell in 0..=MOST_SHELLS {
+        for shell in 0..=MAX_SHELLS {
             for offset in shell_of(shell) {
                 let cell = self.cells.get(&middle.saturating_add(offset));
-                cell.into_iter().flatten().for_each(|&vertex| look(&mut best, vertex));
+                cell.into_iter().flatten().for_each(|&vertex| visit(&mut best, vertex));
             }
-            // Whatever lies further out is at least so many cells away.
+            // Vertices in farther shells are at least this many cells away.
             if best.0 < (f64::from(shell) * self.cell).powi(2) {
                 return best.1;
             }
         }
-        (0..self.mesh.positions.len() as u32).for_each(|vertex| look(&mut best, vertex));
+        (0..self.mesh.positions.len() as u32).for_each(|vertex| visit(&mut best, vertex));
         best.1
     }
 }
@@ -74,7 +74,7 @@ fn cell_of(point: DVec3, cell: f64) -> IVec3 {
     (point / cell).floor().as_ivec3()
 }
 
-/// Offsets whose largest coordinate is `radius`.
+/// Iterates over offsets whose largest absolute coordinate is `radius`.
 fn shell_of(radius: i32) -> impl Iterator<Item = IVec3> {
     let all = -radius..=radius;
     let plane = move |x: i32| {
@@ -113,7 +113,7 @@ mod tests {
         assert!(few.colors.is_empty());
         let mut few = few.with_colors_of(&mesh);
         few.validate().unwrap();
-        // Far away, all vertices are looked at.
+        // Far away, the search is by brute force.
         few.positions.push(glam::Vec3::new(300.0, 1.0, 0.0));
         few.colors.clear();
         let few = few.with_colors_of(&mesh);

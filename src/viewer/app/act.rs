@@ -20,7 +20,7 @@ impl App {
     pub(super) fn execute(&mut self, asked: panel::Asked, now: Instant) {
         if !asked.commands.is_empty() {
             self.reaction.asked(now);
-            self.stirred = true;
+            self.needs_tick = true;
         }
         for command in asked.commands {
             self.open(command, now);
@@ -30,7 +30,7 @@ impl App {
         }
         if asked.toggle_spin {
             self.input.toggle_spin(now);
-            self.stirred = true;
+            self.needs_tick = true;
         }
         if asked.toggle_brush {
             self.toggle_brush(now);

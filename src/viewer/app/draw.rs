@@ -41,7 +41,7 @@ impl App {
         self.handles.update(&mut self.session, self.panel.gizmo, size);
         let projector = Projector::new(&self.session.status().rig, size);
         let (session, handles, brush, panel) = (&self.session, &self.handles, &self.brush, &mut self.panel);
-        let ways = &mut self.ways;
+        let path_filter = &mut self.path_filter;
         let around = panel::Around {
             reaction: &self.reaction,
             speed: self.input.speed(),
@@ -64,7 +64,7 @@ impl App {
                     story::draw(
                         context,
                         story,
-                        ways,
+                        path_filter,
                         &projector,
                         session.world().resource::<SceneBounds>().extent.radius,
                     );
@@ -100,7 +100,7 @@ impl App {
             self.session.note_seen(picture.number);
             self.reaction.shown(generation, Instant::now());
             // A pending movement may have been waiting for this image.
-            self.stirred |= generation > self.seen;
+            self.needs_tick |= generation > self.seen;
             self.seen = generation;
         }
         tracing::trace!("drawn in {:.1} ms", now.elapsed().as_secs_f64() * 1e3);
@@ -119,7 +119,7 @@ impl App {
         self.execute(asked, now);
         if let Some(answer) = answer {
             self.leaving.answer = Some(answer);
-            self.stirred = true;
+            self.needs_tick = true;
         }
         Ok(())
     }

@@ -27,7 +27,7 @@ impl ApplicationHandler<Wake> for App {
 
     fn user_event(&mut self, _: &ActiveEventLoop, _: Wake) {
         self.pending.store(false, Ordering::Release);
-        self.stirred = true;
+        self.needs_tick = true;
         // This image may be an awaited response.
         self.last_tick = None;
     }
@@ -40,7 +40,7 @@ impl ApplicationHandler<Wake> for App {
         }
         if self.closes_help(&event) {
             self.repaint_at = Some(now);
-            self.stirred = true;
+            self.needs_tick = true;
             return;
         }
         let Some(presenter) = &mut self.presenter else { return };
@@ -50,7 +50,7 @@ impl ApplicationHandler<Wake> for App {
         if response.repaint && self.has_widgets() && !self.input.is_dragging() {
             self.repaint_at = Some(now);
         }
-        self.stirred = true;
+        self.needs_tick = true;
         match event {
             WindowEvent::CloseRequested => self.leaving.wanted = true,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.resized(),
@@ -161,20 +161,20 @@ impl ApplicationHandler<Wake> for App {
         {
             self.input.mouse_moved(x, y);
             self.reaction.asked(Instant::now());
-            self.stirred = true;
+            self.needs_tick = true;
         }
     }
 
     fn new_events(&mut self, _: &ActiveEventLoop, cause: StartCause) {
         if let StartCause::ResumeTimeReached { .. } = cause {
             self.wake_at = None;
-            self.stirred = true;
+            self.needs_tick = true;
         }
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let now = Instant::now();
-        if self.stirred {
+        if self.needs_tick {
             match self.last_tick.map(|then| then + FRAME).filter(|soon| *soon > now) {
                 Some(soon) => self.wake_at = Some(soon),
                 None => self.tick(now, event_loop),

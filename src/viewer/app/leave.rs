@@ -61,7 +61,7 @@ impl App {
             return self.ask_to_leave(Some(command), now);
         }
         self.session.send(command);
-        self.stirred = true;
+        self.needs_tick = true;
     }
 
     fn ask_to_leave(&mut self, then: Option<Command>, now: Instant) {
@@ -86,7 +86,7 @@ impl App {
     pub(super) fn answer(&mut self, answer: Answer, now: Instant, event_loop: &ActiveEventLoop) {
         let Some(question) = self.leaving.question.take() else { return };
         self.repaint_at = Some(now);
-        self.stirred = true;
+        self.needs_tick = true;
         match (question, answer) {
             (Question::Leave { then, .. }, Answer::Yes) => {
                 self.save_scene(false);

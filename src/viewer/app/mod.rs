@@ -31,7 +31,7 @@ use super::presenter::{PresentError, Presenter};
 use super::reaction::Reaction;
 use super::region_tool::RegionTool;
 use super::saver::Saver;
-use super::story::WaysShown;
+use super::story::PathFilter;
 use super::toasts::{Toasts, Tone};
 use crate::frame::{
     Command, Explaining, Focus, FocusTarget, LatencyHistogram, MessageKind, Session, SessionOptions, Target, Waker,
@@ -206,7 +206,7 @@ struct App {
     handles: Handles,
     brush: RegionTool,
     /// The paths of an explained pixel that are drawn.
-    ways: WaysShown,
+    path_filter: PathFilter,
     memory: Memory,
     reaction: Reaction,
     overlays: bool,
@@ -220,7 +220,7 @@ struct App {
     keep_size_at: Option<Instant>,
     occluded: bool,
     /// Whether anything happened since the last tick.
-    stirred: bool,
+    needs_tick: bool,
     /// Generation of the image on the window.
     seen: u64,
     /// Since when, or since the last drawing, there is a change that is not visible yet.
@@ -283,7 +283,7 @@ impl App {
             panel: PanelState::default(),
             handles: Handles::default(),
             brush: RegionTool::default(),
-            ways: WaysShown::default(),
+            path_filter: PathFilter::default(),
             memory,
             leaving,
             stop_requested,
@@ -295,7 +295,7 @@ impl App {
             window_size: (options.width, options.height),
             keep_size_at: None,
             occluded: false,
-            stirred: true,
+            needs_tick: true,
             seen: 0,
             unseen_since: None,
             shown_picture: None,
@@ -335,7 +335,7 @@ impl App {
         let (width, height) = (size.width.min(presenter.max_side()), size.height.min(presenter.max_side()));
         self.input.resize(width, height);
         self.session.send(Command::Resize { width, height });
-        self.stirred = true;
+        self.needs_tick = true;
         window.request_redraw();
     }
 
@@ -370,7 +370,7 @@ impl App {
 
     /// Passes on input, advances the session, and checks for anything new to show.
     fn tick(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
-        self.stirred = false;
+        self.needs_tick = false;
         self.last_tick = Some(now);
         let clock = now - self.start;
         let restarts = self.session.status().restarts;

@@ -93,7 +93,7 @@ fn cameras(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     });
 }
 
-/// The moment of the animations, where the open model has any.
+/// The time of the animations, if the open model has any.
 pub fn moment(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     let Some(scene) = session.world().get_resource::<CurrentScene>() else { return };
     let Some(length) = scene.0.facts.as_ref().and_then(|facts| facts.animation_length) else { return };

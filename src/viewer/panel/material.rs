@@ -169,11 +169,11 @@ fn switch(name: &str) -> Option<(Property, &'static str, &'static str)> {
     })
 }
 
-/// Whether opacity is a mask, and from which opacity on the surface is there.
+/// Whether opacity is a mask, and the opacity from which the surface exists.
 fn cutoff_row(ui: &mut Ui, id: u64, cutoff: Option<f32>, asked: &mut Asked) {
-    /// What glTF has where a file says nothing.
-    const USUAL: f32 = 0.5;
-    /// Out of range: the opacity is a share again.
+    /// The default of glTF.
+    const DEFAULT: f32 = 0.5;
+    /// Out of range, which makes opacity a blend factor again.
     const NONE: f64 = 2.0;
     let mut set = |value: f64| {
         asked.edit(Edit::Set { id, property: Property::OpacityCutoff, value: DVec3::splat(value) });
@@ -182,7 +182,7 @@ fn cutoff_row(ui: &mut Ui, id: u64, cutoff: Option<f32>, asked: &mut Asked) {
         ui.horizontal(|ui| {
             let mut on = cutoff.is_some();
             if ui.checkbox(&mut on, "").changed() {
-                set(if on { f64::from(USUAL) } else { NONE });
+                set(if on { f64::from(DEFAULT) } else { NONE });
             }
             if let Some(cutoff) = cutoff
                 && let Some(new) = slider(ui, f64::from(cutoff), 0.0..=1.0, false)

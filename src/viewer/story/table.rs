@@ -2,7 +2,7 @@
 //!
 //! The table shows luminance for readability; `firstlight explain` has the three channels.
 
-use super::{SEGMENTS, WaysShown};
+use super::{PathFilter, SEGMENTS};
 use crate::frame::{PixelStory, brightness};
 use crate::viewer::overlay::GLASS;
 use crate::viewer::status::percent;
@@ -15,7 +15,7 @@ const TEXT_SIZE: f32 = 12.5;
 const WEAK: Color32 = Color32::from_gray(165);
 
 /// Draws the table in the upper left corner, below the messages.
-pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
+pub fn draw(context: &Context, story: &PixelStory, shown: &mut PathFilter) {
     let all = brightness(story.total());
     egui::Area::new("story".into())
         .order(Order::Middle)
@@ -52,7 +52,7 @@ pub fn draw(context: &Context, story: &PixelStory, shown: &mut WaysShown) {
                 });
                 ui.add_space(4.0);
                 bounces(ui, story, shown);
-                ways(ui, shown);
+                path_controls(ui, shown);
                 if story.n_bad > 0 {
                     text(ui, format!("{} samples were not finite and were discarded", story.n_bad), false);
                 }
@@ -90,10 +90,10 @@ fn row(ui: &mut Ui, name: &str, parts: [DVec3; 3], all: f64, chosen: Option<bool
 }
 
 /// Controls for the selection of paths.
-fn ways(ui: &mut Ui, shown: &mut WaysShown) {
+fn path_controls(ui: &mut Ui, shown: &mut PathFilter) {
     ui.horizontal(|ui| {
         text(ui, "paths drawn:".to_owned(), false);
-        let strongest = WaysShown::STRONGEST.map(|n| (Some(n), format!("strongest {n}")));
+        let strongest = PathFilter::STRONGEST.map(|n| (Some(n), format!("strongest {n}")));
         for (n, label) in strongest.into_iter().chain([(None, "all".to_owned())]) {
             if ui.selectable_label(shown.strongest == n, RichText::new(label).size(TEXT_SIZE)).clicked() {
                 shown.strongest = n;
@@ -115,7 +115,7 @@ fn ways(ui: &mut Ui, shown: &mut WaysShown) {
 
 /// Contributions by number of bounces, as a bar in the colours of the paths: directly visible light has the colour of
 /// the first segment.
-fn bounces(ui: &mut Ui, story: &PixelStory, shown: &mut WaysShown) {
+fn bounces(ui: &mut Ui, story: &PixelStory, shown: &mut PathFilter) {
     let parts: Vec<f64> = story.by_bounces.iter().map(|part| brightness(*part).max(0.0)).collect();
     let sum: f64 = parts.iter().sum();
     if sum <= 0.0 {
