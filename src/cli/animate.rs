@@ -27,7 +27,8 @@ pub(super) fn animate(
         progress.at(i as f64 / rigs.len() as f64, format!("frame {} of {}", i + 1, rigs.len()));
         job.set_rig(rig);
         let film = job.picture(args, target)?;
-        job.write(args, &film, &numbered(&args.output, i + 1, digits), replace)?;
+        let features = job.features(args, None)?;
+        job.write(args, (&film, features.as_ref()), &numbered(&args.output, i + 1, digits), replace)?;
         stop.has_saved(format!("{} of {} frames are saved", i + 1, rigs.len()));
     }
     progress.finish();

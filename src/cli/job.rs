@@ -6,9 +6,9 @@ use super::progress::Progress;
 use super::render_args::{DEFAULT_SPP, RenderArgs};
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
-use firstlight::frame::{FilmFile, PictureFormat, Print, Target, render_offline_until};
+use firstlight::frame::{FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until};
 use firstlight::kdtree::InstructionSet;
-use firstlight::render::{Display, Film, NoRoom, Purpose, RenderSettings, Room};
+use firstlight::render::{Display, FEATURE_SAMPLES, Film, NoRoom, Purpose, RenderSettings, Room};
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
     DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Rendering,
@@ -116,9 +116,38 @@ impl RenderJob {
         Ok(film)
     }
 
+    /// What each pixel shows, where layers are asked for that tell it, or what the film has kept.
+    pub fn features(
+        &mut self,
+        args: &RenderArgs,
+        kept: Option<FeatureLayers>,
+    ) -> Result<Option<FeatureLayers>, Failure> {
+        let samples = args.layer_samples.unwrap_or(FEATURE_SAMPLES);
+        if !args.layers.have_features() || kept.as_ref().is_some_and(|kept| kept.buffers.samples >= samples) {
+            return Ok(kept);
+        }
+        let inputs = SceneInputs::of(&mut self.world);
+        let Self { extraction, settings, size, .. } = self;
+        Ok(FeatureLayers::gather(extraction, &inputs, settings, *size, samples, &|| false))
+    }
+
     /// Writes a picture with its metadata to a file, or to standard output.
-    pub fn write(&self, args: &RenderArgs, film: &Film, path: &Path, replace: Replace) -> Result<(), Failure> {
+    pub fn write(
+        &self,
+        args: &RenderArgs,
+        (film, features): (&Film, Option<&FeatureLayers>),
+        path: &Path,
+        replace: Replace,
+    ) -> Result<(), Failure> {
         let note = self.note(film, path);
+        if !args.layers.is_empty() {
+            let layers = args.layers.of(film);
+            let picture = LayeredPicture { film, features, layers: &layers, note: Some(&note) };
+            return match args.to_stdout() {
+                true => print_bytes(&picture.bytes(path)?),
+                false => Ok(picture.write(path, replace)?),
+            };
+        }
         let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
         if !args.to_stdout() {
             return Ok(picture.write(path, replace)?);
@@ -166,7 +195,8 @@ pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
         Ok(PictureFormat::Exr) => Purpose::Exr,
         _ => Purpose::Png,
     };
-    std::iter::once(picture).chain(film.then_some(Purpose::FilmFile)).collect()
+    let layers = args.layers.have_features().then_some(Purpose::Layers);
+    std::iter::once(picture).chain(film.then_some(Purpose::FilmFile)).chain(layers).collect()
 }
 
 /// Memory kept free for what is written at the end: a picture that cannot be written is not worth the wait.

@@ -3,9 +3,13 @@
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
 use super::failure::Failure;
+use super::layers::LayerArgs;
 use super::number::percent;
 use clap::Args;
-use firstlight::frame::{FilmFile, PictureFormat, Print, check_replaced_film, read_film_file, write_film_into};
+use firstlight::frame::{
+    FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, check_replaced_film, read_film_file,
+    write_film_with_features,
+};
 use firstlight::scene::ImageMetadata;
 use firstlight::scene::whole_file::Replace;
 use std::path::{Path, PathBuf};
@@ -21,6 +25,8 @@ pub struct MergeArgs {
     /// Also save the picture: .png is tone-mapped, .exr holds linear light (HDR).
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    #[command(flatten)]
+    layers: LayerArgs,
     #[command(flatten)]
     overwrite: OverwriteArgs,
     /// Print the result as one line of JSON.
@@ -38,14 +44,23 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     // It may take the place of a film of which it has all samples, which is known only when it is there.
     let claim = files.claim(&args.output, Replace::Anything)?;
     if let Some(picture) = &args.picture {
-        PictureFormat::of(picture).map_err(|error| Failure::Usage(error.into()))?;
+        let format = PictureFormat::of(picture).map_err(|error| Failure::Usage(error.into()))?;
+        if !args.layers.is_empty() && format != PictureFormat::Exr {
+            return Err(Failure::Usage(format!(
+                "{}: with --layers, choose a name that ends in .exr",
+                picture.display()
+            )));
+        }
         files.write(picture)?;
+    } else if !args.layers.is_empty() {
+        return Err(Failure::Usage("--layers belong to a picture: name it with --picture FILE.exr".to_owned()));
     }
+    args.layers.check()?;
     // In the order of their samples, so that the result does not depend on how they were named.
     let mut films: Vec<&PathBuf> = args.films.iter().collect();
     films.sort_by_cached_key(|path| ImageMetadata::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
     let (first, others) = films.split_first().expect("two films at least");
-    let FilmFile { mut film, shot, warning } = read_film_file(first)?;
+    let FilmFile { mut film, shot, mut features, warning } = read_film_file(first)?;
     let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
     warn(warning);
     for path in others {
@@ -58,7 +73,9 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
             return Err(failed(format!("they have a different {what}")));
         }
         film.merge(&other.film).map_err(|error| failed(error.to_string()))?;
+        features = FeatureLayers::of_parts(features, other.features);
     }
+    args.layers.check_kept(features.as_ref())?;
     let note = |path: &Path| {
         let samples = (film.first_sample(), film.spp(), film.max_spp() > film.spp());
         ImageMetadata { first_sample: samples.0, spp: samples.1, uneven: samples.2, ..shot.clone() }
@@ -69,11 +86,18 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     if !args.overwrite.overwrite {
         check_replaced_film(&film, &note_of_film, &args.output)?;
     }
-    write_film_into(&film, &note_of_film, claim)?;
+    write_film_with_features(&film, features.as_ref(), &note_of_film, claim)?;
     if let Some(path) = &args.picture {
         let (size, note) = ((film.width(), film.height()), note(path));
         let display = shot.display.into();
-        Print { film: &film, display: &display, size, note: Some(&note) }.write(path, files.replace())?;
+        if args.layers.is_empty() {
+            Print { film: &film, display: &display, size, note: Some(&note) }.write(path, files.replace())?;
+        } else {
+            let layers = args.layers.of(&film);
+            let features = features.as_ref();
+            LayeredPicture { film: &film, features, layers: &layers, note: Some(&note) }
+                .write(path, files.replace())?;
+        }
     }
     let error = film.error_estimate().map(|error| error.relative);
     if args.json {

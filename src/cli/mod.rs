@@ -11,6 +11,7 @@ mod explain;
 mod failure;
 mod info;
 mod job;
+mod layers;
 mod man;
 mod merge;
 mod number;

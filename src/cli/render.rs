@@ -10,7 +10,8 @@ use super::progress::Progress;
 use super::render_args::{RenderArgs, RenderCommand};
 use super::stop::Stop;
 use firstlight::frame::{
-    OfflineReport, Target, read_film_file, render_offline_until, render_region_until, write_errors, write_film_into,
+    OfflineReport, Target, read_film_file, render_offline_until, render_region_until, write_errors,
+    write_film_with_features,
 };
 use firstlight::render::{BadSample, Film, Region};
 use firstlight::report::cpu_seconds;
@@ -20,6 +21,7 @@ use glam::{UVec2, Vec3};
 
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Renders each scene in turn.
 pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
@@ -70,9 +72,12 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
         }
         files.write(path)?;
     }
-    if args.error_picture.is_some() && args.spp == Some(1) && !args.resume {
-        let message = "--error-picture needs at least two samples per pixel: use --spp 2 or more";
-        return Err(Failure::Usage(message.to_owned()));
+    if args.spp == Some(1) && !args.resume {
+        let asked = [("--error-picture", args.error_picture.is_some()), ("--layers error", args.layers.has_error())];
+        if let Some((option, _)) = asked.iter().find(|(_, is_asked)| *is_asked) {
+            let message = format!("{option} needs at least two samples per pixel: use --spp 2 or more");
+            return Err(Failure::Usage(message));
+        }
     }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.map_or(0, usize::from))
@@ -121,7 +126,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let mut progress = Progress::new();
     let film_path = film_file.as_ref().map(|file| file.path().to_path_buf());
     let film_path = film_path.as_deref();
-    let kept = match film_path.filter(|_| args.resume) {
+    let mut kept = match film_path.filter(|_| args.resume) {
         Some(path) => Some((read_film_file(path)?, path)),
         None => None,
     };
@@ -130,7 +135,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
     let job = RenderJob::new(args, kept.as_ref().map(|(kept, _)| &kept.shot), files, &progress)?;
     // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
-    let job = ManuallyDrop::new(job);
+    let mut job = ManuallyDrop::new(job);
     if let Some(shot) = job.scene.shot.as_ref().filter(|shot| shot.uneven && !args.resume) {
         let message = format!("the picture was saved in the middle of a pass; the new one has {} samples", shot.spp);
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
@@ -138,6 +143,7 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     if args.turntable.is_some() || args.bookmarks.is_some() {
         return animate(args, ManuallyDrop::into_inner(job), progress, files.replaced().len(), stop);
     }
+    let kept_features = kept.as_mut().and_then(|(kept, _)| kept.features.take());
     let mut film = job.film(args, kept)?;
     if let Some(path) = film_path.filter(|_| args.resume) {
         let (path, spp) = (path.display(), film.spp());
@@ -148,6 +154,9 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     let bad_before = film.n_bad();
     let cpu_before = cpu_seconds();
     let region = args.region.map(|region| region_in(&film, region)).transpose()?;
+    let features_start = Instant::now();
+    let features = job.features(args, kept_features)?;
+    let features_seconds = features_start.elapsed().as_secs_f64();
     // From here on a stop saves what there is, which must not take long.
     job.draft.prepare();
     stop.attend();
@@ -187,9 +196,9 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     // The film first: a picture can be made of it.
     if let Some(file) = film_file {
         let note = job.note(&film, file.path());
-        write_film_into(&film, &note, file)?;
+        write_film_with_features(&film, features.as_ref(), &note, file)?;
     }
-    job.write(args, &film, &args.output, files.replace())?;
+    job.write(args, (&film, features.as_ref()), &args.output, files.replace())?;
     if let Some(path) = &args.error_picture {
         write_errors(&film, path, files.replace())?;
     }
@@ -226,7 +235,8 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         ));
     }
     if args.json {
-        print(json(&job, &report, cpu_seconds, (&film, is_dark), files.replaced(), stopped))?;
+        let seconds = (features_seconds, cpu_seconds);
+        print(json(&job, &report, seconds, (&film, is_dark), files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output_name(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
@@ -281,7 +291,7 @@ fn is_black(film: &Film) -> bool {
 fn json(
     job: &RenderJob,
     report: &OfflineReport,
-    cpu_seconds: Option<f64>,
+    (features_seconds, cpu_seconds): (f64, Option<f64>),
     (film, is_dark): (&Film, bool),
     replaced: &[PathBuf],
     stopped: bool,
@@ -301,6 +311,7 @@ fn json(
         "stopped": stopped,
         "load_s": job.scene.load_seconds,
         "build_s": job.build_seconds,
+        "features_s": features_seconds,
         "render_s": report.seconds,
         "cpu_s": cpu_seconds,
         "threads": rayon::current_num_threads(),

@@ -2,6 +2,7 @@
 
 use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
 use super::failure::Failure;
+use super::layers::LayerArgs;
 use super::number::{parse_positive, parse_share, parse_size, parse_stops};
 use clap::{Args, ValueEnum};
 use firstlight::frame::PictureFormat;
@@ -19,6 +20,7 @@ Examples:
   firstlight render model.obj --env sky.hdr -o model.exr --error 1%
   firstlight render scene.ron -o scene.png --film scene.exr --time 60
   firstlight render scene.ron -o scene.png --film scene.exr --resume --time 60
+  firstlight render scene.ron -o scene.exr --layers albedo,normal,depth,object
   firstlight render picture.png -o larger.png --scale 2
 
 `firstlight --help` lists the built-in scenes.";
@@ -69,6 +71,11 @@ pub struct RenderArgs {
     /// Values are averaged over 5 x 5 pixels; their root mean square is the error estimate of the whole picture.
     #[arg(help_heading = "Output", long, value_name = "FILE.exr", visible_alias = "error-image", conflicts_with_all = ["turntable", "bookmarks", "region"])]
     pub error_picture: Option<PathBuf>,
+    #[command(flatten)]
+    pub layers: LayerArgs,
+    /// Samples per pixel that albedo, normal, depth, position, object and material are made of [default: 16].
+    #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub layer_samples: Option<u32>,
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
     #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,
@@ -192,20 +199,31 @@ impl RenderArgs {
     /// Of the picture: as asked for, and not another than its name says.
     pub fn picture_format(&self) -> Result<PictureFormat, Failure> {
         if self.to_stdout() {
-            return Ok(self.default_format());
+            return self.check_layers(self.default_format());
         }
         let of_name = PictureFormat::of(&self.output).map_err(|error| Failure::Usage(error.into()))?;
         if self.format.is_some() && of_name != self.default_format() {
             let (name, extension) = (self.output.display(), self.default_format().extension());
             return Err(Failure::Usage(format!("{name}: --format {extension} needs a name that ends in .{extension}")));
         }
-        Ok(of_name)
+        self.check_layers(of_name)
+    }
+
+    /// Layers need a format that has them.
+    fn check_layers(&self, format: PictureFormat) -> Result<PictureFormat, Failure> {
+        self.layers.check()?;
+        if !self.layers.is_empty() && format != PictureFormat::Exr {
+            let message = "a .png has no layers: with --layers, choose a name that ends in .exr";
+            return Err(Failure::Usage(format!("{}: {message}", self.output_name())));
+        }
+        Ok(format)
     }
 
     /// Where no name says it.
     fn default_format(&self) -> PictureFormat {
         match self.format {
             Some(FormatArg::Exr) => PictureFormat::Exr,
+            None if !self.layers.is_empty() => PictureFormat::Exr,
             _ => PictureFormat::Png,
         }
     }

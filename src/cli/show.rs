@@ -158,6 +158,8 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         time: None,
         error: None,
         error_picture: None,
+        layers: Default::default(),
+        layer_samples: None,
         threads: args.threads,
         seed: args.seed,
         integrator: None,

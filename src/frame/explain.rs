@@ -139,6 +139,11 @@ impl SnapshotNames {
         Self { origin: extraction.origin, names, lights }
     }
 
+    /// Of all objects, by their index.
+    pub fn objects(&self) -> &[String] {
+        &self.names
+    }
+
     fn object(&self, object: u32) -> String {
         self.names.get(object as usize).cloned().unwrap_or_else(|| "edge of a light".to_owned())
     }

@@ -4,8 +4,10 @@
 //! [`FilmRecord`]) lies in two channels of 32-bit integers, its upper and its lower half, so nothing is rounded. Sample
 //! numbers and the state of the error estimate are RON text in the attribute `firstlight.film` of the layer; the note of
 //! the picture ([`ImageMetadata`]) says which scene it is, and makes it open as any picture. The same attribute has a checksum of
-//! every byte of the file but its own digits, so that a change of anything is noticed.
+//! every byte of the file but its own digits, so that a change of anything is noticed. Feature buffers, where the film keeps
+//! them, are further channels ([`FeatureLayers`]).
 
+use super::feature_layers::{FeatureHeader, FeatureLayers, LAYERS, channels_of, id_channels, read_layers};
 use super::picture_file::mean_channels;
 use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, NoRoom, Purpose, Room};
 use crate::scene::file::check_film_size;
@@ -31,6 +33,8 @@ pub struct FilmFile {
     pub film: Film,
     /// Scene, view and settings that it was rendered with.
     pub shot: ImageMetadata,
+    /// What each pixel shows, where the film was asked to keep it.
+    pub features: Option<FeatureLayers>,
     /// What cannot be known of it; for people, with its name.
     pub warning: Option<String>,
 }
@@ -81,6 +85,12 @@ pub enum FilmProblem {
     Metadata(#[from] MetadataError),
 }
 
+impl From<String> for FilmProblem {
+    fn from(problem: String) -> Self {
+        Self::Damaged(problem)
+    }
+}
+
 impl From<FilmError> for String {
     fn from(error: FilmError) -> Self {
         error.to_string()
@@ -95,6 +105,9 @@ struct Header {
     /// 32 digits, of all bytes of the file with zeros in their place. In format 1, of the numbers of all pixels alone.
     check: String,
     layout: FilmLayout,
+    /// Of the feature buffers, where the film has them; programs that do not know them skip their channels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    features: Option<FeatureHeader>,
 }
 
 const FORMAT: u32 = 2;
@@ -123,10 +136,24 @@ pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), Write
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<(), WriteError> {
+pub fn write_film_into(film: &Film, note: &str, out: WholeFile) -> Result<(), WriteError> {
+    write_film_with_features(film, None, note, out)
+}
+
+/// The same with what each pixel shows, where that is to be kept.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_film_with_features(
+    film: &Film,
+    features: Option<&FeatureLayers>,
+    note: &str,
+    mut out: WholeFile,
+) -> Result<(), WriteError> {
     let path = &out.path().to_path_buf();
-    drop(Room::for_files(film.width(), film.height(), &[Purpose::FilmFile]).map_err(|error| unwritable(path, error))?);
-    let mut bytes = encode(film, note, FORMAT, NO_CHECK).map_err(|error| unwritable(path, error))?;
+    let purpose = if features.is_some() { Purpose::Layers } else { Purpose::FilmFile };
+    drop(Room::for_files(film.width(), film.height(), &[purpose]).map_err(|error| unwritable(path, error))?);
+    let mut bytes = encode(film, features, note, FORMAT, NO_CHECK).map_err(|error| unwritable(path, error))?;
     let place = place_of_check(&bytes).expect("the header has just been written");
     let check = checksum(&bytes, &place).to_string();
     bytes[place].copy_from_slice(check.as_bytes());
@@ -135,9 +162,16 @@ pub fn write_film_into(film: &Film, note: &str, mut out: WholeFile) -> Result<()
 }
 
 /// A whole file in memory, with this for its checksum.
-fn encode(film: &Film, note: &str, format: u32, check: &str) -> Result<Vec<u8>, exr::error::Error> {
+fn encode(
+    film: &Film,
+    features: Option<&FeatureLayers>,
+    note: &str,
+    format: u32,
+    check: &str,
+) -> Result<Vec<u8>, exr::error::Error> {
     let record = film.to_record();
-    let header = Header { format, check: check.to_owned(), layout: record.layout };
+    let of_features = features.map(FeatureLayers::header);
+    let header = Header { format, check: check.to_owned(), layout: record.layout, features: of_features };
     // Plain structs and numbers can always be written.
     let header = ron::to_string(&header).expect("a film's header is plain data");
     let mut channels = mean_channels(film);
@@ -146,6 +180,14 @@ fn encode(film: &Film, note: &str, format: u32, check: &str) -> Result<Vec<u8>, 
             |shift: u32| FlatSamples::U32(plane.iter().map(|number| (number.to_bits() >> shift) as u32).collect());
         channels.push(AnyChannel::new(format!("{name}.upper").as_str(), half(32)));
         channels.push(AnyChannel::new(format!("{name}.lower").as_str(), half(0)));
+    }
+    if let Some(FeatureLayers { buffers, .. }) = features {
+        for (name, numbers) in LAYERS.iter().flat_map(|layer| channels_of(buffers, layer)) {
+            channels.push(AnyChannel::new(name.as_str(), FlatSamples::F32(numbers)));
+        }
+        for (name, words) in id_channels(buffers) {
+            channels.push(AnyChannel::new(name.as_str(), FlatSamples::U32(words)));
+        }
     }
     let mut attributes = LayerAttributes::named(env!("CARGO_PKG_NAME"));
     attributes.other.insert(Text::from(FILM_KEY), AttributeValue::Text(Text::from(header.as_str())));
@@ -280,13 +322,23 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
         .from_buffered(std::io::Cursor::new(bytes))
         .map_err(|error| damaged(&error))?;
     let channels = &image.layer_data.channel_data.list;
-    let words = |name: String| {
+    let samples = |name: &str| {
         let found = channels.iter().find(|channel| channel.name.to_string() == name);
-        match found.map(|channel| &channel.sample_data) {
-            Some(FlatSamples::U32(words)) => Ok(words),
-            _ => Err(damaged(&format!("channel {name} is missing"))),
-        }
+        found.map(|channel| &channel.sample_data)
     };
+    let missing = |name: &str| damaged(&format!("channel {name} is missing"));
+    let words = |name: String| match samples(&name) {
+        Some(FlatSamples::U32(words)) => Ok(words),
+        _ => Err(missing(&name)),
+    };
+    let features = film.features.map(|of_features| {
+        let numbers = |name: &str| match samples(name) {
+            Some(FlatSamples::F32(numbers)) => Ok(numbers.clone()),
+            _ => Err(missing(name)),
+        };
+        read_layers(of_features, (width, height), numbers, |name| words(name.to_owned()).cloned())
+    });
+    let features = features.transpose()?;
     let mut planes = Vec::with_capacity(N_PLANES);
     for name in plane_names() {
         let (upper, lower) = (words(format!("{name}.upper"))?, words(format!("{name}.lower"))?);
@@ -309,7 +361,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
         let path = path.display();
         format!("{path}: is a film of an older format, whose metadata has no checksum")
     });
-    Ok(FilmFile { film, shot, warning })
+    Ok(FilmFile { film, shot, features, warning })
 }
 
 fn plane_names() -> impl Iterator<Item = String> {
@@ -390,14 +442,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (film, note) = tiny(4);
         let check = checksum_of_numbers(&film.to_record()).to_string();
-        let old = encode(&film, &note, OLD_FORMAT, &check).unwrap();
+        let old = encode(&film, None, &note, OLD_FORMAT, &check).unwrap();
         let kept = read_bytes(&old).unwrap();
         assert!(kept.film.to_record() == film.to_record());
         assert!(kept.warning.unwrap().contains("a.exr: is a film of an older format"));
         // Its numbers were always under the checksum, and its two counts of samples must agree.
-        assert!(read_bytes(&encode(&film, &note, OLD_FORMAT, NO_CHECK).unwrap()).is_err());
+        assert!(read_bytes(&encode(&film, None, &note, OLD_FORMAT, NO_CHECK).unwrap()).is_err());
         let counted = note.replace("spp: 4", "spp: 8");
-        assert!(read_bytes(&encode(&film, &counted, OLD_FORMAT, &check).unwrap()).is_err());
+        assert!(read_bytes(&encode(&film, None, &counted, OLD_FORMAT, &check).unwrap()).is_err());
         let path = folder.path().join("b.exr");
         write_film_file(&kept.film, &kept.shot.to_note(), &path).unwrap();
         assert_eq!(read_film_file(&path).unwrap().warning, None);

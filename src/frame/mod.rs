@@ -16,14 +16,17 @@ mod adopt;
 mod background;
 mod camera_path;
 mod command;
+mod cryptomatte;
 mod edit;
 mod explain;
+mod feature_layers;
 mod film_file;
 mod focus;
 pub mod gizmo;
 mod history;
 mod input;
 mod latency;
+mod layered_picture;
 pub mod navigation;
 mod offline;
 mod picture_file;
@@ -52,13 +55,15 @@ pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
+pub use feature_layers::FeatureLayers;
 pub use film_file::{
     FilmError, FilmFile, FilmProblem, check_film_source, check_replaced_film, read_film_file, read_film_file_within,
-    write_film_file, write_film_into,
+    write_film_file, write_film_into, write_film_with_features,
 };
 pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;
 pub use latency::LatencyHistogram;
+pub use layered_picture::{LayeredPicture, PictureLayer};
 pub use offline::{OfflineReport, Progress, Target, render_offline, render_offline_until, render_region_until};
 pub use picture_file::{PictureFormat, Print, write_errors, write_film};
 pub use recording::check_recordable;

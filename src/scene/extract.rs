@@ -124,6 +124,15 @@ impl Extraction {
         }
     }
 
+    /// The entity of each material of the snapshot: of a material, or of the light that glows; `None` for what stands in
+    /// where an object has no material.
+    pub fn material_entities(&self) -> impl Iterator<Item = Option<Entity>> + '_ {
+        self.order.iter().map(|key| match key {
+            MaterialKey::Grey => None,
+            MaterialKey::Material(entity) | MaterialKey::Light(entity) => Some(*entity),
+        })
+    }
+
     /// Takes the trees of meshes as they are in `trees` now. Every tree of a mesh gives the same hits, so every sample
     /// stays what it is.
     pub fn take_trees(&mut self, trees: &Trees) {

@@ -6,6 +6,7 @@ mod draco;
 mod gltf;
 mod gltf_writer;
 mod input_files;
+mod layers;
 mod neutral;
 mod obj;
 mod outputs;

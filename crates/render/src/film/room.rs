@@ -2,6 +2,7 @@
 //! end of the process.
 
 use crate::film::exact_sum::ExactSum;
+use crate::film::features::FeatureBuffers;
 use glam::DVec3;
 
 /// A picture that there is no memory for.
@@ -32,6 +33,8 @@ pub enum Purpose {
     Exr,
     /// All numbers of the film, as planes and as two channels each, and packed.
     FilmFile,
+    /// A film with feature buffers, or a picture with all layers: the buffers, and more channels.
+    Layers,
 }
 
 impl Purpose {
@@ -40,6 +43,7 @@ impl Purpose {
             Self::Png => 4 + 4 * 3,
             Self::Exr => 12 + 12 + 2 * 12,
             Self::FilmFile => 8 * 15 + 12 + 12 + 3 * (4 * 33),
+            Self::Layers => Self::FilmFile.bytes_a_pixel() + FeatureBuffers::BYTES_A_PIXEL as u64 + 3 * (4 * 45),
         }
     }
 }

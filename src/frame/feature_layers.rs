@@ -1,0 +1,178 @@
+//! Feature buffers of a picture with what they need outside of it: world positions, and the names of objects and
+//! materials. What films keep and layered pictures show.
+
+use super::explain::SnapshotNames;
+use crate::render::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares, RenderSettings, gather_features_and_ids};
+use crate::scene::{Extraction, SceneInputs};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Feature buffers of a picture, with names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeatureLayers {
+    /// Positions count from the origin of the world, and there are objects and materials.
+    pub buffers: FeatureBuffers,
+    /// Names of the objects, by id. Objects that share a name are one for a mask.
+    pub objects: Vec<String>,
+    /// Names of the materials, by id.
+    pub materials: Vec<String>,
+}
+
+impl FeatureLayers {
+    /// Looks at a scene by samples 0 up to `samples` of each pixel, on the current rayon pool; `None` when `stop` said so.
+    ///
+    /// - `inputs`: what the extraction was made from; `size`: of the film, pixels.
+    pub fn gather(
+        extraction: &Extraction,
+        inputs: &SceneInputs,
+        settings: &RenderSettings,
+        size: (u32, u32),
+        samples: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
+        let mut buffers = gather_features_and_ids(&extraction.prepared, settings, size.into(), samples, stop)?;
+        for (position, _) in buffers.position.iter_mut().zip(&buffers.coverage).filter(|(_, share)| **share > 0.0) {
+            *position = (extraction.origin + position.as_dvec3()).as_vec3();
+        }
+        let objects = SnapshotNames::of(extraction, inputs).objects().to_vec();
+        Some(Self { buffers, objects, materials: material_names(extraction, inputs) })
+    }
+
+    /// Those of one picture that was rendered in two parts: both have the same, or one has more samples and is kept.
+    pub fn of_parts(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        match (a, b) {
+            (Some(a), Some(b)) => Some(if b.buffers.samples > a.buffers.samples { b } else { a }),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// What is not a number for each pixel.
+    pub(super) fn header(&self) -> FeatureHeader {
+        let Self { buffers, objects, materials } = self;
+        FeatureHeader { samples: buffers.samples, objects: objects.clone(), materials: materials.clone() }
+    }
+}
+
+/// Names by material of the snapshot; what has no name is called by its number.
+fn material_names(extraction: &Extraction, inputs: &SceneInputs) -> Vec<String> {
+    let of_materials = inputs.materials.iter().map(|material| (material.entity, &material.name));
+    let of_lights = inputs.lights.iter().map(|light| (light.entity, &light.name));
+    let names: BTreeMap<_, _> =
+        of_materials.chain(of_lights).filter_map(|(entity, name)| Some((entity, name.as_ref()?))).collect();
+    let name = |(i, entity): (usize, Option<_>)| match entity.and_then(|entity| names.get(&entity)) {
+        Some(name) => (*name).clone(),
+        None => format!("material {i}"),
+    };
+    extraction.material_entities().enumerate().map(name).collect()
+}
+
+/// What stands in the header of a film that has feature buffers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct FeatureHeader {
+    samples: u32,
+    objects: Vec<String>,
+    materials: Vec<String>,
+}
+
+const RGB: [&str; 3] = ["R", "G", "B"];
+const XYZ: [&str; 3] = ["X", "Y", "Z"];
+
+/// Layers of feature buffers by name, as in an OpenEXR picture: every list but those of ids.
+pub(super) const LAYERS: [&str; 9] = [
+    "albedo",
+    "normal",
+    "position",
+    "depth",
+    "coverage",
+    "albedo_variance",
+    "normal_variance",
+    "position_variance",
+    "depth_variance",
+];
+
+/// The channels of one of [`LAYERS`], each with its name and a number for each pixel.
+pub(super) fn channels_of(buffers: &FeatureBuffers, layer: &str) -> Vec<(String, Vec<f32>)> {
+    let vectors = |channels: [&str; 3], list: &[Vec3]| {
+        let channel = |(k, name): (usize, &str)| (format!("{layer}.{name}"), list.iter().map(|v| v[k]).collect());
+        channels.into_iter().enumerate().map(channel).collect()
+    };
+    let numbers = |channel: &str, list: &[f32]| vec![(format!("{layer}.{channel}"), list.to_vec())];
+    match layer {
+        "albedo" => vectors(RGB, &buffers.albedo),
+        "normal" => vectors(XYZ, &buffers.normal),
+        "position" => vectors(XYZ, &buffers.position),
+        "depth" => numbers("Z", &buffers.depth),
+        "coverage" => numbers("Y", &buffers.coverage),
+        "albedo_variance" => vectors(RGB, &buffers.variance.albedo),
+        "normal_variance" => vectors(XYZ, &buffers.variance.normal),
+        "position_variance" => vectors(XYZ, &buffers.variance.position),
+        "depth_variance" => numbers("Z", &buffers.variance.depth),
+        other => unreachable!("there is no layer {other}"),
+    }
+}
+
+/// Ids and how many samples see them, rank by rank, as a film keeps them.
+pub(super) fn id_channels(buffers: &FeatureBuffers) -> Vec<(String, Vec<u32>)> {
+    let Some(ids) = &buffers.ids else { return Vec::new() };
+    let mut channels = Vec::new();
+    for (kind, shares) in [("object", &ids.objects), ("material", &ids.materials)] {
+        for rank in 0..IdShares::RANKS {
+            channels.push((format!("{kind}.id{rank}"), shares.iter().map(|shares| shares.ranks[rank].0).collect()));
+            channels
+                .push((format!("{kind}.samples{rank}"), shares.iter().map(|shares| shares.ranks[rank].1).collect()));
+        }
+    }
+    channels
+}
+
+/// The feature buffers whose channels these are; the inverse of [`channels_of`] and [`id_channels`].
+///
+/// - `numbers`, `words`: the channel of a name, with a number for each pixel.
+///
+/// # Errors
+/// When a channel is missing or has numbers that no feature has.
+pub(super) fn read_layers<E: From<String>>(
+    header: FeatureHeader,
+    (width, height): (u32, u32),
+    numbers: impl Fn(&str) -> Result<Vec<f32>, E>,
+    words: impl Fn(&str) -> Result<Vec<u32>, E>,
+) -> Result<FeatureLayers, E> {
+    let FeatureHeader { samples, objects, materials } = header;
+    let vectors = |layer: &str, channels: [&str; 3]| -> Result<Vec<Vec3>, E> {
+        let [x, y, z] = channels.map(|channel| numbers(&format!("{layer}.{channel}")));
+        let (x, y, z) = (x?, y?, z?);
+        Ok(x.into_iter().zip(y).zip(z).map(|((x, y), z)| Vec3::new(x, y, z)).collect())
+    };
+    let shares = |kind: &str, names: &[String]| -> Result<Vec<IdShares>, E> {
+        let mut all = vec![IdShares::NONE; width as usize * height as usize];
+        for rank in 0..IdShares::RANKS {
+            let (ids, counts) = (words(&format!("{kind}.id{rank}"))?, words(&format!("{kind}.samples{rank}"))?);
+            for (shares, pair) in all.iter_mut().zip(ids.into_iter().zip(counts)) {
+                if pair.1 > samples || (pair.1 > 0 && pair.0 as usize >= names.len()) {
+                    return Err(E::from(format!("its {kind} ids are inconsistent")));
+                }
+                shares.ranks[rank] = pair;
+            }
+        }
+        Ok(all)
+    };
+    let buffers = FeatureBuffers {
+        width,
+        height,
+        samples,
+        albedo: vectors("albedo", RGB)?,
+        normal: vectors("normal", XYZ)?,
+        position: vectors("position", XYZ)?,
+        depth: numbers("depth.Z")?,
+        coverage: numbers("coverage.Y")?,
+        variance: FeatureVariances {
+            albedo: vectors("albedo_variance", RGB)?,
+            normal: vectors("normal_variance", XYZ)?,
+            position: vectors("position_variance", XYZ)?,
+            depth: numbers("depth_variance.Z")?,
+        },
+        ids: Some(FeatureIds { objects: shares("object", &objects)?, materials: shares("material", &materials)? }),
+    };
+    Ok(FeatureLayers { buffers, objects, materials })
+}

@@ -1,0 +1,228 @@
+//! A picture with layers: one OpenEXR file with light in its plain channels and everything else beside it, by names that
+//! compositing programs know.
+//!
+//! | layer | channels |
+//! |---|---|
+//! | light | `R`, `G`, `B` |
+//! | albedo, and its variance | `albedo.R` …, `albedo_variance.R` … |
+//! | normal, position | `normal.X` …, `position.X` … |
+//! | depth, coverage, samples, error | `depth.Z`, `coverage.Y`, `samples.Y`, `error.Y` |
+//! | objects, materials | `CryptoObject00.R` …, `CryptoMaterial00.R` … (Cryptomatte, see [`super::cryptomatte`]) |
+//!
+//! All channels are 32-bit floats, packed without loss. Start reading at [`LayeredPicture::write`].
+
+use super::cryptomatte::Cryptomatte;
+use super::feature_layers::{FeatureLayers, channels_of};
+use super::picture_file::mean_channels;
+use crate::render::{Film, NoRoom, Purpose, Room, relative_errors};
+use crate::scene::WriteError;
+use crate::scene::image_metadata::{NOTE_KEY, exr_text};
+use crate::scene::whole_file::{Replace, WholeFile, unwritable};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text, WritableImage,
+};
+use std::io::Write;
+use std::path::Path;
+
+/// Depth where nothing is seen: programs that blur or scale a layer have no use for an infinite number.
+const FAR: f32 = 1e10;
+
+/// What a picture can have besides its light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PictureLayer {
+    /// Colour without light.
+    Albedo,
+    /// Shading normal in world space.
+    Normal,
+    /// Metres along the view axis.
+    Depth,
+    /// Metres in world space.
+    Position,
+    /// Share of samples that see a surface.
+    Coverage,
+    /// Masks of objects.
+    Object,
+    /// Masks of materials.
+    Material,
+    /// Variances of the means of albedo, normal, depth and position, of those that are there.
+    Variance,
+    /// Samples of each pixel.
+    Samples,
+    /// Estimated relative error of each pixel.
+    Error,
+}
+
+impl PictureLayer {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::Position,
+        Self::Coverage,
+        Self::Object,
+        Self::Material,
+        Self::Variance,
+        Self::Samples,
+        Self::Error,
+    ];
+
+    /// Name for the user, lower case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Albedo => "albedo",
+            Self::Normal => "normal",
+            Self::Depth => "depth",
+            Self::Position => "position",
+            Self::Coverage => "coverage",
+            Self::Object => "object",
+            Self::Material => "material",
+            Self::Variance => "variance",
+            Self::Samples => "samples",
+            Self::Error => "error",
+        }
+    }
+
+    /// Whether it is made of feature buffers; the others come from the film.
+    pub fn is_feature(self) -> bool {
+        !matches!(self, Self::Samples | Self::Error)
+    }
+}
+
+/// A film as a picture with layers.
+#[derive(Clone, Copy)]
+pub struct LayeredPicture<'a> {
+    /// The film, linear.
+    pub film: &'a Film,
+    /// Of the same picture; asked for by layers that are features.
+    pub features: Option<&'a FeatureLayers>,
+    /// Which layers.
+    pub layers: &'a [PictureLayer],
+    /// What the picture says about itself.
+    pub note: Option<&'a str>,
+}
+
+impl LayeredPicture<'_> {
+    /// Writes the picture: to a temporary name first, which then takes the place of `path`.
+    ///
+    /// # Errors
+    /// When the error is asked for and not known yet, or the file cannot be written.
+    pub fn write(&self, path: &Path, replace: Replace) -> Result<(), WriteError> {
+        drop(self.room().map_err(|error| unwritable(path, error))?);
+        let channels = self.channels().ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
+        let bytes = self.encode(channels).map_err(|error| unwritable(path, error))?;
+        let mut out = WholeFile::begin(path, replace)?;
+        out.write_all(&bytes).map_err(|error| unwritable(path, error))?;
+        out.finish()
+    }
+
+    /// The picture as the bytes of a file; `path` is what errors call it.
+    ///
+    /// # Errors
+    /// When the error is asked for and not known yet, or there is not enough memory.
+    pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, WriteError> {
+        drop(self.room()?);
+        let channels = self.channels().ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
+        self.encode(channels).map_err(|error| WriteError::Encode(Box::new(error)))
+    }
+
+    fn room(&self) -> Result<Room, NoRoom> {
+        Room::for_files(self.film.width(), self.film.height(), &[Purpose::Layers])
+    }
+
+    fn has(&self, layer: PictureLayer) -> bool {
+        self.layers.contains(&layer)
+    }
+
+    /// The masks that are asked for.
+    fn mattes(&self) -> Vec<Cryptomatte<'_>> {
+        let Some(FeatureLayers { buffers, objects, materials }) = self.features else { return Vec::new() };
+        let Some(ids) = &buffers.ids else { return Vec::new() };
+        let matte = |name, names, shares| Cryptomatte { name, names, shares, samples: buffers.samples };
+        let mut mattes = Vec::new();
+        if self.has(PictureLayer::Object) {
+            mattes.push(matte("CryptoObject", objects, &ids.objects));
+        }
+        if self.has(PictureLayer::Material) {
+            mattes.push(matte("CryptoMaterial", materials, &ids.materials));
+        }
+        mattes
+    }
+
+    /// Names and numbers of all channels but light; `None` where the error is not known.
+    fn channels(&self) -> Option<Vec<(String, Vec<f32>)>> {
+        let mut channels = Vec::new();
+        if let Some(FeatureLayers { buffers, .. }) = self.features {
+            for layer in [
+                PictureLayer::Albedo,
+                PictureLayer::Normal,
+                PictureLayer::Depth,
+                PictureLayer::Position,
+                PictureLayer::Coverage,
+            ] {
+                if !self.has(layer) {
+                    continue;
+                }
+                channels.extend(channels_of(buffers, layer.name()));
+                if self.has(PictureLayer::Variance) && layer != PictureLayer::Coverage {
+                    channels.extend(channels_of(buffers, &format!("{}_variance", layer.name())));
+                }
+            }
+        }
+        for number in channels.iter_mut().flat_map(|(_, numbers)| numbers).filter(|number| !number.is_finite()) {
+            *number = FAR;
+        }
+        channels.extend(self.mattes().iter().flat_map(Cryptomatte::channels));
+        if self.has(PictureLayer::Samples) {
+            let (width, height) = (self.film.width(), self.film.height());
+            let samples = |i: u32| self.film.samples(i % width, i / width) as f32;
+            channels.push(("samples.Y".to_owned(), (0..width * height).map(samples).collect()));
+        }
+        if self.has(PictureLayer::Error) {
+            channels.push(("error.Y".to_owned(), relative_errors(self.film)?));
+        }
+        Some(channels)
+    }
+
+    /// A whole file in memory, because the encoder seeks.
+    fn encode(&self, channels: Vec<(String, Vec<f32>)>) -> Result<Vec<u8>, exr::error::Error> {
+        let mut all = mean_channels(self.film);
+        all.extend(channels.into_iter().map(|(name, list)| AnyChannel::new(name.as_str(), FlatSamples::F32(list))));
+        let mut attributes = LayerAttributes::named(env!("CARGO_PKG_NAME"));
+        for (name, value) in self.mattes().iter().flat_map(Cryptomatte::attributes) {
+            attributes.other.insert(Text::from(name.as_str()), exr_text(&value));
+        }
+        let size = (self.film.width() as usize, self.film.height() as usize);
+        // Lines rather than tiles, and the packing that all programs read.
+        let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(all));
+        let mut image = Image::from_layer(layer);
+        if let Some(note) = self.note {
+            image.attributes.other.insert(Text::from(NOTE_KEY), exr_text(note));
+        }
+        let mut memory = std::io::Cursor::new(Vec::new());
+        image.write().non_parallel().to_buffered(&mut memory)?;
+        let mut bytes = memory.into_inner();
+        sort_attributes(&mut bytes);
+        Ok(bytes)
+    }
+}
+
+/// Brings the attributes of a file with one header into the order of their names: the library keeps them in a table whose order
+/// is another each time, and the same picture is to have the same bytes.
+fn sort_attributes(bytes: &mut [u8]) {
+    // Magic number and version come first.
+    const START: usize = 8;
+    let text_end = |from: usize| bytes[from..].iter().position(|&byte| byte == 0).map(|length| from + length);
+    let mut attributes = Vec::new();
+    let mut at = START;
+    while let Some(name_end) = text_end(at).filter(|&end| end > at) {
+        // Name, type and size, then so many bytes.
+        let Some(size_at) = text_end(name_end + 1).map(|end| end + 1) else { return };
+        let Some(size) = bytes.get(size_at..size_at + 4).and_then(|size| size.try_into().ok()) else { return };
+        let end = size_at + 4 + u32::from_le_bytes(size) as usize;
+        attributes.push(bytes[at..end].to_vec());
+        at = end;
+    }
+    attributes.sort_unstable();
+    bytes[START..at].copy_from_slice(&attributes.concat());
+}

@@ -1,0 +1,183 @@
+//! Pictures with layers, read back by the library that other programs use too, and films that keep what layers are made
+//! of.
+
+use assert_cmd::Command;
+use exr::prelude::{AttributeValue, FlatSamples, ReadChannels, ReadLayers, read};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Output;
+
+fn run(folder: &Path, line: &str) -> Output {
+    let mut command = Command::cargo_bin("firstlight").unwrap();
+    command.current_dir(folder).args(line.split_whitespace()).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.output().unwrap()
+}
+
+#[track_caller]
+fn does(folder: &Path, line: &str) {
+    let output = run(folder, line);
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[track_caller]
+fn refused(folder: &Path, line: &str) -> String {
+    let output = run(folder, line);
+    assert!(!output.status.success(), "{line}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// Channels by name, and the texts of the header.
+fn layers_of(path: &Path) -> (BTreeMap<String, Vec<f32>>, BTreeMap<String, String>) {
+    let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let layer = image.from_file(path).unwrap().layer_data;
+    let channels = layer.channel_data.list.iter().map(|channel| match &channel.sample_data {
+        FlatSamples::F32(numbers) => (channel.name.to_string(), numbers.clone()),
+        other => panic!("{}: {other:?}", channel.name),
+    });
+    let texts = layer.attributes.other.iter().filter_map(|(name, value)| match value {
+        AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+        _ => None,
+    });
+    (channels.collect(), texts.collect())
+}
+
+const ALL: &str = "albedo,normal,depth,position,coverage,object,material,variance,samples,error";
+
+/// Names as other programs expect them; sizes, ranges and sums as they must be.
+#[test]
+fn layers_have_the_names_and_numbers_that_other_programs_expect() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "render cornell-balls --size 48x32 --spp 4";
+    does(path, &format!("{scene} -o all.exr --layers {ALL}"));
+    let (channels, texts) = layers_of(&path.join("all.exr"));
+    let mut expected: Vec<String> =
+        ["R", "G", "B", "depth.Z", "depth_variance.Z", "coverage.Y", "samples.Y", "error.Y"].map(str::to_owned).into();
+    for (layer, names) in [("albedo", "RGB"), ("normal", "XYZ"), ("position", "XYZ")] {
+        expected.extend(names.chars().flat_map(|c| [format!("{layer}.{c}"), format!("{layer}_variance.{c}")]));
+    }
+    for layer in ["CryptoObject", "CryptoMaterial"] {
+        expected.extend((0..3).flat_map(|k| "RGBA".chars().map(move |c| format!("{layer}{k:02}.{c}"))));
+    }
+    expected.sort();
+    assert_eq!(channels.keys().cloned().collect::<Vec<_>>(), expected);
+    let get = |name: &str| &channels[name];
+    assert!(get("samples.Y").iter().all(|&n| n == 4.0));
+    assert!(channels.values().flatten().all(|number| number.is_finite()));
+    // The middle of the back wall, which is white and faces the camera.
+    let at = 6 * 48 + 24;
+    assert_eq!([get("normal.X")[at], get("normal.Y")[at], get("normal.Z")[at]], [0.0, 0.0, 1.0]);
+    assert!((get("position.Z")[at] - (4.9 - get("depth.Z")[at])).abs() < 1e-4, "the camera stands at 4.9 m");
+    // Masks: shares sum to what is seen, and the id of a name is its hash (of another implementation).
+    for (layer, key, name, id) in
+        [("CryptoObject", "3ae39a5", "floor", 0x7819_c83c_u32), ("CryptoMaterial", "be359d6", "white", 0xdb8f_0013)]
+    {
+        let attribute = |what: &str| texts[&format!("cryptomatte/{key}/{what}")].as_str();
+        assert_eq!(
+            [attribute("name"), attribute("hash"), attribute("conversion")],
+            [layer, "MurmurHash3_32", "uint32_to_float32"]
+        );
+        let manifest: BTreeMap<String, String> = serde_json::from_str(attribute("manifest")).unwrap();
+        assert_eq!(manifest[name], format!("{id:08x}"));
+        let ids: Vec<u32> = manifest.values().map(|hash| u32::from_str_radix(hash, 16).unwrap()).chain([0]).collect();
+        let mut sums = vec![0.0_f32; 48 * 32];
+        let mut of_name = 0.0;
+        for k in 0..3 {
+            for (of_id, of_share) in [("R", "G"), ("B", "A")] {
+                let channel = |c: &str| get(&format!("{layer}{k:02}.{c}"));
+                for ((found, share), sum) in channel(of_id).iter().zip(channel(of_share)).zip(&mut sums) {
+                    assert!(ids.contains(&found.to_bits()), "{:08x}", found.to_bits());
+                    *sum += share;
+                    of_name += if found.to_bits() == id { *share } else { 0.0 };
+                }
+            }
+        }
+        assert!(of_name > 100.0, "{name} covers {of_name} pixels");
+        let is_whole = |sum: f32| (sum - 1.0).abs() < 1e-6 || sum == 0.0;
+        assert!(sums.iter().filter(|sum| !is_whole(**sum)).count() < 160, "only along the outline of the room");
+        assert_eq!(sums[at], 1.0);
+    }
+    // Fewer layers are fewer channels, and the light is the same with layers and without.
+    does(path, &format!("{scene} -o some.exr --layers depth,samples"));
+    does(path, &format!("{scene} -o none.exr"));
+    let (some, texts) = layers_of(&path.join("some.exr"));
+    assert_eq!(some.keys().collect::<Vec<_>>(), ["B", "G", "R", "depth.Z", "samples.Y"]);
+    assert!(!texts.keys().any(|name| name.starts_with("cryptomatte")));
+    let (none, _) = layers_of(&path.join("none.exr"));
+    assert!("RGB".chars().map(String::from).all(|c| none[&c] == channels[&c] && none[&c] == some[&c]));
+    assert_eq!(some["depth.Z"], channels["depth.Z"]);
+}
+
+/// A picture of layers opens as a scene, as any picture.
+#[test]
+fn a_picture_with_layers_can_be_rendered_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    does(path, "render cornell -o a.exr --size 16x16 --spp 2 --layers albedo,object");
+    does(path, "render a.exr -o b.exr --layers albedo,object");
+    assert!(std::fs::read(path.join("a.exr")).unwrap() == std::fs::read(path.join("b.exr")).unwrap());
+    let stdout = run(path, "render a.exr -o - --format exr --layers albedo,object").stdout;
+    assert!(
+        layers_of(&path.join("a.exr")).0 == {
+            std::fs::write(path.join("c.exr"), stdout).unwrap();
+            layers_of(&path.join("c.exr")).0
+        }
+    );
+}
+
+#[test]
+fn films_keep_layers_through_resuming_and_merging() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+    let scene = "render cornell-balls --size 40x33";
+    does(path, &format!("{scene} --spp 4 -o whole.exr --film whole-film.exr --layers {ALL}"));
+    // Resumed with the layers asked for again, and without.
+    for (name, layers) in [("again", format!("--layers {ALL}")), ("kept", String::new())] {
+        does(path, &format!("{scene} --spp 2 -o r.exr --film {name}.exr --layers albedo"));
+        does(path, &format!("{scene} --spp 4 -o r.exr --film {name}.exr --resume {layers}"));
+        assert!(bytes(&format!("{name}.exr")) == bytes("whole-film.exr"), "{name}");
+    }
+    // In parts, one of which looked at nothing, by different numbers of threads.
+    does(path, &format!("{scene} --samples 0..1 -o p.exr --film a.exr --layers {ALL} --threads 1"));
+    does(path, &format!("{scene} --samples 1..2 -o p.exr --film b.exr"));
+    does(path, &format!("{scene} --samples 2..4 -o p.exr --film c.exr --layers albedo,object --threads 3"));
+    for order in ["a.exr b.exr c.exr", "c.exr a.exr b.exr"] {
+        does(path, &format!("merge {order} -o merged.exr --picture merged-picture.exr --layers {ALL} --overwrite"));
+        assert!(bytes("merged.exr") == bytes("whole-film.exr"), "{order}");
+        assert!(layers_of(&path.join("merged-picture.exr")).0 == layers_of(&path.join("whole.exr")).0, "{order}");
+    }
+    let said = refused(path, "merge b.exr c.exr -o d.exr --layers albedo");
+    assert!(said.contains("--picture"), "{said}");
+    does(path, &format!("{scene} --samples 9..10 -o p.exr --film d.exr"));
+    let said = refused(path, "merge b.exr d.exr -o e.exr --picture e-picture.exr --layers albedo");
+    assert!(said.contains("have no such layers"), "{said}");
+    // More samples for features take the place of fewer.
+    does(path, &format!("{scene} --spp 2 -o r.exr --film more.exr --layers albedo --layer-samples 4"));
+    let few = layers_of(&path.join("r.exr")).0;
+    does(path, &format!("{scene} --spp 4 -o r.exr --film more.exr --resume --layers albedo"));
+    assert!(bytes("more.exr") == bytes("whole-film.exr"));
+    assert!(few["albedo.R"] != layers_of(&path.join("r.exr")).0["albedo.R"]);
+}
+
+#[test]
+fn layers_that_cannot_be_had_are_refused_before_anything_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for (line, expected) in [
+        ("render cornell -o a.png --layers albedo", "a .png has no layers"),
+        ("render cornell -o a.exr --layers variance,samples", "add albedo, normal, depth or position"),
+        ("render cornell -o a.exr --spp 1 --layers error", "at least two samples"),
+        ("render cornell -o a.exr --layers colour", "albedo"),
+        ("render cornell -o a.exr --layer-samples 4", "--layers"),
+        ("render cornell -o a.exr --layers albedo --layer-samples 0", "1..=65536"),
+    ] {
+        let said = refused(path, line);
+        assert!(said.contains(expected), "{line}: {said}");
+    }
+    assert_eq!(std::fs::read_dir(path).unwrap().count(), 0);
+    // Frames of a sequence have layers too.
+    does(path, "render cornell -o turn.exr --size 12x12 --spp 1 --turntable 2 --layers depth");
+    let [a, b] = [1, 2].map(|k| layers_of(&path.join(format!("turn-000{k}.exr"))).0);
+    assert!(a["depth.Z"] != b["depth.Z"]);
+}
