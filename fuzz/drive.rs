@@ -164,7 +164,8 @@ fn go_on(mut film: Film) {
     let spp = film.spp();
     drop((film.means(), film.error_estimate(), film.n_bad(), film.max_spp()));
     // Films that were stopped in the middle of a pass have tiles that must catch up first: that may be long.
-    if film.max_spp() - spp > 8 || film.first_sample() > Film::MAX_SAMPLES / 2 {
+    let (least, _, most) = film.sample_counts();
+    if film.max_spp() - spp > 8 || spp - spp.min(least) > 8 || film.first_sample() > Film::MAX_SAMPLES / 2 {
         return;
     }
     static SCENE: LazyLock<Prepared> = LazyLock::new(|| {
@@ -181,7 +182,7 @@ fn go_on(mut film: Film) {
     }
     let twin = film.clone();
     // Every sample is in both.
-    assert!(film.merge(&twin).is_err() || film.max_spp() == 0);
+    assert!(film.merge(&twin).is_err() || most == 0);
 }
 
 /// The note of a picture, in a PNG or EXR or by itself.

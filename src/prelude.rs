@@ -2,7 +2,7 @@
 
 pub use crate::embed::{Error, Flow, Image, RenderOptions, Scene};
 pub use crate::frame::{Command, Progress, Session, SessionOptions, Target};
-pub use crate::render::{Integrator, PixelFilter};
+pub use crate::render::{ErrorMetric, Integrator, PixelFilter, SampleAllocation};
 pub use crate::scene::{
     ColorParam, DirectionalLight, Lens, Material, MaterialSlots, Placement, PointLight, Projection, ScalarParam,
     SceneEnvironment, Shape, SpotLight, SurfaceMaterial, View,

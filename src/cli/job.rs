@@ -3,12 +3,14 @@
 use super::console::{inform, print_bytes, remark};
 use super::failure::Failure;
 use super::progress::Progress;
-use super::render_args::{DEFAULT_SPP, RenderArgs};
+use super::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
 use firstlight::frame::{FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until};
 use firstlight::kdtree::InstructionSet;
-use firstlight::render::{Display, FEATURE_SAMPLES, Film, NoRoom, Purpose, RenderSettings, Room};
+use firstlight::render::{
+    Display, ErrorMetric, FEATURE_SAMPLES, Film, NoRoom, Purpose, RenderSettings, Room, SampleAllocation,
+};
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
     DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Rendering,
@@ -59,7 +61,19 @@ impl RenderJob {
         }
         // What is not asked for is as the film has it that is gone on with, then as the scene has it.
         let Rendering(of_scene) = *world.resource();
+        let mut display = world.resource::<DisplaySettings>().0;
+        display.exposure_stops += args.exposure;
+        let of_picture = kept.or(scene.shot.as_ref()).map(|shot| shot.allocation);
+        let allocation = match args.error_metric {
+            _ if args.uniform || args.samples.is_some() => SampleAllocation::Uniform,
+            Some(MetricArg::Relmse) => SampleAllocation::Adaptive(ErrorMetric::RelativeMse),
+            Some(MetricArg::Display) => {
+                SampleAllocation::Adaptive(ErrorMetric::Display { exposure_stops: display.exposure_stops })
+            }
+            None => of_picture.unwrap_or(SampleAllocation::Adaptive(ErrorMetric::RelativeMse)),
+        };
         let settings = RenderSettings {
+            allocation,
             integrator: (args.integrator.map(Into::into))
                 .or(kept.map(|kept| kept.integrator))
                 .unwrap_or(of_scene.integrator),
@@ -73,8 +87,6 @@ impl RenderJob {
         let FilmSize { width, height } = *world.resource();
         let size = args.size.or(kept.map(|kept| (kept.film.width, kept.film.height))).unwrap_or((width, height));
         let size = scaled(size, args.scale)?;
-        let mut display = world.resource::<DisplaySettings>().0;
-        display.exposure_stops += args.exposure;
         world.insert_resource(Rendering(settings));
         let draft = MetadataDraft::of(&mut world, Some(&scene));
         Ok(Self { scene, world, extraction, settings, display, size, build_seconds, draft })
@@ -157,7 +169,7 @@ impl RenderJob {
 
     /// The note of a picture of this film at `path`.
     pub fn note(&self, film: &Film, path: &Path) -> String {
-        let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.max_spp() > film.spp() };
+        let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven: film.is_uneven() };
         self.draft.note(path, self.size, samples, self.display.into())
     }
 

@@ -10,6 +10,7 @@ use firstlight::frame::{
     FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, check_replaced_film, read_film_file,
     write_film_with_features,
 };
+use firstlight::render::SampleAllocation;
 use firstlight::scene::ImageMetadata;
 use firstlight::scene::whole_file::Replace;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let mut films: Vec<&PathBuf> = args.films.iter().collect();
     films.sort_by_cached_key(|path| ImageMetadata::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
     let (first, others) = films.split_first().expect("two films at least");
-    let FilmFile { mut film, shot, mut features, warning } = read_film_file(first)?;
+    let FilmFile { mut film, mut shot, mut features, warning } = read_film_file(first)?;
     let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
     warn(warning);
     for path in others {
@@ -69,6 +70,12 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         let failed = |reason: String| {
             Failure::Failed(format!("{} and {} cannot be merged: {reason}", first.display(), path.display()))
         };
+        // Samples add up however they were allocated; what is gone on with is as adaptive as any part.
+        let is_adaptive = |shot: &ImageMetadata| shot.allocation != SampleAllocation::Uniform;
+        if !is_adaptive(&shot) || !is_adaptive(&other.shot) {
+            let of_both = if is_adaptive(&shot) { shot.allocation } else { other.shot.allocation };
+            (shot.allocation, other.shot.allocation) = (of_both, of_both);
+        }
         if let Some(what) = shot.differs_from(&other.shot) {
             return Err(failed(format!("they have a different {what}")));
         }
@@ -77,7 +84,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     }
     args.layers.check_kept(features.as_ref())?;
     let note = |path: &Path| {
-        let samples = (film.first_sample(), film.spp(), film.max_spp() > film.spp());
+        let samples = (film.first_sample(), film.spp(), film.is_uneven());
         ImageMetadata { first_sample: samples.0, spp: samples.1, uneven: samples.2, ..shot.clone() }
             .moved(first, path)
             .to_note()
@@ -100,12 +107,14 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         }
     }
     let error = film.error_estimate().map(|error| error.relative);
+    let (least, mean, most) = film.sample_counts();
     if args.json {
         return print(serde_json::json!({
             "output": args.output.to_string_lossy(),
             "films": args.films.len(),
             "spp": film.spp(),
             "max_spp": film.max_spp(),
+            "samples": { "least": least, "mean": mean, "most": most },
             "first_sample": film.first_sample(),
             "estimated_error": error,
         }));

@@ -298,6 +298,7 @@ fn json(
 ) -> serde_json::Value {
     let replaced: Vec<_> = replaced.iter().map(|path| path.to_string_lossy()).collect();
     let error = film.error_estimate().filter(|_| !is_dark);
+    let (least, mean, most) = film.sample_counts();
     let places = |samples: &[BadSample]| -> Vec<_> {
         samples.iter().map(|bad| serde_json::json!([bad.x, bad.y, bad.sample])).collect()
     };
@@ -306,6 +307,7 @@ fn json(
         "width": film.width(),
         "height": film.height(),
         "spp": film.spp(),
+        "samples": { "least": least, "mean": mean, "most": most },
         "first_sample": film.first_sample(),
         "seed": job.settings.seed,
         "stopped": stopped,

@@ -57,7 +57,7 @@ pub struct RenderArgs {
     /// Scale width and height.
     #[arg(help_heading = "Output", long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = parse_positive)]
     pub scale: Option<f64>,
-    /// Samples per pixel [default: 256, unless --time or --error is given].
+    /// Samples per pixel, the mean over the picture [default: 256, unless --time or --error is given].
     #[arg(help_heading = "When to stop", long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
     pub spp: Option<u32>,
     /// Render samples A to B-1 of each pixel; `firstlight merge` combines films of disjoint ranges.
@@ -101,6 +101,14 @@ pub struct RenderArgs {
     /// Stop when the estimated relative error of the picture is at most this: 1% or 0.01.
     #[arg(help_heading = "When to stop", long, value_name = "ERROR", allow_negative_numbers = true, value_parser = parse_share)]
     pub error: Option<f64>,
+    /// Take as many samples of every pixel [default: more where the error is larger, except with --samples]
+    ///
+    /// --spp is the mean over the picture then.
+    #[arg(help_heading = "Allocation of samples", long, conflicts_with = "error_metric")]
+    pub uniform: bool,
+    /// The error that the allocation of samples minimises [default: relmse].
+    #[arg(help_heading = "Allocation of samples", long, value_enum, value_name = "METRIC", conflicts_with = "samples")]
+    pub error_metric: Option<MetricArg>,
     /// Number of worker threads [default: all cores]; the picture does not depend on it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -139,6 +147,14 @@ pub enum FormatArg {
     Png,
     /// Linear light (HDR).
     Exr,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MetricArg {
+    /// Of linear light, relative to its level.
+    Relmse,
+    /// Of the picture as it is displayed.
+    Display,
 }
 
 impl RenderCommand {

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::number::{parse_positive, parse_size};
 use super::stop::Stop;
 use clap::Args;
-use firstlight::render::{Prepared, Purpose, RenderSettings, Room, Techniques};
+use firstlight::render::{ErrorMetric, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques};
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
     csv, foreign_share, measure_curve, page, summary_text,
@@ -226,7 +226,8 @@ impl ReportScene {
         let light_traced = extraction.prepared.features().caustics;
         let room = Room::for_film(size.0, size.1, light_traced, &[Purpose::Exr]);
         drop(room.map_err(|error| Failure::Failed(error.to_string()))?);
-        let settings = RenderSettings { seed: args.seed, ..world.resource::<Rendering>().0 };
+        let allocation = SampleAllocation::Adaptive(ErrorMetric::RelativeMse);
+        let settings = RenderSettings { seed: args.seed, allocation, ..world.resource::<Rendering>().0 };
         Ok(Self {
             title: scene.source.title(),
             inputs,
@@ -247,7 +248,7 @@ impl ReportScene {
         progress: &mut ReportProgress,
         stop: &Stop,
     ) -> (Option<SceneOutcome>, Option<String>) {
-        let steps = self.measure_curve(limits, Techniques::default(), "all techniques", progress, stop);
+        let steps = self.measure_curve(limits, self.settings, "all techniques", progress, stop);
         let mut missing =
             stop.is_asked().then(|| "its later steps and the comparison of techniques are missing".to_owned());
         let Some(last_rung) = steps.last() else { return (None, Some("no step was completed".to_owned())) };
@@ -265,11 +266,10 @@ impl ReportScene {
         let ablations = if args.no_ablation {
             Vec::new()
         } else {
-            Techniques::ablations()
+            self.ablations()
                 .into_iter()
-                .map_while(|(technique, techniques)| {
-                    let others =
-                        self.measure_curve(limits, techniques, &format!("without {technique}"), progress, stop);
+                .map_while(|(technique, settings)| {
+                    let others = self.measure_curve(limits, settings, &format!("without {technique}"), progress, stop);
                     // Half a curve would be compared with a whole one.
                     if stop.is_asked() {
                         missing.get_or_insert_with(|| {
@@ -300,6 +300,14 @@ impl ReportScene {
         (Some(outcome), missing)
     }
 
+    /// What is compared: each technique switched off alone.
+    fn ablations(&self) -> Vec<(&'static str, RenderSettings)> {
+        let with = |techniques| RenderSettings { techniques, ..self.settings };
+        let even = RenderSettings { allocation: SampleAllocation::Uniform, ..self.settings };
+        let techniques = Techniques::ablations().map(|(name, techniques)| (name, with(techniques)));
+        techniques.into_iter().chain([("adaptive allocation of samples", even)]).collect()
+    }
+
     /// A new one each time: what a render finds out about a scene and keeps (where caustics come from) must be found out,
     /// and paid for, by each.
     fn prepared(&self) -> Prepared {
@@ -309,12 +317,11 @@ impl ReportScene {
     fn measure_curve(
         &self,
         limits: CurveLimits,
-        techniques: Techniques,
+        settings: RenderSettings,
         what: &str,
         progress: &mut ReportProgress,
         stop: &Stop,
     ) -> Vec<CurveStep> {
-        let settings = RenderSettings { techniques, ..self.settings };
         let mut tell = progress.task(format!("{}, {what}", self.title), ReportProgress::CURVE, self.size);
         measure_curve(&self.prepared(), &settings, self.size, limits, &mut tell, &|| stop.is_asked())
     }
@@ -363,7 +370,7 @@ impl ReportProgress {
     const REFERENCE: f64 = REFERENCE_FACTOR as f64;
 
     fn new(scenes: &[ReportScene], ablation: bool, given: bool) -> Self {
-        let curves = 1 + if ablation { Techniques::ablations().len() } else { 0 };
+        let curves = 1 + if ablation { Techniques::ablations().len() + 1 } else { 0 };
         let weight = Self::CURVE * curves as f64 + if given { 0.0 } else { Self::REFERENCE };
         let pixels: f64 = scenes.iter().map(|scene| f64::from(scene.size.0) * f64::from(scene.size.1)).sum();
         Self { bar: Bar::new((weight * pixels) as u64), done: 0.0 }

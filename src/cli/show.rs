@@ -165,6 +165,8 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         integrator: None,
         filter: None,
         max_depth: None,
+        uniform: false,
+        error_metric: None,
         exposure: 0.0,
         json: false,
     };

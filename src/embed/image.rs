@@ -79,7 +79,7 @@ impl Image {
     /// If the extension is neither of the two, or the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let (path, size) = (path.as_ref(), (self.width(), self.height()));
-        let uneven = self.film.max_spp() > self.film.spp();
+        let uneven = self.film.is_uneven();
         let samples = ImageSamples { first: self.film.first_sample(), spp: self.film.spp(), uneven };
         let note = self.metadata.note(path, size, samples, self.display.into());
         let print = Print { film: &self.film, display: &self.display, size, note: Some(&note) };

@@ -2,7 +2,7 @@
 
 use super::Error;
 use crate::frame::{Progress, Target};
-use crate::render::{Integrator, PixelFilter, RenderSettings};
+use crate::render::{ErrorMetric, Integrator, PixelFilter, RenderSettings, SampleAllocation};
 use crate::scene::{check_film_size, check_max_depth};
 use std::fmt;
 
@@ -32,6 +32,7 @@ pub struct RenderOptions {
     max_depth: Option<u32>,
     seed: Option<u32>,
     filter: Option<PixelFilter>,
+    allocation: Option<SampleAllocation>,
     pub(super) exposure: f32,
     pub(super) threads: Option<usize>,
     on_progress: Option<OnProgress>,
@@ -48,7 +49,7 @@ impl RenderOptions {
         self
     }
 
-    /// Sets the target in samples per pixel. The first target that is reached ends the rendering.
+    /// Sets the target in samples per pixel, the mean over all pixels. The first target that is reached ends the rendering.
     pub fn spp(mut self, spp: u32) -> Self {
         self.target.spp = Some(spp);
         self
@@ -87,6 +88,13 @@ impl RenderOptions {
     /// Sets the pixel reconstruction filter.
     pub fn filter(mut self, filter: PixelFilter) -> Self {
         self.filter = Some(filter);
+        self
+    }
+
+    /// Sets how samples are allocated to pixels: more where the relative error is larger unless this is set, or the scene was
+    /// opened from an image that has another allocation.
+    pub fn allocation(mut self, allocation: SampleAllocation) -> Self {
+        self.allocation = Some(allocation);
         self
     }
 
@@ -130,13 +138,16 @@ impl RenderOptions {
         Target { spp: self.target.spp.or(is_open.then_some(Self::DEFAULT_SPP)), ..self.target }
     }
 
-    /// Returns the settings of a rendering; `of_scene` supplies what is not set.
-    pub(super) fn settings(&self, of_scene: RenderSettings) -> RenderSettings {
+    /// Returns the settings of a rendering; `of_scene` supplies what is not set, `of_image` the allocation of the image that
+    /// the scene was opened from.
+    pub(super) fn settings(&self, of_scene: RenderSettings, of_image: Option<SampleAllocation>) -> RenderSettings {
+        const DEFAULT: SampleAllocation = SampleAllocation::Adaptive(ErrorMetric::RelativeMse);
         RenderSettings {
             integrator: self.integrator.unwrap_or(of_scene.integrator),
             max_depth: self.max_depth.unwrap_or(of_scene.max_depth),
             seed: self.seed.unwrap_or(of_scene.seed),
             filter: self.filter.unwrap_or(of_scene.filter),
+            allocation: self.allocation.or(of_image).unwrap_or(DEFAULT),
             ..of_scene
         }
     }
@@ -152,7 +163,7 @@ impl RenderOptions {
 
 impl fmt::Debug for RenderOptions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { size, target, integrator, max_depth, seed, filter, exposure, threads, .. } = self;
+        let Self { size, target, integrator, max_depth, seed, filter, allocation, exposure, threads, .. } = self;
         f.debug_struct("RenderOptions")
             .field("size", size)
             .field("target", target)
@@ -160,6 +171,7 @@ impl fmt::Debug for RenderOptions {
             .field("max_depth", max_depth)
             .field("seed", seed)
             .field("filter", filter)
+            .field("allocation", allocation)
             .field("exposure", exposure)
             .field("threads", threads)
             .finish_non_exhaustive()

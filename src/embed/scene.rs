@@ -101,8 +101,9 @@ impl Scene {
         let mut trees = self.loaded.as_ref().map(|loaded| loaded.trees.clone()).unwrap_or_default();
         add_trees(&mut trees, &inputs);
         let extraction = Extraction::new(&inputs, &trees);
-        let settings =
-            options.settings(world.get_resource::<Rendering>().map(|of_scene| of_scene.0).unwrap_or_default());
+        let of_scene = world.get_resource::<Rendering>().map(|of_scene| of_scene.0).unwrap_or_default();
+        let shot = self.loaded.as_ref().and_then(|loaded| loaded.shot.as_ref());
+        let settings = options.settings(of_scene, shot.map(|shot| shot.allocation));
         settings.check()?;
         let FilmSize { width, height } = world.get_resource::<FilmSize>().copied().unwrap_or_default();
         let (width, height) = options.size.unwrap_or((width, height));

@@ -6,7 +6,7 @@
 
 use super::rig::Rig;
 use super::{Bookmarks, Edit, Target};
-use crate::render::{Inspection, Integrator, ToneCurve};
+use crate::render::{Inspection, Integrator, SampleAllocation, ToneCurve};
 use crate::scene::{BadValue, Lens, Projection, View, check_film_size};
 use bevy_ecs::message::Message;
 use serde::{Deserialize, Serialize};
@@ -150,6 +150,8 @@ pub enum Command {
     Restart,
     /// Set the light model.
     SetIntegrator(Integrator),
+    /// Set how samples are spread over the pixels.
+    SetAllocation(SampleAllocation),
     /// Worker threads; 0 is one for each processor.
     SetThreads {
         /// How many; 0 for one per processor.

@@ -9,7 +9,7 @@
 
 use super::feature_layers::{FeatureHeader, FeatureLayers, LAYERS, channels_of, id_channels, read_layers};
 use super::picture_file::mean_channels;
-use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, NoRoom, Purpose, Room};
+use crate::render::{Film, FilmLayout, FilmRecord, N_PLANES, NoRoom, OldFilmLayout, Purpose, Room};
 use crate::scene::file::check_film_size;
 use crate::scene::image_metadata::{FILM_KEY, NOTE_KEY, exr_text, note_in, string_of};
 use crate::scene::whole_file::{Replace, WholeFile, is_film, unwritable};
@@ -99,18 +99,28 @@ impl From<FilmError> for String {
 
 /// What stands in the attribute.
 #[derive(Serialize, Deserialize)]
-struct Header {
+struct Header<Layout> {
     /// A newer program that writes something else counts this up.
     format: u32,
     /// 32 digits, of all bytes of the file with zeros in their place. In format 1, of the numbers of all pixels alone.
     check: String,
-    layout: FilmLayout,
+    layout: Layout,
     /// Of the feature buffers, where the film has them; programs that do not know them skip their channels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     features: Option<FeatureHeader>,
 }
 
-const FORMAT: u32 = 2;
+/// What every format begins with.
+#[derive(Deserialize)]
+struct HeaderStart {
+    format: u32,
+    check: String,
+}
+
+const FORMAT: u32 = 3;
+
+/// Tiles had the same samples in all of their pixels, and no mean of traced light was kept.
+const TILES_FORMAT: u32 = 2;
 
 /// Header and note are not under its checksum.
 const OLD_FORMAT: u32 = 1;
@@ -118,8 +128,8 @@ const OLD_FORMAT: u32 = 1;
 /// Stands where the checksum will be.
 const NO_CHECK: &str = "00000000000000000000000000000000";
 
-/// Of all channels: three means, and two words for each number of the film.
-const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * N_PLANES as u64);
+/// Of all channels at least: three means, and two words for each number of the film.
+const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * OldFilmLayout::N_PLANES as u64);
 
 /// Writes a film with the note of what it shows; whole or not at all. It may take the place of a film of the same
 /// picture whose samples it has, and of no other.
@@ -153,7 +163,10 @@ pub fn write_film_with_features(
     let path = &out.path().to_path_buf();
     let purpose = if features.is_some() { Purpose::Layers } else { Purpose::FilmFile };
     drop(Room::for_files(film.width(), film.height(), &[purpose]).map_err(|error| unwritable(path, error))?);
-    let mut bytes = encode(film, features, note, FORMAT, NO_CHECK).map_err(|error| unwritable(path, error))?;
+    let FilmRecord { layout, planes } = film.to_record();
+    let of_features = features.map(FeatureLayers::header);
+    let header = Header { format: FORMAT, check: NO_CHECK.to_owned(), layout, features: of_features };
+    let mut bytes = encode(film, &planes, features, note, &header).map_err(|error| unwritable(path, error))?;
     let place = place_of_check(&bytes).expect("the header has just been written");
     let check = checksum(&bytes, &place).to_string();
     bytes[place].copy_from_slice(check.as_bytes());
@@ -161,21 +174,18 @@ pub fn write_film_with_features(
     out.finish()
 }
 
-/// A whole file in memory, with this for its checksum.
+/// A whole file in memory.
 fn encode(
     film: &Film,
+    planes: &[Vec<f64>],
     features: Option<&FeatureLayers>,
     note: &str,
-    format: u32,
-    check: &str,
+    header: &Header<impl Serialize>,
 ) -> Result<Vec<u8>, exr::error::Error> {
-    let record = film.to_record();
-    let of_features = features.map(FeatureLayers::header);
-    let header = Header { format, check: check.to_owned(), layout: record.layout, features: of_features };
     // Plain structs and numbers can always be written.
-    let header = ron::to_string(&header).expect("a film's header is plain data");
+    let header = ron::to_string(header).expect("a film's header is plain data");
     let mut channels = mean_channels(film);
-    for (plane, name) in record.planes.iter().zip(plane_names()) {
+    for (plane, name) in planes.iter().zip(plane_names()) {
         let half =
             |shift: u32| FlatSamples::U32(plane.iter().map(|number| (number.to_bits() >> shift) as u32).collect());
         channels.push(AnyChannel::new(format!("{name}.upper").as_str(), half(32)));
@@ -286,18 +296,25 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
     let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
         return Err(FilmProblem::NoFilm);
     };
-    let film: Header = ron::from_str(&string_of(text)).map_err(|error| damaged(&error))?;
-    if film.format > FORMAT {
+    let text = string_of(text);
+    let HeaderStart { format, check } = ron::from_str(&text).map_err(|error| damaged(&error))?;
+    if format > FORMAT {
         return Err(FilmProblem::Newer);
     }
     const WRONG: &str = "checksum mismatch";
-    if film.format >= FORMAT {
+    if format > OLD_FORMAT {
         let place = place_of_check(bytes).ok_or_else(|| damaged(&WRONG))?;
         if checksum(bytes, &place).to_string().as_bytes() != &bytes[place] {
             return Err(damaged(&WRONG));
         }
     }
-    let FilmLayout { width, height, .. } = film.layout;
+    let known = if format > TILES_FORMAT {
+        ron::from_str::<Header<FilmLayout>>(&text).map(|header| (header.layout, header.features))
+    } else {
+        ron::from_str::<Header<OldFilmLayout>>(&text).map(|header| (header.layout.renewed(), header.features))
+    };
+    let (layout, features) = known.map_err(|error| damaged(&error))?;
+    let FilmLayout { width, height, .. } = layout;
     check_film_size(width, height)?;
     if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {
         return Err(damaged(&"inconsistent size"));
@@ -331,7 +348,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
         Some(FlatSamples::U32(words)) => Ok(words),
         _ => Err(missing(&name)),
     };
-    let features = film.features.map(|of_features| {
+    let features = features.map(|of_features| {
         let numbers = |name: &str| match samples(name) {
             Some(FlatSamples::F32(numbers)) => Ok(numbers.clone()),
             _ => Err(missing(name)),
@@ -340,16 +357,18 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
     });
     let features = features.transpose()?;
     let mut planes = Vec::with_capacity(N_PLANES);
-    for name in plane_names() {
+    let n_planes = if format > TILES_FORMAT { N_PLANES } else { OldFilmLayout::N_PLANES };
+    for name in plane_names().take(n_planes) {
         let (upper, lower) = (words(format!("{name}.upper"))?, words(format!("{name}.lower"))?);
         let pairs = upper.iter().zip(lower);
         planes.push(pairs.map(|(&u, &l)| f64::from_bits(u64::from(u) << 32 | u64::from(l))).collect());
     }
-    let record = FilmRecord { layout: film.layout, planes };
-    let is_old = film.format <= OLD_FORMAT;
-    if is_old && checksum_of_numbers(&record).to_string() != film.check {
+    let is_old = format <= OLD_FORMAT;
+    if is_old && checksum_of_numbers(&planes).to_string() != check {
         return Err(damaged(&WRONG));
     }
+    planes.resize_with(N_PLANES, || vec![0.0; n_pixels as usize]);
+    let record = FilmRecord { layout, planes };
     let film = Film::from_record(&record).map_err(|error| damaged(&error))?;
     let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
     let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its metadata is missing or too long"))?)?;
@@ -365,14 +384,14 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
 }
 
 fn plane_names() -> impl Iterator<Item = String> {
-    ["sum", "rest", "mean", "lamps.sum", "lamps.rest"]
+    ["sum", "rest", "mean", "lamps.sum", "lamps.rest", "lamps.mean"]
         .into_iter()
         .flat_map(|part| ["R", "G", "B"].map(|channel| format!("{part}.{channel}")))
 }
 
 /// The checksum of [`OLD_FORMAT`].
-fn checksum_of_numbers(record: &FilmRecord) -> Fingerprint {
-    record.planes.iter().fold(Fingerprint::default(), |print, plane| {
+fn checksum_of_numbers(planes: &[Vec<f64>]) -> Fingerprint {
+    planes.iter().fold(Fingerprint::default(), |print, plane| {
         print.with(plane.iter().flat_map(|number| number.to_bits().to_le_bytes()))
     })
 }
@@ -381,7 +400,7 @@ fn checksum_of_numbers(record: &FilmRecord) -> Fingerprint {
 mod tests {
     use super::*;
     use crate::frame::{Target, render_offline};
-    use crate::render::RenderSettings;
+    use crate::render::{OldTileRecord, RenderSettings, TileRecord};
     use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
     /// A film of a scene with light paths, and its note.
@@ -425,8 +444,8 @@ mod tests {
             (text("mean_of:4"), text("mean_of:2")),
             (text("seed: 0"), text("seed: 1")),
             (text("spp: 4"), text("spp: 8")),
-            (text("format:2"), text("format:1")),
-            (text("format:2"), text("format:0")),
+            (text("format:3"), text("format:2")),
+            (text("format:3"), text("format:1")),
             (text("cornell-balls"), text("cornell-bells")),
         ] {
             let at = whole.windows(from.len()).position(|part| part == from);
@@ -437,22 +456,46 @@ mod tests {
         }
     }
 
+    /// The file that an older program wrote of the film.
+    fn old_file(film: &Film, note: &str, format: u32) -> Vec<u8> {
+        let FilmRecord { layout, mut planes } = film.to_record();
+        planes.truncate(OldFilmLayout::N_PLANES);
+        let of_tile = |tile: &TileRecord| OldTileRecord { samples: tile.blocks[0].samples.clone(), bad: vec![] };
+        let FilmLayout { width, height, tile_size, tiles, light_traced, .. } = layout;
+        let tiles = tiles.iter().map(of_tile).collect();
+        let layout = OldFilmLayout { width, height, tile_size, tiles, light_traced };
+        let check = if format > OLD_FORMAT { NO_CHECK.to_owned() } else { checksum_of_numbers(&planes).to_string() };
+        let mut bytes = encode(film, &planes, None, note, &Header { format, check, layout, features: None }).unwrap();
+        if format > OLD_FORMAT {
+            let place = place_of_check(&bytes).unwrap();
+            let check = checksum(&bytes, &place).to_string();
+            bytes[place].copy_from_slice(check.as_bytes());
+        }
+        bytes
+    }
+
     #[test]
-    fn a_film_of_the_old_format_is_read_with_a_warning_and_written_in_the_new_one() {
+    fn a_film_of_an_old_format_is_read_and_written_in_the_new_one() {
         let folder = tempfile::tempdir().unwrap();
         let (film, note) = tiny(4);
-        let check = checksum_of_numbers(&film.to_record()).to_string();
-        let old = encode(&film, None, &note, OLD_FORMAT, &check).unwrap();
-        let kept = read_bytes(&old).unwrap();
-        assert!(kept.film.to_record() == film.to_record());
-        assert!(kept.warning.unwrap().contains("a.exr: is a film of an older format"));
-        // Its numbers were always under the checksum, and its two counts of samples must agree.
-        assert!(read_bytes(&encode(&film, None, &note, OLD_FORMAT, NO_CHECK).unwrap()).is_err());
-        let counted = note.replace("spp: 4", "spp: 8");
-        assert!(read_bytes(&encode(&film, None, &counted, OLD_FORMAT, &check).unwrap()).is_err());
-        let path = folder.path().join("b.exr");
-        write_film_file(&kept.film, &kept.shot.to_note(), &path).unwrap();
-        assert_eq!(read_film_file(&path).unwrap().warning, None);
+        for format in [OLD_FORMAT, TILES_FORMAT] {
+            let old = old_file(&film, &note, format);
+            let kept = read_bytes(&old).unwrap();
+            assert!(kept.film.means() == film.means() && kept.film.spp() == 4);
+            // What it knew of its error is known again after the next two doublings.
+            assert!(kept.film.error_estimate().is_none());
+            let warning = kept.warning.unwrap_or_default();
+            assert_eq!(warning.contains("a.exr: is a film of an older format"), format == OLD_FORMAT, "{warning}");
+            // The numbers were always under the checksum, and the two counts of samples must agree.
+            let find = |what: &[u8]| old.windows(what.len()).position(|part| part == what).unwrap();
+            let mut changed = old.clone();
+            changed[find(b"check:\"") + 7] ^= 1;
+            assert!(read_bytes(&changed).is_err());
+            assert!(read_bytes(&old_file(&film, &note.replace("spp: 4", "spp: 8"), format)).is_err());
+            let path = folder.path().join(format!("{format}.exr"));
+            write_film_file(&kept.film, &kept.shot.to_note(), &path).unwrap();
+            assert_eq!(read_film_file(&path).unwrap().warning, None);
+        }
     }
 
     /// Attributes are bytes, whatever the library thinks of letters.

@@ -192,6 +192,10 @@ impl CommandParams<'_, '_> {
                 let settings = crate::render::RenderSettings { integrator, ..self.rendering.0 };
                 self.rendering.set_if_neq(Rendering(settings));
             }
+            Command::SetAllocation(allocation) => {
+                let settings = crate::render::RenderSettings { allocation, ..self.rendering.0 };
+                self.rendering.set_if_neq(Rendering(settings));
+            }
             Command::SetThreads { threads } => drop(self.threads.set_if_neq(Threads(threads.min(MAX_THREADS)))),
             Command::Open { path } => match SceneSource::parse(&path) {
                 Ok(source) => {

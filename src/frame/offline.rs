@@ -1,6 +1,8 @@
 //! Rendering without a window: until a target is reached, on the current rayon pool.
 
-use crate::render::{BadSample, ErrorEstimate, Film, Prepared, RayCounts, Region, RenderSettings, advance_region};
+use crate::render::{
+    BadSample, ErrorEstimate, Film, Prepared, RayCounts, Region, RenderSettings, SampleAllocation, advance_region,
+};
 use crate::scene::BadValue;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -8,7 +10,7 @@ use std::time::{Duration, Instant};
 /// When a picture is good enough; the first that is reached ends it. Without any, it goes on for ever.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Target {
-    /// Samples per pixel.
+    /// Samples per pixel; of an adaptive film the mean over all pixels.
     pub spp: Option<u32>,
     /// Seconds of rendering.
     pub seconds: Option<f64>,
@@ -43,7 +45,7 @@ impl Target {
 /// How far it is, told a few times a second.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Samples that every pixel has.
+    /// Samples that every pixel has; of an adaptive film the mean over all pixels.
     pub spp: u32,
     /// Seconds of rendering so far.
     pub seconds: f64,
@@ -119,7 +121,11 @@ pub fn render_region_until(
         let before = film.spp_in(region);
         let late = || stop() || (before > 0 && deadline.is_some_and(|deadline| Instant::now() >= deadline));
         let at_most = before.saturating_add(step).min(goal);
-        let next = target.error.map_or(at_most, |error| first_worth_a_look(film, region, error, at_most));
+        let look = target.error.map(|error| match settings.allocation {
+            SampleAllocation::Adaptive(_) if region.is_none() => next_look(before),
+            _ => first_worth_a_look(film, region, error, at_most),
+        });
+        let next = look.map_or(at_most, |look| look.min(at_most));
         let pass = advance_region(prepared, settings, film, region, next, &late);
         report.rays += pass.rays;
         report.n_bad += pass.n_bad;
@@ -129,7 +135,8 @@ pub fn render_region_until(
         report.seconds = start.elapsed().as_secs_f64();
         let (spp, seconds, error) = (film.spp_in(region), report.seconds, film.error_estimate_in(region));
         let go_on = progress(Progress { spp, seconds, rays: report.rays, error });
-        if !go_on || stop() || target.reached(spp, seconds, error.map(|error| error.relative)) {
+        let error = error.map(|error| error.relative).filter(|_| look == Some(spp));
+        if !go_on || stop() || target.reached(spp, seconds, error) {
             break;
         }
         // Whole passes as long as a slice, growing gently while the rate is still unknown.
@@ -140,7 +147,15 @@ pub fn render_region_until(
     report
 }
 
-/// The first number of samples up to `at_most` at which the film could turn out to be good enough: where its error so
+/// Where the error of an adaptive film is looked at: it is measured anew with every block that doubles its samples, and
+/// where it is looked at must not depend on how quick the machine is. Eight times from one power of two to the next.
+fn next_look(now: u32) -> u32 {
+    let step = (1 << now.max(1).ilog2()) / 8;
+    let step = step.max(1);
+    (now / step + 1).saturating_mul(step)
+}
+
+/// The first number of samples up to `at_most` at which an even film could turn out to be good enough: where its error so
 /// far, extended, is down to `target`, or at the next power of two, where it is measured anew.
 fn first_worth_a_look(film: &Film, region: Option<&Region>, target: f64, at_most: u32) -> u32 {
     let now = film.spp_in(region);

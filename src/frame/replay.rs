@@ -4,7 +4,7 @@ use super::background::BackgroundTasks;
 use super::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
 use super::resources::{CurrentScene, PictureSize, RenderState, SceneGeneration, StopAt};
 use super::{Command, MessageKind, Session, SessionOptions, Target, render_offline_until};
-use crate::render::{Film, Room};
+use crate::render::{ErrorMetric, Film, Room, SampleAllocation};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use crate::scene::{
     DisplaySettings, Rendering, SceneSource, UpAxis, WriteError, absolute, check_film_size, relative_path, text_to_path,
@@ -104,6 +104,8 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         height: header.height,
         threads: options.threads,
         seed: header.seed,
+        // As the window has it.
+        allocation: SampleAllocation::Adaptive(ErrorMetric::RelativeMse),
         target: idle,
         up,
         yielding: false,

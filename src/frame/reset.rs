@@ -131,6 +131,9 @@ pub fn compare_settings(old: &RenderSettings, new: &RenderSettings, changes: &mu
     if old.seed != new.seed {
         changes.add(Level::Restart, "seed");
     }
+    if old.allocation != new.allocation {
+        changes.add(Level::Restart, "sample allocation");
+    }
 }
 
 pub fn compare_displays(old: &Display, new: &Display, changes: &mut Changes) {

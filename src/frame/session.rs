@@ -22,7 +22,7 @@ use super::systems::{accumulate, develop, edit, present, rebuild, reset};
 use super::views::{Bookmarks, ViewTrail};
 use super::worker::{Waker, Worker};
 use super::{Command, LatencyHistogram, Target};
-use crate::render::{Film, Prepared, RenderSettings};
+use crate::render::{Film, Prepared, RenderSettings, SampleAllocation};
 use crate::scene::{
     BadValue, Description, DisplaySettings, Extent, Inventory, LoadedScene, MetadataDraft, ModelChoice, Rendering,
     SceneInputs, SceneSource, UpAxis, check_film_size,
@@ -46,6 +46,8 @@ pub struct SessionOptions {
     pub threads: Option<usize>,
     /// Seed of the random numbers.
     pub seed: u32,
+    /// How samples are spread over the pixels of scenes that do not come from an image, which has its own.
+    pub allocation: SampleAllocation,
     /// When the picture is good enough; without a target it is rendered for ever.
     pub target: Target,
     /// Workers give way to other threads, for one that draws a window too.
@@ -120,7 +122,9 @@ impl Session {
         let waker = options.waker;
         world.insert_resource(BackgroundTasks::new(waker.clone()));
         world.insert_resource(PictureSize { width: options.width, height: options.height });
-        world.insert_resource(Rendering(RenderSettings { seed: options.seed, ..RenderSettings::default() }));
+        let settings =
+            RenderSettings { seed: options.seed, allocation: options.allocation, ..RenderSettings::default() };
+        world.insert_resource(Rendering(settings));
         world.insert_resource(StopAt(options.target));
         world.insert_resource(Threads(threads));
         world.insert_resource(ModelUp(options.up));

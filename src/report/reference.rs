@@ -5,7 +5,7 @@
 
 use super::LinearPicture;
 use crate::frame::write_film;
-use crate::render::{Display, Film, Prepared, RenderSettings, advance};
+use crate::render::{Display, Film, Prepared, RenderSettings, SampleAllocation, advance};
 use crate::scene::whole_file::write_whole;
 use crate::scene::{FileKind, Fingerprint, InputFile};
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,8 @@ impl Key {
         let plain: String =
             stem.chars().take(40).map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
         // Includes the version, because another one may have fixed errors.
-        let settings = RenderSettings { seed: 0, techniques: Default::default(), ..*settings };
+        let allocation = SampleAllocation::Uniform;
+        let settings = RenderSettings { seed: 0, techniques: Default::default(), allocation, ..*settings };
         let rest = format!("{settings:?} {}", env!("CARGO_PKG_VERSION"));
         let hash = Fingerprint::default().with(scene.0.to_le_bytes()).with(rest.bytes());
         Self { name: format!("{plain}-{}x{}-{hash}", size.0, size.1), size }
@@ -95,7 +96,8 @@ impl ReferenceStore {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Reference, Option<String>)> {
         // Any seed other than the measured one: an image agrees too well with itself.
-        let settings = RenderSettings { seed: !settings.seed, techniques: Default::default(), ..*settings };
+        let allocation = SampleAllocation::Uniform;
+        let settings = RenderSettings { seed: !settings.seed, techniques: Default::default(), allocation, ..*settings };
         let mut film = Film::new(key.size.0, key.size.1);
         let mut slice = 4;
         while film.spp() < spp {

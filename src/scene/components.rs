@@ -321,7 +321,7 @@ impl Default for FilmSize {
 }
 
 /// Light model, depth and seed.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rendering(pub RenderSettings);
 
 /// Exposure and tone curve; no sample depends on them.

@@ -12,7 +12,7 @@ use super::input_file::{FileKind, InputFile, ReadError};
 use super::limits::Limits;
 use super::relative::{absolute, relative_path, text_to_path};
 use super::source::{SceneSource, UpAxis};
-use crate::render::{Film, Integrator};
+use crate::render::{Film, Integrator, SampleAllocation};
 use exr::meta::attribute::{AttributeValue, Text};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
@@ -94,8 +94,11 @@ pub struct ImageMetadata {
     pub seed: u32,
     /// The number of each pixel's first sample.
     pub first_sample: u32,
-    /// Samples of each pixel.
+    /// Samples of each pixel, or the mean over all.
     pub spp: u32,
+    /// How samples are spread over the pixels.
+    #[serde(default, skip_serializing_if = "is_uniform")]
+    pub allocation: SampleAllocation,
     /// Some pixels have more samples: it was stopped in the middle of a pass, and cannot be made again to the last bit.
     #[serde(default)]
     pub uneven: bool,
@@ -255,6 +258,7 @@ impl ImageMetadata {
             (self.max_depth != other.max_depth, "maximum depth"),
             (self.film.filter != other.film.filter, "pixel filter"),
             (self.seed != other.seed, "seed"),
+            (self.allocation != other.allocation, "allocation of samples"),
         ];
         checks.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what)
     }
@@ -267,6 +271,10 @@ impl ImageMetadata {
         file.max_depth = self.max_depth;
         file.display = self.display;
     }
+}
+
+fn is_uniform(allocation: &SampleAllocation) -> bool {
+    *allocation == SampleAllocation::Uniform
 }
 
 fn options() -> ron::Options {
@@ -318,8 +326,8 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
         return chunk.get_text().map_err(unreadable);
     }
     if start[..n.min(4)] == [0x76, 0x2f, 0x31, 0x01] {
-        /// Of all that stands before the pixels beside the note.
-        const HEADER_BYTES: u64 = 1 << 20;
+        /// Of all that stands before the pixels beside the note: of a film, some fifty bytes for each block of pixels.
+        const HEADER_BYTES: u64 = 64 << 20;
         let header = BufReader::new(file).take(limits.note_bytes.saturating_add(HEADER_BYTES));
         let meta = exr::meta::MetaData::read_from_buffered(header, false)
             .map_err(|error| MetadataError::Damaged(Box::new(error)))?;

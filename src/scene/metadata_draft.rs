@@ -7,6 +7,7 @@ use super::image_metadata::{FORMAT, ImageMetadata, ImageSamples, ImageScene};
 use super::loaded::LoadedScene;
 use super::relative::{absolute, relative_path};
 use super::source::{SceneSource, UpAxis};
+use crate::render::SampleAllocation;
 use bevy_ecs::prelude::World;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -21,6 +22,7 @@ pub struct MetadataDraft {
     /// The scene as it was opened.
     loaded: Option<LoadedScene>,
     seed: u32,
+    allocation: SampleAllocation,
     prints: OnceLock<Prints>,
 }
 
@@ -36,14 +38,15 @@ impl MetadataDraft {
     /// Of what `world` shows; `loaded` is the scene that was opened into it.
     pub fn of(world: &mut World, loaded: Option<&LoadedScene>) -> Self {
         let description = Description::of(world, loaded);
-        let seed = world.get_resource::<super::Rendering>().map_or(0, |rendering| rendering.0.seed);
+        let settings = world.get_resource::<super::Rendering>().map(|rendering| rendering.0).unwrap_or_default();
         Self {
             source: loaded.map(|loaded| loaded.source.clone()),
             up: loaded.and_then(|loaded| loaded.up),
             content: SceneContent::of(world, &description),
             loaded: loaded.cloned(),
             description,
-            seed,
+            seed: settings.seed,
+            allocation: settings.allocation,
             prints: OnceLock::new(),
         }
     }
@@ -87,6 +90,7 @@ impl MetadataDraft {
             seed: self.seed,
             first_sample: samples.first,
             spp: samples.spp,
+            allocation: self.allocation,
             uneven: samples.uneven,
             text: has_changed.then(|| file.to_ron()),
         };

@@ -103,13 +103,17 @@ impl LoadedScene {
             air: file.air.0,
         });
         world.insert_resource(FilmSize { width: file.film.width, height: file.film.height });
-        let of_world = world.get_resource::<Rendering>().map_or(0, |rendering| rendering.0.seed);
-        let seed = self.shot.as_ref().map_or(of_world, |shot| shot.seed);
+        let of_world = world.get_resource::<Rendering>().map(|rendering| rendering.0).unwrap_or_default();
+        let (seed, allocation) = match &self.shot {
+            Some(shot) => (shot.seed, shot.allocation),
+            None => (of_world.seed, of_world.allocation),
+        };
         world.insert_resource(Rendering(RenderSettings {
             integrator: file.integrator,
             max_depth: file.max_depth.unwrap_or(u32::MAX),
             seed,
             filter: file.film.filter,
+            allocation,
             ..RenderSettings::default()
         }));
         let display = Display { exposure_stops: file.display.exposure, tone_curve: file.display.tone_curve };

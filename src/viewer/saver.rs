@@ -138,7 +138,7 @@ fn print(
     format: PictureFormat,
 ) -> Saved {
     let coarse = (film.width(), film.height()) != size;
-    let uneven = coarse || film.max_spp() > film.spp();
+    let uneven = coarse || film.is_uneven();
     let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven };
     // Paths in the metadata are relative to the folder, whatever the name of the image will be.
     let note = draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into()));

@@ -7,7 +7,7 @@ use firstlight::render::{
 use glam::Vec3;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
-fn busy_scene() -> Prepared {
+pub fn busy_scene() -> Prepared {
     let mut camera = camera(Vec3::new(0.0, 1.5, 5.0), Vec3::new(0.0, 0.5, 0.0), 40.0);
     camera.lens_radius = 0.05;
     camera.focus_distance = 5.0;
@@ -50,7 +50,7 @@ fn bits(film: &Film) -> Vec<u32> {
     film.means().iter().flat_map(|mean| mean.to_array().map(f32::to_bits)).collect()
 }
 
-fn with_threads<T: Send>(n: usize, work: impl FnOnce() -> T + Send) -> T {
+pub fn with_threads<T: Send>(n: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(work)
 }
 

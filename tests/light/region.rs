@@ -77,11 +77,11 @@ fn only_the_region_gets_samples_and_they_are_those_of_a_whole_picture() {
                 assert_eq!(from_the_eye(&film, x, y), from_the_eye(like, x, y), "{x},{y}");
             }
         }
-        // The region's error is that of a film with as many samples; the whole film's counts as if it had few.
+        // The region's error is that of a film with as many samples; in the whole film's each block counts with its own.
         let told = |film: &Film, region| film.error_estimate_in(region).unwrap().relative;
         assert_eq!(told(&film, Some(&region)), told(&many, Some(&region)), "glass {glass}");
         if !glass {
-            assert_eq!(told(&film, None), told(&few, None));
+            assert!(told(&film, None) < told(&few, None) && told(&film, None) > told(&many, None));
         }
         // The rest catches up, and nothing tells that there was a region.
         assert!(advance(&scene, &settings, &mut film, 32, &NEVER).completed);
@@ -166,12 +166,12 @@ fn the_program_goes_on_with_a_part_of_a_film() {
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
     let done = |args: &str| assert_eq!(run(args).0, Some(0), "{args}: {}", run(args).1);
-    done("render cornell -o a.png --film a.exr --size 96x64 --spp 8");
+    done("render cornell -o a.png --film a.exr --size 96x64 --spp 8 --uniform");
     done("render cornell -o a.png --film a.exr --size 96x64 --spp 24 --resume --region 40,10,10,10");
     let film = read_film_file(&folder.path().join("a.exr")).unwrap().film;
     assert_eq!([film.samples(45, 15), film.samples(31, 15), film.samples(45, 33)], [24, 8, 8]);
     done("render cornell -o a.png --film a.exr --size 96x64 --spp 24 --resume");
-    done("render cornell -o b.png --film b.exr --size 96x64 --spp 24");
+    done("render cornell -o b.png --film b.exr --size 96x64 --spp 24 --uniform");
     let films = ["a.exr", "b.exr"].map(|name| read_film_file(&folder.path().join(name)).unwrap().film);
     assert!(same_picture(&films[0], &films[1]));
     done("render cornell -o c.png --film c.exr --size 96x64 --spp 4 --region 0,0,1,1");

@@ -1,12 +1,14 @@
 //! Every built-in scene has the same mean whichever techniques look for its light.
 //!
-//! Each scene is rendered many times with seeds of their own: with all techniques, and with as few as find its light at
-//! all. Student's t for unequal variances (Welch 1947) compares the two, pixel by pixel and over the whole picture.
+//! Each scene is rendered many times with seeds of their own: with all techniques and samples where the error is, and with
+//! as few techniques as find its light at all and the same samples everywhere. Student's t for unequal variances (Welch 1947) compares the two, pixel by pixel and over the whole picture.
 //!
 //! Point lights are made larger first: plain paths that a mirror sends their way would hit the small spheres that they are
 //! so seldom that a mean of thousands of samples lacks their light, a hundredth of some of the scenes.
 
-use firstlight::render::{Film, Integrator, Prepared, RenderSettings, Techniques, advance};
+use firstlight::render::{
+    ErrorMetric, Film, Integrator, Prepared, RenderSettings, SampleAllocation, Techniques, advance,
+};
 use firstlight::scene::{Extraction, LoadOptions, PointLight, Rendering, SceneInputs, SceneSource, load};
 use rayon::prelude::*;
 use std::path::Path;
@@ -91,8 +93,9 @@ fn all_techniques_together_have_the_mean_of_the_plain_ones() {
     for name in &names {
         let (scene, settings) = prepared(name);
         // Plain paths find gathered light so seldom that in few samples most pixels lack some of it, and do not know.
-        let [n_all, n_plain] = if scene.features().caustics { [32, 256] } else { [8, 32] };
-        let all = RenderSettings { techniques: Techniques::ALL, ..settings };
+        let [n_all, n_plain] = if scene.features().caustics { [32, 256] } else { [32, 32] };
+        let allocation = SampleAllocation::Adaptive(ErrorMetric::RelativeMse);
+        let all = RenderSettings { techniques: Techniques::ALL, allocation, ..settings };
         let all = estimates(&renders(&scene, all, 1000, n_all));
         let plain = estimates(&renders(&scene, RenderSettings { techniques: PLAIN, ..settings }, 2000, n_plain));
         let (whole, pixels) = (all.len() - 1, 0..all.len() - 1);

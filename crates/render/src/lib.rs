@@ -26,7 +26,7 @@ pub use crate::core::material::{
 };
 pub use crate::core::material_kind::{MaterialKind, Param};
 pub use crate::core::material_queries::Emission;
-pub use crate::core::settings::{Integrator, RenderSettings, SettingsError};
+pub use crate::core::settings::{ErrorMetric, Integrator, RenderSettings, SampleAllocation, SettingsError};
 pub use crate::core::snapshot::{Geometry, Object, Shading, Snapshot};
 pub use crate::core::techniques::Techniques;
 pub use crate::core::texture::{
@@ -42,7 +42,10 @@ pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel,
 pub use film::error::{MergeError, RecordError};
 pub use film::estimate::ErrorEstimate;
 pub use film::features::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares};
-pub use film::record::{FilmLayout, FilmRecord, N_PLANES, TileRecord};
+pub use film::record::{
+    BlockRecord, FilmLayout, FilmRecord, LightTracingRecord, N_PLANES, OldFilmLayout, OldTileRecord, RoundRecord,
+    StepsRecord, TileRecord,
+};
 pub use film::region::Region;
 pub use film::room::{NoRoom, Purpose, Room};
 pub use film::tiles::Film;

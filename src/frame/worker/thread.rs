@@ -5,7 +5,7 @@ use super::views::Views;
 use super::{Answer, BESIDE, Job, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
 use crate::frame::{Picture, Target};
-use crate::render::{Display, Film, Region, advance_region, explain};
+use crate::render::{Display, Film, Region, SampleAllocation, advance_region, explain};
 use glam::{DVec2, UVec2};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
@@ -268,10 +268,15 @@ impl<'a> Loop<'a> {
         }
         let pool = lock(&self.shared.pool).clone();
         let start = Instant::now();
+        let mut settings = job.settings;
+        if divider > 1 {
+            // What is gone in a moment is not worth a thought.
+            settings.allocation = SampleAllocation::Uniform;
+        }
         let interrupt = &self.shared.interrupt;
         let stop = || interrupt.load(Ordering::Relaxed) || at_most.is_some_and(|limit| start.elapsed() >= limit);
         let result = catch_unwind(AssertUnwindSafe(|| {
-            pool.install(|| advance_region(&job.prepared, &job.settings, film, region.as_ref(), target_spp, &stop))
+            pool.install(|| advance_region(&job.prepared, &settings, film, region.as_ref(), target_spp, &stop))
         }));
         let seconds = start.elapsed().as_secs_f64();
         tracing::trace!("rendered for {:.1} ms at 1/{divider}", seconds * 1e3);

@@ -36,7 +36,7 @@ use super::toasts::{Toasts, Tone};
 use crate::frame::{
     Command, Explaining, Focus, FocusTarget, LatencyHistogram, MessageKind, Session, SessionOptions, Target, Waker,
 };
-use crate::render::Inspection;
+use crate::render::{ErrorMetric, Inspection, SampleAllocation};
 use crate::scene::{ModelChoice, SceneSource, UpAxis};
 use leaving::Leaving;
 use memory::Memory;
@@ -256,6 +256,7 @@ impl App {
             height: options.height,
             threads: options.threads,
             seed: options.seed,
+            allocation: SampleAllocation::Adaptive(ErrorMetric::RelativeMse),
             // A renderer that stops after a second cannot be measured.
             target: if options.print_figures { Target::default() } else { DEFAULT_TARGET },
             yielding: true,

@@ -3,7 +3,8 @@
 use super::widgets::{number, row, rows, slider, whole};
 use super::{Around, Asked};
 use crate::frame::{Command, Session, StopAt, Target, ViewMode};
-use crate::render::{Inspection, Integrator, ToneCurve};
+use crate::render::{ErrorMetric, Inspection, Integrator, SampleAllocation, ToneCurve};
+use crate::scene::Rendering;
 use crate::viewer::status::tone_curve;
 use egui::Ui;
 
@@ -15,6 +16,35 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
                 for (integrator, label) in [(Integrator::Path, "path tracing"), (Integrator::Phong, "Phong")] {
                     if ui.selectable_label(status.integrator == integrator, label).clicked() {
                         asked.send(Command::SetIntegrator(integrator));
+                    }
+                }
+            })
+        });
+        let allocation = session.world().get_resource::<Rendering>().map(|of_scene| of_scene.0.allocation);
+        let allocation = allocation.unwrap_or_default();
+        row(ui, "more samples", |ui| {
+            use SampleAllocation::{Adaptive, Uniform};
+            let is_display = matches!(allocation, Adaptive(ErrorMetric::Display { .. }));
+            let choices = [
+                (allocation == Uniform, "nowhere", Uniform, "as many samples in every pixel"),
+                (
+                    allocation == Adaptive(ErrorMetric::RelativeMse),
+                    "where relMSE is larger",
+                    Adaptive(ErrorMetric::RelativeMse),
+                    "lowers the relative error of linear light, which is the error estimate",
+                ),
+                (
+                    is_display,
+                    "where it shows",
+                    Adaptive(ErrorMetric::Display { exposure_stops: session.status().display.exposure_stops }),
+                    "lowers the error of the picture as it is displayed now",
+                ),
+            ];
+            let shown = choices.iter().find(|choice| choice.0).map_or("", |choice| choice.1);
+            egui::ComboBox::from_id_salt("allocation").selected_text(shown).width(150.0).show_ui(ui, |ui| {
+                for (is_chosen, label, allocation, about) in choices {
+                    if ui.selectable_label(is_chosen, label).on_hover_text(about).clicked() {
+                        asked.send(Command::SetAllocation(allocation));
                     }
                 }
             })

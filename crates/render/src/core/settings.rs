@@ -19,8 +19,33 @@ pub enum Integrator {
     Phong,
 }
 
+/// How samples are spread over the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SampleAllocation {
+    /// Every pixel gets as many.
+    #[default]
+    Uniform,
+    /// More where the error is larger, so that this error of the whole picture falls fastest.
+    Adaptive(ErrorMetric),
+}
+
+/// The error that an adaptive allocation minimises.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorMetric {
+    /// relMSE: that of linear light relative to its level, which is what is estimated, too.
+    #[default]
+    RelativeMse,
+    /// The squared error of the encoded picture: dark pixels count more, those above white little.
+    Display {
+        /// Exposure of the display, factors of two.
+        exposure_stops: f32,
+    },
+}
+
 /// What decides the samples of a picture besides the scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// The light model.
     pub integrator: Integrator,
@@ -32,6 +57,8 @@ pub struct RenderSettings {
     pub filter: PixelFilter,
     /// Techniques of variance reduction that are used.
     pub techniques: Techniques,
+    /// How samples are spread over the pixels.
+    pub allocation: SampleAllocation,
     /// With which instructions sixteen paths are shaded at a time; `None` shades one after the other, which is what
     /// tests compare with. All sets give the same bits.
     #[doc(hidden)]
@@ -65,6 +92,7 @@ impl Default for RenderSettings {
             seed: 0,
             filter,
             techniques,
+            allocation: SampleAllocation::Uniform,
             simd: Some(InstructionSet::detect()),
         }
     }

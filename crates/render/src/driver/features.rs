@@ -192,7 +192,7 @@ impl Worker {
                     if let Some(set) = settings.simd
                         && lens.is_plain()
                     {
-                        lens.start_paths(set, &pixels, sample, slot(sample), paths);
+                        lens.start_paths(set, &pixels, 0..pixels.local.len(), sample, slot(sample), paths);
                         continue;
                     }
                     for i in 0..n_pixels {

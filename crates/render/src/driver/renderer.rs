@@ -2,10 +2,13 @@
 
 use crate::core::counts::RayCounts;
 use crate::core::filter::FilterSampler;
-use crate::core::settings::{Integrator, RenderSettings};
+use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
 use crate::core::techniques::Techniques;
+use crate::film::block::BLOCK_SIZE;
 use crate::film::region::Region;
-use crate::film::tiles::{Film, FilmTile};
+use crate::film::round::Round;
+use crate::film::tile::FilmTile;
+use crate::film::tiles::Film;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::pilot::prepare_guide;
 use crate::integrators::path::{CameraPath, PathWave};
@@ -47,7 +50,8 @@ pub struct PassReport {
     pub above: Vec<BadSample>,
 }
 
-/// Takes samples until every pixel has `target_spp` of them, or until `stop` says so.
+/// Takes samples until every pixel has `target_spp` of them, or of an adaptive film the mean over all, or until `stop`
+/// says so.
 ///
 /// Tiles are spread over the current rayon pool. `stop` is asked often, from all workers; what a wave had not
 /// finished is dropped, never half kept.
@@ -65,7 +69,8 @@ pub fn advance(
     advance_region(snapshot, settings, film, None, target_spp, stop)
 }
 
-/// The same for the tiles of a region alone. Traced light falls where it falls, so the others may get more of it.
+/// The same for the tiles of a region alone, whose pixels get as many samples each. Traced light falls where it falls, so
+/// the others may get more of it.
 ///
 /// # Panics
 /// As [`advance`].
@@ -81,28 +86,51 @@ pub fn advance_region(
     snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
     let size = UVec2::new(film.width(), film.height());
     let pass = Pass::new(snapshot, settings, size);
-    let Some(caustics) = &pass.caustics else {
-        return advance_tiles(&pass, film, region, target_spp, stop);
+    let metric = match settings.allocation {
+        SampleAllocation::Adaptive(metric) if region.is_none() => Some(metric),
+        SampleAllocation::Adaptive(_) if film.round.is_some() => {
+            film.leave_round();
+            None
+        }
+        SampleAllocation::Adaptive(_) => None,
+        SampleAllocation::Uniform => {
+            film.round = None;
+            None
+        }
     };
-    if !prepare_guide(caustics, stop) || stop() {
-        return PassReport::default();
+    if let Some(caustics) = &pass.caustics {
+        if !prepare_guide(caustics, stop) || stop() {
+            return PassReport::default();
+        }
+        film.want_light();
     }
-    film.want_light();
     let mut total = PassReport { completed: true, ..PassReport::default() };
-    // Traced light goes with all tiles, so their error is told when all of them have come as far.
     while total.completed && film.spp_in(region) < target_spp {
+        if let Some(metric) = metric {
+            film.begin_round_if_due(metric);
+        }
+        // Rounds end at powers of two, and the error of traced light is told there.
         let next = (film.spp_in(region) + 1).checked_next_power_of_two();
-        let goal = next.unwrap_or(u32::MAX).min(target_spp);
-        let mut layer = film.light.take().expect("made above");
-        let (tiles, light) =
-            rayon::join(|| advance_tiles(&pass, film, region, goal, stop), || layer.advance(caustics, goal, stop));
-        film.light = Some(layer);
-        total.completed = tiles.completed && light.completed;
+        let goal = match &pass.caustics {
+            None if metric.is_none() => target_spp,
+            _ => next.unwrap_or(u32::MAX).min(target_spp),
+        };
+        let caustics = pass.caustics.as_ref().zip(film.light.take());
+        let (tiles, light) = rayon::join(
+            || advance_tiles(&pass, film, region, goal, stop),
+            || caustics.map(|(caustics, mut layer)| (layer.advance(caustics, goal, stop), layer)),
+        );
+        total.completed = tiles.completed;
         total.add(tiles);
-        total.rays += light.rays;
-        total.n_bad += light.n_bad;
+        if let Some((light, layer)) = light {
+            film.light = Some(layer);
+            total.completed &= light.completed;
+            total.rays += light.rays;
+            total.n_bad += light.n_bad;
+        }
         if total.completed {
-            film.record_convergence(|tile| tile.spp == goal);
+            film.has_spent(goal);
+            film.record_light();
         }
     }
     total
@@ -112,9 +140,11 @@ fn advance_tiles(
     pass: &Pass,
     film: &mut Film,
     region: Option<&Region>,
-    target_spp: u32,
+    budget: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
+    // In a region there is none but an even one.
+    let round = film.round.filter(|_| region.is_none());
     // One after the other, for whoever is free: divided beforehand, the half with the model in it would be waited for.
     let mut reports: Vec<(usize, PassReport)> = film
         .tiles
@@ -122,7 +152,7 @@ fn advance_tiles(
         .enumerate()
         .filter(|(_, tile)| region.is_none_or(|region| tile.lies_in(region)))
         .par_bridge()
-        .map_init(Wave::default, |wave, (i, tile)| (i, advance_tile(pass, tile, target_spp, stop, wave)))
+        .map_init(Wave::default, |wave, (i, tile)| (i, advance_tile(pass, tile, round.as_ref(), budget, stop, wave)))
         .collect();
     reports.sort_unstable_by_key(|(i, _)| *i);
     let mut total = PassReport { completed: true, ..PassReport::default() };
@@ -155,11 +185,25 @@ const WAVE_SIZE: usize = 4096;
 struct Wave {
     path: PathWave,
     phong: PhongWave,
+    /// Block by block; their places are those in the block.
     pixels: Pixels,
     /// Of the tile whose pixels these are.
     origin: UVec2,
     size: UVec2,
+    /// Which of the pixels each block has.
+    blocks: Vec<Range<usize>>,
+    runs: Vec<Run>,
     radiance: Vec<Vec3>,
+}
+
+/// One sample of each of some pixels.
+#[derive(Clone, Debug)]
+struct Run {
+    /// Of those of the wave.
+    pixels: Range<usize>,
+    sample: u32,
+    /// Where the radiance of the pixel at place 0 goes.
+    slot: u32,
 }
 
 impl Wave {
@@ -167,10 +211,24 @@ impl Wave {
         Self { pixels: Pixels { x: vec![pixel.x], y: vec![pixel.y], local: vec![0] }, ..Self::default() }
     }
 
+    /// One for each of these samples of all pixels, each `stride` after the one before it.
+    fn runs_of(&self, samples: Range<u32>, stride: u32) -> Vec<Run> {
+        let all = 0..self.pixels.local.len();
+        let slots = (0..).map(|i| i * stride);
+        samples.zip(slots).map(|(sample, slot)| Run { pixels: all.clone(), sample, slot }).collect()
+    }
+
     /// Takes the pixels of a tile; those of one that is as large as the last only have to be moved.
-    fn take_tile(&mut self, origin: UVec2, size: UVec2) {
+    fn take_tile(&mut self, tile: &FilmTile) {
+        let (origin, size) = (tile.origin, tile.size);
         if size != self.size || self.pixels.local.is_empty() {
-            self.pixels = pixels_in_blocks(origin, size);
+            self.pixels = Pixels::default();
+            self.blocks.clear();
+            for block in &tile.blocks {
+                let first = self.pixels.local.len();
+                add_pixels(origin + block.start, block.size, &mut self.pixels);
+                self.blocks.push(first..self.pixels.local.len());
+            }
         } else {
             let (x, y) = (origin.x.wrapping_sub(self.origin.x), origin.y.wrapping_sub(self.origin.y));
             self.pixels.x.iter_mut().for_each(|pixel| *pixel = pixel.wrapping_add(x));
@@ -179,32 +237,47 @@ impl Wave {
         (self.origin, self.size) = (origin, size);
     }
 
-    /// Takes one sample of each of the pixels for each number in `samples`, and adds what they see to `radiance`: those
-    /// of one sample follow each other, `stride` apart from those of the next.
+    /// Takes the next samples of the blocks of a tile, as many as are in flight at once: of each that is not done some, so
+    /// that all come along together. `missing` is how many each lacks.
+    fn take_runs(&mut self, tile: &FilmTile, missing: &[u32]) {
+        self.runs.clear();
+        let n_pixels: usize = tile.blocks.iter().zip(missing).filter(|(_, n)| **n > 0).map(|(b, _)| b.n_pixels()).sum();
+        let at_once = (WAVE_SIZE / n_pixels.max(1)).max(1) as u32;
+        let mut slot = 0;
+        for ((block, pixels), missing) in tile.blocks.iter().zip(&self.blocks).zip(missing) {
+            let first = block.next_sample();
+            for sample in first..first + at_once.min(*missing) {
+                self.runs.push(Run { pixels: pixels.clone(), sample, slot });
+                slot += pixels.len() as u32;
+            }
+        }
+        self.radiance.clear();
+        self.radiance.resize(slot as usize, Vec3::ZERO);
+    }
+
+    /// Traces the runs, and adds what their pixels see to `radiance`.
     fn trace(
         &mut self,
         pass: &Pass,
-        samples: Range<u32>,
-        stride: u32,
+        runs: &[Run],
         radiance: &mut [Vec3],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<RayCounts> {
         let Self { path, phong, pixels, .. } = self;
         let pixels = &*pixels;
-        let slot = |sample: u32| (sample - samples.start) * stride;
         let lens = pass.lens();
-        let camera_paths = samples.clone().flat_map(|sample| {
-            (0..pixels.local.len()).map(move |i| {
-                let (ray, sampler, weight) = lens.ray(UVec2::new(pixels.x[i], pixels.y[i]), sample);
-                CameraPath { ray, sampler, slot: slot(sample) + pixels.local[i], weight }
+        let camera_paths = runs.iter().flat_map(|run| {
+            run.pixels.clone().map(|i| {
+                let (ray, sampler, weight) = lens.ray(UVec2::new(pixels.x[i], pixels.y[i]), run.sample);
+                CameraPath { ray, sampler, slot: run.slot + pixels.local[i], weight }
             })
         });
         let start = |paths: &mut PathBatch| {
             if let Some(set) = pass.settings.simd
                 && lens.is_plain()
             {
-                for sample in samples.clone() {
-                    lens.start_paths(set, pixels, sample, slot(sample), paths);
+                for run in runs {
+                    lens.start_paths(set, pixels, run.pixels.clone(), run.sample, run.slot, paths);
                 }
             } else {
                 camera_paths.for_each(|camera| paths.push(&{ camera.ray }, &camera.into()));
@@ -242,56 +315,62 @@ impl FilmTile {
     }
 }
 
+/// - `round`: which blocks of the tile get samples; all of them without one.
 fn advance_tile(
     pass: &Pass,
     tile: &mut FilmTile,
-    target_spp: u32,
+    round: Option<&Round>,
+    budget: u32,
     stop: &(dyn Fn() -> bool + Sync),
     wave: &mut Wave,
 ) -> PassReport {
     let mut report = PassReport { completed: true, ..PassReport::default() };
+    let mut missing: Vec<u32> =
+        tile.blocks.iter().map(|block| block.target(round, budget).saturating_sub(block.spp)).collect();
+    if missing.iter().all(|missing| *missing == 0) {
+        return report;
+    }
     // Rather than begin what would be dropped: with some hundred tiles left, their first rays alone take milliseconds.
-    if tile.spp < target_spp && stop() {
+    if stop() {
         report.completed = false;
         return report;
     }
-    let n_pixels = tile.n_pixels();
-    wave.take_tile(tile.origin, tile.size);
-    let mut radiance = std::mem::take(&mut wave.radiance);
-    while tile.spp < target_spp {
-        let n_samples = (WAVE_SIZE / n_pixels).clamp(1, (target_spp - tile.spp) as usize);
-        radiance.clear();
-        radiance.resize(n_samples * n_pixels, Vec3::ZERO);
-        let first = tile.next_sample();
-        let samples = first..first + n_samples as u32;
-        let Some(rays) = wave.trace(pass, samples, n_pixels as u32, &mut radiance, stop) else {
+    wave.take_tile(tile);
+    while missing.iter().any(|missing| *missing > 0) {
+        wave.take_runs(tile, &missing);
+        let (mut radiance, runs) = (std::mem::take(&mut wave.radiance), std::mem::take(&mut wave.runs));
+        let Some(rays) = wave.trace(pass, &runs, &mut radiance, stop) else {
             report.completed = false;
             break;
         };
         report.rays += rays;
-        if let Some(bound) = pass.bound {
-            let bound = at_depth(bound, wave.path.depth, pass.endless);
-            let above = |light: &Vec3| light.is_finite() && light.abs().max_element() > bound;
-            for slot in (0..radiance.len()).filter(|&slot| above(&radiance[slot])) {
-                report.n_above += 1;
-                if report.above.len() < MAX_LISTED_BAD {
-                    report.above.push(tile.sample_at((slot % n_pixels) as u32, first + (slot / n_pixels) as u32));
+        let bound = pass.bound.map(|bound| at_depth(bound, wave.path.depth, pass.endless));
+        let n_bad_before = tile.bad.len();
+        let (mut runs_left, mut of_block) = (runs.as_slice(), 0);
+        while let Some((run, rest)) = runs_left.split_first() {
+            while wave.blocks[of_block] != run.pixels {
+                of_block += 1;
+            }
+            let seen = &radiance[run.slot as usize..][..run.pixels.len()];
+            for (place, light) in seen.iter().enumerate() {
+                if bound.is_some_and(|bound| light.is_finite() && light.abs().max_element() > bound) {
+                    report.n_above += 1;
+                    if report.above.len() < MAX_LISTED_BAD {
+                        let local = tile.blocks[of_block].locals(tile.size.x).nth(place).expect("a pixel of the block");
+                        report.above.push(tile.sample_at(local as u32, run.sample));
+                    }
                 }
             }
-        }
-        let n_bad_before = tile.bad.len();
-        for (s, sample) in radiance.chunks_exact(n_pixels).enumerate() {
-            tile.add_sample(first + s as u32, sample.iter().copied());
-            if pass.caustics.is_none() {
-                tile.record_convergence(None);
-            }
+            tile.add_sample(of_block, run.sample, seen);
+            missing[of_block] -= 1;
+            runs_left = rest;
         }
         let new_bad = &tile.bad[n_bad_before..];
         report.n_bad += new_bad.len() as u64;
         let room = MAX_LISTED_BAD - report.bad.len();
         report.bad.extend(new_bad.iter().take(room).map(|&(local, sample)| tile.sample_at(local, sample)));
+        (wave.radiance, wave.runs) = (radiance, runs);
     }
-    wave.radiance = radiance;
     report
 }
 
@@ -304,7 +383,8 @@ pub fn replay_sample(snapshot: &Prepared, settings: &RenderSettings, film_size: 
     }
     let mut radiance = [Vec3::ZERO];
     let mut wave = Wave::of_pixel(UVec2::new(at.x, at.y));
-    wave.trace(&pass, at.sample..at.sample + 1, 1, &mut radiance, &|| false);
+    let runs = wave.runs_of(at.sample..at.sample + 1, 1);
+    wave.trace(&pass, &runs, &mut radiance, &|| false);
     radiance[0]
 }
 
@@ -326,7 +406,8 @@ pub(crate) fn trace_recorded(
         let part = first..samples.end.min(first.saturating_add(WAVE_SIZE as u32));
         let mut radiance = vec![Vec3::ZERO; part.len()];
         wave.path.record = Some(Box::new(Record::new(part.clone())));
-        wave.trace(&pass, part, 1, &mut radiance, &|| false);
+        let runs = wave.runs_of(part, 1);
+        wave.trace(&pass, &runs, &mut radiance, &|| false);
         let record = wave.path.record.take().expect("it only looks on");
         paths.extend(record.finish(&radiance));
     }
@@ -355,7 +436,8 @@ pub(crate) fn mean_bounces(
                 wave.pixels.y.push(y);
                 wave.pixels.local.push(0);
             }
-            let rays = wave.trace(&pass, 0..1, 1, &mut [Vec3::ZERO], stop)?;
+            let runs = wave.runs_of(0..1, 1);
+            let rays = wave.trace(&pass, &runs, &mut [Vec3::ZERO], stop)?;
             Some(rays.bounce as f32 / rays.camera.max(1) as f32)
         })
         .collect();
@@ -382,10 +464,17 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The pixels of a tile in blocks of 4 × 4, so that 16 rays that follow each other run side by side.
+/// The pixels of a rectangle in squares of 4 × 4, so that 16 rays that follow each other run side by side.
 pub(super) fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
-    const SIDE: u32 = 4;
     let mut pixels = Pixels::default();
+    add_pixels(origin, size, &mut pixels);
+    pixels
+}
+
+/// Adds them to others; places are counted from 0 row by row.
+fn add_pixels(origin: UVec2, size: UVec2, pixels: &mut Pixels) {
+    const SIDE: u32 = 4;
+    const _: () = assert!(BLOCK_SIZE.is_multiple_of(SIDE));
     for top in (0..size.y).step_by(SIDE as usize) {
         for left in (0..size.x).step_by(SIDE as usize) {
             for y in top..size.y.min(top + SIDE) {
@@ -397,5 +486,4 @@ pub(super) fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
             }
         }
     }
-    pixels
 }

@@ -42,6 +42,9 @@ pub enum RecordError {
     /// The doublings on record do not fit the number of samples.
     #[error("what it knows of its error does not fit its samples")]
     Convergence,
+    /// The allocation of samples does not fit those that there are.
+    #[error("its allocation of samples contradicts its samples")]
+    Allocation,
     /// The complete samples of light from light paths contradict its batches.
     #[error("its light from light paths has another number of samples")]
     LightPaths,

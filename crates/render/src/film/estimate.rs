@@ -9,8 +9,11 @@
 //! What a difference is relative to must not come from the pixel alone: one bright sample that few pixels have drawn
 //! yet (a caustic) would raise the very value that its own error is divided by, and hide itself: see [`local_level`].
 
+//! Blocks of pixels may have doubled their samples a different number of times. Each brings what its own last doublings
+//! changed: the sum over the picture is then that of an estimate of each block's present error.
+
+use crate::film::block::Steps;
 use glam::DVec3;
-use std::collections::TryReserveError;
 
 /// The error of the whole picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,20 +27,63 @@ pub struct ErrorEstimate {
     pub high: f64,
     /// relMSE is expected to fall as samples^−`exponent` from here on, from doubling to doubling; 1 for independent samples.
     pub exponent: f64,
-    /// relMSE of a single sample, extended down from what was seen last.
-    variance_of_one: f64,
+    /// Samples a pixel that the picture has, the mean over it.
+    spp: u32,
+    /// All pixels have that number of samples, and will have.
+    is_even: bool,
+}
+
+/// What the doublings of all parts of a picture have changed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Evidence {
+    parts: Vec<Part>,
+    /// Pixels times channels of each tile.
+    n_values: Vec<f64>,
+}
+
+/// A block of pixels, or the traced light in a tile.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    tile: usize,
+    steps: Steps,
+    /// Samples now, at least those of the newest step.
+    spp: u32,
+}
+
+impl Evidence {
+    /// Begins a tile; its parts follow.
+    pub fn add_tile(&mut self, n_pixels: usize) {
+        self.n_values.push(3.0 * n_pixels as f64);
+    }
+
+    /// A part of the tile that was begun last, of `spp` samples.
+    pub fn add_part(&mut self, steps: Steps, spp: u32) {
+        self.parts.push(Part { tile: self.n_values.len() - 1, steps, spp });
+    }
+
+    /// What the doubling so many before the last changed in each tile, if all parts know it.
+    fn of_tiles(&self, ago: usize) -> Option<Vec<f64>> {
+        let mut of_tiles = vec![0.0; self.n_values.len()];
+        for part in &self.parts {
+            of_tiles[part.tile] += part.steps.ago(ago)?;
+        }
+        Some(of_tiles)
+    }
 }
 
 impl ErrorEstimate {
     /// Relative error at a number of samples a pixel, at least 1.
     ///
-    /// Between powers of two the samples are several nets of different size, one for each bit of their number, and
-    /// each counts with its share: where errors fall fast, 96 samples are no better than 64.
+    /// Between powers of two the samples of an even picture are several nets of different size, one for each bit of their
+    /// number, and each counts with its share: where errors fall fast, 96 samples are no better than 64.
     pub fn relative_at(&self, spp: u32) -> f64 {
-        let spp = spp.max(1);
-        let nets = (0..32).filter(|bit| spp >> bit & 1 == 1).map(|bit| f64::from(1u32 << bit));
-        let share = |n: f64| (n / f64::from(spp)).powi(2) * n.powf(-self.exponent);
-        (self.variance_of_one * nets.map(share).sum::<f64>()).sqrt()
+        let (now, spp) = (self.spp.max(1), spp.max(1));
+        let fall = if self.is_even {
+            of_nets(spp, self.exponent) / of_nets(now, self.exponent)
+        } else {
+            (f64::from(spp) / f64::from(now)).powf(-self.exponent)
+        };
+        self.relative * fall.sqrt()
     }
 
     /// Samples a pixel that bring the relative error down to `target`, to within an eighth; `u32::MAX` if none do.
@@ -46,59 +92,77 @@ impl ErrorEstimate {
         (1..8).chain(candidates).find(|&spp| self.relative_at(spp) <= target).unwrap_or(u32::MAX)
     }
 
-    pub(crate) fn from_tiles<'a>(tiles: impl Iterator<Item = &'a TileConvergence> + Clone, spp: u32) -> Option<Self> {
-        // The last doubling that every tile has seen. Films that were added up may have missed some.
-        let n_levels = tiles.clone().map(|tile| tile.steps.len()).min()?;
-        let is_known = |level: &usize| tiles.clone().all(|tile| !tile.steps[*level].is_nan());
-        let level = (0..n_levels).rev().find(is_known)?;
-        let n_values: f64 = tiles.clone().map(|tile| tile.n_values).sum();
-        let step = |k: usize| tiles.clone().map(|tile| tile.steps[k]).sum::<f64>() / n_values;
-        let last = step(level);
+    /// - `spp`: samples a pixel that the picture has, the mean over it; `is_even`: all pixels have as many.
+    pub(crate) fn new(evidence: &Evidence, spp: u32, is_even: bool) -> Option<Self> {
+        let tiles: Vec<Option<Vec<f64>>> = (0..Steps::KEPT).map(|ago| evidence.of_tiles(ago)).collect();
+        let newest = tiles[0].as_ref().filter(|_| !evidence.parts.is_empty())?;
+        let n_values: f64 = evidence.n_values.iter().sum();
+        let mean = |steps: &[f64]| steps.iter().sum::<f64>() / n_values;
+        let last = mean(newest);
         // Tiles are independent of each other: their scatter is the uncertainty of a sum over them, relative to it.
-        let n_tiles = tiles.clone().count() as f64;
-        let sigma = |k: usize| {
-            let mean = step(k);
+        let n_tiles = evidence.n_values.len() as f64;
+        let scatter_about = |steps: &[f64], expected: &dyn Fn(usize) -> f64| {
+            let squares = steps.iter().enumerate().map(|(i, step)| (step - expected(i)).powi(2));
+            (squares.sum::<f64>() * n_tiles / (n_tiles - 1.0)).sqrt() / n_values
+        };
+        let sigma = |steps: &[f64]| {
+            let mean = mean(steps);
             if n_tiles < 2.0 || mean <= 0.0 {
                 return 1.0;
             }
-            let scatter: f64 = tiles.clone().map(|tile| (tile.steps[k] - mean * tile.n_values).powi(2)).sum();
-            (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * mean)
+            scatter_about(steps, &|tile| mean * evidence.n_values[tile]) / mean
         };
-        let slope = |earliest: usize, expected: &Expected| match (earliest..level).find(is_known) {
-            Some(first) if last > 0.0 => {
-                let span = (level - first) as f64;
-                let seen = (step(first) / last).log2() / span;
-                let of_tiles = sigma(first).hypot(sigma(level)) / std::f64::consts::LN_2;
-                expected.and_seen(seen, of_tiles.hypot(WOBBLE) / span)
+        // Doublings that all blocks have seen, less one.
+        let level = evidence.parts.iter().map(|part| part.steps.at.ilog2() as usize - 1).min()?;
+        let slope = |longest: usize, expected: &Expected| {
+            let known = (1..=longest).rev().find_map(|span| Some((span, tiles[span].as_ref()?)));
+            match known.filter(|_| last > 0.0) {
+                Some((span, before)) => {
+                    let seen = (mean(before) / last).log2() / span as f64;
+                    let of_tiles = sigma(before).hypot(sigma(newest)) / std::f64::consts::LN_2;
+                    expected.and_seen(seen, of_tiles.hypot(WOBBLE) / span as f64)
+                }
+                None => *expected,
             }
-            _ => *expected,
         };
         // The first steps say little of how fast later ones fall; independent samples where there is only one.
-        let so_far = slope(level.saturating_sub(2).max(level.saturating_sub(1).min(2)), &SO_FAR);
+        let earliest = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
+        let so_far = slope(level - earliest, &SO_FAR);
         // Further on all that is known helps.
-        let exponent = slope(level.saturating_sub(2), &FROM_HERE_ON).exponent;
-        let (spp_at_level, growth) = (f64::from(2u32 << level), so_far.exponent.exp2());
-        let variance_of_one = last / (growth - 1.0) * spp_at_level.powf(exponent);
+        let exponent = slope(level.min(2), &FROM_HERE_ON).exponent;
+        let growth = so_far.exponent.exp2();
+        let mut known = (0, 0, 1.0);
+        let now = evidence.parts.iter().map(|part| {
+            let at = part.steps.at;
+            if (known.0, known.1) != (part.spp, at) {
+                known = (part.spp, at, of_nets(part.spp, exponent) / of_nets(at, exponent));
+            }
+            part.steps.ago(0).unwrap_or_default() * known.2
+        });
+        let relative_mse = now.sum::<f64>() / n_values / (growth - 1.0);
 
         // On the logarithm, where the sum of positive terms is closer to symmetric. Two looks at the same tiles, from one
         // doubling to the next, scatter as this one and the truth do; of a first one only the tiles themselves are known.
-        let of_noise = match level.checked_sub(1).filter(is_known) {
-            Some(before) if n_tiles >= 2.0 && last > 0.0 && step(before) > 0.0 => {
-                let fall = last / step(before);
-                let scatter: f64 =
-                    tiles.clone().map(|tile| (tile.steps[level] - fall * tile.steps[before]).powi(2)).sum();
-                (scatter * n_tiles / (n_tiles - 1.0)).sqrt() / (n_values * last)
+        let of_noise = match tiles[1].as_ref().filter(|_| level > 0) {
+            Some(before) if n_tiles >= 2.0 && last > 0.0 && mean(before) > 0.0 => {
+                let fall = last / mean(before);
+                scatter_about(newest, &|tile| fall * before[tile]) / last
             }
-            _ => sigma(level),
+            _ => sigma(newest),
         };
         // And the slope of the last doubling, that the difference is made an error with, is not known for sure.
         let of_slope = growth * std::f64::consts::LN_2 / (growth - 1.0) * so_far.uncertainty;
         let factor = (0.5 * student_t(n_tiles - 1.0) * of_noise).hypot(0.5 * 1.96 * of_slope).exp();
-        let mut estimate = Self { relative: 0.0, low: 0.0, high: 0.0, exponent, variance_of_one };
-        estimate.relative = estimate.relative_at(spp);
-        (estimate.low, estimate.high) = (estimate.relative / factor, estimate.relative * factor);
-        Some(estimate)
+        let relative = relative_mse.sqrt();
+        Some(Self { relative, low: relative / factor, high: relative * factor, exponent, spp, is_even })
     }
+}
+
+/// The variance of so many samples, at least 1, in nets of different size, one for each bit of their number, where that of
+/// a net falls as samples^−`exponent`; 1 for one sample.
+fn of_nets(spp: u32, exponent: f64) -> f64 {
+    let nets = (0..32).filter(|bit| spp >> bit & 1 == 1).map(|bit| f64::from(1u32 << bit));
+    nets.map(|n| (n / f64::from(spp)).powi(2) * n.powf(-exponent)).sum()
 }
 
 /// Between plain random sampling and the best that scrambled nets do on smooth integrands (Owen 1997).
@@ -144,110 +208,56 @@ fn student_t(freedom: f64) -> f64 {
 /// and of even powers of two divide the square differently.
 const WOBBLE: f64 = 0.25;
 
-/// The steps of one tile's pixels from doubling to doubling.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct TileConvergence {
-    /// Means at the last power of two.
-    pub checkpoint: Vec<DVec3>,
-    /// That power of two; 0 before the first.
-    pub checkpoint_spp: u32,
-    /// `steps[k]`: sum over pixels and channels of |I₂ₙ − Iₙ|² / (level² + 0.01), n = 2ᵏ; NaN where it is not known.
-    pub steps: Vec<f64>,
-    /// Each pixel's share of the last step, mean over channels.
-    pub last: Vec<f32>,
-    /// Pixels times channels.
-    pub n_values: f64,
-}
-
-impl TileConvergence {
-    /// Has the memory ready that a tile of `n` pixels needs.
-    pub fn try_reserve(&mut self, n: usize) -> Result<(), TryReserveError> {
-        self.checkpoint.try_reserve_exact(n)?;
-        self.last.try_reserve_exact(n)
-    }
-
-    /// As new, in the same memory.
-    pub fn clear(&mut self) {
-        let Self { checkpoint, checkpoint_spp, steps, last, n_values } = self;
-        checkpoint.clear();
-        steps.clear();
-        last.clear();
-        (*checkpoint_spp, *n_values) = (0, 0.0);
-    }
-
-    /// Takes the means after `spp` samples, a power of two, of a tile `width` pixels wide.
-    pub fn record(&mut self, spp: u32, width: usize, means: impl Iterator<Item = DVec3>) {
-        let now: Vec<DVec3> = means.collect();
-        self.n_values = 3.0 * now.len() as f64;
-        let spp_before = std::mem::replace(&mut self.checkpoint_spp, spp);
-        let level = spp.ilog2() as usize;
-        if spp > 1 && spp_before == spp / 2 {
-            let pairs = self.checkpoint.iter().zip(&now).enumerate();
-            let relative = pairs.map(|(i, (a, b))| {
-                let (difference, level) = (*a - *b, local_level(&now, *a, width, i));
-                (difference * difference / (level * level + 0.01)).element_sum()
-            });
-            self.last.clear();
-            let last = &mut self.last;
-            let sum = relative.inspect(|step| last.push((step / 3.0) as f32)).sum();
-            self.steps.resize(level - 1, f64::NAN);
-            self.steps.push(sum);
-        } else {
-            // Samples came in too large a lump to tell.
-            self.steps.resize(level, f64::NAN);
-        }
-        // Not the new list itself: this one's memory is reserved, for as long as the film is there.
-        self.checkpoint.clear();
-        self.checkpoint.extend_from_slice(&now);
-    }
-
-    /// Of one pixel, relative and squared; 0 before the second sample.
-    pub fn last_step(&self, pixel: usize) -> f32 {
-        self.last.get(pixel).copied().unwrap_or(0.0)
-    }
-}
-
 /// What the error of pixel `i` is relative to: its own mean, but no more than its neighbours' mean and its own darker
 /// half.
 ///
 /// A bright sample that came once raises one half alone, and few of the neighbours. A light of a single pixel, which
 /// its neighbours know nothing of, is bright in both halves.
-fn local_level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
+pub(crate) fn local_level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
     let (x, y, height) = (i % width, i / width, means.len() / width);
-    // At the border pixels repeat.
-    let around = |k: usize, n: usize| [k.saturating_sub(1), k, (k + 1).min(n - 1)];
-    let rows = around(y, height).map(|y| around(x, width).map(|x| means[y * width + x]).iter().sum::<DVec3>());
-    let neighbours = (rows.iter().sum::<DVec3>() - means[i]) / 8.0;
     let darker_half = before.min(2.0 * means[i] - before);
+    // Three by three pixels around it, moved inwards at a border.
+    let around = |k: usize, n: usize| {
+        let first = k.saturating_sub(1).min(n.saturating_sub(3));
+        first..(first + 3).min(n)
+    };
+    let rows = around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x));
+    let (mut sum, mut n) = (-means[i], -1.0);
+    for pixel in rows {
+        sum += means[pixel];
+        n += 1.0;
+    }
+    let neighbours = if n > 0.0 { sum / n } else { means[i] };
     means[i].min(neighbours.max(darker_half))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::tile::FilmTile;
     use crate::sampling::Sampler;
+    use glam::{UVec2, Vec3};
 
     /// Runs pixels with a known mean and compares the estimate with the true error.
     fn run(spp: u32, integrand: impl Fn(glam::Vec2) -> f64, mean: f64) -> (ErrorEstimate, f64) {
         let n_tiles = 64;
-        let mut tiles = vec![TileConvergence::default(); n_tiles];
+        let mut evidence = Evidence::default();
         let mut true_error = 0.0;
-        for (t, tile) in tiles.iter_mut().enumerate() {
-            let mut sums = vec![DVec3::ZERO; 64];
+        for t in 0..n_tiles {
+            let mut tile = FilmTile::try_new(UVec2::ZERO, UVec2::splat(8)).unwrap();
             for s in 0..spp {
-                for (p, sum) in sums.iter_mut().enumerate() {
-                    *sum += DVec3::splat(integrand(Sampler::new(2, t as u32, p as u32, s).pair(0)));
-                }
-                if (s + 1).is_power_of_two() {
-                    tile.record(s + 1, 8, sums.iter().map(|sum| *sum / f64::from(s + 1)));
-                }
+                let sample = |p: u32| integrand(Sampler::new(2, t, p, s).pair(0)) as f32;
+                let radiance: Vec<Vec3> = (0..64).map(|p| Vec3::splat(sample(p))).collect();
+                tile.add_sample(0, s, &radiance);
             }
-            for sum in sums {
-                true_error += (sum.x / f64::from(spp) - mean).powi(2) / (mean * mean + 0.01);
+            evidence.add_tile(64);
+            evidence.add_part(tile.blocks[0].steps, spp);
+            for local in 0..64 {
+                true_error += (tile.mean(local).x - mean).powi(2) / (mean * mean + 0.01);
             }
         }
-        let estimate = ErrorEstimate::from_tiles(tiles.iter(), spp).unwrap();
-        (estimate, (true_error / (64 * n_tiles) as f64).sqrt())
+        let estimate = ErrorEstimate::new(&evidence, spp, true).unwrap();
+        (estimate, (true_error / f64::from(64 * n_tiles)).sqrt())
     }
 
     #[test]
@@ -290,7 +300,10 @@ mod tests {
         // A firefly in the second half, or in the first.
         assert!((local_level(&around(10.05), dark, width, 4) - dark).length() < 1e-12);
         assert!((local_level(&around(10.05), DVec3::splat(20.0), width, 4) - dark).length() < 1e-12);
-        // Its neighbours count a ninth of it at most, and a tile of one pixel has itself alone.
+        // A pixel in a corner has the same neighbours, and a block of one pixel has itself alone.
+        let mut corner = vec![dark; 9];
+        corner[0] = DVec3::splat(10.05);
+        assert!((local_level(&corner, dark, width, 0) - dark).length() < 1e-12);
         assert_eq!(local_level(&around(10.05), dark, width, 0), dark);
         assert_eq!(local_level(&[dark], dark, 1, 0), dark);
     }

@@ -79,6 +79,12 @@ impl LightLayer {
         }
     }
 
+    /// As [`Block::knows_less_than`](crate::film::block::Block::knows_less_than).
+    pub fn knows_less_than(&self, other: &Self) -> bool {
+        let start = |layer: &Self| std::cmp::Reverse(layer.done.first().map_or(0, |range| range.start));
+        (other.spp, start(other)) > (self.spp, start(self))
+    }
+
     /// Adds the paths of a layer of the same picture that has none of these.
     pub fn merge(&mut self, other: &Self) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));

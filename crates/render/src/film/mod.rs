@@ -1,5 +1,7 @@
 //! Where light is summed up, how far it is from the truth, and how it becomes a picture.
 
+pub(crate) mod allocation;
+pub(crate) mod block;
 pub(crate) mod develop;
 pub(crate) mod error;
 pub(crate) mod estimate;
@@ -9,4 +11,6 @@ pub(crate) mod light_layer;
 pub(crate) mod record;
 pub(crate) mod region;
 pub(crate) mod room;
+pub(crate) mod round;
+pub(crate) mod tile;
 pub(crate) mod tiles;

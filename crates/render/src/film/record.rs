@@ -1,16 +1,18 @@
 //! A film as plain numbers, for keeping it on disk, and back.
 
+use crate::film::block::{Block, MAX_DOUBLINGS, NEVER, Steps};
 use crate::film::error::RecordError;
-use crate::film::estimate::TileConvergence;
 use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
-use crate::film::tiles::{Film, FilmTile};
+use crate::film::round::Round;
+use crate::film::tile::FilmTile;
+use crate::film::tiles::Film;
 use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
-/// Numbers for each pixel: three channels of the sum, of its rest, of the mean at the last power of two, and of sum and
-/// rest of the traced light.
-pub const N_PLANES: usize = 15;
+/// Numbers for each pixel: three channels of the sum, of its rest, of the mean at the last power of two; of sum and rest
+/// of the traced light, and of its mean at the last power of two.
+pub const N_PLANES: usize = 18;
 
 /// All that is in a film.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,9 +34,28 @@ pub struct FilmLayout {
     pub tile_size: u32,
     /// Row by row from the top.
     pub tiles: Vec<TileRecord>,
+    /// How samples are allocated, where the film is not even.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub round: Option<RoundRecord>,
     /// What is known of the traced light, where there is such light.
     #[serde(rename = "lamps")]
     pub light_traced: Option<LightTracingRecord>,
+}
+
+/// From which mean of samples per pixel to which a round of the allocation goes, and how far it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoundRecord {
+    /// Where it began.
+    pub from: u32,
+    /// Where it ends.
+    pub to: u32,
+    /// What has been spent.
+    pub budget: u32,
+    /// Whether all pixels get as many samples.
+    pub even: bool,
+    /// Whether there are samples that no round gave it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub irregular: bool,
 }
 
 /// Light paths that are in the film.
@@ -49,15 +70,110 @@ pub struct LightTracingRecord {
 /// Which samples a tile has, and what is known of its error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TileRecord {
+    /// Row by row from the top.
+    pub blocks: Vec<BlockRecord>,
+    /// Pixel of the tile and number of each sample that was left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bad: Vec<(u32, u32)>,
+    /// How many samples the means of traced light at the last power of two have.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub light_mean_of: u32,
+    /// What doublings of the traced light changed.
+    #[serde(default, skip_serializing_if = "StepsRecord::is_none")]
+    pub light_steps: StepsRecord,
+}
+
+/// Which samples a block has, and what is known of its error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlockRecord {
+    /// First sample and the one after the last, of each range.
+    pub samples: Vec<(u32, u32)>,
+    /// How many samples the means at the last power of two have.
+    pub mean_of: u32,
+    /// What doublings changed.
+    #[serde(default, skip_serializing_if = "StepsRecord::is_none")]
+    pub steps: StepsRecord,
+    /// Samples when the round began, and the budgets from which on they are doubled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub due: Option<(u32, Vec<u32>)>,
+}
+
+/// Samples after the newest doubling, and the bits of what that one and those before it changed; 0 before the first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepsRecord(pub u32, pub Vec<u32>);
+
+impl StepsRecord {
+    fn is_none(&self) -> bool {
+        self.0 == 0
+    }
+
+    fn of(steps: &Steps) -> Self {
+        if steps.at == 0 { Self::default() } else { Self(steps.at, steps.values.map(f32::to_bits).to_vec()) }
+    }
+
+    /// - `mean_of`: samples of the means that the next doubling is measured from.
+    fn steps(&self, mean_of: u32) -> Result<Steps, RecordError> {
+        let Self(at, bits) = self;
+        if *at == 0 && bits.is_empty() {
+            return Ok(Steps::default());
+        }
+        let bits: [u32; Steps::KEPT] = bits.as_slice().try_into().map_err(|_| RecordError::Convergence)?;
+        if !at.is_power_of_two() || *at < 2 || *at > mean_of {
+            return Err(RecordError::Convergence);
+        }
+        Ok(Steps { at: *at, values: bits.map(f32::from_bits) })
+    }
+}
+
+fn is_zero(n: &u32) -> bool {
+    *n == 0
+}
+
+/// The layout of films of before blocks had samples of their own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OldFilmLayout {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Pixels.
+    pub tile_size: u32,
+    /// Row by row from the top.
+    pub tiles: Vec<OldTileRecord>,
+    /// What is known of the traced light, where there is such light.
+    #[serde(rename = "lamps")]
+    pub light_traced: Option<LightTracingRecord>,
+}
+
+/// Which samples a tile has; what it said of its error is not read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OldTileRecord {
     /// First sample and the one after the last, of each range.
     pub samples: Vec<(u32, u32)>,
     /// Pixel of the tile and number of each sample that was left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bad: Vec<(u32, u32)>,
-    /// How many samples the means at the last power of two have.
-    pub mean_of: u32,
-    /// The bits of what each doubling changed.
-    pub steps: Vec<u64>,
+}
+
+impl OldFilmLayout {
+    /// Planes of such a film: the first of those of today.
+    pub const N_PLANES: usize = 15;
+
+    /// The same samples, of which the error is known again when they double.
+    pub fn renewed(self) -> FilmLayout {
+        let Self { width, height, tile_size, tiles, light_traced } = self;
+        let n_tiles_x = width.div_ceil(tile_size.max(1)).max(1);
+        let renew = |(i, tile): (usize, OldTileRecord)| {
+            let at = UVec2::new(i as u32 % n_tiles_x, i as u32 / n_tiles_x).saturating_mul(UVec2::splat(tile_size));
+            let size = UVec2::new(width, height).saturating_sub(at).min(UVec2::splat(tile_size));
+            let block = BlockRecord { samples: tile.samples, mean_of: 0, steps: StepsRecord::default(), due: None };
+            // Tiles that are not there are refused later.
+            let blocks = vec![block; Block::count(size)];
+            TileRecord { blocks, bad: tile.bad, light_mean_of: 0, light_steps: StepsRecord::default() }
+        };
+        let tiles = tiles.into_iter().enumerate().map(renew).collect();
+        FilmLayout { width, height, tile_size, tiles, round: None, light_traced }
+    }
 }
 
 impl FilmLayout {
@@ -70,20 +186,38 @@ impl FilmLayout {
         let batches =
             |layout: &Self| layout.light_traced.as_ref().map_or_else(Vec::new, |traced| traced.batches.clone());
         (self.width, self.height, self.tile_size) == (other.width, other.height, other.tile_size)
-            && self.tiles.iter().zip(&other.tiles).all(|(tile, other)| covers(&tile.samples, &other.samples))
+            && self.blocks().zip(other.blocks()).all(|(block, other)| covers(&block.samples, &other.samples))
             && covers(&batches(self), &batches(other))
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = &BlockRecord> {
+        self.tiles.iter().flat_map(|tile| &tile.blocks)
     }
 }
 
 impl Film {
     /// What is not a number for each pixel.
     pub fn layout(&self) -> FilmLayout {
-        let record = |tile: &FilmTile| TileRecord {
-            samples: tile.ranges.iter().map(|range| (range.start, range.end)).collect(),
-            bad: tile.bad.clone(),
-            mean_of: tile.convergence.checkpoint_spp,
-            steps: tile.convergence.steps.iter().map(|step| step.to_bits()).collect(),
+        let is_uneven = self.round.is_some_and(|round| !round.even);
+        let of_block = |block: &Block| BlockRecord {
+            samples: block.ranges.iter().map(|range| (range.start, range.end)).collect(),
+            mean_of: block.mean_of,
+            steps: StepsRecord::of(&block.steps),
+            due: is_uneven.then(|| (block.base, block.due.into_iter().filter(|due| *due != NEVER).collect())),
         };
+        let record = |tile: &FilmTile| {
+            // In an order that does not tell in which one blocks came along.
+            let mut bad = tile.bad.clone();
+            bad.sort_unstable_by_key(|&(pixel, sample)| (sample, pixel));
+            TileRecord {
+                blocks: tile.blocks.iter().map(of_block).collect(),
+                bad,
+                light_mean_of: tile.light.mean_of,
+                light_steps: StepsRecord::of(&tile.light.steps),
+            }
+        };
+        let of_round =
+            |&Round { from, to, budget, even, irregular }: &Round| RoundRecord { from, to, budget, even, irregular };
         let of_light = |light: &LightLayer| LightTracingRecord {
             batches: light.done.iter().map(|range| (range.start, range.end)).collect(),
             spp: light.spp,
@@ -93,6 +227,7 @@ impl Film {
             height: self.height(),
             tile_size: self.tile_size(),
             tiles: self.tiles.iter().map(record).collect(),
+            round: self.round.as_ref().map(of_round),
             light_traced: self.light.as_ref().map(of_light),
         }
     }
@@ -105,10 +240,13 @@ impl Film {
             for (local, sum) in tile.sums.iter().enumerate() {
                 let (x, y) = (local as u32 % tile.size.x, local as u32 / tile.size.x);
                 let at = (tile.origin.y + y) as usize * self.width() as usize + (tile.origin.x + x) as usize;
-                let checkpoint = tile.convergence.checkpoint.get(local).copied().unwrap_or_default();
-                let numbers = [sum.sum, sum.rest, checkpoint];
-                for (plane, number) in planes.iter_mut().zip(numbers.iter().flat_map(DVec3::to_array)) {
-                    plane[at] = number;
+                let known = |samples: u32, means: &[DVec3]| means.get(local).filter(|_| samples > 0).copied();
+                let before = known(tile.block_of(local).mean_of, &tile.before).unwrap_or_default();
+                let light_before = known(tile.light.mean_of, &tile.light.before).unwrap_or_default();
+                for (first, vector) in [(0, sum.sum), (3, sum.rest), (6, before), (15, light_before)] {
+                    for (plane, number) in planes[first..].iter_mut().zip(vector.to_array()) {
+                        plane[at] = number;
+                    }
                 }
             }
         }
@@ -128,7 +266,7 @@ impl Film {
     /// # Errors
     /// When the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, RecordError> {
-        let FilmLayout { width, height, tile_size, tiles, light_traced } = &record.layout;
+        let FilmLayout { width, height, tile_size, tiles, round: _, light_traced } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
         let n_pixels = u64::from(width) * u64::from(height);
         if n_pixels == 0 || tile_size == 0 {
@@ -140,46 +278,25 @@ impl Film {
             return Err(RecordError::Size);
         }
         let mut film = Self::with_tile_size(width, height, tile_size);
-        for (tile, record_of_tile) in film.tiles.iter_mut().zip(tiles) {
-            let n_pixels = tile.n_pixels();
-            check_ranges(&record_of_tile.samples, Self::MAX_SAMPLES)?;
-            let spp: u64 = record_of_tile.samples.iter().map(|(start, end)| u64::from(end - start)).sum();
-            tile.spp = u32::try_from(spp).map_err(|_| RecordError::TooManySamples)?;
-            tile.ranges = record_of_tile.samples.iter().map(|&(start, end)| start..end).collect();
-            tile.bad = record_of_tile.bad.clone();
-            let n_bad_at_most = tile.spp as usize;
-            let mut n_bad = vec![0; n_pixels];
-            for (pixel, _) in &tile.bad {
-                match n_bad.get_mut(*pixel as usize) {
-                    Some(n) if *n < n_bad_at_most => *n += 1,
-                    _ => return Err(RecordError::BadSamples),
-                }
-            }
-            let mut checkpoint = Vec::new();
-            for local in 0..n_pixels {
+        for (tile, of_tile) in film.tiles.iter_mut().zip(tiles) {
+            tile.take_samples(of_tile)?;
+            let mut before = vec![DVec3::ZERO; tile.n_pixels()];
+            let mut light_before = before.clone();
+            for local in 0..tile.n_pixels() {
                 let (x, y) = (local as u32 % tile.size.x, local as u32 / tile.size.x);
                 let at = (tile.origin.y + y) as usize * width as usize + (tile.origin.x + x) as usize;
                 let vector = |first: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));
                 tile.sums[local] = ExactSum { sum: vector(0), rest: vector(3) };
-                checkpoint.push(vector(6));
+                (before[local], light_before[local]) = (vector(6), vector(15));
             }
-            if record_of_tile.mean_of > 0 {
-                let n_doublings = record_of_tile.mean_of.ilog2() as usize;
-                if !record_of_tile.mean_of.is_power_of_two() || record_of_tile.steps.len() != n_doublings {
-                    return Err(RecordError::Convergence);
-                }
-                tile.convergence = TileConvergence {
-                    n_values: 3.0 * checkpoint.len() as f64,
-                    checkpoint,
-                    checkpoint_spp: record_of_tile.mean_of,
-                    steps: record_of_tile.steps.iter().map(|&bits| f64::from_bits(bits)).collect(),
-                    // Not kept on disk: known again after the next doubling.
-                    last: Vec::new(),
-                };
-            } else if !record_of_tile.steps.is_empty() {
-                return Err(RecordError::Convergence);
+            if tile.blocks.iter().any(|block| block.mean_of > 0) {
+                tile.before = before;
+            }
+            if tile.light.mean_of > 0 {
+                tile.light.before = light_before;
             }
         }
+        film.round = record.layout.round(&film)?;
         if let Some(traced) = light_traced {
             let mut light = LightLayer::new(UVec2::new(width, height), 0);
             check_ranges(&traced.batches, light.batches_before(Self::MAX_SAMPLES))?;
@@ -195,6 +312,60 @@ impl Film {
             film.light = Some(light);
         }
         Ok(film)
+    }
+}
+
+impl FilmTile {
+    /// Which samples there are, and what is known of their error; no numbers of pixels.
+    fn take_samples(&mut self, record: &TileRecord) -> Result<(), RecordError> {
+        if record.blocks.len() != self.blocks.len() {
+            return Err(RecordError::Size);
+        }
+        for (block, record) in self.blocks.iter_mut().zip(&record.blocks) {
+            check_ranges(&record.samples, Film::MAX_SAMPLES)?;
+            let spp: u64 = record.samples.iter().map(|(start, end)| u64::from(end - start)).sum();
+            block.spp = u32::try_from(spp).map_err(|_| RecordError::TooManySamples)?;
+            block.ranges = record.samples.iter().map(|&(start, end)| start..end).collect();
+            block.mean_of = checked_mean(record.mean_of)?;
+            block.steps = record.steps.steps(block.mean_of)?;
+            if let Some((base, due)) = &record.due {
+                let ascending = due.windows(2).all(|pair| pair[0] <= pair[1]);
+                if due.len() > MAX_DOUBLINGS || !ascending || *base > block.spp {
+                    return Err(RecordError::Allocation);
+                }
+                block.base = *base;
+                block.due.iter_mut().zip(due).for_each(|(to, from)| *to = *from);
+            }
+        }
+        self.bad = record.bad.clone();
+        let mut n_bad = vec![0; self.n_pixels()];
+        for (pixel, _) in &self.bad {
+            let local = *pixel as usize;
+            match n_bad.get_mut(local) {
+                Some(n) if *n < self.block_of(local).spp => *n += 1,
+                _ => return Err(RecordError::BadSamples),
+            }
+        }
+        self.light.mean_of = checked_mean(record.light_mean_of)?;
+        self.light.steps = record.light_steps.steps(self.light.mean_of)?;
+        Ok(())
+    }
+}
+
+fn checked_mean(samples: u32) -> Result<u32, RecordError> {
+    if samples > 0 && !samples.is_power_of_two() { Err(RecordError::Convergence) } else { Ok(samples) }
+}
+
+impl FilmLayout {
+    /// The round of a film with these samples.
+    fn round(&self, film: &Film) -> Result<Option<Round>, RecordError> {
+        let Some(&RoundRecord { from, to, budget, even, irregular }) = self.round.as_ref() else { return Ok(None) };
+        let round = Round { from, to, budget, even, irregular };
+        let has_all = |block: &Block| even || block.spp >= block.target(Some(&round), budget);
+        let is_due = |block: &Block| block.due.iter().all(|due| *due == NEVER || (from < *due && *due <= to));
+        let mut blocks = film.tiles.iter().flat_map(|tile| &tile.blocks);
+        let fits = from <= budget && budget <= to && blocks.all(|block| has_all(block) && is_due(block));
+        if fits { Ok(Some(round)) } else { Err(RecordError::Allocation) }
     }
 }
 

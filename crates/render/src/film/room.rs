@@ -42,7 +42,7 @@ impl Purpose {
         match self {
             Self::Png => 4 + 4 * 3,
             Self::Exr => 12 + 12 + 2 * 12,
-            Self::FilmFile => 8 * 15 + 12 + 12 + 3 * (4 * 33),
+            Self::FilmFile => 8 * 18 + 12 + 12 + 3 * (4 * 39),
             Self::Layers => Self::FilmFile.bytes_a_pixel() + FeatureBuffers::BYTES_A_PIXEL as u64 + 3 * (4 * 45),
         }
     }
@@ -52,7 +52,7 @@ impl Purpose {
 pub(crate) const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
 
 /// And for traced light, where there is such light.
-pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>();
+pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
 
 /// For what a large picture takes besides, such as the workers' memory: an eighth, and no more than this.
 const MOST_BESIDES: u64 = 32 << 20;

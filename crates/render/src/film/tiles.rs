@@ -3,21 +3,25 @@
 //! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
 //! ([`Film::merge`]) to the very film that has all of them.
 
+use crate::core::settings::ErrorMetric;
+use crate::film::allocation::{FIRST_ROUND, begin_round, end_round};
+use crate::film::block::{BLOCK_SIZE, Block};
 use crate::film::error::MergeError;
-use crate::film::estimate::{ErrorEstimate, TileConvergence};
+use crate::film::estimate::{ErrorEstimate, Evidence};
 use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
 use crate::film::region::Region;
 use crate::film::room::{self, NoRoom, Room};
+use crate::film::round::Round;
+use crate::film::tile::FilmTile;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
-use std::collections::TryReserveError;
-use std::ops::Range;
 
 /// Sums and counts of one picture.
 ///
-/// A tile is always advanced as a whole, so all pixels of a tile have the same number of samples. After a pass that
-/// was stopped early, or one over a [`Region`] alone, tiles may differ, and the next pass over all evens them out.
+/// All pixels of a block of 8 × 8 have the same number of samples. In an even film all blocks have as many; after a pass
+/// that was stopped early, or one over a [`Region`] alone, they may differ, and the next pass over all evens them out. In
+/// an adaptive film samples go where the error is, and what counts is the mean over the picture, its budget.
 #[derive(Clone, Debug)]
 pub struct Film {
     width: u32,
@@ -25,28 +29,12 @@ pub struct Film {
     pub(crate) tiles: Vec<FilmTile>,
     tiles_x: u32,
     tile_size: u32,
+    /// How samples are allocated until the next budget; `None` as long as the film is even.
+    pub(crate) round: Option<Round>,
     /// From paths that began at the lights; `None` until there is some.
     pub(crate) light: Option<LightLayer>,
     /// Memory of such a layer that is not in use.
     idle_light: Vec<ExactSum>,
-}
-
-/// The pixels of one tile, row by row.
-#[derive(Clone, Debug)]
-pub(crate) struct FilmTile {
-    /// Upper left pixel.
-    pub origin: UVec2,
-    pub size: UVec2,
-    /// Samples taken of each pixel of this tile so far, bad ones included.
-    pub spp: u32,
-    /// The numbers of those samples, ascending, with gaps between the ranges; new samples lengthen the last one.
-    pub ranges: Vec<Range<u32>>,
-    /// Sum of radiance a pixel, W·m⁻²·sr⁻¹.
-    pub sums: Vec<ExactSum>,
-    /// Pixel (index in this tile) and number of each sample that was left out because it was not finite.
-    pub bad: Vec<(u32, u32)>,
-    /// What the error estimate needs.
-    pub convergence: TileConvergence,
 }
 
 impl Film {
@@ -124,7 +112,7 @@ impl Film {
             let size = (UVec2::new(width, height) - origin).min(UVec2::splat(tile_size));
             tiles.push(FilmTile::try_new(origin, size).map_err(no_room)?);
         }
-        Ok(Self { width, height, tiles, tiles_x, tile_size, light: None, idle_light: Vec::new() })
+        Ok(Self { width, height, tiles, tiles_x, tile_size, round: None, light: None, idle_light: Vec::new() })
     }
 
     /// Has memory ready for traced light.
@@ -139,14 +127,16 @@ impl Film {
         let n_pixels = width as usize * height as usize;
         let bytes = (n_pixels * Self::LIGHT_BYTES_A_PIXEL) as u64;
         let missing = n_pixels.saturating_sub(self.idle_light.len());
-        self.idle_light.try_reserve_exact(missing).map_err(|_| NoRoom { width, height, bytes })
+        let no_room = |_| NoRoom { width, height, bytes };
+        self.tiles.iter_mut().try_for_each(FilmTile::try_reserve_light).map_err(no_room)?;
+        self.idle_light.try_reserve_exact(missing).map_err(no_room)
     }
 
     /// The same without samples, to begin with sample number `first`.
     pub fn starting_at(mut self, first: u32) -> Self {
         self.clear();
-        for tile in &mut self.tiles {
-            tile.ranges = std::iter::once(first..first).collect();
+        for block in self.tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
+            block.clear(first);
         }
         self
     }
@@ -166,25 +156,54 @@ impl Film {
         self.tile_size
     }
 
-    /// Samples that every pixel has at least.
+    /// Samples per pixel: of an even film those that every pixel has at least, of an adaptive one the mean that has been
+    /// spent.
     pub fn spp(&self) -> u32 {
         self.spp_in(None)
     }
 
-    /// Samples that every pixel of a region has at least, or of the whole film.
+    /// The same of a region, in which every pixel has so many at least, or of the whole film.
     pub fn spp_in(&self, region: Option<&Region>) -> u32 {
         let light_traced = self.light.as_ref().map(|light| light.spp);
-        self.tiles_in(region).map(|tile| tile.spp).chain(light_traced).min().unwrap_or(0)
+        match (&self.round, region) {
+            (Some(round), None) if !round.even => light_traced.unwrap_or(u32::MAX).min(round.budget),
+            _ => self.tiles_in(region).map(FilmTile::spp).chain(light_traced).min().unwrap_or(0),
+        }
     }
 
     fn tiles_in<'a>(&'a self, region: Option<&'a Region>) -> impl Iterator<Item = &'a FilmTile> + Clone {
         self.tiles.iter().filter(move |tile| region.is_none_or(|region| tile.lies_in(region)))
     }
 
-    /// Samples that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
+    fn blocks(&self) -> impl Iterator<Item = &Block> {
+        self.tiles.iter().flat_map(|tile| &tile.blocks)
+    }
+
+    /// Samples per pixel that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
     pub fn max_spp(&self) -> u32 {
         let light_traced = self.light.as_ref().map(LightLayer::begun);
-        self.tiles.iter().map(|tile| tile.spp).chain(light_traced).max().unwrap_or(0)
+        let begun = |block: &Block| match &self.round {
+            Some(round) if !round.even => block.begun(round),
+            _ => block.spp,
+        };
+        let budget = self.round.filter(|round| !round.even).map(|round| round.budget);
+        self.blocks().map(begun).chain(light_traced).chain(budget).max().unwrap_or(0)
+    }
+
+    /// Whether another film of as many samples may not be the same: it was stopped in the middle of a pass, or has samples
+    /// of a region or of a part that its allocation did not give it.
+    pub fn is_uneven(&self) -> bool {
+        self.max_spp() > self.spp() || self.round.is_some_and(|round| round.irregular)
+    }
+
+    /// The fewest and the most samples that a pixel has, and the mean over all pixels.
+    pub fn sample_counts(&self) -> (u32, f64, u32) {
+        let (mut least, mut most, mut sum) = (u32::MAX, 0, 0.0);
+        for block in self.blocks() {
+            (least, most) = (least.min(block.spp), most.max(block.spp));
+            sum += f64::from(block.spp) * block.n_pixels() as f64;
+        }
+        (least, sum / (f64::from(self.width) * f64::from(self.height)), most)
     }
 
     /// A film like a new one, in the memory of this one: for a large film, memory is what takes time.
@@ -197,10 +216,11 @@ impl Film {
         if let Some(layer) = self.light.take() {
             self.idle_light = layer.sums;
         }
+        self.round = None;
         self.tiles.par_iter_mut().all(|tile| {
             let goes_on = !stop();
             if goes_on {
-                tile.clear();
+                tile.clear(0);
             }
             goes_on
         })
@@ -217,7 +237,7 @@ impl Film {
 
     /// The number of the first sample.
     pub fn first_sample(&self) -> u32 {
-        self.tiles.iter().filter_map(|tile| tile.ranges.first()).map(|range| range.start).min().unwrap_or(0)
+        self.blocks().filter_map(|block| block.ranges.first()).map(|range| range.start).min().unwrap_or(0)
     }
 
     /// Samples that were left out because they were not finite.
@@ -237,20 +257,28 @@ impl Film {
         if self.tile_size != other.tile_size {
             return Err(MergeError::TileSizes(self.tile_size, other.tile_size));
         }
-        for (tile, other) in self.tiles.iter().zip(&other.tiles) {
-            if let Some(shared) = tile.shares_with(other) {
+        for (block, other) in self.blocks().zip(other.blocks()) {
+            if let Some(shared) = block.shares_with(other) {
                 return Err(MergeError::SharedSamples { first: shared.start, last: shared.end - 1 });
             }
         }
+        let light_knows_more = match (&self.light, &other.light) {
+            (Some(light), Some(other)) => light.knows_less_than(other),
+            (light, _) => light.is_none(),
+        };
         for (tile, other) in self.tiles.iter_mut().zip(&other.tiles) {
-            tile.merge(other);
+            tile.merge(other, light_knows_more);
         }
         match (&mut self.light, &other.light) {
             (Some(light), Some(other)) => light.merge(other),
             (light, Some(other)) => *light = Some(other.clone()),
             (_, None) => {}
         }
-        self.record_convergence(|_| true);
+        if self.round.is_some() || other.round.is_some() {
+            self.leave_round();
+        }
+        self.tiles.par_iter_mut().for_each(|tile| (0..tile.blocks.len()).for_each(|block| tile.record_block(block)));
+        self.record_light();
         Ok(())
     }
 
@@ -280,16 +308,20 @@ impl Film {
     pub(crate) fn for_each_in_row(&self, y: u32, mut take: impl FnMut(usize, Vec3)) {
         let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
         for tile in tiles {
-            let columns = tile.origin.x..tile.origin.x + tile.size.x;
             let first = ((y - tile.origin.y) * tile.size.x) as usize;
-            if self.light.is_some() || !tile.bad.is_empty() || tile.spp == 0 {
-                for (local, x) in (first..).zip(columns) {
-                    take(x as usize, (tile.mean(local) + self.light_traced(x, y)).as_vec3());
-                }
-            } else {
-                let n = f64::from(tile.spp);
-                for (sum, x) in tile.sums[first..].iter().zip(columns) {
-                    take(x as usize, (sum.sum / n).as_vec3());
+            for block in tile.blocks_in_row(y - tile.origin.y) {
+                let columns = block.start.x..block.start.x + block.size.x;
+                let locals = first + columns.start as usize..first + columns.end as usize;
+                let columns = columns.map(|x| (tile.origin.x + x) as usize);
+                if self.light.is_some() || !tile.bad.is_empty() || block.spp == 0 {
+                    for (local, x) in locals.zip(columns) {
+                        take(x, (tile.mean(local) + self.light_traced(x as u32, y)).as_vec3());
+                    }
+                } else {
+                    let n = f64::from(block.spp);
+                    for (sum, x) in tile.sums[locals].iter().zip(columns) {
+                        take(x, (sum.sum / n).as_vec3());
+                    }
                 }
             }
         }
@@ -302,7 +334,8 @@ impl Film {
 
     /// Samples taken of a pixel so far.
     pub fn samples(&self, x: u32, y: u32) -> u32 {
-        self.locate(x, y).0.spp
+        let (tile, local) = self.locate(x, y);
+        tile.block_of(local).spp
     }
 
     /// How wrong the picture still is, as far as its own samples tell; `None` before the fourth sample of a pixel.
@@ -310,140 +343,72 @@ impl Film {
         self.error_estimate_in(None)
     }
 
-    /// The same of a region alone. That of a whole film of which a region is ahead counts as if it were not.
+    /// The same of a region alone.
     pub fn error_estimate_in(&self, region: Option<&Region>) -> Option<ErrorEstimate> {
-        ErrorEstimate::from_tiles(self.tiles_in(region).map(|tile| &tile.convergence), self.spp_in(region))
+        let mut evidence = Evidence::default();
+        let is_even = region.is_some() || self.is_even();
+        let spp = self.spp_in(region);
+        for tile in self.tiles_in(region) {
+            evidence.add_tile(tile.n_pixels());
+            tile.blocks.iter().for_each(|block| evidence.add_part(block.steps, block.spp));
+            if let Some(light) = &self.light {
+                evidence.add_part(tile.light.steps, light.spp);
+            }
+        }
+        ErrorEstimate::new(&evidence, spp, is_even)
+    }
+
+    /// Whether every pixel gets as many samples.
+    fn is_even(&self) -> bool {
+        self.round.is_none_or(|round| round.even)
     }
 
     /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
     /// mean over many pixels is the variance that is left. 0 before the second sample.
     pub fn doubling_step(&self, x: u32, y: u32) -> f32 {
         let (tile, local) = self.locate(x, y);
-        tile.convergence.last_step(local)
+        tile.last_step(local)
     }
 
-    /// Tells the part of the error estimate of each tile that `is_news` chooses how far the picture is.
-    pub(crate) fn record_convergence(&mut self, is_news: impl Fn(&FilmTile) -> bool + Sync) {
-        let (light, width) = (self.light.as_ref(), self.width);
-        let tiles = self.tiles.par_iter_mut().filter(|tile| is_news(tile));
-        tiles.for_each(|tile| tile.record_convergence(light.map(|light| (light, width))));
+    /// Tells the error estimate how far traced light is, if that has come to a power of two.
+    pub(crate) fn record_light(&mut self) {
+        let Some(layer) = &self.light else { return };
+        let width = self.width;
+        self.tiles.par_iter_mut().for_each(|tile| tile.record_light(layer, width));
+    }
+
+    /// Decides the next round of an adaptive film, if the last one is over.
+    pub(crate) fn begin_round_if_due(&mut self, metric: ErrorMetric) {
+        let spp = self.spp();
+        let (least, mean, most) = self.sample_counts();
+        let (from, irregular) = match &self.round {
+            // Blocks lie across tiles of other sizes, and have no neighbours then.
+            _ if !self.tile_size.is_multiple_of(BLOCK_SIZE) => return,
+            Some(round) if spp < round.to => return,
+            Some(round) => (spp, round.irregular),
+            None if spp < FIRST_ROUND => return,
+            None => (spp.max(mean.round() as u32), least < most),
+        };
+        let size = UVec2::new(self.width, self.height).map(|side| side.div_ceil(BLOCK_SIZE));
+        self.round = Some(begin_round(&mut self.tiles, size, from, irregular, metric));
+    }
+
+    /// All that was to be done up to a budget is done.
+    pub(crate) fn has_spent(&mut self, budget: u32) {
+        if let Some(round) = &mut self.round {
+            round.budget = round.budget.max(budget);
+        }
+    }
+
+    /// Takes the counts as they are, whatever the round was to make of them; the next one is decided from there.
+    pub(crate) fn leave_round(&mut self) {
+        let (least, mean, most) = self.sample_counts();
+        self.round = if least == most { None } else { Some(end_round(&mut self.tiles, mean.round() as u32)) };
     }
 
     fn locate(&self, x: u32, y: u32) -> (&FilmTile, usize) {
         let tile = &self.tiles[(y / self.tile_size * self.tiles_x + x / self.tile_size) as usize];
         let local = UVec2::new(x, y) - tile.origin;
         (tile, (local.y * tile.size.x + local.x) as usize)
-    }
-}
-
-impl FilmTile {
-    pub fn lies_in(&self, region: &Region) -> bool {
-        region.contains(self.origin.x, self.origin.y)
-    }
-
-    fn try_new(origin: UVec2, size: UVec2) -> Result<Self, TryReserveError> {
-        let n = size.x as usize * size.y as usize;
-        let (mut sums, mut convergence) = (Vec::new(), TileConvergence::default());
-        sums.try_reserve_exact(n)?;
-        sums.resize(n, ExactSum::default());
-        convergence.try_reserve(n)?;
-        let ranges = std::iter::once(0..0).collect();
-        Ok(Self { origin, size, spp: 0, ranges, sums, bad: Vec::new(), convergence })
-    }
-
-    fn clear(&mut self) {
-        let Self { origin: _, size: _, spp, ranges, sums, bad, convergence } = self;
-        *spp = 0;
-        ranges.clear();
-        ranges.push(0..0);
-        sums.fill(ExactSum::default());
-        bad.clear();
-        convergence.clear();
-    }
-
-    pub fn n_pixels(&self) -> usize {
-        self.sums.len()
-    }
-
-    pub fn mean(&self, local: usize) -> DVec3 {
-        let n_bad = self.bad.iter().filter(|(pixel, _)| *pixel as usize == local).count() as u32;
-        match self.spp - n_bad {
-            0 => DVec3::ZERO,
-            n => self.sums[local].sum / f64::from(n),
-        }
-    }
-
-    /// The number of the next sample.
-    pub fn next_sample(&self) -> u32 {
-        self.ranges.last().map_or(0, |range| range.end)
-    }
-
-    /// Adds one sample of every pixel, in the order of `sums`; `sample` is its number, the next one.
-    pub fn add_sample(&mut self, sample: u32, radiance: impl Iterator<Item = Vec3>) {
-        debug_assert_eq!(sample, self.next_sample(), "samples come in order");
-        for (local, (sum, radiance)) in self.sums.iter_mut().zip(radiance).enumerate() {
-            if radiance.is_finite() {
-                sum.add(radiance);
-            } else {
-                self.bad.push((local as u32, sample));
-            }
-        }
-        self.spp += 1;
-        if let Some(last) = self.ranges.last_mut() {
-            last.end += 1;
-        }
-    }
-
-    /// At powers of two, tells the error estimate of the picture so far; `light`: from the lights, and the width of the film.
-    pub fn record_convergence(&mut self, light: Option<(&LightLayer, u32)>) {
-        if !self.spp.is_power_of_two() {
-            return;
-        }
-        let mut convergence = std::mem::take(&mut self.convergence);
-        let mean = |local: usize| {
-            let light_traced = light.map_or(DVec3::ZERO, |(layer, width)| {
-                let pixel = self.origin + UVec2::new(local as u32 % self.size.x, local as u32 / self.size.x);
-                layer.mean((pixel.y * width + pixel.x) as usize)
-            });
-            self.mean(local) + light_traced
-        };
-        convergence.record(self.spp, self.size.x as usize, (0..self.n_pixels()).map(mean));
-        self.convergence = convergence;
-    }
-
-    /// Samples that both have.
-    fn shares_with(&self, other: &Self) -> Option<Range<u32>> {
-        let pairs = self.ranges.iter().flat_map(|a| other.ranges.iter().map(move |b| (a, b)));
-        pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).find(|shared| !shared.is_empty())
-    }
-
-    /// Adds the samples of another tile, which has none of these.
-    fn merge(&mut self, other: &Self) {
-        for (sum, other) in self.sums.iter_mut().zip(&other.sums) {
-            sum.merge(other);
-        }
-        // What rendering in one go would have measured is known where the second half doubles the first.
-        let start = |tile: &Self| tile.ranges.first().map_or(0, |range| range.start);
-        let other_knows_more =
-            (other.spp, std::cmp::Reverse(start(other))) > (self.spp, std::cmp::Reverse(start(self)));
-        if other_knows_more {
-            self.convergence = other.convergence.clone();
-        }
-        self.spp += other.spp;
-        self.bad.extend(&other.bad);
-        self.bad.sort_unstable_by_key(|&(pixel, sample)| (sample, pixel));
-        let mut ranges: Vec<Range<u32>> = self.ranges.iter().chain(&other.ranges).cloned().collect();
-        ranges.retain(|range| !range.is_empty());
-        if ranges.is_empty() {
-            ranges.push(self.next_sample()..self.next_sample());
-        }
-        ranges.sort_by_key(|range| range.start);
-        self.ranges = ranges.into_iter().fold(Vec::new(), |mut joined: Vec<Range<u32>>, range| {
-            match joined.last_mut() {
-                Some(last) if last.end == range.start => last.end = range.end,
-                _ => joined.push(range),
-            }
-            joined
-        });
     }
 }

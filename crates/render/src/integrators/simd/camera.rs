@@ -8,13 +8,14 @@ use crate::shading::paths::{PathBatch, PathLanes};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_simd::{Bits, Float, InstructionSet, LANES, Mask, Real, Simd, Vector, dispatch};
 use glam::{UVec2, Vec2, Vec3};
+use std::ops::Range;
 
 /// Pixels whose camera rays are wanted, in the order of the rays.
 #[derive(Default)]
 pub(crate) struct Pixels {
     pub x: Vec<u32>,
     pub y: Vec<u32>,
-    /// Place in the tile.
+    /// Place among the pixels of one sample.
     pub local: Vec<u32>,
 }
 
@@ -46,21 +47,37 @@ impl CameraRays<'_> {
         (self.camera.ray(film, self.size.as_vec2(), lens), sampler, weight)
     }
 
-    /// Appends a path for each of the pixels; `slot` is that of local pixel 0. There must be room.
-    pub fn start_paths(&self, set: InstructionSet, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
+    /// Appends a path for each of the `wanted` pixels; `slot` is that of local pixel 0. There must be room.
+    pub fn start_paths(
+        &self,
+        set: InstructionSet,
+        pixels: &Pixels,
+        wanted: Range<usize>,
+        sample: u32,
+        slot: u32,
+        to: &mut PathBatch,
+    ) {
         let lens = *self;
-        dispatch!(set, start(lens: CameraRays, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch));
+        let at = [sample, slot];
+        dispatch!(set, start(lens: CameraRays, pixels: &Pixels, wanted: Range<usize>, at: [u32; 2], to: &mut PathBatch));
     }
 }
 
 #[inline(always)]
-fn start<S: Simd>(s: S, lens: CameraRays, pixels: &Pixels, sample: u32, slot: u32, to: &mut PathBatch) {
+fn start<S: Simd>(
+    s: S,
+    lens: CameraRays,
+    pixels: &Pixels,
+    wanted: Range<usize>,
+    [sample, slot]: [u32; 2],
+    to: &mut PathBatch,
+) {
     let (camera, size) = (lens.camera, lens.size.as_vec2());
     let one = Float::splat(s, 1.0);
-    for first in (0..pixels.local.len()).step_by(LANES) {
-        let count = (pixels.local.len() - first).min(LANES);
+    for first in wanted.clone().step_by(LANES) {
+        let count = (wanted.end - first).min(LANES);
         let mask = if count == LANES { Mask::MAX } else { (1 << count) - 1 };
-        let (x, y) = (load_some(s, &pixels.x[first..]), load_some(s, &pixels.y[first..]));
+        let (x, y) = (load_some(s, &pixels.x[first..wanted.end]), load_some(s, &pixels.y[first..wanted.end]));
         let sampler = if lens.even_samples {
             SamplerLanes::of_pixels(lens.seed, [x, y], sample)
         } else {
@@ -75,7 +92,7 @@ fn start<S: Simd>(s: S, lens: CameraRays, pixels: &Pixels, sample: u32, slot: u3
             position: origin,
             normal: dir,
             sampler,
-            slot: load_some(s, &pixels.local[first..]) + slot,
+            slot: load_some(s, &pixels.local[first..wanted.end]) + slot,
         };
         to.append(mask, origin, dir, &path);
         if let Some(media) = &mut to.media {

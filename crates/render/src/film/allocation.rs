@@ -1,0 +1,309 @@
+//! Which blocks of pixels get the next samples.
+//!
+//! Samples are allocated in rounds. A round begins when a film has spent its budget, a power of two of samples per pixel
+//! on average, and doubles that. What the round will do is decided at its beginning, from the film alone, and kept with the
+//! film: which blocks double their samples, once or twice, and in which order. So a film is a function of scene, seed and
+//! settings, whatever the threads and portions that it is rendered in, and one that is stopped goes on as it was begun.
+//!
+//! Blocks have powers of two of samples whenever no pass is under way, so that the evenness of each pixel's sequence is
+//! kept, and doublings measure the error. The best allocation has n ∝ √variance; with powers of two it loses 2 %. The
+//! doubling that lowers the error most per sample comes first: that which changes variance / n from n to 2n, which costs n,
+//! by variance / (2 n²).
+//!
+//! The samples that decide are also those that are weighed, which is a bias (a block that was lucky to look dark gets
+//! fewer samples to find out). It is kept small: the variance of a block is that of nine blocks over up to three
+//! doublings, no block falls below a quarter of the mean, and it falls with 1 / n, while noise falls with 1 / √n.
+
+use crate::core::settings::ErrorMetric;
+use crate::film::block::{Block, MAX_DOUBLINGS, NEVER, Steps, doubled};
+use crate::film::round::Round;
+use crate::film::tile::FilmTile;
+use glam::{DVec3, UVec2};
+use rayon::prelude::*;
+
+/// Samples that every pixel gets before anything is known of its error.
+pub(crate) const FIRST_ROUND: u32 = 8;
+
+/// No block has fewer samples than this part of the mean, and none more than that many times the mean.
+const LEAST_SHARE: u32 = 4;
+const MOST_SHARE: u32 = 16;
+
+/// A first uneven round must lower the squared error by this share at least: what is even is quicker to look at and to
+/// foretell, and a smaller gain may be chance.
+const LEAST_GAIN: f64 = 0.05;
+
+/// What is known of a block when a round begins.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    n_pixels: u32,
+    spp: u32,
+    /// Of one sample, relative to the squared level, the mean over pixels and channels; `None` is not known.
+    variance: Option<f64>,
+}
+
+/// The blocks of a film, row by row.
+struct Grid {
+    width: usize,
+    blocks: Vec<Candidate>,
+}
+
+/// A doubling of a block.
+struct Doubling {
+    block: usize,
+    /// Fall of the squared error for a sample of a pixel; infinite where it must be.
+    gain: f64,
+    /// Samples of all of its pixels.
+    cost: u64,
+}
+
+/// Decides a round of a film with these tiles, whose blocks lie in a grid of `size` blocks, and tells the blocks.
+///
+/// - `from`: mean samples per pixel that have been spent.
+/// - `irregular`: see [`Round::irregular`].
+pub(crate) fn begin_round(
+    tiles: &mut [FilmTile],
+    size: UVec2,
+    from: u32,
+    irregular: bool,
+    metric: ErrorMetric,
+) -> Round {
+    let to = doubled(from);
+    let mut grid = Grid::of(tiles, size, metric);
+    grid.smooth();
+    let n_pixels: u64 = grid.blocks.iter().map(|block| u64::from(block.n_pixels)).sum();
+    let doublings = grid.best_doublings(to);
+    let total: u64 = grid.blocks.iter().map(|block| u64::from(block.n_pixels) * u64::from(block.spp)).sum();
+    // What earlier rounds spent too much or too little is made up for, where it is not a region that was ahead.
+    let usual = n_pixels * u64::from(to - from);
+    let budget = (n_pixels * u64::from(to)).saturating_sub(total).clamp(usual / 2, usual + usual / 2);
+    let mut due = vec![[NEVER; MAX_DOUBLINGS]; grid.blocks.len()];
+    let mut spent = 0;
+    for doubling in doublings {
+        // To the nearest.
+        let at = spent + doubling.cost / 2;
+        if at > budget && doubling.gain.is_finite() {
+            break;
+        }
+        spent += doubling.cost;
+        let share = (at as f64 / budget as f64 * f64::from(to - from)).ceil() as u32;
+        let place = due[doubling.block].iter_mut().find(|due| **due == NEVER).expect("no more than that many");
+        *place = (from + share.max(1)).min(to);
+    }
+    let even = grid.is_better_even(&due, from, to);
+    let place = |tile: &FilmTile, block: &Block| place_of(tile, block, grid.width);
+    for tile in tiles {
+        for i in 0..tile.blocks.len() {
+            let due = if even { [NEVER; MAX_DOUBLINGS] } else { due[place(tile, &tile.blocks[i])] };
+            let block = &mut tile.blocks[i];
+            (block.base, block.due) = (block.spp, due);
+        }
+    }
+    Round { from, to, budget: from, even, irregular }
+}
+
+/// A round that is over, of a film that was changed in another way: the next one is decided from what there is.
+pub(crate) fn end_round(tiles: &mut [FilmTile], budget: u32) -> Round {
+    for block in tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
+        (block.base, block.due) = (block.spp, [NEVER; MAX_DOUBLINGS]);
+    }
+    Round { from: budget, to: budget, budget, even: false, irregular: true }
+}
+
+/// The index of a block in a grid of that width.
+fn place_of(tile: &FilmTile, block: &Block, width: usize) -> usize {
+    let at = (tile.origin + block.start) / crate::film::block::BLOCK_SIZE;
+    at.y as usize * width + at.x as usize
+}
+
+impl Grid {
+    fn of(tiles: &[FilmTile], size: UVec2, metric: ErrorMetric) -> Self {
+        let nothing = Candidate { n_pixels: 0, spp: 0, variance: None };
+        let mut grid = Self { width: size.x as usize, blocks: vec![nothing; (size.x * size.y) as usize] };
+        let known: Vec<Vec<(usize, Candidate)>> = tiles
+            .par_iter()
+            .map(|tile| {
+                let of = |(i, block): (usize, &Block)| {
+                    let n_pixels = block.n_pixels() as u32;
+                    let weight = match metric {
+                        ErrorMetric::RelativeMse => 1.0,
+                        ErrorMetric::Display { exposure_stops } => display_weight(tile, block, exposure_stops),
+                    };
+                    let variance = variance_of(&block.steps, 3 * n_pixels).map(|variance| variance * weight);
+                    (place_of(tile, &tile.blocks[i], size.x as usize), Candidate { n_pixels, spp: block.spp, variance })
+                };
+                tile.blocks.iter().enumerate().map(of).collect()
+            })
+            .collect();
+        for (place, candidate) in known.into_iter().flatten() {
+            grid.blocks[place] = candidate;
+        }
+        grid
+    }
+
+    /// Gives each block the variance of itself and its neighbours, which count less; that of the whole picture where none
+    /// of them is known.
+    fn smooth(&mut self) {
+        const WEIGHTS: [[f64; 3]; 3] = [[1.0, 2.0, 1.0], [2.0, 8.0, 2.0], [1.0, 2.0, 1.0]];
+        let (width, height) = (self.width, self.blocks.len() / self.width);
+        let of = |block: &Candidate| {
+            block.variance.map_or((0.0, 0.0), |v| (v * f64::from(block.n_pixels), f64::from(block.n_pixels)))
+        };
+        let (sum, n) = self.blocks.iter().map(of).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let everywhere = if n > 0.0 { sum / n } else { 1.0 };
+        let smoothed: Vec<f64> = (0..self.blocks.len())
+            .into_par_iter()
+            .map(|i| {
+                let (x, y) = (i % width, i / width);
+                let (mut sum, mut n) = (0.0, 0.0);
+                for (dy, row) in WEIGHTS.iter().enumerate().filter(|(dy, _)| (1..=height).contains(&(y + dy))) {
+                    for (dx, weight) in row.iter().enumerate().filter(|(dx, _)| (1..=width).contains(&(x + dx))) {
+                        let (of_sum, of_n) = of(&self.blocks[(y + dy - 1) * width + x + dx - 1]);
+                        (sum, n) = (sum + weight * of_sum, n + weight * of_n);
+                    }
+                }
+                if n > 0.0 { sum / n } else { everywhere }
+            })
+            .collect();
+        for (block, variance) in self.blocks.iter_mut().zip(smoothed) {
+            block.variance = Some(variance);
+        }
+    }
+
+    /// All doublings that there may be on the way to a mean of `to` samples, the best first.
+    fn best_doublings(&self, to: u32) -> Vec<Doubling> {
+        let mut doublings = Vec::new();
+        for (place, block) in self.blocks.iter().enumerate() {
+            let mut spp = block.spp;
+            for _ in 0..MAX_DOUBLINGS {
+                let next = doubled(spp);
+                if u64::from(next) > u64::from(to) * u64::from(MOST_SHARE) {
+                    break;
+                }
+                let cost = u64::from(next - spp) * u64::from(block.n_pixels);
+                let must_be = spp < to / LEAST_SHARE;
+                let fall = block.variance.unwrap_or_default() / (f64::from(spp.max(1)) * f64::from(next));
+                let gain = if must_be { f64::INFINITY } else { fall };
+                doublings.push(Doubling { block: place, gain, cost });
+                spp = next;
+            }
+        }
+        // Stable: equal ones in the order of the blocks, and the doublings of a block in theirs.
+        doublings.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        doublings
+    }
+
+    /// Whether an even film gains too little by not staying so.
+    fn is_better_even(&self, due: &[[u32; MAX_DOUBLINGS]], from: u32, to: u32) -> bool {
+        if self.blocks.iter().any(|block| block.spp != from) {
+            return false;
+        }
+        let error = |spp_of: &dyn Fn(usize, &Candidate) -> u32| {
+            let of = |(i, block): (usize, &Candidate)| {
+                f64::from(block.n_pixels) * block.variance.unwrap_or_default() / f64::from(spp_of(i, block))
+            };
+            self.blocks.iter().enumerate().map(of).sum::<f64>()
+        };
+        let after = |i: usize, block: &Candidate| {
+            due[i].iter().filter(|&&due| due != NEVER).fold(block.spp, |spp, _| doubled(spp))
+        };
+        error(&after) >= (1.0 - LEAST_GAIN) * error(&|_, _| to)
+    }
+}
+
+/// Variance of one sample, relative to the squared level, the mean over pixels and channels, as far as doublings tell it
+/// and as if samples were independent; the later ones have more samples and count more.
+fn variance_of(steps: &Steps, n_values: u32) -> Option<f64> {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for ago in 0..Steps::KEPT {
+        if let Some(step) = steps.ago(ago) {
+            let share = 0.5_f64.powi(ago as i32);
+            sum += share * step * f64::from(steps.at) * share / f64::from(n_values);
+            weights += share;
+        }
+    }
+    (weights > 0.0).then(|| sum / weights)
+}
+
+/// How much a relative error is worth on a display: the squared slope of the encoded value over that of the relative
+/// error, the mean over pixels and channels. Above white, which is 1 after exposure, little is.
+fn display_weight(tile: &FilmTile, block: &Block, exposure_stops: f32) -> f64 {
+    let exposure = f64::from(exposure_stops).exp2();
+    let encoded = |light: f64| (1.0 - (-light.max(0.0) * exposure).exp()).powf(1.0 / 2.2);
+    let of = |light: f64| {
+        // Over a step that a noisy mean may be off by, so that black is no pole.
+        let step = 0.1 * light.abs() + 0.01;
+        let slope = (encoded(light + step) - encoded(light - step)) / (2.0 * step);
+        slope * slope * (light * light + 0.01)
+    };
+    let weight = |mean: DVec3| of(mean.x) + of(mean.y) + of(mean.z);
+    let sum: f64 = block.locals(tile.size.x).map(|local| weight(tile.mean(local))).sum();
+    sum / (3.0 * block.n_pixels() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::tiles::Film;
+    use crate::sampling::Sampler;
+    use glam::Vec3;
+
+    const SIDE: u32 = 64;
+
+    /// An adaptive film of what pixels see, without any scene.
+    fn film_of(seed: u32, budget: u32, light: &(dyn Fn(u32, u32, glam::Vec2) -> f32 + Sync)) -> Film {
+        let mut film = Film::new(SIDE, SIDE);
+        while film.spp() < budget {
+            film.begin_round_if_due(ErrorMetric::RelativeMse);
+            let goal = (film.spp() + 1).next_power_of_two().min(budget);
+            let round = film.round;
+            for tile in &mut film.tiles {
+                for i in 0..tile.blocks.len() {
+                    let origin = tile.origin + tile.blocks[i].start;
+                    while tile.blocks[i].spp < tile.blocks[i].target(round.as_ref(), goal) {
+                        let sample = tile.blocks[i].next_sample();
+                        let seen = |p: u32| {
+                            let (x, y) = (origin.x + p % 8, origin.y + p / 8);
+                            light(x, y, Sampler::new(seed, x, y, sample).pair(0))
+                        };
+                        let radiance: Vec<Vec3> = (0..64).map(|p| Vec3::splat(seen(p))).collect();
+                        tile.add_sample(i, sample, &radiance);
+                    }
+                }
+            }
+            film.has_spent(goal);
+        }
+        film
+    }
+
+    /// Half of the picture has little noise; in the other one sample in 400 brings half of the light.
+    fn rare(x: u32, _y: u32, u: glam::Vec2) -> f32 {
+        let firefly = if x >= SIDE / 2 && u.x < 1.0 / 400.0 { 200.0 } else { 0.0 };
+        let base = if x >= SIDE / 2 { 0.5 } else { 0.9 + 0.2 * u.y };
+        base + firefly
+    }
+
+    #[test]
+    fn rare_bright_samples_keep_their_mean() {
+        for budget in [16, 64] {
+            let halves: Vec<[f64; 2]> = (0..400_u32)
+                .into_par_iter()
+                .map(|seed| {
+                    let film = film_of(1000 + seed, budget, &rare);
+                    let mut sums = [0.0; 2];
+                    for (x, y) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y))) {
+                        sums[(x >= SIDE / 2) as usize] += f64::from(film.mean(x, y).x);
+                    }
+                    sums.map(|sum| sum / f64::from(SIDE * SIDE / 2))
+                })
+                .collect();
+            let n = halves.len() as f64;
+            for side in 0..2 {
+                let mean = halves.iter().map(|half| half[side]).sum::<f64>() / n;
+                let variance = halves.iter().map(|half| (half[side] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+                let (t, noise) = ((mean - 1.0) / (variance / n).sqrt(), variance.sqrt());
+                println!("budget {budget}, half {side}: bias {:.5}, noise of one {noise:.5}, t {t:.2}", mean - 1.0);
+                assert!(t.abs() < 4.0, "budget {budget}, half {side}: {mean}, t {t}");
+            }
+        }
+    }
+}

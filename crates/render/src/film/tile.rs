@@ -1,0 +1,257 @@
+//! The pixels of one tile: what a worker owns while it adds samples.
+
+use crate::film::block::{BLOCK_PIXELS, BLOCK_SIZE, Block, Steps};
+use crate::film::estimate::local_level;
+use crate::film::exact_sum::ExactSum;
+use crate::film::light_layer::LightLayer;
+use crate::film::region::Region;
+use glam::{DVec3, UVec2, Vec3};
+use std::collections::TryReserveError;
+
+/// The pixels of one tile, row by row, in blocks that each have the same samples.
+#[derive(Clone, Debug)]
+pub(crate) struct FilmTile {
+    /// Upper left pixel.
+    pub origin: UVec2,
+    pub size: UVec2,
+    /// Row by row.
+    pub blocks: Vec<Block>,
+    /// Sum of radiance a pixel, W·m⁻²·sr⁻¹.
+    pub sums: Vec<ExactSum>,
+    /// Pixel (index in this tile) and number of each sample that was left out because it was not finite.
+    pub bad: Vec<(u32, u32)>,
+    /// Means at the last power of two of each block's samples; empty before the first.
+    pub before: Vec<DVec3>,
+    /// Each pixel's share of its block's last step, mean over channels; empty where it is not known.
+    pub last: Vec<f32>,
+    /// The same of traced light.
+    pub light: TileLight,
+}
+
+/// What the error estimate knows of the traced light in a tile.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TileLight {
+    /// Samples of the means; 0 before the first.
+    pub mean_of: u32,
+    /// Means at the last power of two.
+    pub before: Vec<DVec3>,
+    /// Each pixel's share of the last step, mean over channels; empty where it is not known.
+    pub last: Vec<f32>,
+    /// What doublings changed.
+    pub steps: Steps,
+}
+
+impl TileLight {
+    /// The mean at the last power of two.
+    fn before(&self, local: usize) -> DVec3 {
+        if self.mean_of > 0 { self.before[local] } else { DVec3::ZERO }
+    }
+
+    fn clear(&mut self) {
+        let Self { mean_of, before, last, steps } = self;
+        before.clear();
+        last.clear();
+        (*mean_of, *steps) = (0, Steps::default());
+    }
+}
+
+impl FilmTile {
+    pub fn lies_in(&self, region: &Region) -> bool {
+        region.contains(self.origin.x, self.origin.y)
+    }
+
+    pub fn try_new(origin: UVec2, size: UVec2) -> Result<Self, TryReserveError> {
+        let n = size.x as usize * size.y as usize;
+        let (mut sums, mut before, mut last) = (Vec::new(), Vec::new(), Vec::new());
+        sums.try_reserve_exact(n)?;
+        sums.resize(n, ExactSum::default());
+        before.try_reserve_exact(n)?;
+        last.try_reserve_exact(n)?;
+        let starts = |length: u32| (0..length).step_by(BLOCK_SIZE as usize);
+        let blocks = starts(size.y).flat_map(|y| starts(size.x).map(move |x| UVec2::new(x, y)));
+        let blocks = blocks.map(|start| Block::new(start, (size - start).min(UVec2::splat(BLOCK_SIZE)))).collect();
+        Ok(Self { origin, size, blocks, sums, bad: Vec::new(), before, last, light: TileLight::default() })
+    }
+
+    /// Has the memory ready that traced light needs.
+    pub fn try_reserve_light(&mut self) -> Result<(), TryReserveError> {
+        let n = self.n_pixels();
+        self.light.before.try_reserve_exact(n)?;
+        self.light.last.try_reserve_exact(n)
+    }
+
+    /// As new, to begin with sample number `first`.
+    pub fn clear(&mut self, first: u32) {
+        let Self { origin: _, size: _, blocks, sums, bad, before, last, light } = self;
+        blocks.iter_mut().for_each(|block| block.clear(first));
+        sums.fill(ExactSum::default());
+        bad.clear();
+        before.clear();
+        last.clear();
+        light.clear();
+    }
+
+    pub fn n_pixels(&self) -> usize {
+        self.sums.len()
+    }
+
+    /// Samples that every pixel has at least.
+    pub fn spp(&self) -> u32 {
+        self.blocks.iter().map(|block| block.spp).min().unwrap_or(0)
+    }
+
+    /// The block of a pixel.
+    pub fn block_of(&self, local: usize) -> &Block {
+        let (x, y) = (local as u32 % self.size.x, local as u32 / self.size.x);
+        &self.blocks[(y / BLOCK_SIZE * self.size.x.div_ceil(BLOCK_SIZE) + x / BLOCK_SIZE) as usize]
+    }
+
+    /// Blocks in column order and the columns of the tile that they have in row `y` of it.
+    pub fn blocks_in_row(&self, y: u32) -> &[Block] {
+        let n = self.size.x.div_ceil(BLOCK_SIZE) as usize;
+        &self.blocks[(y / BLOCK_SIZE) as usize * n..][..n]
+    }
+
+    pub fn mean(&self, local: usize) -> DVec3 {
+        self.mean_of(local, self.block_of(local).spp)
+    }
+
+    /// - `spp`: of its block.
+    fn mean_of(&self, local: usize, spp: u32) -> DVec3 {
+        let n_bad = self.bad.iter().filter(|(pixel, _)| *pixel as usize == local).count() as u32;
+        match spp - n_bad {
+            0 => DVec3::ZERO,
+            n => self.sums[local].sum / f64::from(n),
+        }
+    }
+
+    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels.
+    pub fn last_step(&self, local: usize) -> f32 {
+        let of = |steps: Steps, last: &[f32]| {
+            if steps.at > 0 { last.get(local).copied().unwrap_or(0.0) } else { 0.0 }
+        };
+        of(self.block_of(local).steps, &self.last) + of(self.light.steps, &self.light.last)
+    }
+
+    /// Adds one sample of every pixel of a block, row by row; `sample` is its number, the next one.
+    pub fn add_sample(&mut self, block: usize, sample: u32, radiance: &[Vec3]) {
+        let of = &mut self.blocks[block];
+        debug_assert_eq!(sample, of.next_sample(), "samples come in order");
+        for (local, &radiance) in of.locals(self.size.x).zip(radiance) {
+            if radiance.is_finite() {
+                self.sums[local].add(radiance);
+            } else {
+                self.bad.push((local as u32, sample));
+            }
+        }
+        of.spp += 1;
+        if let Some(last) = of.ranges.last_mut() {
+            last.end += 1;
+        }
+        self.record_block(block);
+    }
+
+    /// At powers of two, tells the error estimate how far a block is.
+    pub fn record_block(&mut self, block: usize) {
+        let Block { spp, mean_of, size, .. } = self.blocks[block];
+        if !spp.is_power_of_two() || mean_of == spp {
+            return;
+        }
+        let (mut seen, mut shown) = ([DVec3::ZERO; BLOCK_PIXELS], [DVec3::ZERO; BLOCK_PIXELS]);
+        let n = self.blocks[block].n_pixels();
+        for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
+            seen[i] = self.mean_of(local, spp);
+            shown[i] = seen[i] + self.light.before(local);
+        }
+        if self.before.is_empty() {
+            self.before.resize(self.sums.len(), DVec3::ZERO);
+        }
+        // What came in too large a lump tells nothing.
+        if mean_of > 0 && mean_of == spp / 2 {
+            if self.last.is_empty() {
+                self.last.resize(self.sums.len(), 0.0);
+            }
+            let mut sum = 0.0;
+            for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
+                let before = self.before[local];
+                let level = local_level(&shown[..n], before + self.light.before(local), size.x as usize, i);
+                let step = relative_square(seen[i] - before, level);
+                self.last[local] = (step / 3.0) as f32;
+                sum += step;
+            }
+            self.blocks[block].steps.push(spp, sum);
+        }
+        for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
+            self.before[local] = seen[i];
+        }
+        self.blocks[block].mean_of = spp;
+    }
+
+    /// When the samples of traced light are a power of two, tells the error estimate how far it is.
+    ///
+    /// - `width`: of the film.
+    pub fn record_light(&mut self, layer: &LightLayer, width: u32) {
+        let (spp, mean_of) = (layer.spp, self.light.mean_of);
+        if !spp.is_power_of_two() || mean_of == spp {
+            return;
+        }
+        let place = |local: usize| self.origin + UVec2::new(local as u32 % self.size.x, local as u32 / self.size.x);
+        let traced = |local: usize| layer.mean((place(local).y * width + place(local).x) as usize);
+        let now: Vec<DVec3> = (0..self.n_pixels()).map(traced).collect();
+        if mean_of > 0 && mean_of == spp / 2 {
+            let seen: Vec<DVec3> = (0..self.n_pixels()).map(|local| self.mean(local)).collect();
+            let shown: Vec<DVec3> = seen.iter().zip(&now).map(|(seen, traced)| *seen + *traced).collect();
+            let Self { light, size, .. } = self;
+            light.last.clear();
+            let mut sum = 0.0;
+            for (local, (traced, before)) in now.iter().zip(&light.before).enumerate() {
+                let level = local_level(&shown, seen[local] + *before, size.x as usize, local);
+                let step = relative_square(*traced - *before, level);
+                light.last.push((step / 3.0) as f32);
+                sum += step;
+            }
+            light.steps.push(spp, sum);
+        }
+        // Not the new list itself: this one's memory is reserved, for as long as the film is there.
+        self.light.before.clear();
+        self.light.before.extend_from_slice(&now);
+        self.light.mean_of = spp;
+    }
+
+    /// Adds the samples of another tile, which has none of these.
+    ///
+    /// - `light_knows_more`: whether the other one knows more of the error of traced light.
+    pub fn merge(&mut self, other: &Self, light_knows_more: bool) {
+        for (sum, other) in self.sums.iter_mut().zip(&other.sums) {
+            sum.merge(other);
+        }
+        if light_knows_more {
+            self.light = other.light.clone();
+        }
+        for (i, of_other) in other.blocks.iter().enumerate() {
+            let block = &mut self.blocks[i];
+            if block.knows_less_than(of_other) {
+                (block.mean_of, block.steps) = (of_other.mean_of, of_other.steps);
+                for local in block.locals(self.size.x) {
+                    copy_one(&other.before, &mut self.before, local, self.sums.len());
+                    copy_one(&other.last, &mut self.last, local, self.sums.len());
+                }
+            }
+            block.merge_samples(of_other);
+        }
+        self.bad.extend(&other.bad);
+    }
+}
+
+/// Of lists that are either empty or have all pixels.
+fn copy_one<T: Copy + Default>(from: &[T], to: &mut Vec<T>, at: usize, n: usize) {
+    if let Some(value) = from.get(at) {
+        to.resize(n, T::default());
+        to[at] = *value;
+    }
+}
+
+/// The squared difference over the squared level, summed over channels.
+fn relative_square(difference: DVec3, level: DVec3) -> f64 {
+    (difference * difference / (level * level + 0.01)).element_sum()
+}

@@ -1,0 +1,187 @@
+//! Samples that go where the error is: the same bytes in whatever portions, kept and gone on with, and no more of them than
+//! an even picture has.
+
+use crate::common::*;
+use crate::determinism::{busy_scene, with_threads};
+use firstlight::render::{
+    Environment, ErrorMetric, Film, Material, MergeError, Prepared, RenderSettings, SampleAllocation, Techniques,
+    advance,
+};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+const NEVER: fn() -> bool = || false;
+
+fn adaptive() -> RenderSettings {
+    let allocation = SampleAllocation::Adaptive(ErrorMetric::RelativeMse);
+    RenderSettings { seed: 3, allocation, ..RenderSettings::default() }
+}
+
+/// Noisy under the ball, and nothing to be found out elsewhere.
+fn half_empty() -> Prepared {
+    let ball = sphere(Vec3::new(0.0, 0.5, 0.0), 0.5);
+    let lamp = quad(Vec3::new(-0.3, 2.0, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
+    let floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0);
+    let eye = camera(Vec3::new(0.0, 1.5, 4.0), Vec3::new(0.0, 0.5, 0.0), 50.0);
+    scene(vec![(floor, 0), (ball, 0), (lamp, 1)], vec![diffuse(0.7), emissive(8.0)], Environment::Black, eye)
+}
+
+fn rendered(scene: &Prepared, settings: &RenderSettings, spp: u32) -> Film {
+    let mut film = Film::new(75, 50);
+    assert!(advance(scene, settings, &mut film, spp, &NEVER).completed);
+    film
+}
+
+#[test]
+fn samples_go_where_the_error_is_and_are_no_more_than_asked_for() {
+    let scene = half_empty();
+    for spp in [16, 24, 64] {
+        let film = rendered(&scene, &adaptive(), spp);
+        let (least, mean, most) = film.sample_counts();
+        assert_eq!((film.spp(), film.max_spp()), (spp, spp));
+        // A block is as small as a fiftieth of this picture.
+        assert!((mean / f64::from(spp) - 1.0).abs() < 0.04, "{mean} for {spp}");
+        assert!(least * 4 >= spp.next_power_of_two() / 2 && most >= 2 * least, "{least} to {most} for {spp}");
+        let counts = (0..50).flat_map(|y| (0..75).map(move |x| (x, y)));
+        for (x, y) in counts {
+            let count = film.samples(x, y);
+            assert!(count.is_power_of_two(), "{count}");
+            assert_eq!(count, film.samples(x / 8 * 8, y / 8 * 8), "a block has the same samples");
+        }
+        // The corners show nothing, the shadow is noisy.
+        assert_eq!(film.samples(2, 2), least);
+        assert!(film.samples(37, 33) > least);
+    }
+    // What is even is left so.
+    let nothing = self::scene(
+        vec![(sphere(Vec3::new(0.0, 0.0, -50.0), 40.0), 0)],
+        vec![diffuse(0.5)],
+        Environment::Constant(Vec3::ONE),
+        camera(Vec3::ZERO, -Vec3::Z, 20.0),
+    );
+    let (even, uniform) =
+        (rendered(&nothing, &adaptive(), 40), RenderSettings { seed: 3, ..RenderSettings::default() });
+    assert_eq!(even.sample_counts(), (40, 40.0, 40));
+    assert!(even.means() == rendered(&nothing, &uniform, 40).means());
+}
+
+#[test]
+fn threads_and_tiles_change_nothing() {
+    let scene = busy_scene();
+    let display = SampleAllocation::Adaptive(ErrorMetric::Display { exposure_stops: 0.5 });
+    for settings in [adaptive(), RenderSettings { allocation: display, ..adaptive() }] {
+        let render = |threads, tile_size| {
+            with_threads(threads, || {
+                let mut film = Film::with_tile_size(75, 50, tile_size);
+                advance(&scene, &settings, &mut film, 24, &NEVER);
+                let counts: Vec<u32> = (0..75 * 50).map(|i| film.samples(i % 75, i / 75)).collect();
+                (film.means(), counts)
+            })
+        };
+        let expected = render(1, 32);
+        assert!(expected.1.iter().any(|count| *count != expected.1[0]));
+        for (threads, tile_size) in [(2, 32), (3, 8), (1, 16), (4, 128)] {
+            assert!(render(threads, tile_size) == expected, "{threads} threads, tiles of {tile_size}");
+        }
+    }
+}
+
+#[test]
+fn portions_interruptions_and_the_way_over_the_disk_change_nothing() {
+    let (scene, settings) = (busy_scene(), adaptive());
+    let whole = rendered(&scene, &settings, 40);
+    let mut portions = Film::new(75, 50);
+    for (i, target) in [3, 8, 9, 17, 20, 32, 33, 40].into_iter().enumerate() {
+        // Stopped after a while, a different while each time; kept, and gone on with.
+        let asked = AtomicU32::new(0);
+        let stop = || asked.fetch_add(1, Ordering::Relaxed) > 40 * i as u32;
+        advance(&scene, &settings, &mut portions, target, &stop);
+        portions = Film::from_record(&portions.to_record()).unwrap();
+        assert!(advance(&scene, &settings, &mut portions, target, &NEVER).completed);
+        assert_eq!((portions.spp(), portions.max_spp()), (target, target));
+    }
+    assert!(portions.to_record() == whole.to_record());
+    assert_eq!(portions.error_estimate(), whole.error_estimate());
+}
+
+/// A small light that paths find through glass by chance alone: one path in hundreds brings all of the light of a spot, and a
+/// block that has met none looks as if it were done. Blocks that decide by their own samples would keep it too dark.
+#[test]
+fn a_rare_caustic_keeps_its_mean() {
+    const RENDERS: u32 = 160;
+    let lamp = sphere(Vec3::new(0.4, 2.4, 0.3), 0.12);
+    let glass = Material::Glass { ior: 1.5, absorption: Vec3::ZERO };
+    let shapes = vec![(plane(Vec3::ZERO, Vec3::Y), 0), (lamp, 1), (sphere(Vec3::new(0.0, 0.5, 0.0), 0.5), 2)];
+    let eye = camera(Vec3::new(0.3, 1.6, 4.0), Vec3::new(0.0, 0.3, 0.0), 30.0);
+    let scene = scene(shapes, vec![diffuse(0.6), emissive(60.0), glass], Environment::Black, eye);
+    let techniques = Techniques { caustics: false, ..Techniques::ALL };
+    // Means of the picture, and of its brightest blocks as all renders together have them.
+    let renders = |allocation, first_seed| -> Vec<Vec<f64>> {
+        (0..RENDERS)
+            .into_par_iter()
+            .map(|render| {
+                let settings =
+                    RenderSettings { seed: first_seed + render, allocation, techniques, ..RenderSettings::default() };
+                let mut film = Film::new(48, 32);
+                assert!(advance(&scene, &settings, &mut film, 32, &NEVER).completed);
+                let mut blocks = vec![0.0; 24];
+                for (x, y) in (0..32).flat_map(|y| (0..48).map(move |x| (x, y))) {
+                    blocks[(y / 8 * 6 + x / 8) as usize] += f64::from(film.mean(x, y).y) / 64.0;
+                }
+                blocks
+            })
+            .collect()
+    };
+    let [adaptive, uniform] = [(adaptive().allocation, 5000), (SampleAllocation::Uniform, 9000)]
+        .map(|(allocation, first_seed)| renders(allocation, first_seed));
+    let n = f64::from(RENDERS);
+    let mean_and_variance = |renders: &[Vec<f64>], of: &dyn Fn(&Vec<f64>) -> f64| {
+        let mean = renders.iter().map(of).sum::<f64>() / n;
+        (mean, renders.iter().map(|render| (of(render) - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
+    };
+    let compare = |what: &str, of: &dyn Fn(&Vec<f64>) -> f64| {
+        let [(a, va), (b, vb)] = [&adaptive, &uniform].map(|renders| mean_and_variance(renders, of));
+        let t = (a - b) / (va + vb).sqrt();
+        println!(
+            "{what}: {a:.5} and {b:.5}, t {t:.2}, noise {:.2} % and {:.2} %",
+            va.sqrt() / a * 100.0,
+            vb.sqrt() / b * 100.0
+        );
+        t
+    };
+    let whole = compare("picture", &|blocks| blocks.iter().sum::<f64>() / 24.0);
+    let ts: Vec<f64> = (0..24).map(|i| compare(&format!("block {i}"), &|blocks| blocks[i])).collect();
+    // Of 24 blocks one in a hundred runs has a t beyond 3.7.
+    assert!(whole.abs() < 3.0 && ts.iter().all(|t| t.abs() < 4.0), "{whole} {ts:?}");
+}
+
+#[test]
+fn parts_add_up_to_an_adaptive_film_exactly() {
+    let (scene, settings) = (half_empty(), adaptive());
+    let uniform = RenderSettings { allocation: SampleAllocation::Uniform, ..settings };
+    let film = rendered(&scene, &settings, 32);
+    let most = film.sample_counts().2;
+    let mut part = Film::new(75, 50).starting_at(most);
+    assert!(advance(&scene, &uniform, &mut part, 8, &NEVER).completed);
+    let (mut ours, mut theirs) = (film.clone(), part.clone());
+    ours.merge(&part).unwrap();
+    theirs.merge(&film).unwrap();
+    assert!(ours.to_record() == theirs.to_record());
+    assert_eq!(ours.spp(), 40);
+    for (x, y) in [(2, 2), (37, 33), (74, 49)] {
+        assert_eq!(ours.samples(x, y), film.samples(x, y) + 8);
+        let (n, m) = (f64::from(film.samples(x, y)), 8.0);
+        let expected = (film.mean(x, y).as_dvec3() * n + part.mean(x, y).as_dvec3() * m) / (n + m);
+        assert!((ours.mean(x, y).as_dvec3() - expected).abs().max_element() < 1e-6);
+    }
+    // It goes on from there, and a block that both have is refused.
+    let before = ours.to_record();
+    assert!(advance(&scene, &settings, &mut ours, 64, &NEVER).completed);
+    assert_eq!(ours.spp(), 64);
+    let mut again = Film::from_record(&before).unwrap();
+    advance(&scene, &settings, &mut again, 48, &NEVER);
+    assert!(advance(&scene, &settings, &mut again, 64, &NEVER).completed);
+    assert!(again.to_record() == ours.to_record());
+    assert!(matches!(ours.merge(&part), Err(MergeError::SharedSamples { .. })));
+}
