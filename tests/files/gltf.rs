@@ -611,6 +611,30 @@ fn files_that_other_programs_wrote() {
     }
 }
 
+#[test]
+fn files_that_mean_harm_are_refused_with_their_place() {
+    for (name, expected) in [
+        ("truncated.glb", "the file is truncated"),
+        ("truncated_json.glb", "the file is truncated"),
+        ("accessor_out_of_bounds.glb", "accessors[0]: needs 12000000 bytes"),
+        ("index_out_of_range.glb", "index 65000 is out of range"),
+        ("offset_overflow.glb", "bufferViews[0]: needs 4294967316 bytes"),
+        ("cyclic_nodes.glb", "nodes[0]: is named as a child more than once"),
+        ("node_dag_doubling.glb", "nodes[1]: is named as a child more than once"),
+        ("base64_bomb.gltf", "buffers[0]: needs 1099511627776 bytes"),
+        ("path_traversal.gltf", "is a path out of the folder"),
+        ("nan_positions.glb", "accessors[0]: element 1 has a number that is NaN"),
+    ] {
+        let Some(path) = kept_beside(&format!("hostile/{name}")) else { continue };
+        let error = open(&path, &ModelChoice::default()).err().unwrap_or_else(|| panic!("{name} opens"));
+        assert!(error.contains(expected), "{name}: {error}");
+    }
+    // Ten thousand nodes within each other are allowed.
+    if let Some(path) = kept_beside("hostile/deep_nodes.glb") {
+        assert_eq!(meshes(&open(&path, &ModelChoice::default()).unwrap()).len(), 1);
+    }
+}
+
 /// Writes `fuzz/seeds/gltf` anew: run it with `--ignored` when the writer has learned something.
 #[test]
 #[ignore = "it writes into the source tree"]

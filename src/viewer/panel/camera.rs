@@ -100,13 +100,17 @@ pub fn moment(ui: &mut Ui, session: &Session, asked: &mut Asked) {
     let at = scene.0.choice.at;
     rows(ui, "moment", |ui| {
         row_with_hint(ui, "moment", "seconds into the animations of the model", |ui| {
+            if let Some(seconds) = slider(ui, at.unwrap_or(0.0), 0.0..=length.max(1e-3), false) {
+                asked.send(Command::SetMoment { seconds: Some(seconds) });
+            }
+        });
+        row_with_hint(ui, "pose", "of the animations at that moment, or as the file stores it", |ui| {
             ui.horizontal(|ui| {
-                if let Some(seconds) = slider(ui, at.unwrap_or(0.0), 0.0..=length.max(1e-3), false) {
-                    asked.send(Command::SetMoment { seconds: Some(seconds) });
-                }
-                let stored = ui.selectable_label(at.is_none(), "stored").on_hover_text("the pose that the file stores");
-                if stored.clicked() && at.is_some() {
-                    asked.send(Command::SetMoment { seconds: None });
+                for (label, seconds) in [("stored", None), ("animated", Some(at.unwrap_or(0.0)))] {
+                    let is_chosen = at.is_none() == seconds.is_none();
+                    if ui.selectable_label(is_chosen, label).clicked() && !is_chosen {
+                        asked.send(Command::SetMoment { seconds });
+                    }
                 }
             })
         });

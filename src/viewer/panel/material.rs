@@ -113,6 +113,9 @@ struct Scale {
     range: RangeInclusive<f64>,
 }
 
+/// Points.
+const SLIDER_WIDTH: f32 = 84.0;
+
 impl Scale {
     /// `None` for properties that are not scalar.
     fn of(property: Property) -> Option<Self> {
@@ -151,6 +154,8 @@ impl Scale {
         let shown = if is_alpha { value.sqrt() } else { value };
         let logarithmic = *self.range.end() > 10.0;
         row_with_hint(ui, self.name, self.hint, |ui| {
+            // The longest names leave less room.
+            ui.spacing_mut().slider_width = SLIDER_WIDTH;
             if let Some(new) = slider(ui, shown, self.range, logarithmic) {
                 let value = if is_alpha { new * new } else { new };
                 asked.edit(Edit::Set { id, property: self.property, value: DVec3::splat(value) });
@@ -184,6 +189,7 @@ fn cutoff_row(ui: &mut Ui, id: u64, cutoff: Option<f32>, asked: &mut Asked) {
             if ui.checkbox(&mut on, "").changed() {
                 set(if on { f64::from(DEFAULT) } else { NONE });
             }
+            ui.spacing_mut().slider_width = SLIDER_WIDTH - 22.0;
             if let Some(cutoff) = cutoff
                 && let Some(new) = slider(ui, f64::from(cutoff), 0.0..=1.0, false)
             {
@@ -239,9 +245,11 @@ fn numbers(ui: &mut Ui, inventory: &Inventory, id: u64, material: &Material, ask
                 let (Some(property), false) = (property, property == Some(Property::Color)) else { continue };
                 row(ui, &name.replace('_', " "), |ui| {
                     let is_bright = matches!(property, Property::Emission | Property::SpecularColor);
-                    if let Some(value) = color(ui, *rgb, is_bright) {
-                        asked.edit(Edit::Set { id, property, value });
-                    }
+                    ui.horizontal(|ui| {
+                        if let Some(value) = color(ui, *rgb, is_bright) {
+                            asked.edit(Edit::Set { id, property, value });
+                        }
+                    })
                 });
                 continue;
             }

@@ -53,6 +53,7 @@ mod tests {
     use crate::shading::interface::MediumId;
     use crate::shading::sheen;
     use crate::test_statistics::ChiSquared;
+    use rayon::prelude::*;
     use std::f64::consts::{PI, TAU};
 
     const RINGS: usize = 12;
@@ -254,44 +255,54 @@ mod tests {
 
     #[test]
     fn no_parameters_give_what_is_no_number() {
-        for i in 0..200_000 {
-            let sampler = Sampler::new(9, 1, 0, i);
-            let pick = |k: u32| sampler.single(k);
-            let ends = |k: u32| match pick(k) {
-                x if x < 0.2 => 0.0,
-                x if x > 0.8 => 1.0,
-                x => (x - 0.2) / 0.6,
-            };
-            let normal = Vec3::new(pick(1) - 0.5, pick(2) - 0.5, pick(3) + 0.02).normalize();
-            let surface = Principled {
-                dielectric: ends(4),
-                facing: Vec3::new(ends(5), ends(6), ends(7)),
-                grazing: Vec3::splat(ends(8)),
-                diffuse: Vec3::splat(ends(9)) * (1.0 - ends(10)),
-                metallic: ends(10),
-                metal: Vec3::new(ends(11), ends(12), ends(13)),
-                alpha: [ends(14).powi(2), if pick(15) < 0.5 { ends(14).powi(2) } else { ends(15).powi(2) }],
-                tangent: (pick(16) < 0.5).then_some(Vec3::X),
-                transmission: (pick(17) < 0.5).then(|| Transmission {
-                    share: ends(18),
-                    tint: Vec3::splat(ends(19)),
-                    inside: if pick(20) < 0.5 { Inside::Thin(MediumId::OUTSIDE) } else { solid(0.4 + 2.0 * pick(21)) },
-                    is_lit: pick(22) < 0.5,
-                }),
-                sheen: Vec3::splat(ends(23)),
-                sheen_alpha: sheen::alpha_of(ends(24)),
-                coat: ends(25),
-                coat_alpha: ends(26).powi(2),
-                coat_normal: if pick(27) < 0.5 { normal } else { Vec3::Z },
-            };
-            let wo = direction((pick(28).powi(4)).max(1e-7));
-            let wi = Vec3::new(pick(29) - 0.5, pick(30) - 0.5, pick(31) - 0.5).normalize_or(Vec3::Z);
-            let (value, pdf) = surface.eval(wo, wi, Vec3::Z);
-            assert!(value.is_finite() && value.min_element() >= 0.0 && pdf >= 0.0 && !pdf.is_nan(), "{i}: {surface:?}");
-            if let Some(sample) = surface.sample(wo, Vec3::Z, || pick(32), Vec2::new(pick(33), pick(34))) {
-                assert!(sample.weight.is_finite() && sample.weight.min_element() >= 0.0, "{i}: {sample:?} {surface:?}");
-                assert!(sample.pdf > 0.0 && sample.wi.is_normalized(), "{i}: {sample:?} {surface:?}");
-            }
+        (0..200_000).for_each(check_configuration);
+    }
+
+    /// The same for longer: `cargo test -p firstlight-render --lib hundred_million -- --ignored`.
+    #[test]
+    #[ignore = "it takes minutes"]
+    fn none_of_a_hundred_million_configurations_gives_what_is_no_number() {
+        (0..100_000_000_u32).into_par_iter().for_each(check_configuration);
+    }
+
+    /// Surface, directions and random numbers number `i`: all layers, with many values at the ends of their ranges.
+    fn check_configuration(i: u32) {
+        let sampler = Sampler::new(9, 1, 0, i);
+        let pick = |k: u32| sampler.single(k);
+        let ends = |k: u32| match pick(k) {
+            x if x < 0.2 => 0.0,
+            x if x > 0.8 => 1.0,
+            x => (x - 0.2) / 0.6,
+        };
+        let normal = Vec3::new(pick(1) - 0.5, pick(2) - 0.5, pick(3) + 0.02).normalize();
+        let surface = Principled {
+            dielectric: ends(4),
+            facing: Vec3::new(ends(5), ends(6), ends(7)),
+            grazing: Vec3::splat(ends(8)),
+            diffuse: Vec3::splat(ends(9)) * (1.0 - ends(10)),
+            metallic: ends(10),
+            metal: Vec3::new(ends(11), ends(12), ends(13)),
+            alpha: [ends(14).powi(2), if pick(15) < 0.5 { ends(14).powi(2) } else { ends(15).powi(2) }],
+            tangent: (pick(16) < 0.5).then_some(Vec3::X),
+            transmission: (pick(17) < 0.5).then(|| Transmission {
+                share: ends(18),
+                tint: Vec3::splat(ends(19)),
+                inside: if pick(20) < 0.5 { Inside::Thin(MediumId::OUTSIDE) } else { solid(0.4 + 2.0 * pick(21)) },
+                is_lit: pick(22) < 0.5,
+            }),
+            sheen: Vec3::splat(ends(23)),
+            sheen_alpha: sheen::alpha_of(ends(24)),
+            coat: ends(25),
+            coat_alpha: ends(26).powi(2),
+            coat_normal: if pick(27) < 0.5 { normal } else { Vec3::Z },
+        };
+        let wo = direction((pick(28).powi(4)).max(1e-7));
+        let wi = Vec3::new(pick(29) - 0.5, pick(30) - 0.5, pick(31) - 0.5).normalize_or(Vec3::Z);
+        let (value, pdf) = surface.eval(wo, wi, Vec3::Z);
+        assert!(value.is_finite() && value.min_element() >= 0.0 && pdf >= 0.0 && !pdf.is_nan(), "{i}: {surface:?}");
+        if let Some(sample) = surface.sample(wo, Vec3::Z, || pick(32), Vec2::new(pick(33), pick(34))) {
+            assert!(sample.weight.is_finite() && sample.weight.min_element() >= 0.0, "{i}: {sample:?} {surface:?}");
+            assert!(sample.pdf > 0.0 && sample.wi.is_normalized(), "{i}: {sample:?} {surface:?}");
         }
     }
 }
