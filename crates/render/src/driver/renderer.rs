@@ -4,7 +4,7 @@ use crate::core::counts::RayCounts;
 use crate::core::filter::FilterSampler;
 use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
 use crate::core::techniques::Techniques;
-use crate::film::block::BLOCK_SIZE;
+use crate::film::block::{BLOCK_SIZE, doubled};
 use crate::film::region::Region;
 use crate::film::round::Round;
 use crate::film::tile::FilmTile;
@@ -246,7 +246,9 @@ impl Wave {
         let mut slot = 0;
         for ((block, pixels), missing) in tile.blocks.iter().zip(&self.blocks).zip(missing) {
             let first = block.next_sample();
-            for sample in first..first + at_once.min(*missing) {
+            // Not beyond the next power of two, where the error estimate looks at the block.
+            let to_power = doubled(block.spp) - block.spp;
+            for sample in first..first + at_once.min(*missing).min(to_power) {
                 self.runs.push(Run { pixels: pixels.clone(), sample, slot });
                 slot += pixels.len() as u32;
             }
@@ -365,6 +367,7 @@ fn advance_tile(
             missing[of_block] -= 1;
             runs_left = rest;
         }
+        tile.record(round.is_none_or(|round| round.even));
         let new_bad = &tile.bad[n_bad_before..];
         report.n_bad += new_bad.len() as u64;
         let room = MAX_LISTED_BAD - report.bad.len();

@@ -267,6 +267,7 @@ mod tests {
                         };
                         let radiance: Vec<Vec3> = (0..64).map(|p| Vec3::splat(seen(p))).collect();
                         tile.add_sample(i, sample, &radiance);
+                        tile.record(false);
                     }
                 }
             }

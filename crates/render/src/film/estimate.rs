@@ -249,6 +249,7 @@ mod tests {
                 let sample = |p: u32| integrand(Sampler::new(2, t, p, s).pair(0)) as f32;
                 let radiance: Vec<Vec3> = (0..64).map(|p| Vec3::splat(sample(p))).collect();
                 tile.add_sample(0, s, &radiance);
+                tile.record(true);
             }
             evidence.add_tile(64);
             evidence.add_part(tile.blocks[0].steps, spp);

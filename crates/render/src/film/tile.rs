@@ -148,15 +148,32 @@ impl FilmTile {
         if let Some(last) = of.ranges.last_mut() {
             last.end += 1;
         }
-        self.record_block(block);
     }
 
-    /// At powers of two, tells the error estimate how far a block is.
-    pub fn record_block(&mut self, block: usize) {
-        let Block { spp, mean_of, size, .. } = self.blocks[block];
-        if !spp.is_power_of_two() || mean_of == spp {
+    /// At powers of two, tells the error estimate how far the blocks are; it must be told each of them.
+    ///
+    /// - `even`: all blocks get as many samples, so that the level of a pixel may be that of its neighbours in other blocks,
+    ///   too. Otherwise it would depend on which block came first, and so on the portions of a pass.
+    pub fn record(&mut self, even: bool) {
+        let is_news = |block: &Block| block.spp.is_power_of_two() && block.mean_of != block.spp;
+        if !self.blocks.iter().any(is_news) {
             return;
         }
+        let first = self.blocks[0].spp;
+        let mut of_tile = Vec::new();
+        if even && self.blocks.iter().all(|block| block.spp == first) {
+            of_tile.extend((0..self.n_pixels()).map(|local| self.mean_of(local, first) + self.light.before(local)));
+        }
+        for block in 0..self.blocks.len() {
+            if is_news(&self.blocks[block]) {
+                self.record_block(block, &of_tile);
+            }
+        }
+    }
+
+    /// - `of_tile`: what all pixels of the tile show, if that counts; else the list is empty.
+    fn record_block(&mut self, block: usize, of_tile: &[DVec3]) {
+        let Block { spp, mean_of, size, .. } = self.blocks[block];
         let (mut seen, mut shown) = ([DVec3::ZERO; BLOCK_PIXELS], [DVec3::ZERO; BLOCK_PIXELS]);
         let n = self.blocks[block].n_pixels();
         for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
@@ -174,7 +191,12 @@ impl FilmTile {
             let mut sum = 0.0;
             for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
                 let before = self.before[local];
-                let level = local_level(&shown[..n], before + self.light.before(local), size.x as usize, i);
+                let shown_before = before + self.light.before(local);
+                let level = if of_tile.is_empty() {
+                    local_level(&shown[..n], shown_before, size.x as usize, i)
+                } else {
+                    local_level(of_tile, shown_before, self.size.x as usize, local)
+                };
                 let step = relative_square(seen[i] - before, level);
                 self.last[local] = (step / 3.0) as f32;
                 sum += step;

@@ -277,7 +277,8 @@ impl Film {
         if self.round.is_some() || other.round.is_some() {
             self.leave_round();
         }
-        self.tiles.par_iter_mut().for_each(|tile| (0..tile.blocks.len()).for_each(|block| tile.record_block(block)));
+        let even = self.is_even();
+        self.tiles.par_iter_mut().for_each(|tile| tile.record(even));
         self.record_light();
         Ok(())
     }
