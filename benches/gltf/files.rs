@@ -68,7 +68,7 @@ pub fn png(size: u32, seed: u32, normals: bool) -> Vec<u8> {
 
 /// The torus in one buffer with its pictures: base colour, roughness and metallic, normals.
 ///
-/// - `pictures`: none for a plain material.
+/// - `pictures`: none for a plain material; the third, normals, may be missing.
 pub fn glb(torus: &Torus, pictures: &[Vec<u8>]) -> Vec<u8> {
     let (mut bytes, mut views) = (Vec::new(), Vec::<Value>::new());
     let mut view = |part: &[u8]| {
@@ -84,14 +84,16 @@ pub fn glb(torus: &Torus, pictures: &[Vec<u8>]) -> Vec<u8> {
     let count = torus.positions.len();
     let least = torus.positions.iter().fold(Vec3::INFINITY, |a, &b| a.min(b)).to_array();
     let most = torus.positions.iter().fold(Vec3::NEG_INFINITY, |a, &b| a.max(b)).to_array();
-    let material = match pictures.is_empty() {
+    let mut material = match pictures.is_empty() {
         true => json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0.5,
             "roughnessFactor": 0.5 } }),
         false => json!({
-            "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 1 } },
-            "normalTexture": { "index": 2 }
+            "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 1 } }
         }),
     };
+    if pictures.len() > 2 {
+        material["normalTexture"] = json!({ "index": 2 });
+    }
     let document = json!({
         "asset": { "version": "2.0" },
         "buffers": [{ "byteLength": bytes.len() }],
