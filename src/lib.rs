@@ -22,6 +22,7 @@
 //! |---|---|
 //! | `viewer` (feature `viewer`) | the window: input, overlays, presenting |
 //! | [`embed`] | [`Scene`], [`RenderOptions`], [`Image`] |
+//! | `cluster` (feature `cli`) | parts of an image on many machines: what a set of films has, job files of engines |
 //! | `report`, `stability` (feature `cli`) | error against time; counts of hard cases |
 //! | [`frame`] | the session: the ECS schedule in the order in which a frame runs; image files |
 //! | [`scene`] | components, scene file, importers, built-in scenes, extraction of the snapshot |
@@ -38,6 +39,9 @@ pub use firstlight_render::{self as render, sampling};
 pub use glam;
 
 // Hidden: used by the program, its tests and its benchmarks, not by other libraries.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cluster;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 #[allow(missing_docs)]

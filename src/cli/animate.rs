@@ -7,39 +7,64 @@ use super::progress::Progress;
 use super::render_args::RenderArgs;
 use super::stop::Stop;
 use firstlight::frame::navigation::Rig;
-use firstlight::frame::{SettingsStore, along, turntable};
+use firstlight::frame::{SettingsStore, Target, along, turntable};
+use firstlight::scene::{ImageMetadata, ImageSamples};
 use std::ffi::OsStr;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+/// Which frames are rendered.
+pub(super) struct Sequence {
+    /// From 0.
+    pub frames: Range<usize>,
+    /// Frames that are there already stay.
+    pub is_part: bool,
+    /// Images whose place is taken.
+    pub n_replaced: usize,
+}
 
 /// Renders every frame to `FILE-0001.png` and so on; each is a picture as any other, and opens as one.
 pub(super) fn animate(
     args: &RenderArgs,
     mut job: RenderJob,
     mut progress: Progress,
-    n_replaced: usize,
+    sequence: &Sequence,
     stop: &Stop,
 ) -> Result<(), Failure> {
     let rigs = way(args, &mut job)?;
     let target = job.target(args);
     let digits = digits(rigs.len());
     let replace = args.overwrite.replace();
-    for (i, rig) in rigs.iter().enumerate() {
-        progress.at(i as f64 / rigs.len() as f64, format!("frame {} of {}", i + 1, rigs.len()));
-        job.set_rig(rig);
-        let film = job.picture(args, target)?;
-        let features = job.features(args, None)?;
-        job.write(args, (&film, features.as_ref()), &numbered(&args.output, i + 1, digits), replace)?;
-        stop.has_saved(format!("{} of {} frames are saved", i + 1, rigs.len()));
+    let frames = &sequence.frames;
+    for (done, i) in frames.clone().enumerate() {
+        progress.at(done as f64 / frames.len() as f64, format!("frame {} of {}", i + 1, rigs.len()));
+        job.set_rig(&rigs[i]);
+        let path = numbered(&args.output, i + 1, digits);
+        if !(sequence.is_part && is_complete(&job, &path, target)?) {
+            let film = job.picture(args, target)?;
+            let features = job.features(args, None)?;
+            job.write(args, (&film, features.as_ref()), &path, replace)?;
+        }
+        stop.has_saved(format!("{} of {} frames are saved", done + 1, frames.len()));
     }
     progress.finish();
-    let (first, last) = (numbered(&args.output, 1, digits), numbered(&args.output, rigs.len(), digits));
-    let replaced = match n_replaced {
+    let (first, last) = (numbered(&args.output, frames.start + 1, digits), numbered(&args.output, frames.end, digits));
+    let replaced = match sequence.n_replaced {
         0 => String::new(),
         1 => ", replacing 1 existing file".to_owned(),
         n => format!(", replacing {n} existing files"),
     };
-    inform(format_args!("{} to {}: {} frames{replaced}", first.display(), last.display(), rigs.len()));
+    inform(format_args!("{} to {}: {} frames{replaced}", first.display(), last.display(), frames.len()));
     Ok(())
+}
+
+/// Whether a frame is there already, as it would be rendered.
+fn is_complete(job: &RenderJob, path: &Path, target: Target) -> Result<bool, Failure> {
+    let Ok(there) = ImageMetadata::read(path) else { return Ok(false) };
+    let samples = ImageSamples { first: 0, spp: there.spp, uneven: there.uneven };
+    let note = job.draft.note(path, job.size, samples, job.display.into());
+    let ours = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
+    Ok(ours == there && target.spp.is_none_or(|spp| spp == there.spp))
 }
 
 /// The names of all pictures, if there are to be several.

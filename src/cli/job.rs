@@ -9,7 +9,7 @@ use firstlight::frame::navigation::Rig;
 use firstlight::frame::{FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until};
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
-    Display, ErrorMetric, FEATURE_SAMPLES, Film, NoRoom, Purpose, RenderSettings, Room, SampleAllocation,
+    Display, ErrorMetric, FEATURE_SAMPLES, Film, Purpose, RenderSettings, Room, SampleAllocation,
 };
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
@@ -118,12 +118,11 @@ impl RenderJob {
     /// A film, and the certainty that there is memory for all that it is made for: before any ray is traced.
     fn new_film(&self, purposes: &[Purpose]) -> Result<Film, Failure> {
         let (width, height) = self.size;
-        let no_room = |error: NoRoom| Failure::Failed(error.to_string());
         let light_traced = self.extraction.prepared.features().caustics;
-        drop(Room::for_film(width, height, light_traced, purposes).map_err(no_room)?);
-        let mut film = Film::try_new(width, height).map_err(no_room)?;
+        drop(Room::for_film(width, height, light_traced, purposes)?);
+        let mut film = Film::try_new(width, height)?;
         if light_traced {
-            film.reserve_light().map_err(no_room)?;
+            film.reserve_light()?;
         }
         Ok(film)
     }
@@ -213,7 +212,7 @@ pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
 
 /// Memory kept free for what is written at the end: a picture that cannot be written is not worth the wait.
 pub fn room_to_write(args: &RenderArgs, (width, height): (u32, u32)) -> Result<Room, Failure> {
-    Room::for_files(width, height, &purposes(args)).map_err(|error| Failure::Failed(error.to_string()))
+    Ok(Room::for_files(width, height, &purposes(args))?)
 }
 
 /// `size` times `scale`, if that is a film that can be had.

@@ -1,23 +1,33 @@
 //! `firstlight merge A.exr B.exr -o C.exr`: films of the same picture with different samples, added up.
+//!
+//! What films say of themselves is looked through first: which belong together, which samples are there twice or missing.
+//! Then they are added up one after the other, with memory for two, however many there are.
 
 use super::args::{OverwriteArgs, replaced};
 use super::console::{inform, print, remark};
 use super::failure::Failure;
 use super::layers::LayerArgs;
 use super::number::percent;
+use super::part::numbered;
+use super::progress::Progress;
+use super::render_args::parse_range;
+use super::stop::Stop;
 use clap::Args;
+use firstlight::cluster::coverage::{Coverage, Duplicate, groups, in_words};
+use firstlight::cluster::part::Part;
 use firstlight::frame::{
     FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, check_replaced_film, read_film_file,
-    write_film_with_features,
+    read_film_summary, write_film_with_features,
 };
-use firstlight::render::SampleAllocation;
+use firstlight::render::{Film, SampleAllocation};
 use firstlight::scene::ImageMetadata;
 use firstlight::scene::whole_file::Replace;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// Films of one picture with disjoint samples (`render --film FILE --samples A..B`).
+    /// Films of one picture with disjoint samples (`render --film FILE --samples A..B`, or `--part I/N`).
     #[arg(value_name = "FILM.exr", required = true, num_args = 2..)]
     films: Vec<PathBuf>,
     /// Merged film; `render --resume` continues it.
@@ -26,6 +36,17 @@ pub struct MergeArgs {
     /// Also save the picture: .png is tone-mapped, .exr holds linear light (HDR).
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Samples that the films must have together [default: from the first to the last that any film has].
+    #[arg(long, value_name = "A..B", value_parser = parse_range)]
+    samples: Option<Range<u32>>,
+    /// Merge although samples are missing; the counts of what is there are kept.
+    #[arg(long)]
+    allow_missing: bool,
+    /// Merge only the I-th of N groups of the films, or auto for the task of an array job
+    ///
+    /// Merging the results gives the film that merging all at once gives. {part} in the output is replaced by the number.
+    #[arg(long, value_name = "I/N")]
+    part: Option<String>,
     #[command(flatten)]
     layers: LayerArgs,
     #[command(flatten)]
@@ -35,15 +56,28 @@ pub struct MergeArgs {
     json: bool,
 }
 
-pub fn run(args: &MergeArgs) -> Result<(), Failure> {
-    if !matches!(PictureFormat::of(&args.output), Ok(PictureFormat::Exr)) {
+pub fn run(args: &MergeArgs, stop: &Stop) -> Result<(), Failure> {
+    let part = match &args.part {
+        None => None,
+        Some(text) => {
+            stop.is_of_part();
+            Some(Part::parse(text).map_err(|error| Failure::Usage(format!("--part: {error}")))?)
+        }
+    };
+    let result = merge(args, part);
+    if part.is_some() { result.map_err(Failure::of_part) } else { result }
+}
+
+fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
+    let output = &part.map_or_else(|| args.output.clone(), |part| numbered(&args.output, part));
+    if !matches!(PictureFormat::of(output), Ok(PictureFormat::Exr)) {
         let message = "the name of a film must end in .exr (use --picture for a .png)";
-        return Err(Failure::Usage(format!("{}: {message}", args.output.display())));
+        return Err(Failure::Usage(format!("{}: {message}", output.display())));
     }
     let mut files = args.overwrite.files();
     files.read_all(args.films.iter().cloned())?;
     // It may take the place of a film of which it has all samples, which is known only when it is there.
-    let claim = files.claim(&args.output, Replace::Anything)?;
+    let claim = files.claim(output, Replace::Anything)?;
     if let Some(picture) = &args.picture {
         let format = PictureFormat::of(picture).map_err(|error| Failure::Usage(error.into()))?;
         if !args.layers.is_empty() && format != PictureFormat::Exr {
@@ -57,41 +91,33 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         return Err(Failure::Usage("--layers belong to a picture: name it with --picture FILE.exr".to_owned()));
     }
     args.layers.check()?;
-    // In the order of their samples, so that the result does not depend on how they were named.
-    let mut films: Vec<&PathBuf> = args.films.iter().collect();
-    films.sort_by_cached_key(|path| ImageMetadata::read(path).map(|shot| (shot.first_sample, shot.to_note())).ok());
-    let (first, others) = films.split_first().expect("two films at least");
-    let FilmFile { mut film, mut shot, mut features, warning } = read_film_file(first)?;
-    let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
-    warn(warning);
-    for path in others {
-        let mut other = read_film_file(path)?;
-        warn(other.warning.take());
-        let failed = |reason: String| {
-            Failure::Failed(format!("{} and {} cannot be merged: {reason}", first.display(), path.display()))
-        };
-        // Samples add up however they were allocated; what is gone on with is as adaptive as any part.
-        let is_adaptive = |shot: &ImageMetadata| shot.allocation != SampleAllocation::Uniform;
-        if !is_adaptive(&shot) || !is_adaptive(&other.shot) {
-            let of_both = if is_adaptive(&shot) { shot.allocation } else { other.shot.allocation };
-            (shot.allocation, other.shot.allocation) = (of_both, of_both);
+    let mut set = FilmSet::read(args.films.clone())?;
+    let missing = set.missing(args.samples.clone());
+    if !missing.is_empty() {
+        let message = format!("samples {} are missing", in_words(&missing));
+        if !args.allow_missing {
+            let advice = "render them, or merge without them with --allow-missing";
+            return Err(Failure::Failed(format!("{message}: {advice}")));
         }
-        if let Some(what) = shot.differs_from(&other.shot) {
-            return Err(failed(format!("they have a different {what}")));
-        }
-        film.merge(&other.film).map_err(|error| failed(error.to_string()))?;
-        features = FeatureLayers::of_parts(features, other.features);
+        remark(format_args!("warning: {message}"));
     }
+    if let Some(part) = part {
+        let Some(group) = set.group(part) else {
+            inform(format_args!("group {} of {}: there are no films for it", part.number(), part.count));
+            return Ok(());
+        };
+        set = group;
+    }
+    let progress = Progress::new();
+    let first = set.films[0].clone();
+    let told = |done, n| progress.at(done as f64 / n as f64, format!("{done} of {n} films"));
+    let FilmFile { film, shot, features, .. } = set.add_up(&told)?;
+    drop(progress);
     args.layers.check_kept(features.as_ref())?;
-    let note = |path: &Path| {
-        let samples = (film.first_sample(), film.spp(), film.is_uneven());
-        ImageMetadata { first_sample: samples.0, spp: samples.1, uneven: samples.2, ..shot.clone() }
-            .moved(first, path)
-            .to_note()
-    };
-    let note_of_film = note(&args.output);
+    let note = |path: &Path| note_of(&film, shot.clone(), &first, path);
+    let note_of_film = note(output);
     if !args.overwrite.overwrite {
-        check_replaced_film(&film, &note_of_film, &args.output)?;
+        check_replaced_film(&film, &note_of_film, output)?;
     }
     write_film_with_features(&film, features.as_ref(), &note_of_film, claim)?;
     if let Some(path) = &args.picture {
@@ -110,17 +136,121 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let (least, mean, most) = film.sample_counts();
     if args.json {
         return print(serde_json::json!({
-            "output": args.output.to_string_lossy(),
-            "films": args.films.len(),
+            "output": output.to_string_lossy(),
+            "films": set.films.len(),
             "spp": film.spp(),
             "max_spp": film.max_spp(),
             "samples": { "least": least, "mean": mean, "most": most },
             "first_sample": film.first_sample(),
+            "missing": missing.iter().map(|range| [range.start, range.end]).collect::<Vec<_>>(),
             "estimated_error": error,
         }));
     }
     let error = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
-    let replaced = replaced(files.replaced(), &args.output);
-    inform(format_args!("{}: {} samples per pixel{error}{replaced}", args.output.display(), film.spp()));
+    let replaced = replaced(files.replaced(), output);
+    inform(format_args!("{}: {} samples per pixel{error}{replaced}", output.display(), film.spp()));
     Ok(())
+}
+
+/// What a film or an image of `film` at `path` says of itself.
+///
+/// - `first`: the film whose metadata `shot` is.
+pub fn note_of(film: &Film, shot: ImageMetadata, first: &Path, path: &Path) -> String {
+    let (first_sample, spp, uneven) = (film.first_sample(), film.spp(), film.is_uneven());
+    ImageMetadata { first_sample, spp, uneven, ..shot }.moved(first, path).to_note()
+}
+
+/// Films that belong together and have no sample in common, in the order of their samples.
+pub struct FilmSet {
+    pub films: Vec<PathBuf>,
+    /// Samples of each film that all of its pixels have.
+    samples: Vec<Range<u32>>,
+    coverage: Coverage,
+    /// Some of them have samples where the error was: gaps say nothing then.
+    is_adaptive: bool,
+}
+
+impl FilmSet {
+    /// Looks through what films say of themselves.
+    ///
+    /// - `paths`: in any order.
+    pub fn read(paths: Vec<PathBuf>) -> Result<Self, Failure> {
+        let mut coverage = Coverage::default();
+        let mut known: Vec<(u32, String, usize)> = Vec::new();
+        let mut first: Option<(usize, ImageMetadata)> = None;
+        let mut is_adaptive = false;
+        for (i, path) in paths.iter().enumerate() {
+            let mut summary = read_film_summary(path)?;
+            let (number, shot) = first.get_or_insert_with(|| (i, summary.shot.clone()));
+            is_adaptive |= summary.shot.allocation != SampleAllocation::Uniform;
+            known.push((summary.shot.first_sample, summary.shot.to_note(), i));
+            agree_on_allocation(shot, &mut summary.shot);
+            if let Some(what) = shot.differs_from(&summary.shot) {
+                return Err(refused(&paths[*number], path, format!("they have a different {what}")));
+            }
+            coverage.add(&summary.layout);
+        }
+        if let Some(Duplicate { films: [a, b], samples: Range { start, end } }) = coverage.duplicate() {
+            let shared = firstlight::render::MergeError::SharedSamples { first: start, last: end - 1 };
+            return Err(refused(&paths[a], &paths[b], shared.to_string()));
+        }
+        // So that the result does not depend on how they are named.
+        known.sort();
+        let films = known.iter().map(|(.., i)| paths[*i].clone()).collect();
+        let ends = known.iter().skip(1).map(|(first, ..)| *first).chain([coverage.hull().end]);
+        let samples = known.iter().zip(ends).map(|((first, ..), end)| *first..end).collect();
+        Ok(Self { films, samples, coverage, is_adaptive })
+    }
+
+    /// Samples that some pixel does not have.
+    ///
+    /// - `wanted`: all that are to be there; else from the first to the last that is, if all films are uniform.
+    pub fn missing(&self, wanted: Option<Range<u32>>) -> Vec<Range<u32>> {
+        match wanted {
+            None if self.is_adaptive => Vec::new(),
+            wanted => self.coverage.missing(wanted.unwrap_or_else(|| self.coverage.hull())),
+        }
+    }
+
+    /// The films of a group of them; `None` where there are fewer groups.
+    fn group(&self, part: Part) -> Option<Self> {
+        let group = groups(&self.samples, part.count as usize).into_iter().nth(part.index as usize)?;
+        let (films, samples) = (self.films[group.clone()].to_vec(), self.samples[group].to_vec());
+        Some(Self { films, samples, coverage: self.coverage.clone(), is_adaptive: self.is_adaptive })
+    }
+
+    /// Adds them up, one after the other.
+    ///
+    /// - `progress`: told how many films are there of how many.
+    pub fn add_up(&self, progress: &dyn Fn(usize, usize)) -> Result<FilmFile, Failure> {
+        let warn = |warning: Option<String>| warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
+        let (first, others) = self.films.split_first().expect("one film at least");
+        let FilmFile { mut film, mut shot, mut features, warning } = read_film_file(first)?;
+        warn(warning);
+        for (i, path) in others.iter().enumerate() {
+            progress(i + 1, self.films.len());
+            let mut other = read_film_file(path)?;
+            warn(other.warning.take());
+            agree_on_allocation(&mut shot, &mut other.shot);
+            if let Some(what) = shot.differs_from(&other.shot) {
+                return Err(refused(first, path, format!("they have a different {what}")));
+            }
+            film.merge(&other.film).map_err(|error| refused(first, path, error.to_string()))?;
+            features = FeatureLayers::of_parts(features, other.features);
+        }
+        Ok(FilmFile { film, shot, features, warning: None })
+    }
+}
+
+/// Samples add up however they were allocated; what is resumed is as adaptive as any part.
+fn agree_on_allocation(a: &mut ImageMetadata, b: &mut ImageMetadata) {
+    let is_adaptive = |shot: &ImageMetadata| shot.allocation != SampleAllocation::Uniform;
+    if !is_adaptive(a) || !is_adaptive(b) {
+        let of_both = if is_adaptive(a) { a.allocation } else { b.allocation };
+        (a.allocation, b.allocation) = (of_both, of_both);
+    }
+}
+
+fn refused(a: &Path, b: &Path, reason: String) -> Failure {
+    Failure::Failed(format!("{} and {} cannot be merged: {reason}", a.display(), b.display()))
 }

@@ -1,5 +1,6 @@
 //! The command line: one file a command. Exit status 0: done; 1: it failed; 2: the command was not
-//! understood; 130: stopped by Ctrl+C, what there was is saved.
+//! understood, or the input of a part is wrong; 75: a part is to be tried again; 130: stopped by Ctrl+C, what there was is
+//! saved.
 //!
 //! A command is obedient by construction: it runs where it can be left behind (see `stop`).
 
@@ -15,6 +16,8 @@ mod layers;
 mod man;
 mod merge;
 mod number;
+mod pack;
+mod part;
 mod progress;
 mod render;
 mod render_args;
@@ -23,10 +26,13 @@ mod save;
 mod show;
 mod simplify;
 mod stability;
+mod status;
 mod stop;
+mod submit;
 mod trees;
 mod waiting;
 mod words;
+mod work;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use console::{lines, remark};
@@ -89,6 +95,15 @@ enum CliCommand {
     Merge(merge::MergeArgs),
     /// Save a model, a built-in scene or the scene of a picture as a scene file.
     Save(save::SaveArgs),
+    /// Pack a scene with all of its files into an archive, for other machines.
+    Pack(pack::PackArgs),
+    /// Write a job that renders a scene in many parts, and submit it to Slurm, Kubernetes or a render farm.
+    #[command(after_help = submit::EXAMPLES)]
+    Submit(submit::SubmitArgs),
+    /// Show how far a job is.
+    Status(status::StatusArgs),
+    /// Do what an engine is asked for in the folder of a job: a part, a merge.
+    Work(work::WorkArgs),
     /// Stress-test the renderer: count leaks, self-intersections, missed hits, wrong depths, non-finite samples and lost energy.
     Stability(stability::StabilityArgs),
     /// Show what a scene contains, which features it uses and what is not modelled.
@@ -110,8 +125,12 @@ impl CliCommand {
         match self {
             Self::Render(args) => render::run(args, stop),
             Self::Report(args) => report::run(args, stop),
-            Self::Merge(args) => merge::run(args),
+            Self::Merge(args) => merge::run(args, stop),
             Self::Save(args) => save::run(args),
+            Self::Pack(args) => pack::run(args),
+            Self::Submit(args) => submit::run(args),
+            Self::Status(args) => status::run(args),
+            Self::Work(args) => work::run(args, stop),
             Self::Stability(args) => stability::run(args),
             Self::Info(args) => info::run(args),
             Self::Explain(args) => explain::run(args),
@@ -146,8 +165,13 @@ pub fn main() -> ExitCode {
     let (messages, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Usage(message)) => (vec![message], 2),
-        Err(Failure::Failed(message)) => (vec![message], 1),
+        Err(Failure::Failed(message) | Failure::Passing(message)) => (vec![message], 1),
         Err(Failure::Problems(messages)) => (messages, 1),
+        Err(Failure::Input(messages)) => (messages, 2),
+        Err(Failure::Retry(message)) => {
+            remark(message);
+            return ExitCode::from(failure::TRY_AGAIN);
+        }
         Err(Failure::Stopped(message)) => {
             remark(message);
             return ExitCode::from(stop::STOPPED);
@@ -210,7 +234,8 @@ fn builtin_help() -> String {
          RUST_LOG           Log filter, such as info or firstlight=debug\n  \
          FIRSTLIGHT_LIMITS  Factor for the limits on input size, such as 2\n\n\
          Exit status:\n  \
-         0 success, 1 failure, 2 usage error, 130 stopped by Ctrl+C (what was rendered is saved)\n\n\
+         0 success, 1 failure, 2 usage error, 130 stopped by Ctrl+C (what was rendered is saved);\n  \
+         of render --part: 2 wrong input, 75 interrupted or blocked, try again\n\n\
          Settings and bookmarks of the window are kept in $XDG_CONFIG_HOME/firstlight (Linux)"
     )
 }

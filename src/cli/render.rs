@@ -1,11 +1,12 @@
 //! `firstlight render SCENE -o out.png`: a picture without a window, and the film that it can go on from.
 
-use super::animate::{animate, frames};
+use super::animate::{Sequence, animate, frames};
 use super::args::replaced;
 use super::console::{inform, print, prints_to_terminal, remark};
 use super::failure::Failure;
 use super::job::{RenderJob, room_to_write};
 use super::number::percent;
+use super::part;
 use super::progress::Progress;
 use super::render_args::{RenderArgs, RenderCommand};
 use super::stop::Stop;
@@ -23,8 +24,35 @@ use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// The command, from words that a job has.
+#[derive(clap::Parser)]
+#[command(name = "firstlight render", no_binary_name = true)]
+pub struct Command {
+    #[command(flatten)]
+    pub render: RenderCommand,
+}
+
+impl Command {
+    /// - `words`: the scene and the options.
+    pub fn parse(words: &[String]) -> Result<Self, Failure> {
+        use clap::Parser;
+        Self::try_parse_from(words).map_err(|error| {
+            let text = error.render().to_string();
+            Failure::Usage(text.trim_start_matches("error: ").lines().next().unwrap_or_default().to_owned())
+        })
+    }
+
+    /// The part that the words ask for.
+    pub fn part(&self) -> Result<Option<RenderArgs>, Failure> {
+        self.render.part()
+    }
+}
+
 /// Renders each scene in turn.
 pub fn run(command: &RenderCommand, stop: &Stop) -> Result<(), Failure> {
+    if let Some(job) = command.part()? {
+        return part::run(&job, stop);
+    }
     let jobs = command.jobs()?;
     // A mistake in the last name should not cost the wait for the others.
     for job in &jobs {
@@ -141,7 +169,9 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         progress.suspend(|| remark(format_args!("warning: {message} in every pixel")));
     }
     if args.turntable.is_some() || args.bookmarks.is_some() {
-        return animate(args, ManuallyDrop::into_inner(job), progress, files.replaced().len(), stop);
+        let n = args.turntable.or(args.frames).unwrap_or(1) as usize;
+        let sequence = Sequence { frames: 0..n, is_part: false, n_replaced: files.replaced().len() };
+        return animate(args, ManuallyDrop::into_inner(job), progress, &sequence, stop);
     }
     let kept_features = kept.as_mut().and_then(|(kept, _)| kept.features.take());
     let mut film = job.film(args, kept)?;

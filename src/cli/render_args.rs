@@ -90,6 +90,18 @@ pub struct RenderArgs {
     /// Number of frames for --bookmarks.
     #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "bookmarks")]
     pub frames: Option<u32>,
+    /// Render one of N equal parts into --film: I/N, such as 3/64, or auto for the task of an array job
+    ///
+    /// A complete part is skipped, an interrupted one is resumed. {part} in --film is replaced by the number of the part.
+    /// Exit status: 0 done, 75 try again, 2 wrong input.
+    #[arg(help_heading = "Films and parts", long, value_name = "I/N", conflicts_with_all = ["resume", "region", "time", "error", "json", "error_picture", "error_metric"])]
+    pub part: Option<String>,
+    /// What is divided into parts.
+    #[arg(help_heading = "Films and parts", long, value_name = "WHAT", value_enum, default_value_t = PartBy::Samples, requires = "part")]
+    pub part_by: PartBy,
+    /// Seconds between two saves of the film of a part.
+    #[arg(help_heading = "Films and parts", long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive, default_value_t = 60.0, requires = "part")]
+    pub save_every: f64,
     /// Resume the film given by --film, or a film given as the scene.
     #[arg(long, help_heading = "Films and parts")]
     pub resume: bool,
@@ -157,7 +169,47 @@ pub enum MetricArg {
     Display,
 }
 
+/// What is divided into parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PartBy {
+    /// Ranges of samples of the whole image.
+    Samples,
+    /// Rectangles of tiles with all samples.
+    Tiles,
+    /// Frames of a sequence.
+    Frames,
+}
+
 impl RenderCommand {
+    /// The only job, where it is a part of something larger.
+    pub fn part(&self) -> Result<Option<RenderArgs>, Failure> {
+        let render = &self.render;
+        if render.part.is_none() {
+            return Ok(None);
+        }
+        let mut scenes = self.scenes.each();
+        let scene = scenes.next().unwrap_or_default();
+        if scenes.next().is_some() {
+            return Err(Failure::Usage("--part works with one scene only".to_owned()));
+        }
+        let output = match (&self.output, render.part_by) {
+            (Some(_), PartBy::Samples | PartBy::Tiles) => {
+                let message =
+                    "a part has no image of its own: omit -o, and use `firstlight merge --picture` for all parts";
+                return Err(Failure::Usage(message.to_owned()));
+            }
+            (None, PartBy::Frames) => {
+                return Err(Failure::Usage(
+                    "--part-by frames needs -o FILE: all parts write to the same names".to_owned(),
+                ));
+            }
+            // What the film is shown as.
+            (None, _) => PathBuf::from("part.png"),
+            (Some(output), PartBy::Frames) => output.clone(),
+        };
+        Ok(Some(RenderArgs { scene, output, ..render.clone() }))
+    }
+
     /// One for each scene.
     pub fn jobs(&self) -> Result<Vec<RenderArgs>, Failure> {
         let scenes: Vec<SceneArgs> = self.scenes.each().collect();
@@ -245,7 +297,7 @@ impl RenderArgs {
     }
 }
 
-fn file_stem(scene: &OsStr) -> OsString {
+pub fn file_stem(scene: &OsStr) -> OsString {
     Path::new(scene).file_stem().unwrap_or(OsStr::new("scene")).to_owned()
 }
 
@@ -263,7 +315,7 @@ pub fn free_name(scene: &OsStr, extension: &str, others: &[RenderArgs]) -> PathB
 }
 
 /// `64..128` as sample numbers.
-fn parse_range(text: &str) -> Result<Range<u32>, String> {
+pub fn parse_range(text: &str) -> Result<Range<u32>, String> {
     let (start, end) = text.split_once("..").ok_or("expected A..B, such as 64..128: from A up to, not including, B")?;
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a sample number"));
     let range = number(start)?..number(end)?;

@@ -4,7 +4,7 @@ use super::args::{OverwriteArgs, SceneArgs};
 use super::console::{inform, remark};
 use super::failure::Failure;
 use super::render;
-use super::render_args::{RenderArgs, free_name};
+use super::render_args::{PartBy, RenderArgs, free_name};
 use super::stop::Stop;
 use clap::Args;
 use firstlight::frame::{PictureFormat, Print, ReplayOptions, replay};
@@ -169,6 +169,9 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         error_metric: None,
         exposure: 0.0,
         json: false,
+        part: None,
+        part_by: PartBy::Samples,
+        save_every: 60.0,
     };
     render::run_one(&args, stop)
 }

@@ -6,7 +6,7 @@
 //! people, which cannot.
 
 use super::failure::Failure;
-use firstlight::console::clear_line;
+use firstlight::console::{Bar, clear_line};
 use firstlight::scene::whole_file;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,6 +27,8 @@ pub struct Stop(Arc<StopState>);
 struct StopState {
     asked: AtomicBool,
     attended: AtomicBool,
+    /// It is told to end by an engine that tries it again.
+    is_part: AtomicBool,
     left: Mutex<Left>,
 }
 
@@ -51,6 +53,10 @@ impl Stop {
         let shared = stop.clone();
         let taken_over = ctrlc::set_handler(move || {
             if shared.0.asked.swap(true, Ordering::SeqCst) {
+                if shared.is_tried_again() {
+                    // Engines signal more than once before they kill, and a film may be half written.
+                    return;
+                }
                 std::process::exit(i32::from(STOPPED));
             }
             // Nobody waits any more for what is done.
@@ -87,6 +93,21 @@ impl Stop {
         self.0.asked.load(Ordering::Relaxed)
     }
 
+    /// The command is a part of something larger: when an engine stops it, it is to be tried again.
+    pub fn is_of_part(&self) {
+        self.0.is_part.store(true, Ordering::SeqCst);
+    }
+
+    /// Whether a stop means that the command is to be tried again; on a terminal somebody has pressed Ctrl+C.
+    pub fn is_tried_again(&self) -> bool {
+        self.0.is_part.load(Ordering::SeqCst) && !Bar::is_watched()
+    }
+
+    /// What a command that was stopped ends with.
+    pub fn failure(&self, message: String) -> Failure {
+        if self.is_tried_again() { Failure::Retry(message) } else { Failure::Stopped(message) }
+    }
+
     /// From here on the command looks at [`is_asked`](Self::is_asked), and saves what it has when it is asked.
     pub fn attend(&self) {
         self.0.attended.store(true, Ordering::SeqCst);
@@ -117,6 +138,6 @@ impl Stop {
         undo.into_iter().for_each(|work| work());
         // A bar may stand there.
         clear_line();
-        Failure::Stopped(saved.map_or("stopped: nothing was saved".to_owned(), |saved| format!("stopped: {saved}")))
+        self.failure(saved.map_or("stopped: nothing was saved".to_owned(), |saved| format!("stopped: {saved}")))
     }
 }

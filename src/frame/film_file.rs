@@ -22,7 +22,7 @@ use exr::prelude::{
     ReadLayers, Text, WritableImage,
 };
 use serde::{Deserialize, Serialize};
-use std::io::{Read, Seek, Write};
+use std::io::{BufReader, Read, Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -37,6 +37,15 @@ pub struct FilmFile {
     pub features: Option<FeatureLayers>,
     /// What cannot be known of it; for people, with its name.
     pub warning: Option<String>,
+}
+
+/// What a film says of itself before its numbers.
+#[derive(Clone, Debug)]
+pub struct FilmSummary {
+    /// Scene, view and settings that it was rendered with.
+    pub shot: ImageMetadata,
+    /// Which samples it has.
+    pub layout: FilmLayout,
 }
 
 /// Why a file is not read as a film.
@@ -91,6 +100,22 @@ impl From<String> for FilmProblem {
     }
 }
 
+impl FilmError {
+    /// Whether the same may succeed later, or on another machine: the disk cannot be reached, or there is no memory.
+    pub fn may_pass(&self) -> bool {
+        match &self.problem {
+            FilmProblem::Read(error) => error.may_pass(),
+            FilmProblem::Memory(_) => true,
+            _ => false,
+        }
+    }
+
+    /// Whether the file is not as it was written.
+    pub fn is_damaged(&self) -> bool {
+        matches!(self.problem, FilmProblem::Damaged(_))
+    }
+}
+
 impl From<FilmError> for String {
     fn from(error: FilmError) -> Self {
         error.to_string()
@@ -124,6 +149,9 @@ const TILES_FORMAT: u32 = 2;
 
 /// Header and note are not under its checksum.
 const OLD_FORMAT: u32 = 1;
+
+/// How every OpenEXR file begins.
+const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Stands where the checksum will be.
 const NO_CHECK: &str = "00000000000000000000000000000000";
@@ -256,6 +284,56 @@ pub fn check_film_source(source: &SceneSource) -> Result<(), FilmError> {
     }
 }
 
+/// Reads what a film says of itself, without its numbers. Nothing is checked against the checksum, which is that of the
+/// whole file.
+///
+/// # Errors
+/// A sentence that names the file: when it is not there, or no film.
+pub fn read_film_summary(path: &Path) -> Result<FilmSummary, FilmError> {
+    let limits = Limits::of_this_process();
+    summary(path, &limits).map_err(|problem| FilmError { path: path.to_path_buf(), problem })
+}
+
+fn summary(path: &Path, limits: &Limits) -> Result<FilmSummary, FilmProblem> {
+    let mut file = InputFile::open_within(path, FileKind::Film, FileKind::Film.limit(limits))?;
+    let mut start = [0; 4];
+    let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
+    if start[..n] != MAGIC {
+        return Err(FilmProblem::NoFilm);
+    }
+    let damaged = |error: &dyn std::fmt::Display| FilmProblem::Damaged(error.to_string());
+    let meta = exr::meta::MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| damaged(&error))?;
+    let layout = layout_in(&meta)?;
+    check_film_size(layout.width, layout.height)?;
+    let note = note_in(&meta).filter(|note| note.len() as u64 <= limits.note_bytes);
+    let shot = ImageMetadata::from_note(&note.ok_or_else(|| damaged(&"its metadata is missing or too long"))?)?;
+    Ok(FilmSummary { shot, layout })
+}
+
+/// The layout of a film, from its attribute.
+fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
+    let header = meta.headers.first().ok_or(FilmProblem::NoFilm)?;
+    let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
+        return Err(FilmProblem::NoFilm);
+    };
+    let text = string_of(text);
+    let damaged = |error: ron::error::SpannedError| FilmProblem::Damaged(error.to_string());
+    let HeaderStart { format, .. } = ron::from_str(&text).map_err(damaged)?;
+    if format > FORMAT {
+        return Err(FilmProblem::Newer);
+    }
+    Ok(header_of(format, &text).map_err(damaged)?.0)
+}
+
+/// Layout and feature buffers of a film of this format, as the text of its attribute says them.
+fn header_of(format: u32, text: &str) -> Result<(FilmLayout, Option<FeatureHeader>), ron::error::SpannedError> {
+    if format > TILES_FORMAT {
+        ron::from_str::<Header<FilmLayout>>(text).map(|header| (header.layout, header.features))
+    } else {
+        ron::from_str::<Header<OldFilmLayout>>(text).map(|header| (header.layout.renewed(), header.features))
+    }
+}
+
 /// Reads a film back, to the last bit.
 ///
 /// # Errors
@@ -278,7 +356,7 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
     // Before gigabytes of something else are read.
     let mut start = [0; 4];
     let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
-    if start[..n] != [0x76, 0x2f, 0x31, 0x01] {
+    if start[..n] != MAGIC {
         return Err(FilmProblem::NoFilm);
     }
     let bytes = file.bytes()?;
@@ -287,7 +365,7 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
 
 /// A film from the bytes of its file.
 fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
-    if bytes.get(..4) != Some(&[0x76, 0x2f, 0x31, 0x01]) {
+    if bytes.get(..4) != Some(&MAGIC) {
         return Err(FilmProblem::NoFilm);
     }
     let damaged = |error: &dyn std::fmt::Display| FilmProblem::Damaged(error.to_string());
@@ -308,12 +386,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
             return Err(damaged(&WRONG));
         }
     }
-    let known = if format > TILES_FORMAT {
-        ron::from_str::<Header<FilmLayout>>(&text).map(|header| (header.layout, header.features))
-    } else {
-        ron::from_str::<Header<OldFilmLayout>>(&text).map(|header| (header.layout.renewed(), header.features))
-    };
-    let (layout, features) = known.map_err(|error| damaged(&error))?;
+    let (layout, features) = header_of(format, &text).map_err(|error| damaged(&error))?;
     let FilmLayout { width, height, .. } = layout;
     check_film_size(width, height)?;
     if (header.layer_size.width(), header.layer_size.height()) != (width as usize, height as usize) {

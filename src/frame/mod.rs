@@ -57,8 +57,8 @@ pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
 pub use feature_layers::FeatureLayers;
 pub use film_file::{
-    FilmError, FilmFile, FilmProblem, check_film_source, check_replaced_film, read_film_file, read_film_file_within,
-    write_film_file, write_film_into, write_film_with_features,
+    FilmError, FilmFile, FilmProblem, FilmSummary, check_film_source, check_replaced_film, read_film_file,
+    read_film_file_within, read_film_summary, write_film_file, write_film_into, write_film_with_features,
 };
 pub use focus::{Focus, FocusTarget, SharpZone, f_number, f_number_decimals, f_stop, radius_of_f_stop, sharp_zone};
 pub use history::History;

@@ -6,7 +6,7 @@
 
 use super::limits::Limits;
 use std::fs::{File, Metadata};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -61,6 +61,36 @@ pub enum ReadError {
     /// The caller's `stop` said so.
     #[error("reading was cancelled")]
     Stopped,
+}
+
+impl ReadError {
+    /// Whether the same may succeed later, or on another machine.
+    pub fn may_pass(&self) -> bool {
+        match self {
+            Self::Io(error) => may_pass(error.kind()),
+            Self::TooSlow => true,
+            _ => false,
+        }
+    }
+}
+
+/// Whether what the system says may be otherwise later: what is not there, is no folder or is not allowed will not.
+pub(super) fn may_pass(kind: ErrorKind) -> bool {
+    !matches!(
+        kind,
+        ErrorKind::NotFound
+            | ErrorKind::PermissionDenied
+            | ErrorKind::AlreadyExists
+            | ErrorKind::NotADirectory
+            | ErrorKind::IsADirectory
+            | ErrorKind::ReadOnlyFilesystem
+            | ErrorKind::InvalidInput
+            | ErrorKind::InvalidFilename
+            | ErrorKind::InvalidData
+            | ErrorKind::UnexpectedEof
+            | ErrorKind::FileTooLarge
+            | ErrorKind::Unsupported
+    )
 }
 
 /// No file takes longer, unless what it lies on hangs.

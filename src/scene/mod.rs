@@ -83,7 +83,7 @@ pub use picture::{PictureError, read_picture, read_picture_within};
 pub(crate) use picture::{decode_picture, picture_reader};
 pub use placement::{Linear, Placement};
 pub use relative::{absolute, bytes_to_text, path_text, path_to_text, relative_path, text_to_path};
-pub use save::{SavedScene, save_scene};
+pub use save::{SavedScene, each_path, save_scene};
 pub use source::{SceneSource, UpAxis};
 pub use sources::{EnvironmentSource, MeshShading, MeshSource, Seconds, TextureSource};
 pub(crate) use spawn::texture_of;

@@ -94,18 +94,23 @@ fn move_paths(file: &mut SceneFile, from: &Path, to: &Path) {
             *path = relative_path(&to, &from.join(text_to_path(path)));
         }
     };
+    each_path(file, moved);
+}
+
+/// Every path of a file that a scene names.
+pub fn each_path(file: &mut SceneFile, mut change: impl FnMut(&mut String)) {
     for object in &mut file.objects {
         if let ObjectPart::Mesh { source, .. } = object {
-            source.file_mut().into_iter().for_each(moved);
+            source.file_mut().into_iter().for_each(&mut change);
         }
     }
     for (_, texture) in &mut file.textures.0 {
         if let TextureSource::Image { file, .. } = texture {
-            moved(file);
+            change(file);
         }
     }
     if let EnvironmentSource::Image { file, .. } = &mut file.environment {
-        moved(file);
+        change(file);
     }
 }
 

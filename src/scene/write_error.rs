@@ -2,6 +2,7 @@
 
 use super::error::SceneError;
 use super::image_metadata::MetadataError;
+use super::input_file::may_pass;
 use crate::render::NoRoom;
 use std::error::Error;
 use std::io::{self, ErrorKind};
@@ -111,22 +112,42 @@ pub enum WriteError {
     Mesh(#[source] Box<dyn Error + Send + Sync>),
 }
 
+impl WriteError {
+    /// Whether the same may succeed later, or on another machine: another process has the file, a disk is full or cannot be
+    /// reached, or there is no memory.
+    pub fn may_pass(&self) -> bool {
+        match self {
+            Self::Busy(_) | Self::Memory(_) => true,
+            Self::Begin { source, .. } | Self::NoFolder { source, .. } => may_pass(source.kind()),
+            Self::Failed { source, .. } => {
+                let is_memory = source.downcast_ref::<NoRoom>().is_some();
+                is_memory || io_kind(&**source).is_some_and(may_pass)
+            }
+            _ => false,
+        }
+    }
+}
+
 impl From<WriteError> for String {
     fn from(error: WriteError) -> Self {
         error.to_string()
     }
 }
 
-/// What a failure to write says to people.
-fn reason(error: &(dyn Error + 'static)) -> String {
-    // Libraries wrap what the system says in words of their own.
+/// What the system says. Libraries wrap it in words of their own.
+fn io_kind(error: &(dyn Error + 'static)) -> Option<ErrorKind> {
     let mut cause = Some(error);
     let kind = std::iter::from_fn(|| {
         let this = cause?;
         cause = this.source();
         Some(this.downcast_ref::<io::Error>().map(io::Error::kind))
     });
-    match kind.flatten().next() {
+    kind.flatten().next()
+}
+
+/// What a failure to write says to people.
+fn reason(error: &(dyn Error + 'static)) -> String {
+    match io_kind(error) {
         Some(ErrorKind::StorageFull) => "the disk is full".to_owned(),
         Some(ErrorKind::QuotaExceeded) => "the disk quota is exceeded".to_owned(),
         Some(ErrorKind::FileTooLarge) => "the file would exceed the size limit".to_owned(),

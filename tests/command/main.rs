@@ -7,6 +7,8 @@ mod cli;
 mod cli_simplify;
 mod explain;
 mod faults;
+mod pack;
+mod parts;
 mod report;
 mod terminal;
 mod usage;

@@ -25,7 +25,7 @@ const EMBED: &str = "src/embed";
 
 /// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
 /// of its line; in `src` they may be imported everywhere.
-const LAYERS: [(&str, &[&str]); 23] = [
+const LAYERS: [(&str, &[&str]); 24] = [
     (SIMD, &[]),
     (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
@@ -43,6 +43,7 @@ const LAYERS: [(&str, &[&str]); 23] = [
     (CONSOLE, &[PRINTABLE]),
     (SCENE, &[PRINTABLE, CONSOLE]),
     (FRAME, &[PRINTABLE, CONSOLE, SCENE]),
+    ("src/cluster", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     ("src/report", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     ("src/stability", &[PRINTABLE, CONSOLE, SCENE, FRAME]),
     (EMBED, &[SCENE, FRAME]),

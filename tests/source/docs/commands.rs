@@ -109,7 +109,7 @@ pub fn cheap(mut words: Vec<String>) -> Vec<String> {
         // Everything before `--help` is parsed.
         "stability" if !has(&words, "--list") => words.push("--help".to_owned()),
         "info" if has(&words, "--tree") => words.push("--help".to_owned()),
-        "info" | "merge" | "save" | "explain" | "simplify" | "stability" | "help" => {}
+        "info" | "merge" | "pack" | "save" | "explain" | "simplify" | "stability" | "help" => {}
         _ => {
             for (option, value) in
                 [("--time", "0.1"), ("--turntable", "2"), ("--frames", "2"), ("--region", "0,0,16,9")]

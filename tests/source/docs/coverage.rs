@@ -74,11 +74,26 @@ fn every_word_of_the_scene_file_is_described() {
 
 #[test]
 fn every_option_is_described() {
-    let page = read("docs/command-line.md").text;
+    let page = ["command-line", "cluster-options"].map(|name| read(&format!("docs/{name}.md")).text).concat();
     let folder = TempFolder::new("options");
     let mut problems = Vec::new();
-    let commands =
-        ["", "render", "info", "merge", "save", "explain", "simplify", "stability", "report", "completions", "man"];
+    let commands = [
+        "",
+        "render",
+        "info",
+        "merge",
+        "pack",
+        "submit",
+        "status",
+        "work",
+        "save",
+        "explain",
+        "simplify",
+        "stability",
+        "report",
+        "completions",
+        "man",
+    ];
     for command in commands {
         let words: Vec<String> =
             [command, "--help"].into_iter().filter(|word| !word.is_empty()).map(str::to_owned).collect();

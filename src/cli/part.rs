@@ -1,0 +1,298 @@
+//! `firstlight render SCENE --part I/N --film part.exr`: one part of an image, as often as an engine asks for it.
+//!
+//! A part that is complete is recognised and skipped; one that was interrupted is resumed from its last film, which is saved
+//! every minute. Exit status: 0 done, 75 try again, 2 wrong input.
+
+use super::animate::{Sequence, animate};
+use super::console::{inform, remark};
+use super::failure::Failure;
+use super::job::RenderJob;
+use super::progress::Progress;
+use super::render_args::{PartBy, RenderArgs};
+use super::stop::Stop;
+use firstlight::cluster::coverage::in_words;
+use firstlight::cluster::part::Part;
+use firstlight::frame::{
+    FeatureLayers, Target, read_film_file, read_film_summary, render_region_until, write_film_with_features,
+};
+use firstlight::render::{Film, Region};
+use firstlight::scene::whole_file::{Replace, WholeFile};
+use firstlight::scene::{FileKind, Files, InputFile, SceneSource};
+use glam::UVec2;
+use std::mem::ManuallyDrop;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Stands for the number of the part in the name of a film.
+const NUMBER: &str = "{part}";
+
+/// Renders the part that `args` asks for.
+pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
+    stop.is_of_part();
+    // The same samples in every pixel: only those can be divided before any is taken.
+    let args = &RenderArgs { uniform: args.part_by != PartBy::Frames || args.uniform, ..args.clone() };
+    let part = args.part.as_deref().expect("only parts come here");
+    let part = Part::parse(part).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.map_or(0, usize::from))
+        .build()
+        .map_err(|error| Failure::Retry(format!("error: cannot start worker threads: {error}")))?;
+    pool.install(|| match args.part_by {
+        PartBy::Frames => frames(args, part, stop),
+        PartBy::Samples | PartBy::Tiles => film(args, part, stop),
+    })
+}
+
+/// A part of a sequence.
+fn frames(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
+    let Some(n) = args.turntable.or(args.bookmarks.as_ref().and(args.frames)) else {
+        return Err(Failure::Usage("--part-by frames needs a sequence: --turntable N or --bookmarks".to_owned()));
+    };
+    if args.film.is_some() {
+        return Err(Failure::Usage("--part-by frames writes images: use -o FILE instead of --film".to_owned()));
+    }
+    let frames = part.frames(n).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
+    let mut files = args.overwrite.files();
+    let progress = Progress::new();
+    let job = load(args, &mut files, &progress)?;
+    let frames = frames.start as usize..frames.end as usize;
+    animate(args, job, progress, &Sequence { frames, is_part: true, n_replaced: 0 }, stop).map_err(Failure::of_part)
+}
+
+/// A part of the samples or of the tiles of one image.
+fn film(args: &RenderArgs, part: Part, stop: &Stop) -> Result<(), Failure> {
+    if args.turntable.is_some() || args.bookmarks.is_some() {
+        return Err(Failure::Usage("a sequence is divided into frames: use --part-by frames".to_owned()));
+    }
+    let path = film_path(args, part)?;
+    let mut files = args.overwrite.files();
+    let claim = files.go_on(&path).map_err(|error| Failure::from(error).of_part())?;
+    let progress = Progress::new();
+    let job = load(args, &mut files, &progress)?;
+    // The program ends after this: taking a large scene apart piece by piece would only make people wait for that.
+    let mut job = ManuallyDrop::new(job);
+    let all = samples(args, &job);
+    let samples = match args.part_by {
+        PartBy::Tiles => all.clone(),
+        _ => part.samples(all.clone()).map_err(|error| Failure::Usage(format!("--part: {error}")))?,
+    };
+    let args = &RenderArgs { samples: Some(samples.clone()), ..args.clone() };
+    let (film, kept) = film_so_far(args, &job, &path).map_err(Failure::of_part)?;
+    let region = match args.part_by {
+        PartBy::Tiles => Some(region(&film, part, &job)?),
+        _ => None,
+    };
+    check_samples(&film, &samples, region.as_ref(), &path)?;
+    // All parts see the same: the first one keeps it for the film of all.
+    let features = if part.index == 0 { job.features(args, kept).map_err(Failure::of_part)? } else { None };
+    let work = Work { args, job: &job, part, samples, region, features, path };
+    work.render(film, claim, progress, stop)
+}
+
+/// What there is to do.
+struct Work<'a> {
+    args: &'a RenderArgs,
+    job: &'a RenderJob,
+    part: Part,
+    samples: Range<u32>,
+    region: Option<Region>,
+    features: Option<FeatureLayers>,
+    path: PathBuf,
+}
+
+impl Work<'_> {
+    fn render(&self, mut film: Film, claim: WholeFile, mut progress: Progress, stop: &Stop) -> Result<(), Failure> {
+        let Self { args, job, samples, region, .. } = self;
+        let (region, goal) = (region.as_ref(), samples.end - samples.start);
+        let target = Target { spp: Some(goal), ..Target::default() };
+        let before = film.spp_in(region);
+        if before >= goal {
+            progress.finish();
+            inform(format_args!("{}: is complete already: {}", self.name(), self.path.display()));
+            return Ok(());
+        }
+        if before > 0 {
+            let path = self.path.display();
+            progress
+                .suspend(|| inform(format_args!("resuming {path}, which has {before} of {goal} samples per pixel")));
+        }
+        job.draft.prepare();
+        // From here on a stop saves what there is.
+        stop.attend();
+        let (mut claim, mut wait) = (Some(claim), Duration::from_secs_f64(args.save_every));
+        let bad_before = film.n_bad();
+        while film.spp_in(region) < goal && !stop.is_asked() {
+            let due = Instant::now() + wait;
+            // A pass that takes long is ended in the middle.
+            let late = || stop.is_asked() || Instant::now() > due + wait / 2;
+            let prepared = &job.extraction.prepared;
+            let report = render_region_until(prepared, &job.settings, &mut film, region, target, &late, |now| {
+                let share = f64::from(now.spp) / f64::from(goal);
+                let mrays = now.rays.total() as f64 / now.seconds.max(1e-9) * 1e-6;
+                progress.at(share, format!("{} of {goal} samples per pixel, {mrays:.1} Mrays/s", now.spp));
+                Instant::now() < due
+            });
+            if report.n_above > 0 {
+                let n_above = report.n_above;
+                progress.suspend(|| {
+                    remark(format_args!(
+                        "warning: {n_above} samples are brighter than the scene allows: this is a bug"
+                    ));
+                });
+            }
+            if film.max_spp() == 0 {
+                continue;
+            }
+            let start = Instant::now();
+            claim = self.save(&film, claim.take())?;
+            // Large films are saved less often: no more than a twentieth of the time is spent on it.
+            wait = wait.max(20 * start.elapsed());
+        }
+        progress.finish();
+        if film.n_bad() > bad_before {
+            let n_bad = film.n_bad() - bad_before;
+            remark(format_args!("warning: {n_bad} samples were not finite and were discarded"));
+        }
+        let (path, done) = (self.path.display(), film.spp_in(region));
+        if done >= goal {
+            inform(format_args!("{}: done, film saved to {path}", self.name()));
+            return Ok(());
+        }
+        let saved =
+            if film.max_spp() > 0 { format!("the film {path} is saved") } else { "nothing was saved".to_owned() };
+        let message =
+            format!("{}: stopped after {done} of {goal} samples per pixel; {saved}: run it again", self.name());
+        Err(stop.failure(message))
+    }
+
+    /// Saves the film, and claims its file for the next time.
+    fn save(&self, film: &Film, claim: Option<WholeFile>) -> Result<Option<WholeFile>, Failure> {
+        // On a disk without locks another process may have come further: its film stays.
+        if let Ok(there) = read_film_summary(&self.path)
+            && there.layout != film.layout()
+            && there.layout.has_all_of(&film.layout())
+        {
+            let message = format!("{}: another process has rendered more of this part", self.path.display());
+            return Err(Failure::Retry(message));
+        }
+        let claim_again = || {
+            let claimed = WholeFile::claim(&self.path, Replace::Anything);
+            claimed.map_err(|error| Failure::from(error).of_part())
+        };
+        let claim = claim.map_or_else(claim_again, Ok)?;
+        let note = self.job.note(film, &self.path);
+        write_film_with_features(film, self.features.as_ref(), &note, claim)
+            .map_err(|error| Failure::from(error).of_part())?;
+        claim_again().map(Some)
+    }
+
+    /// `part 3/64, samples 128 to 191`.
+    fn name(&self) -> String {
+        let Part { count, .. } = self.part;
+        let samples = in_words(std::slice::from_ref(&self.samples));
+        let what = match self.region {
+            Some(Region { start, end }) => format!("pixels {},{} to {},{}", start.x, start.y, end.x - 1, end.y - 1),
+            None if self.samples.len() == 1 => format!("sample {samples}"),
+            None => format!("samples {samples}"),
+        };
+        format!("part {}/{count}, {what}", self.part.number())
+    }
+}
+
+/// Where the film of the part is kept.
+fn film_path(args: &RenderArgs, part: Part) -> Result<PathBuf, Failure> {
+    let path = args.film.as_deref().ok_or_else(|| Failure::Usage("--part needs --film FILE.exr".to_owned()))?;
+    let path = numbered(path, part);
+    match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("exr") => Ok(path),
+        _ => Err(Failure::Usage(format!("{}: the name of a film must end in .exr", path.display()))),
+    }
+}
+
+/// A path with the number of the part in the place of `{part}`.
+pub fn numbered(path: &Path, part: Part) -> PathBuf {
+    match path.to_str() {
+        Some(text) => PathBuf::from(text.replace(NUMBER, &part.padded())),
+        None => path.to_path_buf(),
+    }
+}
+
+/// The scene; what is wrong with it stays wrong, unless its disk cannot be reached.
+fn load(args: &RenderArgs, files: &mut Files, progress: &Progress) -> Result<RenderJob, Failure> {
+    RenderJob::new(args, None, files, progress).map_err(|failure| match args.scene.source() {
+        Ok(SceneSource::Scene(path) | SceneSource::Model(path) | SceneSource::Picture(path)) => {
+            match InputFile::open_within(&path, FileKind::Film, u64::MAX) {
+                Err(error) if error.may_pass() => Failure::Retry(format!("error: {}: {error}", path.display())),
+                _ => failure.of_part(),
+            }
+        }
+        _ => failure.of_part(),
+    })
+}
+
+/// All samples that are divided.
+fn samples(args: &RenderArgs, job: &RenderJob) -> Range<u32> {
+    args.samples.clone().unwrap_or_else(|| {
+        let first = job.scene.shot.as_ref().map_or(0, |shot| shot.first_sample);
+        first..first.saturating_add(job.target(args).spp.unwrap_or(0)).min(Film::MAX_SAMPLES)
+    })
+}
+
+/// The film that is there with what it has kept, or an empty one.
+fn film_so_far(args: &RenderArgs, job: &RenderJob, path: &Path) -> Result<(Film, Option<FeatureLayers>), Failure> {
+    let empty = || Ok((job.film(args, None)?, None));
+    if !path.exists() {
+        return empty();
+    }
+    match read_film_file(path) {
+        Ok(mut kept) => {
+            kept.warning.iter().for_each(|text| remark(format_args!("warning: {text}")));
+            let features = kept.features.take();
+            Ok((job.film(args, Some((kept, path)))?, features))
+        }
+        // Its samples are lost either way.
+        Err(error) if error.is_damaged() => {
+            remark(format_args!("warning: {error}: this part is rendered again"));
+            empty()
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The tiles of a part.
+fn region(film: &Film, part: Part, job: &RenderJob) -> Result<Region, Failure> {
+    if job.extraction.prepared.features().caustics {
+        let message = "this scene has caustics from light paths, which fall on any tile: use --part-by samples";
+        return Err(Failure::Usage(message.to_owned()));
+    }
+    let side = film.tile_size();
+    let tiles = [film.width().div_ceil(side), film.height().div_ceil(side)];
+    let [start, end] = part.tiles(tiles).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
+    let (start, end) = (UVec2::from_array(start) * side, UVec2::from_array(end) * side);
+    Ok(film.region(start, end).expect("a part has a tile at least"))
+}
+
+/// Refuses a film with samples of another part.
+fn check_samples(film: &Film, samples: &Range<u32>, region: Option<&Region>, path: &Path) -> Result<(), Failure> {
+    let layout = film.layout();
+    let tiles_x = film.width().div_ceil(film.tile_size());
+    for (i, tile) in (0..).zip(&layout.tiles) {
+        let at = UVec2::new(i % tiles_x, i / tiles_x) * film.tile_size();
+        let is_ours = region.is_none_or(|region| region.contains(at.x, at.y));
+        let others = tile
+            .blocks
+            .iter()
+            .flat_map(|block| &block.samples)
+            .find(|(start, end)| start < end && !(is_ours && samples.start <= *start && *end <= samples.end));
+        if let Some(&(start, end)) = others {
+            let message = format!(
+                "{}: has samples {} of other parts: choose another --film for each part, such as part-{NUMBER}.exr",
+                path.display(),
+                in_words(&[start..end])
+            );
+            return Err(Failure::Input(vec![message]));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,132 @@
+//! `firstlight status FOLDER`: how far a job is, from what lies in its folder.
+
+use super::console::{inform, print, remark};
+use super::failure::Failure;
+use super::merge::{FilmSet, note_of};
+use super::number::percent;
+use super::work::ALL;
+use clap::Args;
+use firstlight::cluster::coverage::in_words;
+use firstlight::cluster::job::{Job, Round, Rounds};
+use firstlight::cluster::part::Part;
+use firstlight::frame::{FilmFile, PictureFormat, Print, read_film_summary};
+use firstlight::scene::whole_file::Replace;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+#[derive(Args, Clone, Debug)]
+pub struct StatusArgs {
+    /// The folder of the job.
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Save a picture of all samples that are there, .png or .exr.
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How far the parts of a round are.
+#[derive(Default)]
+struct Parts {
+    count: u32,
+    done: u32,
+    begun: u32,
+    /// Samples per pixel that are there, of all parts together.
+    samples: u64,
+    films: Vec<PathBuf>,
+}
+
+impl Parts {
+    fn of(folder: &Path, job: &Job, number: usize, round: &Round) -> Self {
+        let count = job.parts_of(&round.range());
+        let mut parts = Self { count, ..Self::default() };
+        for index in 0..count {
+            let part = Part { index, count };
+            let path = folder.join(job.film_of(number, &part.padded()));
+            let Ok(summary) = read_film_summary(&path) else { continue };
+            let wanted = part.samples(round.range()).map_or(0, |samples| samples.len() as u32);
+            let there = summary.shot.spp.min(wanted);
+            parts.samples += u64::from(there);
+            parts.done += u32::from(there == wanted);
+            parts.begun += u32::from(there < wanted);
+            parts.films.push(path);
+        }
+        parts
+    }
+}
+
+pub fn run(args: &StatusArgs) -> Result<(), Failure> {
+    let folder = &args.folder;
+    let (job, rounds) = (Job::read(folder)?, Rounds::read(folder)?);
+    let (number, is_done) = rounds.open().map_or((rounds.0.len(), true), |number| (number, false));
+    let round = rounds.get(number).expect("there is one at least");
+    let parts = if is_done { Parts::default() } else { Parts::of(folder, &job, number, round) };
+    let merged = rounds.0.iter().rev().find(|round| round.merged);
+    let share = parts.samples as f64 / round.range().len() as f64;
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    let so_far = now.saturating_sub(round.since) as f64;
+    let left = (!is_done && share > 0.0).then(|| so_far * (1.0 - share) / share);
+    if let Some(path) = &args.picture {
+        picture(folder, path, &parts.films, merged.is_some())?;
+    }
+    if args.json {
+        return print(serde_json::json!({
+            "done": is_done,
+            "round": number,
+            "samples": [round.samples.0, round.samples.1],
+            "parts": parts.count,
+            "parts_done": parts.done,
+            "parts_begun": parts.begun,
+            "spp": merged.map_or(0, |round| round.samples.1),
+            "error": merged.and_then(|round| round.error),
+            "target_error": job.error,
+            "seconds_left_in_round": left,
+        }));
+    }
+    let target = job.error.map_or_else(String::new, |error| format!(", to an error of {}", percent(error)));
+    print(format!("{}: {} in {} parts{target}", folder.display(), job.scene, job.parts))?;
+    for (number, round) in (1..).zip(rounds.0.iter().filter(|round| round.merged)) {
+        let error = round.error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
+        print(format!("round {number}: {} samples per pixel{error}", round.samples.1))?;
+    }
+    if is_done {
+        return print(format!("done: {}", folder.join(ALL[1]).display()));
+    }
+    let Parts { count, done, begun, .. } = parts;
+    let left = left.map_or_else(String::new, |seconds| format!(", about {} left in this round", duration(seconds)));
+    let samples = in_words(&[round.range()]);
+    print(format!(
+        "round {number}, samples {samples}: {done} of {count} parts done, {begun} begun, {:.0} %{left}",
+        100.0 * share
+    ))
+}
+
+/// `40 s`, `12 min` or `3.5 h`.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        ..100.0 => format!("{seconds:.0} s"),
+        ..6000.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+/// Saves what all films show together, whatever is missing.
+fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> Result<(), Failure> {
+    PictureFormat::of(path).map_err(|error| Failure::Usage(error.into()))?;
+    let all = has_merged.then(|| folder.join(ALL[0]));
+    let films: Vec<PathBuf> = all.into_iter().chain(films.iter().cloned()).collect();
+    if films.is_empty() {
+        remark("warning: no part has a film yet: there is no picture");
+        return Ok(());
+    }
+    let set = FilmSet::read(films)?;
+    let FilmFile { film, shot, .. } = set.add_up(&|_, _| ())?;
+    let note = note_of(&film, shot.clone(), &set.films[0], path);
+    let (size, display) = ((film.width(), film.height()), shot.display.into());
+    Print { film: &film, display: &display, size, note: Some(&note) }.write(path, Replace::AllButFilms)?;
+    let error = film.error_estimate().map(|error| format!(", estimated error {}", percent(error.relative)));
+    inform(format_args!("{}: {} samples per pixel{}", path.display(), film.spp(), error.unwrap_or_default()));
+    Ok(())
+}

@@ -1,0 +1,262 @@
+//! `firstlight submit ENGINE SCENE --parts N`: the folder of a job with all that it needs, and its first round handed to an
+//! engine.
+
+use super::args::{FilterArg, IntegratorArg, OpenArgs, SceneArgs};
+use super::console::inform;
+use super::failure::Failure;
+use super::number::{parse_positive, parse_share, parse_size, parse_stops};
+use super::render::Command;
+use super::render_args::file_stem;
+use super::work::render_words;
+use clap::{Args, ValueEnum};
+use firstlight::cluster::engine::{EngineOptions, files, job_name};
+use firstlight::cluster::job::{Engine, Job};
+use firstlight::cluster::pack::Package;
+use firstlight::render::Film;
+use firstlight::scene::whole_file::write_whole;
+use firstlight::scene::{Files, SceneSource, WriteError, absolute};
+use std::path::{Path, PathBuf};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  firstlight submit slurm scene.ron --size 3840x2160 --parts 64 --spp 1024
+  firstlight submit slurm scene.ron --parts 64 --error 0.5% --max-spp 8192
+  firstlight submit kubernetes scene.ron --parts 20 --image registry/firstlight:1 --dry-run
+  firstlight status firstlight-job-scene --picture so-far.png";
+
+#[derive(Args, Clone, Debug)]
+pub struct SubmitArgs {
+    /// What runs the parts.
+    #[arg(value_enum)]
+    engine: EngineArg,
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    look: LookArgs,
+    /// Number of parts of each round.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    parts: u32,
+    /// Folder of the job, which all machines see [default: firstlight-job-SCENE].
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Samples per pixel; of the first round where --error is given [default: 256; with --error one for each part, 16 at
+    /// least].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
+    spp: Option<u32>,
+    /// Render in rounds until the estimated relative error is at most this: 1% or 0.01.
+    #[arg(long, value_name = "ERROR", value_parser = parse_share)]
+    error: Option<f64>,
+    /// Samples per pixel after which no other round follows.
+    #[arg(long, value_name = "N", requires = "error", default_value_t = 16_384, value_parser = clap::value_parser!(u32).range(1..=i64::from(Film::MAX_SAMPLES)))]
+    max_spp: u32,
+    /// Write the folder, and submit nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// How the program is called where parts run [default: this program; firstlight for Kubernetes].
+    #[arg(long, value_name = "COMMAND")]
+    program: Option<String>,
+    /// Option for Slurm, such as --slurm=--partition=long; may be given several times.
+    #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
+    slurm: Vec<String>,
+    /// Container image for Kubernetes.
+    #[arg(long, value_name = "IMAGE", default_value = "firstlight:latest")]
+    image: String,
+    /// Persistent volume claim for Kubernetes; the folder of the job lies at its top.
+    #[arg(long, value_name = "NAME", default_value = "firstlight")]
+    claim: String,
+}
+
+/// What the picture is, as `render` has it.
+#[derive(Args, Clone, Debug)]
+struct LookArgs {
+    /// Width and height in pixels [default: from the scene].
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Scale width and height.
+    #[arg(long, value_name = "FACTOR", value_parser = parse_positive)]
+    scale: Option<f64>,
+    /// Random seed [default: from the scene, else 0].
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Light transport [default: from the scene].
+    #[arg(long, value_enum)]
+    integrator: Option<IntegratorArg>,
+    /// Pixel reconstruction filter [default: from the scene].
+    #[arg(long, value_enum)]
+    filter: Option<FilterArg>,
+    /// Maximum path length in segments.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_depth: Option<u32>,
+    /// Exposure in stops, added to that of the scene.
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = parse_stops)]
+    exposure: Option<f32>,
+}
+
+impl LookArgs {
+    /// The same as options of `render`.
+    fn words(&self) -> Vec<String> {
+        let name = |value: Option<clap::builder::PossibleValue>| value.map(|value| value.get_name().to_owned());
+        let options = [
+            ("--size", self.size.map(|(width, height)| format!("{width}x{height}"))),
+            ("--scale", self.scale.map(|scale| scale.to_string())),
+            ("--seed", self.seed.map(|seed| seed.to_string())),
+            ("--integrator", name(self.integrator.and_then(|arg| arg.to_possible_value()))),
+            ("--filter", name(self.filter.and_then(|arg| arg.to_possible_value()))),
+            ("--max-depth", self.max_depth.map(|depth| depth.to_string())),
+            ("--exposure", self.exposure.map(|stops| stops.to_string())),
+        ];
+        let given = options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?]));
+        given.flatten().collect()
+    }
+}
+
+/// How the scene is opened, as options of `render`, but for the image that lights it.
+fn open_words(how: &OpenArgs) -> Vec<String> {
+    let up = how.up.and_then(|up| up.to_possible_value()).map(|value| value.get_name().to_owned());
+    let options = [
+        ("--up", up),
+        ("--camera", how.camera.clone()),
+        ("--at", how.at.map(|at| at.to_string())),
+        ("--variant", how.variant.clone()),
+    ];
+    let given = options.into_iter().filter_map(|(option, value)| Some([option.to_owned(), value?]));
+    given.flatten().chain(how.allow_outside.then(|| "--allow-outside".to_owned())).collect()
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum EngineArg {
+    /// Array jobs of Slurm.
+    Slurm,
+    /// Indexed jobs of Kubernetes.
+    Kubernetes,
+    /// A template of Open Job Description.
+    Openjd,
+}
+
+impl From<EngineArg> for Engine {
+    fn from(arg: EngineArg) -> Self {
+        match arg {
+            EngineArg::Slurm => Self::Slurm,
+            EngineArg::Kubernetes => Self::Kubernetes,
+            EngineArg::Openjd => Self::Openjd,
+        }
+    }
+}
+
+pub fn run(args: &SubmitArgs) -> Result<(), Failure> {
+    let title = file_stem(&args.scene.scene).to_string_lossy().into_owned();
+    let engine = Engine::from(args.engine);
+    let folder = match &args.output {
+        Some(folder) => folder.clone(),
+        None => PathBuf::from(format!("firstlight-job-{title}")),
+    };
+    if folder.join("job.json").exists() {
+        let message = "has a job already: see `firstlight status`, or choose another folder with -o";
+        return Err(Failure::Failed(format!("{}: {message}", folder.display())));
+    }
+    let spp = args.spp.unwrap_or(match args.error {
+        Some(_) => Job::first_round(args.parts, args.max_spp),
+        None => super::render_args::DEFAULT_SPP,
+    });
+    if u64::from(args.parts) > u64::from(spp) && args.error.is_none() {
+        return Err(Failure::Usage(format!("--parts: {} parts of {spp} samples: use at most {spp} parts", args.parts)));
+    }
+    make_folders(&folder)?;
+    let (scene, environment) = pack(&args.scene, &folder)?;
+    let environment = environment.into_iter().flat_map(|path| ["--env".to_owned(), path]);
+    let this = std::env::current_exe().ok().and_then(|path| path.to_str().map(str::to_owned));
+    let job = Job {
+        format: Job::FORMAT,
+        name: job_name(&title),
+        engine,
+        program: args.program.clone().unwrap_or_else(|| match engine {
+            Engine::Kubernetes => "firstlight".to_owned(),
+            _ => this.unwrap_or_else(|| "firstlight".to_owned()),
+        }),
+        scene,
+        options: open_words(&args.scene.how).into_iter().chain(args.look.words()).chain(environment).collect(),
+        parts: args.parts,
+        spp,
+        error: args.error,
+        max_spp: args.max_spp.max(spp),
+    };
+    // As every part will read them.
+    Command::parse(&render_words(&job))?;
+    let options = EngineOptions {
+        folder: absolute(&folder).to_str().map(str::to_owned).ok_or_else(|| not_utf8(&folder))?,
+        slurm: args.slurm.clone(),
+        image: args.image.clone(),
+        claim: args.claim.clone(),
+    };
+    for file in files(&job, &options) {
+        let path = folder.join(file.name);
+        write_whole(&path, file.text.as_bytes())?;
+        #[cfg(unix)]
+        if file.is_script {
+            use std::os::unix::fs::PermissionsExt;
+            // Without it, the script is run by naming the shell.
+            let _ = std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755));
+        }
+    }
+    // Last: a folder with this file is a job.
+    job.write(&folder)?;
+    let (name, parts) = (folder.display(), job.parts);
+    inform(format_args!(
+        "{name}: {parts} parts, {} samples per pixel{}",
+        job.spp,
+        if job.error.is_some() { " in the first round" } else { "" }
+    ));
+    hand_over(engine, &folder, args.dry_run)
+}
+
+fn not_utf8(path: &Path) -> Failure {
+    Failure::Failed(format!("{}: the name of the folder is not UTF-8", path.display()))
+}
+
+fn make_folders(folder: &Path) -> Result<(), Failure> {
+    for folder in [folder.join("parts"), folder.join("log")] {
+        std::fs::create_dir_all(&folder).map_err(|source| Failure::from(WriteError::NoFolder { folder, source }))?;
+    }
+    Ok(())
+}
+
+/// Puts the scene into the folder; answers with what parts open, and the image that lights it.
+fn pack(scene: &SceneArgs, folder: &Path) -> Result<(String, Option<String>), Failure> {
+    let source = scene.source()?;
+    if let SceneSource::Builtin(name) = &source
+        && scene.how.env.is_none()
+    {
+        return Ok((name.clone(), None));
+    }
+    let loaded = scene.load(None, &mut Files::default(), &|_| ())?;
+    let package = Package::of(&loaded, &source)?;
+    package.write_folder(&folder.join("scene"))?;
+    let inside = |name: &str| format!("scene/{name}");
+    Ok((inside(&package.scene), package.environment.as_deref().map(inside)))
+}
+
+/// Submits the first round where the engine is there.
+fn hand_over(engine: Engine, folder: &Path, dry_run: bool) -> Result<(), Failure> {
+    let name = folder.display();
+    let (tool, line) = match engine {
+        Engine::Slurm => ("sbatch", format!("{name}/submit.sh 1")),
+        Engine::Kubernetes => ("kubectl", format!("{name}/submit.sh")),
+        Engine::Openjd => {
+            inform(format_args!("submit {name}/template.yaml to a farm, with Folder={name}"));
+            return Ok(());
+        }
+    };
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let is_there = std::env::split_paths(&paths).any(|path| path.join(tool).is_file());
+    // Kubernetes waits for its rounds, which is for the person to decide where.
+    if dry_run || !is_there || engine == Engine::Kubernetes {
+        inform(format_args!("submit it with: {line}"));
+        return Ok(());
+    }
+    let status = std::process::Command::new("bash").arg(folder.join("submit.sh")).arg("1").status();
+    match status {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(Failure::Failed(format!("{line}: {status}"))),
+        Err(error) => Err(Failure::Failed(format!("{line}: {error}"))),
+    }
+}

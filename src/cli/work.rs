@@ -1,0 +1,204 @@
+//! `firstlight work FOLDER`: what engines run in the folder of a job that `firstlight submit` has written: one part of a round,
+//! its merge, or the question which round is next.
+
+use super::console::{inform, print};
+use super::failure::Failure;
+use super::merge::{FilmSet, note_of};
+use super::number::percent;
+use super::part;
+use super::render::Command;
+use super::stop::Stop;
+use clap::Args;
+use firstlight::cluster::coverage::in_words;
+use firstlight::cluster::job::{Job, JobError, Round, Rounds};
+use firstlight::cluster::part::Part;
+use firstlight::frame::{FilmFile, Print, read_film_summary, write_film_with_features};
+use firstlight::scene::whole_file::{Replace, WholeFile};
+use std::path::{Path, PathBuf};
+
+#[derive(Args, Clone, Debug)]
+pub struct WorkArgs {
+    /// The folder of the job.
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Number of the round, from 1 [default: the one that is to be rendered now].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    round: Option<u32>,
+    /// Render this part of the round: I/N, or auto for the task of an array job.
+    #[arg(long, value_name = "I/N")]
+    part: Option<String>,
+    /// Add the parts of the round to the film of all, and decide whether another round follows.
+    #[arg(long, conflicts_with = "part")]
+    merge: bool,
+    /// Merge although parts are missing.
+    #[arg(long, requires = "merge")]
+    allow_missing: bool,
+    /// Print the number of the round that is to be rendered now, or nothing when all is done.
+    #[arg(long, conflicts_with_all = ["part", "merge", "round"])]
+    next: bool,
+    /// Number of worker threads [default: all cores]; the picture does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// The film of all rounds that are merged, and its image.
+pub const ALL: [&str; 2] = ["all.exr", "all.png"];
+
+impl From<JobError> for Failure {
+    fn from(error: JobError) -> Self {
+        if error.may_pass() { Self::Passing(error.to_string()) } else { Self::Failed(error.to_string()) }
+    }
+}
+
+pub fn run(args: &WorkArgs, stop: &Stop) -> Result<(), Failure> {
+    stop.is_of_part();
+    let work = Work::open(&args.folder).map_err(|error| Failure::from(error).of_part())?;
+    if args.next {
+        return match work.rounds.open() {
+            Some(round) => print(round.to_string()),
+            None => Ok(()),
+        };
+    }
+    let number = match args.round {
+        Some(number) => number as usize,
+        None => work.rounds.open().unwrap_or(work.rounds.0.len()),
+    };
+    let Some(round) = work.rounds.get(number) else {
+        return match work.rounds.open() {
+            Some(open) => Err(Failure::Retry(format!("error: round {number} begins when round {open} is merged"))),
+            None => {
+                inform(format_args!("round {number} is not needed: the job is done"));
+                Ok(())
+            }
+        };
+    };
+    match (&args.part, args.merge) {
+        (Some(part), _) => work.part(number, round, part, args.threads, stop),
+        (None, true) => work.merge(number, round, args.allow_missing, stop).map_err(Failure::of_part),
+        (None, false) => Err(Failure::Usage("say what to do: --part I/N, --merge or --next".to_owned())),
+    }
+}
+
+/// A job, from inside of its folder.
+struct Work {
+    folder: PathBuf,
+    job: Job,
+    rounds: Rounds,
+}
+
+impl Work {
+    fn open(folder: &Path) -> Result<Self, JobError> {
+        Ok(Self { folder: folder.to_path_buf(), job: Job::read(folder)?, rounds: Rounds::read(folder)? })
+    }
+
+    fn part(&self, number: usize, round: &Round, part: &str, threads: Option<u16>, stop: &Stop) -> Result<(), Failure> {
+        let part = Part::parse(part).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
+        let Job { parts, .. } = self.job;
+        if part.count != parts {
+            return Err(Failure::Usage(format!("--part: the job has {parts} parts, not {}", part.count)));
+        }
+        let count = self.job.parts_of(&round.range());
+        if part.index >= count || round.merged {
+            let (part, samples) = (part.number(), in_words(&[round.range()]));
+            inform(format_args!("part {part}/{parts} of round {number}, samples {samples}: there is nothing to do"));
+            return Ok(());
+        }
+        let mut words = render_words(&self.job);
+        words.extend(["--samples".to_owned(), format!("{}..{}", round.samples.0, round.samples.1)]);
+        words.extend(["--part".to_owned(), format!("{}/{count}", part.number())]);
+        words.extend(["--film".to_owned(), self.job.film_of(number, "{part}")]);
+        words.extend(threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]));
+        // Paths of the job count from its folder.
+        let moved = std::env::set_current_dir(&self.folder);
+        moved.map_err(|error| Failure::Retry(format!("error: {}: {error}", self.folder.display())))?;
+        let command = Command::parse(&words).map_err(|failure| failure.of_part())?;
+        match command.part()? {
+            Some(args) => part::run(&args, stop),
+            None => unreachable!("the words have --part"),
+        }
+    }
+
+    /// Films of the parts of a round that are there, and how many there are to be.
+    fn films(&self, number: usize, round: &Round) -> (Vec<PathBuf>, u32) {
+        let count = self.job.parts_of(&round.range());
+        let path = |index| self.folder.join(self.job.film_of(number, &Part { index, count }.padded()));
+        ((0..count).map(path).filter(|path| path.is_file()).collect(), count)
+    }
+
+    fn merge(&self, number: usize, round: &Round, allow_missing: bool, stop: &Stop) -> Result<(), Failure> {
+        if round.merged {
+            inform(format_args!("round {number} is merged already"));
+            self.tell_next(&self.rounds);
+            return Ok(());
+        }
+        let all = self.folder.join(ALL[0]);
+        let claim = WholeFile::claim(&all, Replace::Anything)?;
+        let (films, count) = self.films(number, round);
+        // A merge that was killed after it had written the film does not add the parts to it again.
+        let is_in_all = |path: &Path| {
+            let summary = read_film_summary(path).ok()?;
+            let mut blocks = summary.layout.tiles.iter().flat_map(|tile| &tile.blocks);
+            Some(blocks.all(|block| block.samples.iter().any(|&(_, end)| end > round.samples.0)))
+        };
+        let added = is_in_all(&all) == Some(true);
+        if films.is_empty() && !added {
+            return Err(Failure::Retry(format!("error: round {number}: none of its {count} parts is there yet")));
+        }
+        let before = (number > 1 || added).then(|| all.clone());
+        let films = if added { Vec::new() } else { films };
+        let set = FilmSet::read(before.into_iter().chain(films).collect())?;
+        let missing = set.missing(Some(0..round.samples.1));
+        if !missing.is_empty() && !allow_missing {
+            let missing = in_words(&missing);
+            let message = format!("error: round {number}: samples {missing} are missing: their parts are not done yet");
+            return Err(Failure::Retry(message));
+        }
+        let FilmFile { film, shot, features, .. } = set.add_up(&|done, n| inform_of(done, n))?;
+        if stop.is_asked() {
+            return Err(stop.failure("stopped before the merged film was saved".to_owned()));
+        }
+        let first = &set.films[0];
+        if !added {
+            write_film_with_features(&film, features.as_ref(), &note_of(&film, shot.clone(), first, &all), claim)?;
+        }
+        let picture = self.folder.join(ALL[1]);
+        let (size, note) = ((film.width(), film.height()), note_of(&film, shot.clone(), first, &picture));
+        let display = shot.display.into();
+        Print { film: &film, display: &display, size, note: Some(&note) }.write(&picture, Replace::AllButFilms)?;
+        let estimate = film.error_estimate();
+        let mut rounds = self.rounds.clone();
+        let error = estimate.map(|estimate| estimate.relative);
+        rounds.0[number - 1] = Round { merged: true, error, ..round.clone() };
+        let told = error.map_or_else(String::new, |error| format!(", estimated error {}", percent(error)));
+        inform(format_args!("round {number}: {} samples per pixel{told}: {}", film.spp(), all.display()));
+        let is_good = self.job.error.zip(error).is_some_and(|(target, error)| error <= target);
+        let wanted = self.job.error.zip(estimate).map(|(target, estimate)| estimate.spp_for(target));
+        let end = self.job.next_end(round.samples.1, Some(wanted.unwrap_or(u32::MAX))).filter(|_| !is_good);
+        if let Some(end) = end.filter(|_| number == rounds.0.len()) {
+            rounds.0.push(Round::beginning(round.samples.1..end));
+        }
+        rounds.write(&self.folder)?;
+        self.tell_next(&rounds);
+        Ok(())
+    }
+
+    fn tell_next(&self, rounds: &Rounds) {
+        match rounds.open().and_then(|number| Some((number, rounds.get(number)?))) {
+            Some((number, round)) => {
+                inform(format_args!("next: round {number}, samples {}", in_words(&[round.range()])));
+            }
+            None => inform("done"),
+        }
+    }
+}
+
+fn inform_of(done: usize, n: usize) {
+    if done.is_multiple_of(50) {
+        inform(format_args!("{done} of {n} films are added up"));
+    }
+}
+
+/// The words of `render` that all parts of a job have.
+pub fn render_words(job: &Job) -> Vec<String> {
+    [job.scene.clone()].into_iter().chain(job.options.iter().cloned()).collect()
+}

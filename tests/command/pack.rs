@@ -1,0 +1,109 @@
+//! Scenes with all of their files in an archive: unpacked elsewhere, they render to the same bytes.
+
+use super::parts::{does, equal, fails};
+use std::path::Path;
+
+fn unpack(archive: &Path, folder: &Path) -> Vec<String> {
+    let mut archive = zip::ZipArchive::new(std::fs::File::open(archive).unwrap()).unwrap();
+    archive.extract(folder).unwrap();
+    (0..archive.len()).map(|i| archive.by_index(i).unwrap().name().unwrap().into_owned()).collect()
+}
+
+/// A model with a library and a texture below it, a texture beside the scene, and one that is named by its absolute path.
+fn write_scene(path: &Path) {
+    for folder in ["scenes", "models/maps", "far"] {
+        std::fs::create_dir_all(path.join(folder)).unwrap();
+    }
+    for (name, grey) in [("models/maps/a b.png", 90), ("scenes/near.png", 200), ("far/far.png", 40)] {
+        let image = image::RgbImage::from_fn(4, 4, |x, y| image::Rgb([grey, (60 * x) as u8, (60 * y) as u8]));
+        image.save(path.join(name)).unwrap();
+    }
+    std::fs::write(path.join("models/m.mtl"), "newmtl a\nKd 1 1 1\nmap_Kd maps/a b.png\n").unwrap();
+    let model = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n";
+    std::fs::write(path.join("models/m.obj"), model).unwrap();
+    let far = path.join("far/far.png").canonicalize().unwrap();
+    let text = format!(
+        "(camera: (eye: (0, 0, 4), look_at: (0, 0, 0)), environment: constant(1), film: (width: 24, height: 16),\n\
+         // A comment.\n\
+         textures: {{ \"near\": image(file: \"near.png\"), \"far\": image(file: {far:?}) }},\n\
+         materials: {{ \"near\": diffuse(albedo: \"near\"), \"far\": diffuse(albedo: \"far\") }},\n\
+         objects: [mesh(source: obj(\"../models/m.obj\")), sphere(center: (-1, 0, 0), radius: 0.5, material: \"near\"),\n\
+         sphere(center: (1, -1, 0), radius: 0.5, material: \"far\")])"
+    );
+    std::fs::write(path.join("scenes/s.ron"), text).unwrap();
+}
+
+#[test]
+fn a_packed_scene_renders_to_the_same_bytes_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_scene(path);
+    does(path, "render scenes/s.ron -o here.exr --spp 2");
+    let said = does(path, "pack scenes/s.ron -o s.zip");
+    assert!(said.contains("open scenes/s.ron"), "{said}");
+    does(path, "pack scenes/s.ron -o again.zip");
+    equal(path, "s.zip", "again.zip");
+    let there = tempfile::tempdir().unwrap();
+    let mut names = unpack(&path.join("s.zip"), there.path());
+    names.sort();
+    let expected = [
+        "SHA256SUMS",
+        "far/far.png",
+        "models/m.mtl",
+        "models/m.obj",
+        "models/maps/a b.png",
+        "scenes/near.png",
+        "scenes/s.ron",
+    ];
+    assert_eq!(names, expected);
+    let text = std::fs::read_to_string(there.path().join("scenes/s.ron")).unwrap();
+    assert!(text.contains("\"../far/far.png\""), "{text}");
+    // The files are nowhere else any more.
+    for gone in ["scenes", "models", "far"] {
+        std::fs::remove_dir_all(path.join(gone)).unwrap();
+    }
+    does(there.path(), "render scenes/s.ron -o there.exr --spp 2");
+    let [here, there_image] = [path.join("here.exr"), there.path().join("there.exr")].map(std::fs::read);
+    assert!(here.unwrap() == there_image.unwrap());
+    #[cfg(target_os = "linux")]
+    {
+        let mut command = std::process::Command::new("sha256sum");
+        let output = command.args(["--check", "--strict", "SHA256SUMS"]).current_dir(there.path()).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+    }
+}
+
+#[test]
+fn models_images_and_built_in_scenes_are_packed_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_scene(path);
+    let hdr = [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec(), [128, 120, 110, 129].repeat(8)].concat();
+    std::fs::write(path.join("far/light.hdr"), hdr).unwrap();
+    let model = "models/m.obj --env far/light.hdr";
+    does(path, &format!("render {model} -o here.png --size 24x16 --spp 2"));
+    let said = does(path, &format!("pack {model} -o m.zip"));
+    assert!(said.contains("open models/m.obj --env far/light.hdr"), "{said}");
+    let there = tempfile::tempdir().unwrap();
+    unpack(&path.join("m.zip"), there.path());
+    does(there.path(), &format!("render {model} -o there.png --size 24x16 --spp 2"));
+    assert!(std::fs::read(path.join("here.png")).unwrap() == std::fs::read(there.path().join("there.png")).unwrap());
+    // An image, for the scene that it shows.
+    does(path, "render scenes/s.ron -o shot.png --spp 1");
+    does(path, "pack shot.png -o shot.zip");
+    let there = tempfile::tempdir().unwrap();
+    unpack(&path.join("shot.zip"), there.path());
+    does(there.path(), "render shot.png -o again.png");
+    assert!(std::fs::read(path.join("shot.png")).unwrap() == std::fs::read(there.path().join("again.png")).unwrap());
+    does(path, "pack cornell -o cornell.zip");
+    let there = tempfile::tempdir().unwrap();
+    assert_eq!(unpack(&path.join("cornell.zip"), there.path()).len(), 2);
+    does(there.path(), "render cornell.ron -o c.png --size 8x8 --spp 1");
+    // What no other machine would find is refused.
+    let texture = path.join("models/maps/a b.png").canonicalize().unwrap();
+    std::fs::write(path.join("models/m.mtl"), format!("newmtl a\nmap_Kd {}\n", texture.display())).unwrap();
+    let said = fails(path, "pack models/m.obj -o wrong.zip", 1);
+    assert!(said.contains("m.mtl") && said.contains("absolute path"), "{said}");
+    assert!(!path.join("wrong.zip").exists());
+    fails(path, "pack models/m.obj -o wrong.tar", 2);
+}
