@@ -5,13 +5,14 @@ use super::console::{print, remark};
 use super::failure::Failure;
 use super::number::two_digits;
 use clap::Args;
-use firstlight::frame::{f_number, f_stop};
+use firstlight::frame::{PictureLayer, f_number, f_stop};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
 use firstlight::render::{Environment, Film};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
-    self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, SceneInputs, Shape,
+    self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, SceneInputs, SceneSource,
+    Shape,
 };
 use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
@@ -34,6 +35,10 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
 }
 
 fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
+    let layers = match scene.source()? {
+        SceneSource::Picture(path) => PictureLayer::in_file(&path).into_iter().map(PictureLayer::name).collect(),
+        _ => Vec::new(),
+    };
     let scene = scene.load(None, &mut firstlight::scene::Files::default(), &|_| ())?;
     let mut world = bevy_ecs::world::World::new();
     scene.spawn(&mut world);
@@ -52,7 +57,7 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
             faults.entry(Arc::as_ptr(mesh)).or_insert_with(|| Faults::of(mesh));
         }
     }
-    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, faults };
+    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, layers, faults };
     if args.json { print(told.json()) } else { print(told.text()) }
 }
 
@@ -62,6 +67,8 @@ struct Told<'a> {
     inputs: &'a SceneInputs,
     extraction: &'a Extraction,
     film: FilmSize,
+    /// Of the image that the scene is read from; none for other sources.
+    layers: Vec<&'static str>,
     /// Of each mesh.
     faults: BTreeMap<*const Mesh, Faults>,
 }
@@ -111,6 +118,9 @@ impl Told<'_> {
         let lens = self.lens();
         row("camera", if lens.enabled { self.aperture() } else { "pinhole".to_owned() });
         row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
+        if !self.layers.is_empty() {
+            row("layers", self.layers.join(", "));
+        }
         if let Some(facts) = &scene.facts {
             facts_rows(facts, &mut row);
         }
@@ -159,6 +169,7 @@ impl Told<'_> {
             "width": film.width,
             "height": film.height,
             "filter": self.filter(),
+            "layers": self.layers,
             "bytes": { "meshes": meshes, "trees": trees, "textures": scene.picture_bytes(), "film": film_bytes },
             "load_s": scene.load_seconds,
             "build_s": scene.build_seconds,

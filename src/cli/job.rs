@@ -6,7 +6,9 @@ use super::progress::Progress;
 use super::render_args::{DEFAULT_SPP, MetricArg, RenderArgs};
 use bevy_ecs::prelude::World;
 use firstlight::frame::navigation::Rig;
-use firstlight::frame::{FeatureLayers, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until};
+use firstlight::frame::{
+    FeatureLayers, FeatureNames, FilmFile, LayeredPicture, PictureFormat, Print, Target, render_offline_until,
+};
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
     Display, ErrorMetric, FEATURE_SAMPLES, Film, Purpose, RenderSettings, Room, SampleAllocation,
@@ -137,9 +139,9 @@ impl RenderJob {
         if !args.layers.have_features() || kept.as_ref().is_some_and(|kept| kept.buffers.samples >= samples) {
             return Ok(kept);
         }
-        let inputs = SceneInputs::of(&mut self.world);
+        let names = FeatureNames::of(&self.extraction, &SceneInputs::of(&mut self.world));
         let Self { extraction, settings, size, .. } = self;
-        Ok(FeatureLayers::gather(extraction, &inputs, settings, *size, samples, &|| false))
+        Ok(FeatureLayers::gather(&extraction.prepared, names, settings, *size, samples, &|| false))
     }
 
     /// Writes a picture with its metadata to a file, or to standard output.

@@ -2,9 +2,11 @@
 //! materials. What films keep and layered pictures show.
 
 use super::explain::SnapshotNames;
-use crate::render::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares, RenderSettings, gather_features_and_ids};
+use crate::render::{
+    FeatureBuffers, FeatureIds, FeatureVariances, IdShares, Prepared, RenderSettings, gather_features_and_ids,
+};
 use crate::scene::{Extraction, SceneInputs};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -19,24 +21,41 @@ pub struct FeatureLayers {
     pub materials: Vec<String>,
 }
 
+/// What feature buffers need of a scene besides its snapshot.
+#[derive(Clone, Debug)]
+pub struct FeatureNames {
+    /// Metres: the world point that is (0, 0, 0) of the snapshot.
+    origin: DVec3,
+    objects: Vec<String>,
+    materials: Vec<String>,
+}
+
+impl FeatureNames {
+    /// - `inputs`: what the extraction was made from.
+    pub fn of(extraction: &Extraction, inputs: &SceneInputs) -> Self {
+        let objects = SnapshotNames::of(extraction, inputs).objects().to_vec();
+        Self { origin: extraction.origin, objects, materials: material_names(extraction, inputs) }
+    }
+}
+
 impl FeatureLayers {
     /// Looks at a scene by samples 0 up to `samples` of each pixel, on the current rayon pool; `None` when `stop` said so.
     ///
-    /// - `inputs`: what the extraction was made from; `size`: of the film, pixels.
+    /// - `names`: of the same snapshot; `size`: of the film, pixels.
     pub fn gather(
-        extraction: &Extraction,
-        inputs: &SceneInputs,
+        prepared: &Prepared,
+        names: FeatureNames,
         settings: &RenderSettings,
         size: (u32, u32),
         samples: u32,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
-        let mut buffers = gather_features_and_ids(&extraction.prepared, settings, size.into(), samples, stop)?;
+        let FeatureNames { origin, objects, materials } = names;
+        let mut buffers = gather_features_and_ids(prepared, settings, size.into(), samples, stop)?;
         for (position, _) in buffers.position.iter_mut().zip(&buffers.coverage).filter(|(_, share)| **share > 0.0) {
-            *position = (extraction.origin + position.as_dvec3()).as_vec3();
+            *position = (origin + position.as_dvec3()).as_vec3();
         }
-        let objects = SnapshotNames::of(extraction, inputs).objects().to_vec();
-        Some(Self { buffers, objects, materials: material_names(extraction, inputs) })
+        Some(Self { buffers, objects, materials })
     }
 
     /// Those of one picture that was rendered in two parts: both have the same, or one has more samples and is kept.

@@ -16,13 +16,13 @@ use super::feature_layers::{FeatureLayers, channels_of};
 use super::picture_file::mean_channels;
 use crate::render::{Film, NoRoom, Purpose, Room, relative_errors};
 use crate::scene::WriteError;
-use crate::scene::image_metadata::{NOTE_KEY, exr_text};
+use crate::scene::image_metadata::{NOTE_KEY, exr_channels, exr_text};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text, WritableImage,
 };
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Depth where nothing is seen: programs that blur or scale a layer have no use for an infinite number.
 const FAR: f32 = 1e10;
@@ -83,6 +83,25 @@ impl PictureLayer {
         }
     }
 
+    /// The layers that an EXR file has, be it a picture or a film that keeps what they are made of; none of another file.
+    pub fn in_file(path: &Path) -> Vec<Self> {
+        let channels = exr_channels(path).unwrap_or_default();
+        let has = |name: &str| channels.iter().any(|channel| channel == name);
+        let is_there = |layer: &Self| match layer {
+            Self::Albedo => has("albedo.R"),
+            Self::Normal => has("normal.X"),
+            Self::Depth => has("depth.Z"),
+            Self::Position => has("position.X"),
+            Self::Coverage => has("coverage.Y"),
+            Self::Object => has("CryptoObject00.R") || has("object.id0"),
+            Self::Material => has("CryptoMaterial00.R") || has("material.id0"),
+            Self::Variance => channels.iter().any(|channel| channel.contains("_variance.")),
+            Self::Samples => has("samples.Y"),
+            Self::Error => has("error.Y"),
+        };
+        Self::ALL.into_iter().filter(is_there).collect()
+    }
+
     /// Whether it is made of feature buffers; the others come from the film.
     pub fn is_feature(self) -> bool {
         !matches!(self, Self::Samples | Self::Error)
@@ -124,6 +143,20 @@ impl LayeredPicture<'_> {
         drop(self.room()?);
         let channels = self.channels().ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
         self.encode(channels).map_err(|error| WriteError::Encode(Box::new(error)))
+    }
+
+    /// Writes the picture into `folder` as `STEM-0001.exr`, or with the first higher number that is free. Answers with the path.
+    ///
+    /// # Errors
+    /// As [`Self::write`], and when no number is free.
+    pub fn write_new(&self, folder: &Path, stem: &str) -> Result<PathBuf, WriteError> {
+        let name = |number: u32| folder.join(format!("{stem}-{number:04}.exr"));
+        let path = name(0);
+        let bytes = self.bytes(&path)?;
+        let mut out = WholeFile::begin(&path, Replace::AllButFilms)?;
+        out.write_all(&bytes).map_err(|error| unwritable(&path, error))?;
+        let taken = || WriteError::NoFreeName(name(u32::MAX));
+        out.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
     }
 
     fn room(&self) -> Result<Room, NoRoom> {

@@ -55,7 +55,7 @@ pub use camera_path::{along, turntable};
 pub use command::Command;
 pub use edit::{Edit, Id, NewThing, Property, sky_strength, textures};
 pub use explain::{End, Explaining, LightRow, PathRecord, PixelStory, SnapshotNames, Stop, brightness};
-pub use feature_layers::FeatureLayers;
+pub use feature_layers::{FeatureLayers, FeatureNames};
 pub use film_file::{
     FilmError, FilmFile, FilmProblem, FilmSummary, check_film_source, check_replaced_film, read_film_file,
     read_film_file_within, read_film_summary, write_film_file, write_film_into, write_film_with_features,

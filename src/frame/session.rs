@@ -4,6 +4,7 @@ use super::adopt::adopt;
 use super::background::BackgroundTasks;
 use super::edit::{EditQueue, edit_scene};
 use super::explain::{Explaining, explain_pixel};
+use super::feature_layers::FeatureNames;
 use super::focus::{Focus, hold_focus};
 use super::history::{History, notice, remember};
 use super::input::{CommandQueue, ModelUp, input};
@@ -277,6 +278,12 @@ impl Session {
     /// What the workers render now, and how.
     pub fn rendered(&self) -> Option<(Prepared, RenderSettings)> {
         self.world.resource::<RenderState>().rendered()
+    }
+
+    /// Names of what the workers render now, for layers of a picture.
+    pub fn feature_names(&self) -> Option<FeatureNames> {
+        let shown = self.world.resource::<RenderState>();
+        Some(FeatureNames::of(shown.extraction.as_ref()?, &shown.inputs))
     }
 
     /// How many scenes have taken their place so far.

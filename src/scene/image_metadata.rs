@@ -326,12 +326,28 @@ fn note_of(path: &Path, limits: &Limits) -> Result<String, MetadataError> {
         return chunk.get_text().map_err(unreadable);
     }
     if start[..n.min(4)] == [0x76, 0x2f, 0x31, 0x01] {
-        /// Of all that stands before the pixels beside the note: of a film, some fifty bytes for each block of pixels.
-        const HEADER_BYTES: u64 = 64 << 20;
-        let header = BufReader::new(file).take(limits.note_bytes.saturating_add(HEADER_BYTES));
-        let meta = exr::meta::MetaData::read_from_buffered(header, false)
-            .map_err(|error| MetadataError::Damaged(Box::new(error)))?;
-        return note_in(&meta).ok_or(MetadataError::Missing);
+        return note_in(&exr_header(file, limits)?).ok_or(MetadataError::Missing);
     }
     Err(MetadataError::Format)
+}
+
+/// The header of an EXR image, within the limits.
+fn exr_header(file: InputFile, limits: &Limits) -> Result<exr::meta::MetaData, MetadataError> {
+    /// Of all that stands before the pixels beside the note: of a film, some fifty bytes for each block of pixels; names of
+    /// objects and materials.
+    const HEADER_BYTES: u64 = 64 << 20;
+    let header = BufReader::new(file).take(limits.note_bytes.saturating_add(HEADER_BYTES));
+    exr::meta::MetaData::read_from_buffered(header, false).map_err(|error| MetadataError::Damaged(Box::new(error)))
+}
+
+/// Names of the channels of an EXR image, in their order.
+///
+/// # Errors
+/// When the file cannot be read, or is something else.
+pub fn exr_channels(path: &Path) -> Result<Vec<String>, MetadataError> {
+    let limits = Limits::of_this_process();
+    let longest = FileKind::Film.limit(&limits).max(FileKind::Image.limit(&limits));
+    let header = exr_header(InputFile::open_within(path, FileKind::Image, longest)?, &limits)?;
+    let channels = header.headers.first().map(|header| header.channels.list.iter());
+    Ok(channels.into_iter().flatten().map(|channel| channel.name.to_string()).collect())
 }

@@ -1,7 +1,10 @@
 //! Saves images on separate threads, so that the window stays responsive.
 
-use crate::frame::{PictureFormat, Print, Target, Waker, render_offline_until};
-use crate::render::{Display, Film, Prepared, RenderSettings};
+use crate::frame::{
+    FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
+    render_offline_until,
+};
+use crate::render::{Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings};
 use crate::scene::file::check_film_size;
 use crate::scene::{ImageSamples, MetadataDraft};
 use std::path::{Path, PathBuf};
@@ -29,6 +32,16 @@ pub struct Larger {
     /// Samples per pixel.
     pub spp: u32,
     pub threads: usize,
+}
+
+/// The scene that a film shows, from which layers are gathered.
+pub struct Shown {
+    pub prepared: Prepared,
+    pub names: FeatureNames,
+    pub settings: RenderSettings,
+    pub threads: usize,
+    /// Pixels of the requested image.
+    pub size: (u32, u32),
 }
 
 pub struct Saver {
@@ -95,6 +108,36 @@ impl Saver {
         });
     }
 
+    /// Saves the film that will come as a linear picture with layers of what it shows.
+    pub fn save_layers(
+        &mut self,
+        film: Receiver<Film>,
+        shown: Shown,
+        draft: Option<MetadataDraft>,
+        display: Display,
+        scene: &str,
+    ) {
+        let (folder, stem, ending) = (self.folder.clone(), file_stem(scene), self.ending.clone());
+        self.spawn(move || {
+            let film = film.recv().map_err(|_| "there was no picture to save".to_owned())?;
+            let Shown { prepared, names, settings, threads, size } = shown;
+            let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
+            let of_film = (film.width(), film.height());
+            let stop = || ending.load(Ordering::Relaxed);
+            let gather = || FeatureLayers::gather(&prepared, names, &settings, of_film, FEATURE_SAMPLES, &stop);
+            let features = pool.install(gather).ok_or_else(|| failed(&"the window was closed"))?;
+            let knows_error = film.error_estimate().is_some();
+            let is_known = |layer: &PictureLayer| knows_error || *layer != PictureLayer::Error;
+            let layers: Vec<PictureLayer> = PictureLayer::ALL.into_iter().filter(is_known).collect();
+            let (coarse, note) = metadata_of(&folder, &stem, &film, draft, &display, size);
+            let picture =
+                LayeredPicture { film: &film, features: Some(&features), layers: &layers, note: note.as_deref() };
+            Ok(picture.write_new(&folder, &stem).map(|path| Kept { path, coarse })?)
+        });
+    }
+
     fn spawn(&mut self, work: impl FnOnce() -> Saved + Send + 'static) {
         let (sender, waker) = (self.sender.clone(), self.waker.clone());
         let work = move || {
@@ -137,13 +180,25 @@ fn print(
     size: (u32, u32),
     format: PictureFormat,
 ) -> Saved {
+    let (coarse, note) = metadata_of(folder, stem, film, draft, display, size);
+    let print = Print { film, display, size, note: note.as_deref() };
+    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
+}
+
+/// Whether a film is coarser than the requested image, and the metadata of the image.
+fn metadata_of(
+    folder: &Path,
+    stem: &str,
+    film: &Film,
+    draft: Option<MetadataDraft>,
+    display: &Display,
+    size: (u32, u32),
+) -> (bool, Option<String>) {
     let coarse = (film.width(), film.height()) != size;
     let uneven = coarse || film.is_uneven();
     let samples = ImageSamples { first: film.first_sample(), spp: film.spp(), uneven };
     // Paths in the metadata are relative to the folder, whatever the name of the image will be.
-    let note = draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into()));
-    let print = Print { film, display, size, note: note.as_deref() };
-    Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
+    (coarse, draft.map(|draft| draft.note(&folder.join(stem), size, samples, (*display).into())))
 }
 
 /// Returns an unused name of a scene file in `folder` for the open scene: `NAME-0001.ron`.
@@ -194,6 +249,31 @@ mod tests {
         let expected: Vec<PathBuf> = (1..=8).map(|i| folder.path().join(format!("my room-{i:04}.png"))).collect();
         assert_eq!(saved, expected);
         assert_eq!(woken.load(Ordering::SeqCst), 8);
+    }
+
+    #[test]
+    fn a_picture_with_layers_has_all_that_are_known() {
+        use crate::render::advance;
+        use crate::scene::{Extraction, LoadOptions, SceneInputs, SceneSource, load};
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();
+        let mut world = bevy_ecs::world::World::new();
+        loaded.spawn(&mut world);
+        let inputs = SceneInputs::of(&mut world);
+        let extraction = Extraction::new(&inputs, &loaded.trees);
+        let mut saver = Saver::new(folder.path(), Arc::new(|| ()));
+        // The error is known from the second sample on.
+        for (spp, n_layers) in [(1, 9), (4, 10)] {
+            let settings = RenderSettings::default();
+            let (prepared, names) = (extraction.prepared.clone(), FeatureNames::of(&extraction, &inputs));
+            let mut film = Film::new(9, 7);
+            advance(&prepared, &settings, &mut film, spp, &|| false);
+            let shown = Shown { prepared, names, settings, threads: 1, size: (9, 7) };
+            saver.save_layers(ready(film), shown, None, Display::default(), "cornell");
+            saver.threads.drain(..).for_each(|thread| thread.join().unwrap());
+            let [Ok(Kept { path, coarse: false })] = &saver.finished()[..] else { panic!("it cannot be saved") };
+            assert_eq!(PictureLayer::in_file(path).len(), n_layers, "{spp} samples");
+        }
     }
 
     #[test]

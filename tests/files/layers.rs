@@ -130,8 +130,17 @@ fn films_keep_layers_through_resuming_and_merging() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
-    let scene = "render cornell-balls --size 40x33";
+    // Parts have the same samples in all pixels.
+    let scene = "render cornell-balls --size 40x33 --uniform";
     does(path, &format!("{scene} --spp 4 -o whole.exr --film whole-film.exr --layers {ALL}"));
+    let layers_told = |name: &str| -> Vec<String> {
+        let told = run(path, &format!("info {name} --json")).stdout;
+        serde_json::from_value(serde_json::from_slice::<serde_json::Value>(&told).unwrap()["layers"].take()).unwrap()
+    };
+    assert_eq!(layers_told("whole.exr").join(","), ALL);
+    let kept: Vec<&str> = ALL.split(',').take(8).collect();
+    assert_eq!(layers_told("whole-film.exr"), kept, "what comes from the film itself is no channel of it");
+    assert!(layers_told("cornell").is_empty());
     // Resumed with the layers asked for again, and without.
     for (name, layers) in [("again", format!("--layers {ALL}")), ("kept", String::new())] {
         does(path, &format!("{scene} --spp 2 -o r.exr --film {name}.exr --layers albedo"));

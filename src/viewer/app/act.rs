@@ -8,7 +8,7 @@ use crate::frame::{
 use crate::render::{Inspection, Integrator};
 use crate::viewer::dialog::DialogPurpose;
 use crate::viewer::keys::Action;
-use crate::viewer::saver::{Larger, Saved, new_scene_file};
+use crate::viewer::saver::{Larger, Saved, Shown, new_scene_file};
 use crate::viewer::toasts::Tone;
 use crate::viewer::{camera_text, panel};
 use std::path::{Path, PathBuf};
@@ -46,6 +46,9 @@ impl App {
         }
         if let Some(linear) = asked.screenshot {
             self.screenshot(linear);
+        }
+        if asked.save_layers {
+            self.save_layers(now);
         }
     }
 
@@ -250,6 +253,20 @@ impl App {
             return;
         }
         self.saver.save(self.session.keep_film(), draft, display, size, &scene, format);
+    }
+
+    /// Saves the image with all layers, in the size of the window.
+    fn save_layers(&mut self, now: Instant) {
+        let names = self.session.feature_names();
+        let Some((names, (prepared, settings))) = names.zip(self.session.rendered()) else { return };
+        self.toasts.add(Tone::News, "screenshot: saving layers …", now);
+        let picture = self.session.picture();
+        let size = (picture.width.max(1), picture.height.max(1));
+        let status = self.session.status();
+        let (display, scene, threads) = (status.display, status.scene.clone(), status.threads);
+        let draft = (!scene.is_empty()).then(|| self.session.shot_draft());
+        let shown = Shown { prepared, names, settings, threads, size };
+        self.saver.save_layers(self.session.keep_film(), shown, draft, display, &scene);
     }
 
     pub(super) fn report_saved(&mut self, saved: Saved) {

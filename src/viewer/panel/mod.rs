@@ -116,6 +116,7 @@ pub struct Asked {
     pub toggle_drag: bool,
     pub navigation: Option<Navigation>,
     pub screenshot: Option<bool>,
+    pub save_layers: bool,
     pub toggle_brush: bool,
     /// A file dialog to show, with its purpose.
     pub dialog: Option<DialogPurpose>,

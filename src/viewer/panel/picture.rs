@@ -102,6 +102,11 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
         if ui.button("Save EXR").on_hover_text("save linear light (HDR) in a new file (Shift+K)").clicked() {
             asked.screenshot = Some(true);
         }
+        let layers =
+            "save linear light with layers in a new EXR: albedo, normal, depth, position, masks, samples, error";
+        if ui.button("Save layers").on_hover_text(layers).clicked() {
+            asked.save_layers = true;
+        }
         let drag = egui::DragValue::new(scale).speed(0.03).range(1..=16).prefix("× ").update_while_editing(false);
         ui.add(drag)
             .on_hover_text("size of saved pictures relative to the window; larger ones are rendered in the background");
