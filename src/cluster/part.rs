@@ -179,7 +179,8 @@ impl Part {
 
 /// Divides `samples` among `count` parts, at most as many as there are samples, each a range of its own, ascending.
 ///
-/// No part but that which begins with sample 0 has a power of two inside: there the error estimate looks at the image.
+/// No part but that which begins with sample 0 has a power of two inside, unless there are more of them than parts: there the
+/// error estimate looks at the image.
 pub fn sample_ranges(samples: Range<u32>, count: u32) -> Vec<Range<u32>> {
     let n = samples.end.saturating_sub(samples.start);
     if n == 0 || count <= 1 {
@@ -196,9 +197,15 @@ pub fn sample_ranges(samples: Range<u32>, count: u32) -> Vec<Range<u32>> {
             too_short = length;
         }
     }
+    let parts = cut(&samples, long_enough);
+    if parts.len() > count {
+        // There are more powers of two than parts: the light is the same, the estimate misses some of its looks.
+        let end_of = |i: usize| samples.start + (u64::from(n) * i as u64 / count as u64) as u32;
+        return (0..count).map(|i| end_of(i)..end_of(i + 1)).collect();
+    }
     // Those that are left are halves of the longest.
     let key = |range: Range<u32>| (range.end - range.start, std::cmp::Reverse(range.start), range.end);
-    let mut parts: BinaryHeap<_> = cut(&samples, long_enough).into_iter().map(key).collect();
+    let mut parts: BinaryHeap<_> = parts.into_iter().map(key).collect();
     while parts.len() < count {
         let (length, std::cmp::Reverse(start), end) = parts.pop().expect("there is one at least");
         // The first goes on having all powers of two up to its end.
@@ -243,7 +250,8 @@ mod tests {
                     assert!(parts.windows(2).all(|pair| pair[0].end == pair[1].start), "{place}");
                     assert!(parts.iter().all(|part| !part.is_empty()), "{place}");
                     let has_power = |part: &Range<u32>| (part.start + 1..part.end).any(u32::is_power_of_two);
-                    if count > 1 {
+                    let n_powers = (start + 1..start + n).filter(|n| n.is_power_of_two()).count() as u32;
+                    if count > 1 && (start == 0 || count > n_powers) {
                         assert!(parts.iter().all(|part| part.start == 0 || !has_power(part)), "{place}");
                         // The price of it: no part is longer than twice its share.
                         let longest = parts.iter().map(|part| part.len() as u32).max().unwrap();
