@@ -8,11 +8,11 @@ use clap::Args;
 use firstlight::frame::{PictureLayer, f_number, f_stop};
 use firstlight::mesh::{Faults, Mesh};
 use firstlight::printable;
-use firstlight::render::{Environment, Film};
+use firstlight::render::{CausticChoice, Environment, Film, caustic_choice};
 use firstlight::scene::gltf::GltfFacts;
 use firstlight::scene::{
-    self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, SceneInputs, SceneSource,
-    Shape,
+    self, Extraction, FilmSize, Lens, LightKind, LoadedScene, MaterialInput, ObjectInput, Rendering, SceneInputs,
+    SceneSource, Shape,
 };
 use glam::Vec3;
 use std::collections::{BTreeMap, HashSet};
@@ -57,7 +57,12 @@ fn tell(args: &InfoArgs, scene: &SceneArgs) -> Result<(), Failure> {
             faults.entry(Arc::as_ptr(mesh)).or_insert_with(|| Faults::of(mesh));
         }
     }
-    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, layers, faults };
+    let prepared = &extraction.prepared;
+    let settings = world.resource::<Rendering>().0;
+    let can_be_seen = prepared.camera.check().is_ok() && settings.check().is_ok();
+    let caustics = (prepared.features().caustics && can_be_seen)
+        .then(|| caustic_choice(prepared, &settings, (film.width, film.height)));
+    let told = Told { scene: &scene, inputs: &inputs, extraction: &extraction, film, layers, faults, caustics };
     if args.json { print(told.json()) } else { print(told.text()) }
 }
 
@@ -71,6 +76,8 @@ struct Told<'a> {
     layers: Vec<&'static str>,
     /// Of each mesh.
     faults: BTreeMap<*const Mesh, Faults>,
+    /// How they are looked for, where there may be some.
+    caustics: Option<CausticChoice>,
 }
 
 const NOT_MODELLED: [&str; 5] = ["spectra", "polarisation", "motion blur", "participating media", "lens aberrations"];
@@ -120,6 +127,9 @@ impl Told<'_> {
         row("film", format!("{} x {}, {} filter", film.width, film.height, self.filter()));
         if !self.layers.is_empty() {
             row("layers", self.layers.join(", "));
+        }
+        if let Some(caustics) = self.caustics {
+            row("caustics", caustics.to_string());
         }
         if let Some(facts) = &scene.facts {
             facts_rows(facts, &mut row);
@@ -176,6 +186,7 @@ impl Told<'_> {
             "uses": self.features(true),
             "not_used": self.features(false),
             "not_modelled": NOT_MODELLED,
+            "caustics": self.caustics.map(caustics_json),
             "model": scene.facts.as_ref().map(facts_json),
             "warnings": scene.warnings,
             "problems": extraction.problems,
@@ -255,6 +266,15 @@ impl Told<'_> {
         let has = features(self.extraction, &self.lens());
         FEATURES.into_iter().zip(has).filter(|(_, has)| *has == used).map(|(name, _)| name).collect()
     }
+}
+
+/// For machines.
+fn caustics_json(choice: CausticChoice) -> serde_json::Value {
+    let CausticChoice { plan, cost, gain } = choice;
+    serde_json::json!({
+        "light_path_stride": plan.light_path_stride, "guided": plan.guided, "cost": cost, "variance_saved": gain,
+        "text": choice.to_string(),
+    })
 }
 
 /// What a glTF file has, for people.

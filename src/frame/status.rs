@@ -2,7 +2,7 @@
 
 use super::rig::Rig;
 use crate::printable;
-use crate::render::{BadSample, Display, Inspection, Integrator, Legend, RayCounts, Region};
+use crate::render::{BadSample, CausticChoice, Display, Inspection, Integrator, Legend, RayCounts, Region};
 use bevy_ecs::prelude::Resource;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -65,6 +65,8 @@ pub struct Status {
     pub divider: u32,
     /// Relative error of the whole picture, or of the region, when it is known.
     pub estimated_error: Option<f64>,
+    /// How caustics are looked for, where the scene may have some and it is known.
+    pub caustics: Option<CausticChoice>,
     /// Why the samples were last dropped.
     pub restart_cause: String,
     /// How often they were.

@@ -362,6 +362,7 @@ pub fn present(
     status.seconds = stats.seconds;
     (status.rays, status.elapsed) = (stats.rays, stats.elapsed);
     status.estimated_error = stats.error;
+    status.caustics = stats.caustics;
     status.camera_mrays = per_second(stats.recent_rays.camera);
     status.bounce_mrays = per_second(stats.recent_rays.bounce);
     status.shadow_mrays = per_second(stats.recent_rays.shadow);

@@ -4,8 +4,8 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, MeshTree, Shape};
 use firstlight::mesh::procedural;
 use firstlight::render::{
-    Camera, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, Prepared, RenderSettings,
-    ScalarInput, Shading, Snapshot, Techniques, advance,
+    Camera, CausticPlan, ColorInput, Environment, Film, Geometry, Material, Object, PixelFilter, Prepared,
+    RenderSettings, ScalarInput, Shading, Snapshot, Techniques, advance,
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use std::sync::Arc;
@@ -21,7 +21,11 @@ fn blend(a: u32, b: u32, weight: f32) -> Material {
 }
 
 fn settings(seed: u32, caustics: bool) -> RenderSettings {
-    RenderSettings { seed, techniques: Techniques { caustics, ..Techniques::ALL }, ..RenderSettings::default() }
+    RenderSettings {
+        seed,
+        techniques: Techniques { caustics, caustic_plan: Some(CausticPlan::UNKNOWN), ..Techniques::ALL },
+        ..RenderSettings::default()
+    }
 }
 
 /// Mean of all pixels and channels over renders with seeds of their own, and its standard error.

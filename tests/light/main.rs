@@ -4,6 +4,7 @@
 mod common;
 
 mod adaptive;
+mod caustic_choice;
 mod caustics;
 mod delta_lights;
 mod determinism;

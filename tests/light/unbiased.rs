@@ -7,7 +7,7 @@
 //! so seldom that a mean of thousands of samples lacks their light, a hundredth of some of the scenes.
 
 use firstlight::render::{
-    ErrorMetric, Film, Integrator, Prepared, RenderSettings, SampleAllocation, Techniques, advance,
+    CausticPlan, ErrorMetric, Film, Integrator, Prepared, RenderSettings, SampleAllocation, Techniques, advance,
 };
 use firstlight::scene::{Extraction, LoadOptions, PointLight, Rendering, SceneInputs, SceneSource, load};
 use rayon::prelude::*;
@@ -25,6 +25,7 @@ const PLAIN: Techniques = Techniques {
     solid_angle: false,
     light_selection: false,
     caustics: false,
+    caustic_plan: None,
     roulette: false,
 };
 
@@ -95,7 +96,9 @@ fn all_techniques_together_have_the_mean_of_the_plain_ones() {
         // Plain paths find gathered light so seldom that in few samples most pixels lack some of it, and do not know.
         let [n_all, n_plain] = if scene.features().caustics { [32, 256] } else { [32, 32] };
         let allocation = SampleAllocation::Adaptive(ErrorMetric::RelativeMse);
-        let all = RenderSettings { techniques: Techniques::ALL, allocation, ..settings };
+        // Light paths and guiding both, whether or not they pay.
+        let techniques = Techniques { caustic_plan: Some(CausticPlan::UNKNOWN), ..Techniques::ALL };
+        let all = RenderSettings { techniques, allocation, ..settings };
         let all = estimates(&renders(&scene, all, 1000, n_all));
         let plain = estimates(&renders(&scene, RenderSettings { techniques: PLAIN, ..settings }, 2000, n_plain));
         let (whole, pixels) = (all.len() - 1, 0..all.len() - 1);

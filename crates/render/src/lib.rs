@@ -16,6 +16,7 @@ mod test_scene;
 mod test_statistics;
 
 pub use crate::core::camera::{Camera, CameraError};
+pub use crate::core::caustic_plan::{CausticChoice, CausticPlan};
 pub use crate::core::counts::RayCounts;
 pub use crate::core::delta_light::{Cone, DeltaLight};
 pub use crate::core::environment::Environment;
@@ -32,6 +33,7 @@ pub use crate::core::techniques::Techniques;
 pub use crate::core::texture::{
     Channel, Encoding, ImageTexture, Texels, Texture, TextureId, TexturePattern, TexturePoint, Wrap,
 };
+pub use driver::caustic_choice::{caustic_choice, known_caustic_choice};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
 pub use driver::inspect::{

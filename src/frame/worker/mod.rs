@@ -13,7 +13,9 @@ mod thread;
 mod views;
 
 use super::{LatencyHistogram, Picture, Target};
-use crate::render::{BadSample, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings};
+use crate::render::{
+    BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
+};
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -87,6 +89,8 @@ pub struct Stats {
     pub seconds: f64,
     /// Relative error of the whole picture, or of the region, when it is known.
     pub error: Option<f64>,
+    /// How it looks for caustics, where the scene may have some; of the film at full resolution.
+    pub caustics: Option<CausticChoice>,
     /// Rays of the last steps, and the seconds that they took.
     pub recent_rays: RayCounts,
     pub recent_seconds: f64,

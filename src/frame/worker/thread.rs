@@ -5,7 +5,7 @@ use super::views::Views;
 use super::{Answer, BESIDE, Job, Question, Shared, Stats, ViewOptions, WORKERS, lock, make_pool};
 use crate::frame::scheduler::{RenderStep, Scheduler, StepReport};
 use crate::frame::{Picture, Target};
-use crate::render::{Display, Film, Region, SampleAllocation, advance_region, explain};
+use crate::render::{Display, Film, Region, SampleAllocation, advance_region, explain, known_caustic_choice};
 use glam::{DVec2, UVec2};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
@@ -236,7 +236,7 @@ impl<'a> Loop<'a> {
         let Some(job) = &self.job else { return };
         if self.film.as_ref().is_none_or(|(of, _)| *of != divider) {
             let size = (job.width.div_ceil(divider), job.height.div_ceil(divider));
-            let film = match self.idle.take(size) {
+            let mut film = match self.idle.take(size) {
                 Some(mut film) => {
                     let pool = lock(&self.shared.pool).clone();
                     let stop = || self.shared.interrupt.load(Ordering::Relaxed);
@@ -250,6 +250,7 @@ impl<'a> Loop<'a> {
                     Err(error) => return self.give_up(error.to_string()),
                 },
             };
+            film.set_preview(divider > 1);
             match self.film.replace((divider, film)) {
                 Some(old) if old.1.spp() > 0 => self.previous = Some(old),
                 old => old.into_iter().for_each(|(_, film)| self.idle.keep(film)),
@@ -304,6 +305,9 @@ impl<'a> Loop<'a> {
         let replaced = interrupted && lock(&self.shared.inbox).orders.job.is_some();
         let error = film.error_estimate_in(region.as_ref()).map(|error| error.relative);
         stats.error = error.filter(|_| divider == 1);
+        if divider == 1 && job.prepared.features().caustics {
+            stats.caustics = known_caustic_choice(&job.prepared, &job.settings, (film.width(), film.height()));
+        }
         let report = StepReport { paths: pass.rays.camera, seconds, spp: film.spp_in(region.as_ref()), error };
         let can_be_seen = film.spp() > 0;
         self.is_uneven &= region.is_some() || film.max_spp() > film.spp();

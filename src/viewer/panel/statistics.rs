@@ -17,6 +17,9 @@ pub fn statistics(ui: &mut Ui, session: &Session, around: &Around) {
         figure("", format!("{camera:.2} camera, {bounce:.2} bounce"));
         figure("", format!("{shadow:.2} shadow"));
         figure("error estimate", status.estimated_error.map_or("–".to_owned(), percent));
+        if let Some(caustics) = status.caustics {
+            figure("caustics", caustics.to_string());
+        }
         figure("discarded", format!("{} non-finite samples", status.n_bad));
         if status.n_above > 0 {
             figure("", format!("{} brighter than the scene allows", status.n_above));

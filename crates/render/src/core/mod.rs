@@ -1,6 +1,7 @@
 //! What a picture is a function of, as plain data: scene, camera, settings.
 
 pub(crate) mod camera;
+pub(crate) mod caustic_plan;
 pub(crate) mod color;
 pub(crate) mod counts;
 pub(crate) mod delta_light;

@@ -1,5 +1,7 @@
 //! Switches for the techniques that make the picture better sooner, so that a report can tell what each is worth.
 
+use crate::core::caustic_plan::CausticPlan;
+
 /// Which techniques are used. Each leaves the mean of the picture as it is: without it there is more noise, or the
 /// same noise takes longer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +18,8 @@ pub struct Techniques {
     pub light_selection: bool,
     /// Where specular surfaces gather light, paths are traced from the lights as well; off: from the camera alone.
     pub caustics: bool,
+    /// How, where [`Self::caustics`] are; `None`: as a pilot finds best for the picture, see [`crate::caustic_plan`].
+    pub caustic_plan: Option<CausticPlan>,
     /// Dim paths are ended early; off: only very long ones.
     pub roulette: bool,
 }
@@ -29,6 +33,7 @@ impl Techniques {
         solid_angle: true,
         light_selection: true,
         caustics: true,
+        caustic_plan: None,
         roulette: true,
     };
 }

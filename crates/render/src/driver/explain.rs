@@ -10,6 +10,7 @@ use crate::film::exact_sum::ExactSum;
 use crate::film::light_layer::LightLayer;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::pilot::prepare_guide;
+use crate::integrators::caustics::plan::choose;
 use crate::integrators::record::{FoundBy, LightSource, Place, TracedPath};
 use crate::prepare::prepared::Prepared;
 use glam::{DVec3, UVec2};
@@ -119,10 +120,14 @@ pub fn light_traced(
     samples: Range<u32>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<DVec3> {
-    let Some(pass) = CausticPass::of(snapshot, settings, film_size, &snapshot.camera_media()) else {
+    let plan = choose(snapshot, settings, film_size, stop)?.plan;
+    if !plan.has_light_paths() {
+        return Some(DVec3::ZERO);
+    }
+    let Some(pass) = CausticPass::of(snapshot, settings, film_size, &snapshot.camera_media(), plan) else {
         return Some(DVec3::ZERO);
     };
-    let mut layer = LightLayer::new(film_size, samples.start);
+    let mut layer = LightLayer::new(film_size, samples.start, plan.light_path_stride);
     let completed = prepare_guide(&pass, stop) && layer.advance(&pass, samples.len() as u32, stop).completed;
     completed.then(|| layer.mean((pixel.y * film_size.x + pixel.x) as usize))
 }

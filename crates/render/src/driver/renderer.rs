@@ -1,9 +1,11 @@
 //! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
 
+use crate::core::caustic_plan::CausticPlan;
 use crate::core::counts::RayCounts;
 use crate::core::filter::FilterSampler;
 use crate::core::settings::{Integrator, RenderSettings, SampleAllocation};
 use crate::core::techniques::Techniques;
+use crate::driver::caustic_choice::plan_of_film;
 use crate::film::block::{BLOCK_SIZE, doubled};
 use crate::film::region::Region;
 use crate::film::round::Round;
@@ -11,6 +13,7 @@ use crate::film::tile::FilmTile;
 use crate::film::tiles::Film;
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::pilot::prepare_guide;
+use crate::integrators::caustics::plan::choose;
 use crate::integrators::path::{CameraPath, PathWave};
 use crate::integrators::phong::PhongWave;
 use crate::integrators::record::{Record, TracedPath};
@@ -85,7 +88,8 @@ pub fn advance_region(
     settings.check().unwrap_or_else(|error| panic!("{error}"));
     snapshot.camera.check().unwrap_or_else(|error| panic!("{error}"));
     let size = UVec2::new(film.width(), film.height());
-    let pass = Pass::new(snapshot, settings, size);
+    let Some(plan) = plan_of_film(snapshot, settings, film, stop) else { return PassReport::default() };
+    let pass = Pass::new(snapshot, settings, size, plan);
     let metric = match settings.allocation {
         SampleAllocation::Adaptive(metric) if region.is_none() => Some(metric),
         SampleAllocation::Adaptive(_) if film.round.is_some() => {
@@ -102,7 +106,9 @@ pub fn advance_region(
         if !prepare_guide(caustics, stop) || stop() {
             return PassReport::default();
         }
-        film.want_light();
+        if plan.has_light_paths() {
+            film.want_light(plan.light_path_stride);
+        }
     }
     let mut total = PassReport { completed: true, ..PassReport::default() };
     while total.completed && film.spp_in(region) < target_spp {
@@ -380,7 +386,7 @@ fn advance_tile(
 /// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film, but for that of paths from
 /// the lights, which belong to no pixel.
 pub fn replay_sample(snapshot: &Prepared, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
-    let pass = Pass::new(snapshot, settings, film_size);
+    let pass = Pass::planned(snapshot, settings, film_size);
     if let Some(caustics) = &pass.caustics {
         prepare_guide(caustics, &|| false);
     }
@@ -399,7 +405,7 @@ pub(crate) fn trace_recorded(
     pixel: UVec2,
     samples: Range<u32>,
 ) -> Vec<TracedPath> {
-    let pass = Pass::new(snapshot, settings, film_size);
+    let pass = Pass::planned(snapshot, settings, film_size);
     if let Some(caustics) = &pass.caustics {
         prepare_guide(caustics, &|| false);
     }
@@ -426,7 +432,7 @@ pub(crate) fn mean_bounces(
 ) -> Option<Vec<f32>> {
     const SIDE: u32 = 4;
     // Camera paths alone; traced light has no pixel to begin with.
-    let pass = Pass { caustics: None, ..Pass::new(snapshot, settings, size) };
+    let pass = Pass::new(snapshot, settings, size, CausticPlan::NONE);
     let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
     let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
         .into_par_iter()
@@ -450,9 +456,15 @@ pub(crate) fn mean_bounces(
 }
 
 impl<'a> Pass<'a> {
-    fn new(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2) -> Self {
+    /// The pass of a picture whose plan is found first, if it is not known.
+    fn planned(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2) -> Self {
+        let choice = choose(snapshot, settings, size, &|| false).expect("nobody stops it");
+        Self::new(snapshot, settings, size, choice.plan)
+    }
+
+    fn new(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2, plan: CausticPlan) -> Self {
         let camera_media = snapshot.camera_media();
-        let caustics = CausticPass::of(snapshot, settings, size, &camera_media);
+        let caustics = CausticPass::of(snapshot, settings, size, &camera_media, plan);
         let filter = FilterSampler::new(settings.filter);
         let bound = (snapshot.tables.radiance_bound)
             .filter(|_| settings.integrator == Integrator::Path)

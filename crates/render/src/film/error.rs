@@ -11,6 +11,12 @@ pub enum MergeError {
     /// Pixels along the sides of a tile.
     #[error("one film has tiles of {0}, the other of {1}")]
     TileSizes(u32, u32),
+    /// Camera paths for each light path, 0 for no such paths.
+    #[error(
+        "one film has a light path for every {0} camera paths, the other for every {1} (0: none): they were made by \
+             different versions or of different views"
+    )]
+    LightPaths(u32, u32),
     /// The first and the last of the sample numbers that both have.
     #[error(
         "both films have the samples {first} to {last}: render ranges that do not overlap, such as --samples 0..64 and \

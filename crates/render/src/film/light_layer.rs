@@ -36,18 +36,19 @@ pub(crate) struct LayerReport {
 
 impl LightLayer {
     /// - `first_sample`: number of the sample to begin with.
-    pub fn new(size: UVec2, first_sample: u32) -> Self {
-        Self::in_memory(Vec::new(), size, first_sample)
+    /// - `stride`: camera paths for each light path, at least 1.
+    pub fn new(size: UVec2, first_sample: u32, stride: u32) -> Self {
+        Self::in_memory(Vec::new(), size, first_sample, stride)
     }
 
     /// The same with `sums`, whatever they are, as its memory.
-    pub fn in_memory(mut sums: Vec<ExactSum>, size: UVec2, first_sample: u32) -> Self {
+    pub fn in_memory(mut sums: Vec<ExactSum>, size: UVec2, first_sample: u32, stride: u32) -> Self {
         let n_pixels = (size.x * size.y) as usize;
         sums.truncate(n_pixels);
         sums.par_iter_mut().for_each(|sum| *sum = ExactSum::default());
         // By all threads, for new memory is slow when it is first touched.
         sums.par_extend(rayon::iter::repeat_n(ExactSum::default(), n_pixels - sums.len()));
-        let batches = Batches::of_film(sums.len());
+        let batches = Batches::of_film(sums.len(), stride);
         let first = batches.of_sample(first_sample);
         Self { sums, batches, done: std::iter::once(first..first).collect(), spp: 0 }
     }

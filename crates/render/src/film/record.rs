@@ -1,5 +1,6 @@
 //! A film as plain numbers, for keeping it on disk, and back.
 
+use crate::core::caustic_plan::CausticPlan;
 use crate::film::block::{Block, MAX_DOUBLINGS, NEVER, Steps};
 use crate::film::error::RecordError;
 use crate::film::exact_sum::ExactSum;
@@ -40,6 +41,10 @@ pub struct FilmLayout {
     /// What is known of the traced light, where there is such light.
     #[serde(rename = "lamps")]
     pub light_traced: Option<LightTracingRecord>,
+    /// How caustics are looked for; `None` without samples. Films that do not tell it have a light path for every four
+    /// camera paths, where they have light paths.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub caustics: Option<CausticPlan>,
 }
 
 /// From which mean of samples per pixel to which a round of the allocation goes, and how far it is.
@@ -172,7 +177,7 @@ impl OldFilmLayout {
             TileRecord { blocks, bad: tile.bad, light_mean_of: 0, light_steps: StepsRecord::default() }
         };
         let tiles = tiles.into_iter().enumerate().map(renew).collect();
-        FilmLayout { width, height, tile_size, tiles, round: None, light_traced }
+        FilmLayout { width, height, tile_size, tiles, round: None, light_traced, caustics: None }
     }
 }
 
@@ -229,6 +234,7 @@ impl Film {
             tiles: self.tiles.iter().map(record).collect(),
             round: self.round.as_ref().map(of_round),
             light_traced: self.light.as_ref().map(of_light),
+            caustics: self.caustic_plan,
         }
     }
 
@@ -266,7 +272,7 @@ impl Film {
     /// # Errors
     /// When the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, RecordError> {
-        let FilmLayout { width, height, tile_size, tiles, round: _, light_traced } = &record.layout;
+        let FilmLayout { width, height, tile_size, tiles, round: _, light_traced, caustics } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
         let n_pixels = u64::from(width) * u64::from(height);
         if n_pixels == 0 || tile_size == 0 {
@@ -297,8 +303,12 @@ impl Film {
             }
         }
         film.round = record.layout.round(&film)?;
-        if let Some(traced) = light_traced {
-            let mut light = LightLayer::new(UVec2::new(width, height), 0);
+        film.caustic_plan = caustics.or(light_traced.as_ref().map(|_| CausticPlan::UNKNOWN));
+        if film.caustic_plan.is_some_and(|plan| !plan.is_valid() || light_traced.is_some() && !plan.has_light_paths()) {
+            return Err(RecordError::LightPaths);
+        }
+        if let (Some(traced), Some(plan)) = (light_traced, film.caustic_plan) {
+            let mut light = LightLayer::new(UVec2::new(width, height), 0, plan.light_path_stride);
             check_ranges(&traced.batches, light.batches_before(Self::MAX_SAMPLES))?;
             for (at, sum) in light.sums.iter_mut().enumerate() {
                 let vector = |first: usize| DVec3::from_array([0, 1, 2].map(|c| record.planes[first + c][at]));

@@ -3,6 +3,7 @@
 //! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
 //! ([`Film::merge`]) to the very film that has all of them.
 
+use crate::core::caustic_plan::CausticPlan;
 use crate::core::settings::ErrorMetric;
 use crate::film::allocation::{FIRST_ROUND, begin_round, end_round};
 use crate::film::block::{BLOCK_SIZE, Block};
@@ -35,6 +36,10 @@ pub struct Film {
     pub(crate) light: Option<LightLayer>,
     /// Memory of such a layer that is not in use.
     idle_light: Vec<ExactSum>,
+    /// How caustics are looked for: of all its samples, so known from the first one on.
+    pub(crate) caustic_plan: Option<CausticPlan>,
+    /// See [`Self::set_preview`].
+    pub(crate) is_preview: bool,
 }
 
 impl Film {
@@ -112,7 +117,18 @@ impl Film {
             let size = (UVec2::new(width, height) - origin).min(UVec2::splat(tile_size));
             tiles.push(FilmTile::try_new(origin, size).map_err(no_room)?);
         }
-        Ok(Self { width, height, tiles, tiles_x, tile_size, round: None, light: None, idle_light: Vec::new() })
+        Ok(Self {
+            width,
+            height,
+            tiles,
+            tiles_x,
+            tile_size,
+            round: None,
+            light: None,
+            idle_light: Vec::new(),
+            caustic_plan: None,
+            is_preview: false,
+        })
     }
 
     /// Has memory ready for traced light.
@@ -213,6 +229,7 @@ impl Film {
 
     /// The same until `stop` says so. Then it is false, and the film is good for nothing but being cleared again.
     pub fn clear_unless(&mut self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
+        self.caustic_plan = None;
         if let Some(layer) = self.light.take() {
             self.idle_light = layer.sums;
         }
@@ -226,12 +243,25 @@ impl Film {
         })
     }
 
+    /// Says that it is shown while things move: its samples need not be those of another film of the same size, so nothing
+    /// is measured that the first of them would have to wait for. To be said before that.
+    pub fn set_preview(&mut self, is_preview: bool) {
+        self.is_preview = is_preview;
+    }
+
+    /// How caustics are looked for; `None` before the first sample.
+    pub fn caustic_plan(&self) -> Option<CausticPlan> {
+        self.caustic_plan
+    }
+
     /// Makes room for traced light, if there is none.
-    pub(crate) fn want_light(&mut self) {
+    ///
+    /// - `stride`: camera paths for each light path, at least 1.
+    pub(crate) fn want_light(&mut self, stride: u32) {
         if self.light.is_none() {
             let size = UVec2::new(self.width, self.height);
             let memory = std::mem::take(&mut self.idle_light);
-            self.light = Some(LightLayer::in_memory(memory, size, self.first_sample()));
+            self.light = Some(LightLayer::in_memory(memory, size, self.first_sample(), stride));
         }
     }
 
@@ -257,6 +287,11 @@ impl Film {
         if self.tile_size != other.tile_size {
             return Err(MergeError::TileSizes(self.tile_size, other.tile_size));
         }
+        if let (Some(own), Some(others)) = (self.caustic_plan, other.caustic_plan)
+            && own.light_path_stride != others.light_path_stride
+        {
+            return Err(MergeError::LightPaths(own.light_path_stride, others.light_path_stride));
+        }
         for (block, other) in self.blocks().zip(other.blocks()) {
             if let Some(shared) = block.shares_with(other) {
                 return Err(MergeError::SharedSamples { first: shared.start, last: shared.end - 1 });
@@ -274,6 +309,7 @@ impl Film {
             (light, Some(other)) => *light = Some(other.clone()),
             (_, None) => {}
         }
+        self.caustic_plan = self.caustic_plan.or(other.caustic_plan);
         if self.round.is_some() || other.round.is_some() {
             self.leave_round();
         }

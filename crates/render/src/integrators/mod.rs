@@ -8,3 +8,4 @@ pub(crate) mod record;
 pub(crate) mod seen;
 pub(crate) mod simd;
 pub(crate) mod survival;
+pub(crate) mod work;

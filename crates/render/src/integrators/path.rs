@@ -18,6 +18,7 @@ use crate::integrators::simd::shade::KindHits;
 use crate::integrators::simd::sort::{KINDS, SortedHits};
 use crate::integrators::simd::{emitters, misses, shade};
 use crate::integrators::survival::{ROULETTE_GRACE, Survival};
+use crate::integrators::work::Work;
 use crate::prepare::prepared::Prepared;
 use crate::sampling::Sampler;
 use crate::shading::dimensions::{DIM_DIRECTION, DIM_LOBE, DIM_ROULETTE, first_dimension};
@@ -74,6 +75,8 @@ pub(crate) struct PathWave {
     pub depth: u32,
     /// Looks on, when somebody wants to know.
     pub record: Option<Box<Record>>,
+    /// Adds up what it costs, likewise.
+    pub work: Option<Box<Work>>,
 }
 
 /// Of hits, see [`SortedHits::of_kind`]; the others are one more than [`Material::kind`].
@@ -118,6 +121,12 @@ impl PathWave {
             if let Some(record) = &mut self.record {
                 record.see_hits(&self.paths, &self.hits);
             }
+            if let Some(work) = &mut self.work {
+                work.add_rays(&self.hits, self.paths.len(), class);
+                if depth > 1 && caustics.is_some_and(|pass| pass.guide().is_some()) {
+                    work.add_told(scene, &self.paths, &self.hits);
+                }
+            }
             self.shade(scene, depth, settings, caustics, radiance);
             if let Some(record) = &mut self.record {
                 record.see_shaded(&self.paths, radiance);
@@ -127,6 +136,9 @@ impl PathWave {
                 record.see_settled(scene, &self.shadows, radiance);
             }
             counts.shadow += self.shadows.rays.len() as u64;
+            if let Some(work) = &mut self.work {
+                work.add_shadow_rays(self.shadows.rays.len());
+            }
             counts.bounce += self.next.len() as u64;
             std::mem::swap(&mut self.paths, &mut self.next);
         }

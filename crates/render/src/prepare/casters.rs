@@ -16,6 +16,7 @@ use crate::prepare::guide::Guide;
 use crate::prepare::light::LightTable;
 use crate::prepare::light::emitter::Light;
 use crate::prepare::light::shape::LightShape;
+use crate::prepare::plan_cache::PlanCache;
 use crate::sampling::{AliasTable, Sampler, cosine_hemisphere, one_minus_cos_from_sin2, uniform_cone};
 use firstlight_kdtree::geometry::{Frame, Ray, robust};
 use firstlight_kdtree::{Hit, Shape};
@@ -48,6 +49,8 @@ pub(crate) struct CasterTable {
     media: Vec<Vec<u32>>,
     /// Made when it is first needed.
     pub(crate) guide: OnceLock<Guide>,
+    /// How caustics are looked for in pictures of the scene.
+    pub(crate) plans: PlanCache,
 }
 
 /// A sphere around something specular; without end for a plane.
@@ -118,7 +121,15 @@ impl CasterTable {
         }
         let pairs = Pairs::new(&casters, lights)?;
         let outside = Outside::of(&geometry.tree);
-        Some(Self { casters, by_object, pairs, outside, media: Vec::new(), guide: OnceLock::new() })
+        Some(Self {
+            casters,
+            by_object,
+            pairs,
+            outside,
+            media: Vec::new(),
+            guide: OnceLock::new(),
+            plans: PlanCache::default(),
+        })
     }
 
     /// Finds what lights without size are inside of.

@@ -1,9 +1,5 @@
 //! How many light paths a picture gets, and how they are divided.
 
-/// Light paths for each camera path: they cost less, and all of them carry light that the others hardly
-/// find.
-const LIGHT_PATHS_PER_PIXEL: f64 = 0.25;
-
 /// Paths in a batch, at most.
 const MAX_BATCH: u32 = 4096;
 
@@ -16,8 +12,9 @@ pub(crate) struct Batches {
 }
 
 impl Batches {
-    pub fn of_film(n_pixels: usize) -> Self {
-        let n_paths = (n_pixels as f64 * LIGHT_PATHS_PER_PIXEL).ceil();
+    /// - `stride`: camera paths for each light path, at least 1.
+    pub fn of_film(n_pixels: usize, stride: u32) -> Self {
+        let n_paths = (n_pixels as f64 / f64::from(stride)).ceil();
         let per_sample = (n_paths / f64::from(MAX_BATCH)).ceil();
         Self { per_sample: per_sample as u32, size: (n_paths / per_sample).ceil() as u32 }
     }

@@ -13,12 +13,27 @@ pub(crate) struct Splat {
     pub light: Vec3,
 }
 
+/// The same, to tell what it is worth to look for it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeasuredSplat {
+    pub film: Vec2,
+    /// Before it is weighted against camera paths.
+    pub light: Vec3,
+    /// Density of the light path over that of the same camera path, see [`super::weight`].
+    pub ratio: f32,
+    /// The probability with which roulette has let it come so far.
+    pub kept: f32,
+}
+
 /// Shadow rays to the lens, where in the film each leads, and with how much light.
 #[derive(Default)]
 pub(crate) struct LensConnections {
     pub rays: RayBatch,
     film: [Vec<f32>; 2],
     light: [Vec<f32>; 3],
+    /// See [`MeasuredSplat`].
+    ratio: Vec<f32>,
+    kept: Vec<f32>,
     pub occluded: Vec<bool>,
 }
 
@@ -28,17 +43,18 @@ impl LensConnections {
         self.rays.clear();
         self.rays.make_room(n);
         let least = n + LANES;
-        for array in self.film.iter_mut().chain(&mut self.light) {
+        for array in self.film.iter_mut().chain(&mut self.light).chain([&mut self.ratio, &mut self.kept]) {
             if array.len() < least {
                 array.resize(least, 0.0);
             }
         }
     }
 
-    pub fn push(&mut self, ray: &Ray, film: Vec2, light: Vec3) {
+    pub fn push(&mut self, ray: &Ray, film: Vec2, light: Vec3, [ratio, kept]: [f32; 2]) {
         let i = self.rays.len();
         self.film.iter_mut().zip(film.to_array()).for_each(|(array, x)| array[i] = x);
         set(&mut self.light, i, light);
+        (self.ratio[i], self.kept[i]) = (ratio, kept);
         self.rays.push(ray);
     }
 
@@ -50,16 +66,25 @@ impl LensConnections {
         [origin, dir]: [Vector<S>; 2],
         film: [Float<S>; 2],
         light: Vector<S>,
+        [ratio, kept]: [Float<S>; 2],
     ) {
         let at = self.rays.len();
         append(&mut self.film[0], at, mask, film[0]);
         append(&mut self.film[1], at, mask, film[1]);
         append_vector(&mut self.light, at, mask, light);
+        append(&mut self.ratio, at, mask, ratio);
+        append(&mut self.kept, at, mask, kept);
         self.rays.append(mask, origin, dir, light.x.all(1.0));
     }
 
     /// Where in the film a ray leads, and its light.
     pub fn get(&self, i: usize) -> (Vec2, Vec3) {
         (Vec2::new(self.film[0][i], self.film[1][i]), get(&self.light, i))
+    }
+
+    /// As it was measured, where [`super::pass::CausticPass::is_measured`].
+    pub fn measured(&self, i: usize) -> MeasuredSplat {
+        let (film, light) = self.get(i);
+        MeasuredSplat { film, light, ratio: self.ratio[i], kept: self.kept[i] }
     }
 }

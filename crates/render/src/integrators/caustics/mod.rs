@@ -16,6 +16,7 @@ pub(crate) mod dimensions;
 pub(crate) mod lens_connections;
 pub(crate) mod pass;
 pub(crate) mod pilot;
+pub(crate) mod plan;
 pub(crate) mod simd;
 pub(crate) mod trace;
 pub(crate) mod weight;

@@ -1,5 +1,6 @@
 //! What of a picture light paths, and paths that are weighed against them, need to know.
 
+use crate::core::caustic_plan::CausticPlan;
 use crate::core::filter::PixelFilter;
 use crate::core::settings::{Integrator, RenderSettings};
 use crate::core::techniques::Techniques;
@@ -24,8 +25,11 @@ pub(crate) struct CausticPass<'a> {
     pub filter: PixelFilter,
     /// The integral of the filter along one axis.
     pub filter_norm: f64,
-    /// Light paths a sample of the whole picture.
+    pub plan: CausticPlan,
+    /// Light paths a sample of the whole picture; 0 if there are none.
     pub paths_per_sample: f64,
+    /// Light paths tell what they bring before it is weighted, and its ratio: see [`super::plan`].
+    pub is_measured: bool,
     /// Of a pixel on the film; see [`crate::core::camera::Camera::pixel_size`]; square metres.
     pub pixel_area: f32,
     /// See [`crate::prepare::bodies::Bodies::around`].
@@ -33,14 +37,22 @@ pub(crate) struct CausticPass<'a> {
 }
 
 impl<'a> CausticPass<'a> {
-    /// `None` where there is nothing to gain.
-    pub fn of(scene: &'a Prepared, settings: &RenderSettings, size: UVec2, camera_media: &[u32]) -> Option<Self> {
-        let casters = scene.tables.casters.as_ref()?;
-        // Light, mirror, diffuse, camera: three segments.
-        let traces_paths = settings.integrator == Integrator::Path;
-        if !traces_paths || !settings.techniques.caustics || settings.max_depth < 3 {
+    /// `None` where there is nothing to gain, or nothing is to be used.
+    pub fn of(
+        scene: &'a Prepared,
+        settings: &RenderSettings,
+        size: UVec2,
+        camera_media: &[u32],
+        plan: CausticPlan,
+    ) -> Option<Self> {
+        let casters = casters_of(scene, settings)?;
+        if plan.is_none() {
             return None;
         }
+        let paths_per_sample = match plan.light_path_stride {
+            0 => 0.0,
+            stride => Batches::of_film((size.x * size.y) as usize, stride).paths_per_sample(),
+        };
         let pixel = scene.camera.pixel_size(size.as_vec2());
         Some(Self {
             scene,
@@ -52,17 +64,29 @@ impl<'a> CausticPass<'a> {
             size: size.as_vec2(),
             filter: settings.filter,
             filter_norm: settings.filter.integral(),
-            paths_per_sample: Batches::of_film((size.x * size.y) as usize).paths_per_sample(),
+            plan,
+            paths_per_sample,
+            is_measured: false,
             pixel_area: pixel * pixel,
             camera_media: camera_media.to_vec(),
         })
     }
 }
 
+/// What caustics come from, where they are looked for at all.
+pub(crate) fn casters_of<'a>(scene: &'a Prepared, settings: &RenderSettings) -> Option<&'a CasterTable> {
+    // Light, mirror, diffuse, camera: three segments.
+    let looks = settings.integrator == Integrator::Path && settings.techniques.caustics && settings.max_depth >= 3;
+    scene.tables.casters.as_ref().filter(|_| looks)
+}
+
 impl CausticPass<'_> {
-    /// `None` while it is not prepared, and where it knows nothing.
+    /// `None` while it is not prepared, where it knows nothing, and where it is not used.
     #[inline]
     pub fn guide(&self) -> Option<&Guide> {
+        if !self.plan.guided {
+            return None;
+        }
         self.casters.guide.get().filter(|guide| !guide.is_empty())
     }
 

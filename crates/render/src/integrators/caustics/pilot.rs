@@ -12,11 +12,11 @@ const PILOT_PATHS: u32 = 1 << 15;
 /// Scouts that one worker sends at once.
 const PILOT_BATCH: u32 = 2048;
 
-/// Sees to it that hints are there; false if `stop` said so before they were.
+/// Sees to it that hints are there, if they are to be used; false if `stop` said so before they were.
 ///
 /// They belong to the lights and surfaces of the scene, so they outlive cameras, seeds and settings.
 pub(crate) fn prepare_guide(pass: &CausticPass, stop: &(dyn Fn() -> bool + Sync)) -> bool {
-    if pass.casters.guide.get().is_some() {
+    if !pass.plan.guided || pass.casters.guide.get().is_some() {
         return true;
     }
     let scouts =

@@ -109,8 +109,9 @@ fn scatter_kind<S: Simd, const KIND: usize>(s: S, group: LightHits) {
             throughput = throughput.times(transmittance(s, sets, mask, &media, distance));
         }
         let (ratio, sampler) = (Float::gather(&paths.pdf, index), paths.sampler_lanes(index));
+        let kept = Float::gather(&paths.normal[0], index);
         let step =
-            LightPathLanes { pass, at: &at, place: &place, media: &media, throughput, ratio, sampler, dimension };
+            LightPathLanes { pass, at: &at, place: &place, media: &media, throughput, ratio, kept, sampler, dimension };
         if scatters(KIND) && n_vertices > 1 {
             step.join::<KIND>(s, sets, camera, arrivals);
         }
@@ -129,6 +130,8 @@ struct LightPathLanes<'a, S: Simd> {
     media: &'a [MediumId; LANES],
     throughput: Vector<S>,
     ratio: Float<S>,
+    /// By roulette, so far.
+    kept: Float<S>,
     sampler: SamplerLanes<S>,
     dimension: u32,
 }
@@ -166,7 +169,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
         let importance = scene.camera.spread(distance2, cos_lens);
         // `CausticPass::join_ratio`, rounded in an order of its own.
         let ratio = ratio * importance * pass.density_scale() * cos_i / (cos_o * pdf);
-        let weight = pass.light_path_weight(ratio);
+        let weight = if pass.is_measured { ratio.all(1.0) } else { pass.light_path_weight(ratio) };
         let light = throughput.times(value) * (weight * cos_o / (importance * pass.pixel_area) / cos_i);
         open &= !light.is_zero();
         if open == 0 {
@@ -178,7 +181,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             light
         };
         let start = place.leaving();
-        arrivals.append(open, [start, lens - start], [film_x, film_y], light);
+        arrivals.append(open, [start, lens - start], [film_x, film_y], light, [ratio, self.kept]);
     }
 
     /// Along the axes of the film, metres.
@@ -240,7 +243,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             factor = select_vector(specular, factor, value * (cos_o / (cos_i * bounce.pdf)));
             ratio = select(specular, ratio, self.ratio * bounce.pdf * cos_i / (cos_o * pdf));
         }
-        let mut throughput = self.throughput.times(factor);
+        let (mut throughput, mut all_kept) = (self.throughput.times(factor), self.kept);
         let mut at_stake = 0;
         let (one, mut most) = (ratio.all(1.0), ratio.all(1.0));
         for (kept, lanes) in
@@ -257,6 +260,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             let survives = sampler.single(dimension + DIM_ROULETTE).lt(survival);
             go_on &= !at_stake | survives;
             throughput = throughput * select(at_stake, one / survival, one);
+            all_kept = all_kept * select(at_stake, survival, one);
         }
         go_on &= !throughput.is_zero();
         if go_on == 0 {
@@ -267,7 +271,7 @@ impl<S: Simd> LightPathLanes<'_, S> {
             origin = select_vector(bounce.transmitted, place.passing(), origin);
         }
         let slot = Bits::splat(s, NO_CASTER);
-        let (position, normal) = (place.position, place.normal);
+        let (position, normal) = (place.position, Vector { x: all_kept, ..place.normal });
         let path = PathLanes { throughput, pdf: ratio, position, normal, sampler: *sampler, slot };
         next.append(go_on, origin, wi, &path);
         if let Some(next_media) = &mut next.media {

@@ -9,12 +9,13 @@ use crate::core::counts::RayCounts;
 use crate::core::filter::PixelFilter;
 use crate::core::material::{Material, MaterialId};
 use crate::integrators::caustics::dimensions::{DIM_LENS, DIM_ROULETTE, VERTEX_DIMENSIONS, most_kept};
-use crate::integrators::caustics::lens_connections::{LensConnections, Splat};
+use crate::integrators::caustics::lens_connections::{LensConnections, MeasuredSplat, Splat};
 use crate::integrators::caustics::pass::CausticPass;
 use crate::integrators::caustics::simd;
 use crate::integrators::caustics::simd::LightHits;
 use crate::integrators::caustics::weight::{MisBounce, etendue_gain_at, etendue_scale, is_reversible};
 use crate::integrators::simd::sort::{KINDS, SortedHits};
+use crate::integrators::work::Work;
 use crate::prepare::casters;
 use crate::prepare::casters::LINE_DIMENSIONS;
 use crate::prepare::guide::Trace;
@@ -48,22 +49,24 @@ struct LightPath {
     /// To be hit first; no caster any more after that.
     aimed_at: u32,
     media: MediumId,
+    /// The probability with which roulette has let it come so far.
+    kept: f32,
     /// On its first segment only: the light is outside of the scene, see [`casters::LightLine::is_far`].
     is_far: bool,
 }
 
 /// Light paths are kept like those from the camera, of which they need less: the density is the ratio, and the
-/// slot is what they are aimed at. The place of the last vertex says at first whether the light is far away.
+/// slot is what they are aimed at. The normal says what roulette has kept. The place of the last vertex says at first whether the light is far away.
 impl From<LightPath> for Path {
-    fn from(LightPath { throughput, ratio, sampler, aimed_at, media, is_far }: LightPath) -> Self {
-        let (position, normal) = (Vec3::splat(f32::from(is_far)), Vec3::ZERO);
+    fn from(LightPath { throughput, ratio, sampler, aimed_at, media, kept, is_far }: LightPath) -> Self {
+        let (position, normal) = (Vec3::splat(f32::from(is_far)), Vec3::splat(kept));
         Self { throughput, pdf: ratio, position, normal, sampler, slot: aimed_at, media, track: MisState::default() }
     }
 }
 
 impl From<Path> for LightPath {
-    fn from(Path { throughput, pdf, sampler, slot, media, position, .. }: Path) -> Self {
-        Self { throughput, ratio: pdf, sampler, aimed_at: slot, media, is_far: position == Vec3::ONE }
+    fn from(Path { throughput, pdf, sampler, slot, media, position, normal, .. }: Path) -> Self {
+        Self { throughput, ratio: pdf, sampler, aimed_at: slot, media, kept: normal.x, is_far: position == Vec3::ONE }
     }
 }
 
@@ -81,6 +84,8 @@ pub(crate) struct LightWave {
     sets: MediumSets,
     /// What the camera is inside of.
     camera: MediumId,
+    /// Adds up what it costs, when somebody wants to know.
+    pub work: Option<Box<Work>>,
 }
 
 /// One of the two kinds of scattering of a surface.
@@ -99,6 +104,36 @@ impl LightWave {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Vec<Splat>, RayCounts)> {
         let mut splats = Vec::new();
+        let spread = |found: &LensConnections, i| {
+            let (film, light) = found.get(i);
+            pass.spread(film, light, &mut splats);
+        };
+        let counts = self.trace_to_lens(pass, first, n, stop, spread)?;
+        Some((splats, counts))
+    }
+
+    /// The same for a pass whose light paths are measured.
+    pub fn trace_measured(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<MeasuredSplat>> {
+        let mut splats = Vec::new();
+        self.trace_to_lens(pass, first, n, stop, |found, i| splats.push(found.measured(i)))?;
+        Some(splats)
+    }
+
+    /// Follows paths, and lets `take` have all connections to the lens that nothing stands in the way of.
+    fn trace_to_lens(
+        &mut self,
+        pass: &CausticPass,
+        first: u64,
+        n: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+        mut take: impl FnMut(&LensConnections, usize),
+    ) -> Option<RayCounts> {
         let mut counts = RayCounts::default();
         self.start(pass, first, n, false);
         let mut n_vertices = 0;
@@ -110,19 +145,24 @@ impl LightWave {
             counts.bounce += self.paths.len() as u64;
             pass.scene.closest_hits(&self.paths.rays, RayClass::Incoherent, &mut self.hits);
             pass.scene.settle(&self.paths.rays, &mut self.hits);
+            if let Some(work) = &mut self.work {
+                work.add_rays(&self.hits, self.paths.len(), RayClass::Incoherent);
+            }
             self.scatter(pass, n_vertices);
             let arrivals = &mut self.arrivals;
+            if let Some(work) = &mut self.work {
+                work.add_shadow_rays(arrivals.rays.len());
+            }
             pass.scene.any_hits(&arrivals.rays, RayClass::Incoherent, &mut arrivals.occluded);
             counts.shadow += arrivals.rays.len() as u64;
             for i in 0..arrivals.rays.len() {
                 if !arrivals.occluded[i] {
-                    let (film, light) = arrivals.get(i);
-                    pass.spread(film, light, &mut splats);
+                    take(arrivals, i);
                 }
             }
             std::mem::swap(&mut self.paths, &mut self.next);
         }
-        Some((splats, counts))
+        Some(counts)
     }
 
     /// Follows paths to where they first scatter, for [`crate::prepare::guide`].
@@ -196,7 +236,8 @@ impl LightWave {
             if line.is_delta {
                 (ratio, media) = (f32::INFINITY, self.sets.within(pass.scene, pass.casters.media_of(line.light)));
             }
-            let path = LightPath { throughput, ratio, sampler, aimed_at: line.caster, media, is_far: line.is_far };
+            let path =
+                LightPath { throughput, ratio, sampler, aimed_at: line.caster, media, kept: 1.0, is_far: line.is_far };
             self.paths.push(&line.ray, &path.into());
         }
     }
@@ -257,9 +298,9 @@ impl LightWave {
         if n_vertices > 1
             && surface.has_non_specular()
             && (path.media == self.camera || surface.through().is_some())
-            && let Some((ray, film, light)) = step.join(&surface, &self.sets, self.camera)
+            && let Some((ray, film, light, ratio)) = step.join(&surface, &self.sets, self.camera)
         {
-            self.arrivals.push(&ray, film, light);
+            self.arrivals.push(&ray, film, light, [ratio, path.kept]);
         }
         if pass.goes_on(n_vertices)
             && let Some((ray, path, _)) = step.go_on(&surface)
@@ -317,10 +358,11 @@ impl LightPathStep<'_> {
         first_dimension(self.n_vertices)
     }
 
-    /// A shadow ray to a point of the lens, where in the film it ends and the light that it brings.
+    /// A shadow ray to a point of the lens, where in the film it ends, the light that it brings, and the ratio of its
+    /// density to that of the camera path.
     ///
     /// - `media`: what the camera is inside of.
-    fn join(&self, surface: &LightPathSurface, sets: &MediumSets, media: MediumId) -> Option<(Ray, Vec2, Vec3)> {
+    fn join(&self, surface: &LightPathSurface, sets: &MediumSets, media: MediumId) -> Option<(Ray, Vec2, Vec3, f32)> {
         let &Self { pass, path, .. } = self;
         let (scene, camera) = (pass.scene, &pass.scene.camera);
         let lens = if camera.lens_radius > 0.0 {
@@ -358,8 +400,8 @@ impl LightPathStep<'_> {
         if cos_o <= 0.0 || cos_i <= 0.0 {
             return None;
         }
-        let ratio = path.ratio * etendue_scale(through);
-        let weight = pass.light_path_weight(ratio * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf));
+        let ratio = path.ratio * etendue_scale(through) * pass.join_ratio(distance2, cos_lens, cos_o, cos_i, pdf);
+        let weight = if pass.is_measured { 1.0 } else { pass.light_path_weight(ratio) };
         let importance = cos_o / (camera.spread(distance2, cos_lens) * pass.pixel_area);
         let mut light = path.throughput * value * (weight * importance / cos_i);
         if light == Vec3::ZERO {
@@ -369,7 +411,7 @@ impl LightPathStep<'_> {
             light *= sets.transmittance(after, distance2.sqrt());
         }
         let start = if through.is_some() { vertex.passing(vertex.wo) } else { vertex.leaving(vertex.wo) };
-        Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light))
+        Some((Ray { origin: start, dir: origin - start, t_max: 1.0 }, film, light, ratio))
     }
 
     /// Chooses how the path goes on, and whether; and tells whether it does so off something specular.
@@ -440,6 +482,7 @@ impl LightPathStep<'_> {
                 return None;
             }
             path.throughput /= survival;
+            path.kept *= survival;
         }
         if path.throughput == Vec3::ZERO {
             return None;

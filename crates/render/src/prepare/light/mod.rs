@@ -80,6 +80,11 @@ impl LightTable {
         self.lights.is_empty()
     }
 
+    /// Whether some of them have no size.
+    pub(crate) fn has_delta(&self) -> bool {
+        self.lights.iter().any(|light| light.shape.delta().is_some())
+    }
+
     #[inline]
     pub(crate) fn light(&self, id: u32) -> &Light {
         &self.lights[id as usize]
