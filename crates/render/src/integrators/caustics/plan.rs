@@ -58,8 +58,10 @@ const RARE: f64 = 2.5;
 /// What camera paths cost more where they are weighed against light paths.
 const TRACKING: f64 = 1.04;
 
-/// Guiding must promise at least this factor: what it costs is known, what it saves is noisy.
+/// Guiding must promise this factor, and be better in so many of so many parts of the pilot's pixels: what it costs is known,
+/// but a single bright sample without it can seem to be worth as much as all that it saves.
 const CLEARLY: f64 = 1.2;
+const IN_PARTS: (usize, usize) = (5, 8);
 
 /// What a splat's variance is relative to is told by cells of which so many lie along the side of a spot.
 const CELLS: u32 = 4;
@@ -210,8 +212,13 @@ impl Pilot {
         let plans = STRIDES
             .into_iter()
             .flat_map(|light_path_stride| [false, true].map(|guided| CausticPlan { light_path_stride, guided }));
+        let guiding_pays = self.guiding_pays();
+        let known = CausticPlan { guided: guiding_pays, ..known };
         let (mut best, mut least) = (known, product(known));
         for plan in plans.clone().filter(|plan| plan.has_light_paths() || !self.needs_light_paths) {
+            if plan.guided && !guiding_pays {
+                continue;
+            }
             if product(plan) < least {
                 (best, least) = (plan, product(plan));
             }
@@ -223,6 +230,20 @@ impl Pilot {
         let shown = if best.has_light_paths() { best } else { CausticPlan { light_path_stride: 8, ..best } };
         let ((variance, cost), (less, more)) = (value(without), value(shown));
         CausticChoice { plan: best, cost: (more / cost) as f32, gain: (variance / less) as f32 }
+    }
+
+    /// Whether camera paths had better be guided, whatever light paths there are.
+    fn guiding_pays(&self) -> bool {
+        let (least, n) = IN_PARTS;
+        let levels = self.levels();
+        let is_better = |part: &usize| {
+            let of = |pilot: &CameraPilot| {
+                let spots = pilot.spots.iter().zip(&levels).skip(*part).step_by(n);
+                pilot.cost * spots.map(|(spot, level)| relative(spot.variance, *level)).sum::<f64>()
+            };
+            of(&self.guided) < of(&self.plain)
+        };
+        (0..n).filter(is_better).count() >= least
     }
 
     /// Place in the list of spots of a point of the film.
