@@ -4,9 +4,9 @@ use crate::common::*;
 use firstlight::kdtree::{BuildPreset, InstructionSet, MeshTree, Shape, SphereTree};
 use firstlight::mesh::{Mesh, procedural};
 use firstlight::render::{
-    BadSample, ColorInput, Cone, DeltaLight, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture, Integrator,
-    Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques, Texture,
-    TexturePattern, Wrap, advance, replay_sample,
+    BadSample, CausticPlan, ColorInput, Cone, DeltaLight, Encoding, Environment, Film, Fresnel, Geometry, ImageTexture,
+    Integrator, Material, Object, PixelFilter, Prepared, RenderSettings, ScalarInput, Shading, Snapshot, Techniques,
+    Texture, TexturePattern, Wrap, advance, replay_sample,
 };
 use glam::{Affine3A, Mat2, UVec2, Vec2, Vec3};
 use std::sync::Arc;
@@ -214,7 +214,7 @@ fn lanes_light_what_one_path_at_a_time_lights() {
     for (name, scene) in rooms() {
         for techniques in [Techniques::ALL, Techniques { mis: false, ..Techniques::ALL }] {
             let draw = |lanes, caustics| {
-                let techniques = Techniques { caustics, ..techniques };
+                let techniques = Techniques { caustics, caustic_plan: Some(CausticPlan::UNKNOWN), ..techniques };
                 let settings =
                     RenderSettings { techniques, simd: lanes, seed: 3, max_depth: 10, ..RenderSettings::default() };
                 let mut film = Film::new(48, 48);
