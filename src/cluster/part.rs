@@ -1,8 +1,8 @@
 //! A part of a whole: its number, where that comes from, and which samples, tiles or frames it has.
 //!
-//! Samples are divided so that the films of all parts add up to the very film of one go, its error estimate included. The
-//! estimate looks at the image at powers of two, so all of them beyond the first part are ends of parts; in between parts
-//! are as equal as whole numbers allow. A power of two as the number of samples divides best.
+//! Samples are divided so that the films of all parts add up to the very film of one go, its error estimate included.
+//! The estimate looks at the image at powers of two, so all of them beyond the first part are ends of parts; in between,
+//! parts are as equal as whole numbers allow. A power of two as the number of samples divides best.
 
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -179,8 +179,8 @@ impl Part {
 
 /// Divides `samples` among `count` parts, at most as many as there are samples, each a range of its own, ascending.
 ///
-/// No part but that which begins with sample 0 has a power of two inside, unless there are more of them than parts: there the
-/// error estimate looks at the image.
+/// No part but that which begins with sample 0 has a power of two inside, where the error estimate looks at the image,
+/// unless there are more of them than parts.
 pub fn sample_ranges(samples: Range<u32>, count: u32) -> Vec<Range<u32>> {
     let n = samples.end.saturating_sub(samples.start);
     if n == 0 || count <= 1 {
