@@ -189,7 +189,7 @@ mod tests {
             light_steps: Default::default(),
         };
         let (width, tiles) = (32 * tiles.len() as u32, tiles.iter().map(tile).collect());
-        FilmLayout { width, height: 32, tile_size: 32, tiles, round: None, light_traced: None }
+        FilmLayout { width, height: 32, tile_size: 32, tiles, round: None, light_traced: None, caustics: None }
     }
 
     fn coverage(films: &[FilmLayout]) -> Coverage {
