@@ -43,7 +43,8 @@ pub(super) fn animate(
         if !(sequence.is_part && is_complete(&job, &path, target)?) {
             let film = job.picture(args, target)?;
             let features = job.features(args, None)?;
-            job.write(args, (&film, features.as_ref()), &path, replace)?;
+            let denoised = job.denoised(args, &film, &|| false);
+            job.write(args, (&film, features.as_ref()), denoised.as_ref(), &path, replace)?;
         }
         stop.has_saved(format!("{} of {} frames are saved", done + 1, frames.len()));
     }

@@ -11,13 +11,15 @@ use firstlight::frame::{
 };
 use firstlight::kdtree::InstructionSet;
 use firstlight::render::{
-    Display, ErrorMetric, FEATURE_SAMPLES, Film, Purpose, RenderSettings, Room, SampleAllocation,
+    Denoised, Display, ErrorMetric, FEATURE_SAMPLES, Film, Purpose, RenderSettings, Room, SampleAllocation,
+    denoise_film, gather_guides,
 };
 use firstlight::scene::whole_file::Replace;
 use firstlight::scene::{
     DisplaySettings, Extraction, Files, FilmSize, ImageMetadata, ImageSamples, LoadedScene, MetadataDraft, Rendering,
     SceneInputs, SnapshotPart,
 };
+use glam::UVec2;
 use std::path::Path;
 use std::time::Instant;
 
@@ -144,15 +146,26 @@ impl RenderJob {
         Ok(FeatureLayers::gather(&extraction.prepared, names, settings, *size, samples, &|| false))
     }
 
+    /// What the film shows without most of its noise, if that is asked for and `stop` does not say so.
+    pub fn denoised(&self, args: &RenderArgs, film: &Film, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
+        if !args.denoise {
+            return None;
+        }
+        let (prepared, size) = (&self.extraction.prepared, UVec2::new(film.width(), film.height()));
+        let features = gather_guides(prepared, &self.settings, size, FEATURE_SAMPLES, stop)?;
+        denoise_film(prepared, film, &features, stop)
+    }
+
     /// Writes a picture with its metadata to a file, or to standard output.
     pub fn write(
         &self,
         args: &RenderArgs,
         (film, features): (&Film, Option<&FeatureLayers>),
+        denoised: Option<&Denoised>,
         path: &Path,
         replace: Replace,
     ) -> Result<(), Failure> {
-        let note = self.note(film, path);
+        let mut note = self.note(film, path);
         if !args.layers.is_empty() {
             let layers = args.layers.of(film);
             let picture = LayeredPicture { film, features, layers: &layers, note: Some(&note) };
@@ -161,7 +174,12 @@ impl RenderJob {
                 false => Ok(picture.write(path, replace)?),
             };
         }
-        let picture = Print { film, display: &self.display, size: self.size, note: Some(&note) };
+        if denoised.is_some() {
+            let raw = ImageMetadata::from_note(&note).map_err(|error| Failure::Failed(error.into()))?;
+            note = ImageMetadata { denoised: Some("own".to_owned()), ..raw }.to_note();
+        }
+        let denoised = denoised.map(|denoised| &denoised.color[..]);
+        let picture = Print { film, display: &self.display, size: self.size, note: Some(&note), denoised };
         if !args.to_stdout() {
             return Ok(picture.write(path, replace)?);
         }
@@ -208,8 +226,12 @@ pub fn purposes(args: &RenderArgs) -> Vec<Purpose> {
         Ok(PictureFormat::Exr) => Purpose::Exr,
         _ => Purpose::Png,
     };
-    let layers = args.layers.have_features().then_some(Purpose::Layers);
-    std::iter::once(picture).chain(film.then_some(Purpose::FilmFile)).chain(layers).collect()
+    let others = [
+        film.then_some(Purpose::FilmFile),
+        args.layers.have_features().then_some(Purpose::Layers),
+        args.denoise.then_some(Purpose::Denoised),
+    ];
+    std::iter::once(picture).chain(others.into_iter().flatten()).collect()
 }
 
 /// Memory kept free for what is written at the end: a picture that cannot be written is not worth the wait.

@@ -124,7 +124,8 @@ fn merge(args: &MergeArgs, part: Option<Part>) -> Result<(), Failure> {
         let (size, note) = ((film.width(), film.height()), note(path));
         let display = shot.display.into();
         if args.layers.is_empty() {
-            Print { film: &film, display: &display, size, note: Some(&note) }.write(path, files.replace())?;
+            Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
+                .write(path, files.replace())?;
         } else {
             let layers = args.layers.of(&film);
             let features = features.as_ref();

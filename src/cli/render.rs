@@ -228,7 +228,12 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
         let note = job.note(&film, file.path());
         write_film_with_features(&film, features.as_ref(), &note, file)?;
     }
-    job.write(args, (&film, features.as_ref()), &args.output, files.replace())?;
+    let denoised = job.denoised(args, &film, &asked);
+    if args.denoise && denoised.is_none() {
+        remark(format_args!("warning: stopped before the picture was denoised: {} is raw", args.output_name()));
+    }
+    job.write(args, (&film, features.as_ref()), denoised.as_ref(), &args.output, files.replace())?;
+    let denoised_error = denoised.map(|denoised| denoised.error).filter(|_| !is_dark);
     if let Some(path) = &args.error_picture {
         write_errors(&film, path, files.replace())?;
     }
@@ -266,16 +271,17 @@ fn render(args: &RenderArgs, film_file: Option<WholeFile>, files: &mut Files, st
     }
     if args.json {
         let seconds = (features_seconds, cpu_seconds);
-        print(json(&job, &report, seconds, (&film, is_dark), files.replaced(), stopped))?;
+        print(json(&job, &report, seconds, (&film, is_dark), denoised_error, files.replaced(), stopped))?;
     } else {
         let (output, (width, height)) = (args.output_name(), job.size);
         let (spp, seconds) = (film.spp(), report.seconds);
         let error = error.filter(|_| !is_dark);
         let error = error.map_or(String::new(), |error| format!(", estimated error {}", percent(error)));
+        let denoised = denoised_error.map_or(String::new(), |error| format!(" (denoised: {})", percent(error)));
         let kept = film_path.map_or(String::new(), |path| format!(", film saved to {}", path.display()));
         let replaced = replaced(files.replaced(), &args.output);
         inform(format_args!(
-            "{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{kept}{replaced}"
+            "{output}: {width} x {height}, {spp} samples per pixel in {seconds:.1} s{error}{denoised}{kept}{replaced}"
         ));
     }
     if args.has_next {
@@ -323,6 +329,7 @@ fn json(
     report: &OfflineReport,
     (features_seconds, cpu_seconds): (f64, Option<f64>),
     (film, is_dark): (&Film, bool),
+    denoised_error: Option<f64>,
     replaced: &[PathBuf],
     stopped: bool,
 ) -> serde_json::Value {
@@ -354,6 +361,7 @@ fn json(
         },
         "mrays_per_s": report.rays.total() as f64 / report.seconds.max(1e-9) * 1e-6,
         "estimated_error": error.map(|error| error.relative),
+        "estimated_error_denoised": denoised_error,
         "estimated_error_95": error.map(|error| [error.low, error.high]),
         "bad_samples": report.n_bad,
         "bad_samples_at": places(&report.bad),

@@ -76,6 +76,11 @@ pub struct RenderArgs {
     /// Samples per pixel that albedo, normal, depth, position, object and material are made of [default: 16].
     #[arg(long, value_name = "N", requires = "layers", help_heading = "Output", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub layer_samples: Option<u32>,
+    /// Save the picture denoised: raw and filtered combined, so that it converges to the raw picture
+    ///
+    /// The film stays raw, and --error counts for the raw picture.
+    #[arg(help_heading = "Output", long, conflicts_with_all = ["region", "layers"])]
+    pub denoise: bool,
     /// Orbit the camera once around its target in N frames: FILE-0001.png, FILE-0002.png, ….
     #[arg(help_heading = "Animation", long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["film", "resume", "samples", "json"])]
     pub turntable: Option<u32>,

@@ -123,7 +123,7 @@ fn play(args: &ShowArgs) -> Result<(), Failure> {
     let size = (film.width(), film.height());
     let samples = ImageSamples { first: 0, spp: film.spp(), uneven: false };
     let note = played.session.shot_draft().note(&args.output, size, samples, display.into());
-    let print = Print { film: &played.film, display: &display, size, note: Some(&note) };
+    let print = Print { film: &played.film, display: &display, size, note: Some(&note), denoised: None };
     print.write(&args.output, files.replace())?;
     if files.replaced().contains(&args.output) {
         inform(format_args!("{}: replaced the existing file", args.output.display()));
@@ -160,6 +160,7 @@ fn render_instead(args: &ShowArgs, stop: &Stop) -> Result<(), Failure> {
         error_picture: None,
         layers: Default::default(),
         layer_samples: None,
+        denoise: false,
         threads: args.threads,
         seed: args.seed,
         integrator: None,

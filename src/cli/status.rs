@@ -125,7 +125,8 @@ fn picture(folder: &Path, path: &Path, films: &[PathBuf], has_merged: bool) -> R
     let FilmFile { film, shot, .. } = set.add_up(&|_, _| ())?;
     let note = note_of(&film, shot.clone(), &set.films[0], path);
     let (size, display) = ((film.width(), film.height()), shot.display.into());
-    Print { film: &film, display: &display, size, note: Some(&note) }.write(path, Replace::AllButFilms)?;
+    Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
+        .write(path, Replace::AllButFilms)?;
     let error = film.error_estimate().map(|error| format!(", estimated error {}", percent(error.relative)));
     inform(format_args!("{}: {} samples per pixel{}", path.display(), film.spp(), error.unwrap_or_default()));
     Ok(())

@@ -164,7 +164,8 @@ impl Work {
         let picture = self.folder.join(ALL[1]);
         let (size, note) = ((film.width(), film.height()), note_of(&film, shot.clone(), first, &picture));
         let display = shot.display.into();
-        Print { film: &film, display: &display, size, note: Some(&note) }.write(&picture, Replace::AllButFilms)?;
+        Print { film: &film, display: &display, size, note: Some(&note), denoised: None }
+            .write(&picture, Replace::AllButFilms)?;
         let estimate = film.error_estimate();
         let mut rounds = self.rounds.clone();
         let error = estimate.map(|estimate| estimate.relative);

@@ -82,7 +82,7 @@ impl Image {
         let uneven = self.film.is_uneven();
         let samples = ImageSamples { first: self.film.first_sample(), spp: self.film.spp(), uneven };
         let note = self.metadata.note(path, size, samples, self.display.into());
-        let print = Print { film: &self.film, display: &self.display, size, note: Some(&note) };
+        let print = Print { film: &self.film, display: &self.display, size, note: Some(&note), denoised: None };
         Ok(print.write(path, Replace::AllButFilms)?)
     }
 }

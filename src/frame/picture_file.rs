@@ -2,13 +2,14 @@
 //!
 //! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
 
-use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, relative_errors};
+use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, develop_colors, relative_errors};
 use crate::scene::WriteError;
 use crate::scene::image_metadata::{NOTE_KEY, exr_text};
 use crate::scene::whole_file::{Replace, WholeFile, unwritable};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text, WritableImage,
 };
+use glam::Vec3;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -55,6 +56,8 @@ pub struct Print<'a> {
     pub size: (u32, u32),
     /// What the picture says about itself.
     pub note: Option<&'a str>,
+    /// Shown in place of what the film has: radiance of as many pixels, row by row from the top.
+    pub denoised: Option<&'a [Vec3]>,
 }
 
 /// Writes a film as its name asks, without a note.
@@ -62,7 +65,8 @@ pub struct Print<'a> {
 /// # Errors
 /// As [`Print::write`].
 pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), WriteError> {
-    Print { film, display, size: (film.width(), film.height()), note: None }.write(path, Replace::AllButFilms)
+    Print { film, display, size: (film.width(), film.height()), note: None, denoised: None }
+        .write(path, Replace::AllButFilms)
 }
 
 /// Writes the relative error of each pixel ([`relative_errors`]) as a grey EXR: 0.05 is 5 %.
@@ -139,7 +143,13 @@ impl Print<'_> {
     fn png(&self, out: &mut impl Write) -> Result<(), png::EncodingError> {
         let (width, height) = self.size;
         let mut rgb = Vec::new();
-        develop(self.film, self.display, width, height, &mut rgb);
+        match self.denoised {
+            None => develop(self.film, self.display, width, height, &mut rgb),
+            Some(colors) => {
+                let from = (self.film.width(), self.film.height());
+                develop_colors(colors, from, self.display, (width, height), &mut rgb);
+            }
+        }
         // In place: no pixel is opaque more than another.
         let n_pixels = rgb.len() / 4;
         (0..n_pixels).for_each(|i| rgb.copy_within(4 * i..4 * i + 3, 3 * i));
@@ -157,7 +167,11 @@ impl Print<'_> {
     }
 
     fn exr(&self) -> Result<Vec<u8>, exr::error::Error> {
-        encode(self.film, mean_channels(self.film), self.note)
+        let channels = match self.denoised {
+            None => mean_channels(self.film),
+            Some(colors) => channels_of(colors),
+        };
+        encode(self.film, channels, self.note)
     }
 }
 
@@ -181,9 +195,12 @@ fn encode(
 
 /// What the film shows, as the red, green and blue channels of an EXR.
 pub(super) fn mean_channels(film: &Film) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
-    let means = film.means();
+    channels_of(&film.means())
+}
+
+fn channels_of(colors: &[Vec3]) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
     let channel =
-        |name: &str, c: usize| AnyChannel::new(name, FlatSamples::F32(means.iter().map(|mean| mean[c]).collect()));
+        |name: &str, c: usize| AnyChannel::new(name, FlatSamples::F32(colors.iter().map(|color| color[c]).collect()));
     SmallVec::from_vec(vec![channel("R", 0), channel("G", 1), channel("B", 2)])
 }
 
@@ -196,7 +213,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (film, display) = (Film::new(5, 3), Display::default());
         std::fs::write(folder.path().join("gallery-0002.png"), "not ours").unwrap();
-        let print = Print { film: &film, display: &display, size: (10, 6), note: None };
+        let print = Print { film: &film, display: &display, size: (10, 6), note: None, denoised: None };
         let save = |format| print.write_new(folder.path(), "gallery", format).unwrap();
         let first = save(PictureFormat::Png);
         assert_eq!(first, folder.path().join("gallery-0001.png"));

@@ -102,6 +102,9 @@ pub struct ImageMetadata {
     /// Some pixels have more samples: it was stopped in the middle of a pass, and cannot be made again to the last bit.
     #[serde(default)]
     pub uneven: bool,
+    /// What has denoised the pixels, which are then no longer what the samples say; `None`: nothing has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoised: Option<String>,
     /// The scene itself, where it had changes that its file has not; paths as in that file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,

@@ -92,6 +92,7 @@ impl MetadataDraft {
             spp: samples.spp,
             allocation: self.allocation,
             uneven: samples.uneven,
+            denoised: None,
             text: has_changed.then(|| file.to_ron()),
         };
         shot.to_note()

@@ -181,7 +181,7 @@ fn print(
     format: PictureFormat,
 ) -> Saved {
     let (coarse, note) = metadata_of(folder, stem, film, draft, display, size);
-    let print = Print { film, display, size, note: note.as_deref() };
+    let print = Print { film, display, size, note: note.as_deref(), denoised: None };
     Ok(print.write_new(folder, stem, format).map(|path| Kept { path, coarse })?)
 }
 

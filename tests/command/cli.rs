@@ -36,6 +36,25 @@ fn a_png_and_an_exr_show_the_same_light() {
 }
 
 #[test]
+fn a_denoised_picture_says_so_and_leaves_the_film_raw() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let render = |line: &str| firstlight(path, &line.split(' ').collect::<Vec<_>>());
+    render("render cornell -o raw.exr --size 48x48 --spp 4 --film raw-film.exr");
+    let told = render("render cornell -o denoised.exr --size 48x48 --spp 4 --film film.exr --denoise --json");
+    let told: serde_json::Value = serde_json::from_str(told.lines().last().unwrap()).unwrap();
+    let [raw_error, error] = ["estimated_error", "estimated_error_denoised"].map(|key| told[key].as_f64().unwrap());
+    assert!(error > 0.0 && error < raw_error, "{told}");
+    let pixels = |name: &str| image::open(path.join(name)).unwrap().into_rgb32f().into_raw();
+    assert_ne!(pixels("raw.exr"), pixels("denoised.exr"));
+    assert_eq!(pixels("raw-film.exr"), pixels("film.exr"), "the film is raw");
+    let denoised_by = |name: &str| firstlight::scene::ImageMetadata::read(&path.join(name)).unwrap().denoised;
+    assert_eq!(["raw.exr", "denoised.exr", "film.exr"].map(denoised_by), [None, Some("own".to_owned()), None]);
+    render("render cornell -o denoised.png --size 48x48 --spp 1 --denoise --threads 1");
+    assert_eq!(denoised_by("denoised.png"), Some("own".to_owned()));
+}
+
+#[test]
 fn a_picture_that_found_no_light_does_not_know_its_error() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

@@ -7,6 +7,7 @@ mod adaptive;
 mod caustic_choice;
 mod caustics;
 mod delta_lights;
+mod denoise;
 mod determinism;
 mod features;
 mod filters;

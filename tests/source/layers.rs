@@ -16,6 +16,7 @@ const PREPARE: &str = "crates/render/src/prepare";
 const SHADING: &str = "crates/render/src/shading";
 const INTEGRATORS: &str = "crates/render/src/integrators";
 const FILM: &str = "crates/render/src/film";
+const DENOISE: &str = "crates/render/src/denoise";
 const DRIVER: &str = "crates/render/src/driver";
 const PRINTABLE: &str = "src/printable";
 const CONSOLE: &str = "src/console";
@@ -25,7 +26,7 @@ const EMBED: &str = "src/embed";
 
 /// Each folder, and what it may import from, lower layers first. A package of `crates/` imports no other package than those
 /// of its line; in `src` they may be imported everywhere.
-const LAYERS: [(&str, &[&str]); 24] = [
+const LAYERS: [(&str, &[&str]); 25] = [
     (SIMD, &[]),
     (GEOMETRY, &[SIMD]),
     (KDTREE, &[SIMD, GEOMETRY]),
@@ -36,9 +37,11 @@ const LAYERS: [(&str, &[&str]); 24] = [
     (SHADING, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE]),
     (INTEGRATORS, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING]),
     (FILM, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS]),
-    (DRIVER, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS, FILM]),
+    // It knows slices, and what the film says of its variance.
+    (DENOISE, &[FILM]),
+    (DRIVER, &[SIMD, KDTREE, GEOMETRY, MESH, SAMPLING, CORE, PREPARE, SHADING, INTEGRATORS, FILM, DENOISE]),
     // `lib.rs`, which shows what the folders have.
-    ("crates/render/src", &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DRIVER]),
+    ("crates/render/src", &[KDTREE, CORE, PREPARE, INTEGRATORS, FILM, DENOISE, DRIVER]),
     (PRINTABLE, &[]),
     (CONSOLE, &[PRINTABLE]),
     (SCENE, &[PRINTABLE, CONSOLE]),

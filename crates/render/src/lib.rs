@@ -4,6 +4,7 @@
 //! folders are layers, each of which imports from those before it alone.
 
 mod core;
+mod denoise;
 mod driver;
 mod film;
 mod integrators;
@@ -33,17 +34,20 @@ pub use crate::core::techniques::Techniques;
 pub use crate::core::texture::{
     Channel, Encoding, ImageTexture, Texels, Texture, TextureId, TexturePattern, TexturePoint, Wrap,
 };
+pub use denoise::{DenoiseInput, Denoised, Guides, denoise};
 pub use driver::caustic_choice::{caustic_choice, known_caustic_choice};
+pub use driver::denoised::{denoise_film, gather_guides};
 pub use driver::explain::{Contribution, Explanation, explain, light_traced};
 pub use driver::features::{FEATURE_SAMPLES, gather_features, gather_features_and_ids};
 pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };
 pub use driver::renderer::{BadSample, PassReport, advance, advance_region, replay_sample};
-pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_pixel, encode_srgb};
+pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_colors, develop_pixel, encode_srgb};
 pub use film::error::{MergeError, RecordError};
 pub use film::estimate::ErrorEstimate;
 pub use film::features::{FeatureBuffers, FeatureIds, FeatureVariances, IdShares};
+pub use film::halves::HalfSteps;
 pub use film::record::{
     BlockRecord, FilmLayout, FilmRecord, LightTracingRecord, N_PLANES, OldFilmLayout, OldTileRecord, RoundRecord,
     StepsRecord, TileRecord,

@@ -7,6 +7,7 @@ pub(crate) mod error;
 pub(crate) mod estimate;
 pub(crate) mod exact_sum;
 pub(crate) mod features;
+pub(crate) mod halves;
 pub(crate) mod light_layer;
 pub(crate) mod record;
 pub(crate) mod region;

@@ -3,7 +3,7 @@
 
 use crate::film::exact_sum::ExactSum;
 use crate::film::features::FeatureBuffers;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// A picture that there is no memory for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -35,6 +35,8 @@ pub enum Purpose {
     FilmFile,
     /// A film with feature buffers, or a picture with all layers: the buffers, and more channels.
     Layers,
+    /// Feature buffers, and the lists of the denoiser.
+    Denoised,
 }
 
 impl Purpose {
@@ -44,15 +46,16 @@ impl Purpose {
             Self::Exr => 12 + 12 + 2 * 12,
             Self::FilmFile => 8 * 18 + 12 + 12 + 3 * (4 * 39),
             Self::Layers => Self::FilmFile.bytes_a_pixel() + FeatureBuffers::BYTES_A_PIXEL as u64 + 3 * (4 * 45),
+            Self::Denoised => FeatureBuffers::BYTES_A_PIXEL as u64 + 640,
         }
     }
 }
 
-/// Memory that a pixel of a film takes: its sums, and its mean at the last power of two.
-pub(crate) const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
+/// Memory that a pixel of a film takes: its sums, its mean at the last power of two, and how far that had moved.
+pub(crate) const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>() + size_of::<Vec3>();
 
 /// And for traced light, where there is such light.
-pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>();
+pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>() + size_of::<Vec3>();
 
 /// For what a large picture takes besides, such as the workers' memory: an eighth, and no more than this.
 const MOST_BESIDES: u64 = 32 << 20;

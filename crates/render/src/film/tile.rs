@@ -24,6 +24,8 @@ pub(crate) struct FilmTile {
     pub before: Vec<DVec3>,
     /// Each pixel's share of its block's last step, mean over channels; empty where it is not known.
     pub last: Vec<f32>,
+    /// How far each pixel's mean moved in that step, W·m⁻²·sr⁻¹; NaN where it is not known, empty where it is known of none.
+    pub half_steps: Vec<Vec3>,
     /// The same of traced light.
     pub light: TileLight,
 }
@@ -37,6 +39,8 @@ pub(crate) struct TileLight {
     pub before: Vec<DVec3>,
     /// Each pixel's share of the last step, mean over channels; empty where it is not known.
     pub last: Vec<f32>,
+    /// How far each pixel's mean moved in that step; empty where it is not known.
+    pub half_steps: Vec<Vec3>,
     /// What doublings changed.
     pub steps: Steps,
 }
@@ -48,9 +52,10 @@ impl TileLight {
     }
 
     fn clear(&mut self) {
-        let Self { mean_of, before, last, steps } = self;
+        let Self { mean_of, before, last, half_steps, steps } = self;
         before.clear();
         last.clear();
+        half_steps.clear();
         (*mean_of, *steps) = (0, Steps::default());
     }
 }
@@ -62,32 +67,35 @@ impl FilmTile {
 
     pub fn try_new(origin: UVec2, size: UVec2) -> Result<Self, TryReserveError> {
         let n = size.x as usize * size.y as usize;
-        let (mut sums, mut before, mut last) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut sums, mut before, mut last, mut half_steps) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         sums.try_reserve_exact(n)?;
         sums.resize(n, ExactSum::default());
         before.try_reserve_exact(n)?;
         last.try_reserve_exact(n)?;
+        half_steps.try_reserve_exact(n)?;
         let starts = |length: u32| (0..length).step_by(BLOCK_SIZE as usize);
         let blocks = starts(size.y).flat_map(|y| starts(size.x).map(move |x| UVec2::new(x, y)));
         let blocks = blocks.map(|start| Block::new(start, (size - start).min(UVec2::splat(BLOCK_SIZE)))).collect();
-        Ok(Self { origin, size, blocks, sums, bad: Vec::new(), before, last, light: TileLight::default() })
+        Ok(Self { origin, size, blocks, sums, bad: Vec::new(), before, last, half_steps, light: TileLight::default() })
     }
 
     /// Has the memory ready that traced light needs.
     pub fn try_reserve_light(&mut self) -> Result<(), TryReserveError> {
         let n = self.n_pixels();
         self.light.before.try_reserve_exact(n)?;
+        self.light.half_steps.try_reserve_exact(n)?;
         self.light.last.try_reserve_exact(n)
     }
 
     /// As new, to begin with sample number `first`.
     pub fn clear(&mut self, first: u32) {
-        let Self { origin: _, size: _, blocks, sums, bad, before, last, light } = self;
+        let Self { origin: _, size: _, blocks, sums, bad, before, last, half_steps, light } = self;
         blocks.iter_mut().for_each(|block| block.clear(first));
         sums.fill(ExactSum::default());
         bad.clear();
         before.clear();
         last.clear();
+        half_steps.clear();
         light.clear();
     }
 
@@ -188,6 +196,9 @@ impl FilmTile {
             if self.last.is_empty() {
                 self.last.resize(self.sums.len(), 0.0);
             }
+            if self.half_steps.is_empty() {
+                self.half_steps.resize(self.sums.len(), Vec3::NAN);
+            }
             let mut sum = 0.0;
             for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
                 let before = self.before[local];
@@ -199,9 +210,14 @@ impl FilmTile {
                 };
                 let step = relative_square(seen[i] - before, level);
                 self.last[local] = (step / 3.0) as f32;
+                self.half_steps[local] = (seen[i] - before).as_vec3();
                 sum += step;
             }
             self.blocks[block].steps.push(spp, sum);
+        } else if !self.half_steps.is_empty() {
+            for local in self.blocks[block].locals(self.size.x) {
+                self.half_steps[local] = Vec3::NAN;
+            }
         }
         for (i, local) in self.blocks[block].locals(self.size.x).enumerate() {
             self.before[local] = seen[i];
@@ -220,6 +236,7 @@ impl FilmTile {
         let place = |local: usize| self.origin + UVec2::new(local as u32 % self.size.x, local as u32 / self.size.x);
         let traced = |local: usize| layer.mean((place(local).y * width + place(local).x) as usize);
         let now: Vec<DVec3> = (0..self.n_pixels()).map(traced).collect();
+        self.light.half_steps.clear();
         if mean_of > 0 && mean_of == spp / 2 {
             let seen: Vec<DVec3> = (0..self.n_pixels()).map(|local| self.mean(local)).collect();
             let shown: Vec<DVec3> = seen.iter().zip(&now).map(|(seen, traced)| *seen + *traced).collect();
@@ -230,6 +247,7 @@ impl FilmTile {
                 let level = local_level(&shown, seen[local] + *before, size.x as usize, local);
                 let step = relative_square(*traced - *before, level);
                 light.last.push((step / 3.0) as f32);
+                light.half_steps.push((*traced - *before).as_vec3());
                 sum += step;
             }
             light.steps.push(spp, sum);
@@ -257,6 +275,11 @@ impl FilmTile {
                 for local in block.locals(self.size.x) {
                     copy_one(&other.before, &mut self.before, local, self.sums.len());
                     copy_one(&other.last, &mut self.last, local, self.sums.len());
+                    let half_step = other.half_steps.get(local).copied().unwrap_or(Vec3::NAN);
+                    if !half_step.is_nan() || !self.half_steps.is_empty() {
+                        self.half_steps.resize(self.sums.len(), Vec3::NAN);
+                        self.half_steps[local] = half_step;
+                    }
                 }
             }
             block.merge_samples(of_other);

@@ -69,7 +69,7 @@ impl Film {
     /// Samples of a pixel are numbered below this.
     pub const MAX_SAMPLES: u32 = 1 << 31;
 
-    /// Memory that a pixel takes: its sums, and its mean at the last power of two.
+    /// Memory that a pixel takes: its sums, its mean at the last power of two, and how far that had moved.
     pub const BYTES_A_PIXEL: usize = room::BYTES_A_PIXEL;
 
     /// Memory that a pixel takes for traced light, where there is such light.

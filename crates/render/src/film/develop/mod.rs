@@ -40,23 +40,47 @@ pub fn develop_pixel(radiance: Vec3, display: &Display) -> [u8; 3] {
 
 /// Fills `rgba` with `width * height` opaque pixels: the film itself, or, when the sizes differ, scaled bilinearly.
 pub fn develop(film: &Film, display: &Display, width: u32, height: u32, rgba: &mut Vec<u8>) {
-    let set = InstructionSet::detect();
-    rgba.resize(4 * width as usize * height as usize, 255);
-    if (width, height) == (film.width(), film.height()) {
-        return develop_film(set, film, display, rgba);
-    }
-    let mut small = vec![255; 4 * film.width() as usize * film.height() as usize];
-    develop_film(set, film, display, &mut small);
-    scale::scale(set, &small, [film.width(), film.height()], [width, height], rgba);
+    develop_rows([film.width(), film.height()], display, [width, height], rgba, &|row, y| row.read(film, y));
 }
 
-/// At the size of the film.
-fn develop_film(set: InstructionSet, film: &Film, display: &Display, rgba: &mut [u8]) {
-    let width = film.width() as usize;
-    rgba.par_chunks_exact_mut(4 * width).enumerate().for_each_init(Row::default, |row, (y, rgba)| {
-        row.read(film, y as u32);
-        row.develop(set, *display, rgba);
-    });
+/// The same of a picture that is no film: `colors` is the radiance of `from[0] * from[1]` pixels, row by row from the top.
+///
+/// # Panics
+/// When it is another number of pixels.
+pub fn develop_colors(
+    colors: &[Vec3],
+    from: (u32, u32),
+    display: &Display,
+    (width, height): (u32, u32),
+    rgba: &mut Vec<u8>,
+) {
+    assert_eq!(colors.len(), from.0 as usize * from.1 as usize, "pixels of a picture of {} x {}", from.0, from.1);
+    let row_of = |row: &mut Row, y: u32| row.take(&colors[y as usize * from.0 as usize..][..from.0 as usize]);
+    develop_rows([from.0, from.1], display, [width, height], rgba, &row_of);
+}
+
+/// - `read`: fills a row with the radiance of the pixels of a row.
+fn develop_rows(
+    from: [u32; 2],
+    display: &Display,
+    to: [u32; 2],
+    rgba: &mut Vec<u8>,
+    read: &(dyn Fn(&mut Row, u32) + Sync),
+) {
+    let set = InstructionSet::detect();
+    rgba.resize(4 * to[0] as usize * to[1] as usize, 255);
+    let unscaled = |rgba: &mut [u8]| {
+        rgba.par_chunks_exact_mut(4 * from[0] as usize).enumerate().for_each_init(Row::default, |row, (y, rgba)| {
+            read(row, y as u32);
+            row.develop(set, *display, rgba);
+        });
+    };
+    if to == from {
+        return unscaled(rgba);
+    }
+    let mut small = vec![255; 4 * from[0] as usize * from[1] as usize];
+    unscaled(&mut small);
+    scale::scale(set, &small, from, to, rgba);
 }
 
 /// Radiance of a row of pixels, a list for each channel with room up to a multiple of sixteen.
@@ -70,6 +94,14 @@ impl Row {
         }
         let [r, g, b] = &mut self.0;
         film.for_each_in_row(y, |x, mean| (r[x], g[x], b[x]) = mean.into());
+    }
+
+    fn take(&mut self, colors: &[Vec3]) {
+        for (c, channel) in self.0.iter_mut().enumerate() {
+            channel.clear();
+            channel.extend(colors.iter().map(|color| color[c]));
+            channel.resize(colors.len().next_multiple_of(LANES), 0.0);
+        }
     }
 
     /// - `rgba`: of as many pixels as were read.

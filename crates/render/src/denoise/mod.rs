@@ -1,0 +1,247 @@
+//! A picture without most of its noise, that says how wrong it is: a filter guided by what surfaces are known to be
+//! (`regression`), and a combination of raw and filtered that converges to what the raw picture converges to (`combine`).
+//!
+//! Pure functions of slices. Every pixel is a fixed sequence of operations, so the result depends neither on threads nor on
+//! the instruction set. Start reading at [`denoise`].
+
+mod blur;
+mod combine;
+mod fit;
+mod input;
+mod moments;
+mod regression;
+
+pub use input::{DenoiseInput, Guides};
+
+use glam::Vec3;
+
+/// A denoised picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Denoised {
+    /// Raw and filtered combined, radiance of each pixel row by row from the top.
+    pub color: Vec<Vec3>,
+    /// How much of each pixel is filtered, 0..1; it goes to zero as the raw picture becomes better than the filter.
+    pub share: Vec<f32>,
+    /// Estimated root of relMSE, as [`ErrorEstimate::relative`](crate::film::estimate::ErrorEstimate::relative) is of the raw
+    /// picture.
+    pub error: f64,
+}
+
+/// Removes noise from a picture, on the current rayon pool; `None` when `stop` said so, which is asked often.
+///
+/// # Panics
+/// When the lists of the input do not have as many entries as the picture has pixels.
+pub fn denoise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
+    input.check();
+    let found = regression::regression(input, stop)?;
+    let filtered = regression::pick(input, &found);
+    let combined = combine::combine(input, &found, &filtered);
+    let combine::Combined { color, share, relative_mse } = combined;
+    Some(Denoised { color, share, error: relative_mse.max(0.0).sqrt() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::halves::HalfSteps;
+    use crate::sampling::{hash_combine, hash_u32};
+    use glam::Vec2;
+
+    const WIDTH: usize = 96;
+    const HEIGHT: usize = 64;
+
+    /// A picture whose truth is known, with what is known of its surfaces.
+    struct Scene {
+        truth: Vec<Vec3>,
+        albedo: Vec<Vec3>,
+        normal: Vec<Vec3>,
+        depth: Vec<f32>,
+        emitters: Vec<bool>,
+    }
+
+    /// What halves of samples with this much noise show.
+    struct Rendered {
+        color: Vec<Vec3>,
+        halves: HalfSteps,
+    }
+
+    impl Scene {
+        /// - `of`: albedo and light of each pixel.
+        fn of(of: impl Fn(usize, usize) -> (f32, Vec3)) -> Self {
+            let pixels: Vec<(f32, Vec3)> = (0..WIDTH * HEIGHT).map(|i| of(i % WIDTH, i / WIDTH)).collect();
+            Self {
+                truth: pixels.iter().map(|(albedo, light)| *albedo * *light).collect(),
+                albedo: pixels.iter().map(|(albedo, _)| Vec3::splat(*albedo)).collect(),
+                normal: vec![Vec3::Z; pixels.len()],
+                depth: vec![5.0; pixels.len()],
+                emitters: vec![false; pixels.len()],
+            }
+        }
+
+        /// - `noise`: standard deviation of each channel over its truth, of one sample.
+        fn render(&self, spp: u32, noise: f32) -> Rendered {
+            let normal = |pixel: usize, k: u32| {
+                let number = |k: u32| {
+                    let hash = hash_combine(hash_u32(pixel as u32), k);
+                    (f64::from(hash) + 0.5) / (1u64 << 32) as f64
+                };
+                let u = [number(2 * k), number(2 * k + 1)];
+                ((-2.0 * u[0].ln()).sqrt() * (std::f64::consts::TAU * u[1]).cos()) as f32
+            };
+            let deviation = noise / (spp as f32 / 2.0).sqrt();
+            let half = |pixel: usize, which: u32| {
+                let channel = |c: usize| self.truth[pixel][c] * (1.0 + deviation * normal(pixel, 3 * which + c as u32));
+                Vec3::new(channel(0), channel(1), channel(2))
+            };
+            let halves: Vec<[Vec3; 2]> = (0..self.truth.len()).map(|i| [half(i, 0), half(i, 1)]).collect();
+            Rendered {
+                color: halves.iter().map(|[a, b]| 0.5 * (*a + *b)).collect(),
+                halves: HalfSteps {
+                    steps: halves.iter().map(|[a, b]| 0.5 * (*b - *a)).collect(),
+                    scale: vec![1.0; halves.len()],
+                },
+            }
+        }
+
+        fn denoise(&self, of: &Rendered, with_halves: bool) -> Denoised {
+            let Self { albedo, normal, depth, emitters, .. } = self;
+            let guides = Guides { albedo, normal, depth, emitters };
+            let half_steps = with_halves.then_some(&of.halves);
+            let input = DenoiseInput { width: WIDTH, height: HEIGHT, color: &of.color, half_steps, guides };
+            denoise(&input, &|| false).expect("nothing stops it")
+        }
+
+        fn relative_mse(&self, colors: &[Vec3]) -> f64 {
+            let of = |(color, truth): (&Vec3, &Vec3)| {
+                let off = *color - *truth;
+                f64::from((off * off / (*truth * *truth + 0.01)).element_sum())
+            };
+            colors.iter().zip(&self.truth).map(of).sum::<f64>() / (3 * colors.len()) as f64
+        }
+    }
+
+    fn checker(x: usize, y: usize) -> f32 {
+        if (x / 7 + y / 5).is_multiple_of(2) { 0.8 } else { 0.1 }
+    }
+
+    /// Light that falls off to one side, on a floor whose colours are known.
+    fn floor() -> Scene {
+        Scene::of(|x, y| {
+            (checker(x, y), Vec3::new(1.0, 0.8, 0.6) * (0.5 + x as f32 / WIDTH as f32 + 0.3 * y as f32 / HEIGHT as f32))
+        })
+    }
+
+    /// An edge of a shadow that no feature tells of.
+    fn shadow() -> Scene {
+        Scene::of(|x, y| {
+            let lit = Vec2::new(x as f32, y as f32).dot(Vec2::new(0.8, 0.6)) > 50.0;
+            (0.6, Vec3::splat(if lit { 1.0 } else { 0.2 }))
+        })
+    }
+
+    #[test]
+    fn even_light_on_a_textured_floor_loses_nearly_all_noise() {
+        let scene = floor();
+        for (spp, with_halves) in [(1, false), (4, true), (64, true)] {
+            let rendered = scene.render(spp.max(2), if spp == 1 { 0.4 * 2.0_f32.sqrt() } else { 0.4 });
+            let found = scene.denoise(&rendered, with_halves);
+            let (raw, denoised) = (scene.relative_mse(&rendered.color), scene.relative_mse(&found.color));
+            // A single sample says nothing of its noise.
+            let most = if with_halves { 0.04 } else { 0.06 };
+            assert!(denoised < most * raw, "{spp} samples: {denoised} of {raw}");
+        }
+    }
+
+    #[test]
+    fn the_edge_of_a_shadow_stays_where_it_is() {
+        let scene = shadow();
+        for spp in [4, 16, 64, 256, 1024] {
+            let rendered = scene.render(spp, 0.4);
+            let found = scene.denoise(&rendered, true);
+            let (raw, denoised) = (scene.relative_mse(&rendered.color), scene.relative_mse(&found.color));
+            assert!(denoised < 0.35 * raw, "{spp} samples: {denoised} of {raw}");
+            let at_edge = |colors: &[Vec3]| {
+                let off = |i: usize| (colors[i] - scene.truth[i]).length_squared() / scene.truth[i].length_squared();
+                let near = (0..WIDTH * HEIGHT).filter(|i| {
+                    let place = Vec2::new((i % WIDTH) as f32, (i / WIDTH) as f32).dot(Vec2::new(0.8, 0.6));
+                    (place - 50.0).abs() < 1.5
+                });
+                near.map(|i| f64::from(off(i))).sum::<f64>()
+            };
+            let (raw, denoised) = (at_edge(&rendered.color), at_edge(&found.color));
+            // What a few pixels say of their noise is not much: the edge itself is soft until they have more samples.
+            let most = if spp < 256 { 4.0 } else { 1.25 };
+            assert!(denoised < most * raw, "{spp} samples, at the edge: {denoised} of {raw}");
+        }
+    }
+
+    /// Nothing that the filter knows of: every pixel has its own light.
+    #[test]
+    fn what_no_filter_can_know_is_left_alone() {
+        let number = |x: usize, y: usize| f64::from(hash_u32((y * WIDTH + x) as u32)) / f64::from(u32::MAX);
+        let scene = Scene::of(|x, y| (0.5, Vec3::splat(0.7 + 0.6 * number(x, y) as f32)));
+        for spp in [16, 256, 4096] {
+            let rendered = scene.render(spp, 0.4);
+            let found = scene.denoise(&rendered, true);
+            let (raw, denoised) = (scene.relative_mse(&rendered.color), scene.relative_mse(&found.color));
+            assert!(denoised < 1.02 * raw, "{spp} samples: {denoised} of {raw}");
+        }
+        let silent = scene.render(1 << 30, 0.0);
+        assert_eq!(scene.denoise(&silent, true).color, silent.color, "without noise the raw picture is the result");
+    }
+
+    #[test]
+    fn the_error_that_is_told_is_the_error() {
+        let wild = Scene::of(|x, y| {
+            let stripe = (x * x / 40 + y).is_multiple_of(3);
+            (checker(x, y), Vec3::splat(if stripe { 1.0 } else { 0.5 }))
+        });
+        for (name, scene) in [("shadow", shadow()), ("stripes", wild)] {
+            for spp in [16, 64] {
+                let rendered = scene.render(spp, 0.6);
+                let found = scene.denoise(&rendered, true);
+                let ratio = found.error / scene.relative_mse(&found.color).sqrt();
+                assert!((0.8..1.25).contains(&ratio), "{name} at {spp} samples: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn threads_change_nothing_and_a_stop_ends_it() {
+        let scene = floor();
+        let rendered = scene.render(16, 0.4);
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| scene.denoise(&rendered, true))
+        };
+        assert_eq!(with(1), with(3));
+        let Scene { albedo, normal, depth, emitters, .. } = &scene;
+        let guides = Guides { albedo, normal, depth, emitters };
+        let input = DenoiseInput {
+            width: WIDTH,
+            height: HEIGHT,
+            color: &rendered.color,
+            half_steps: Some(&rendered.halves),
+            guides,
+        };
+        assert_eq!(denoise(&input, &|| true), None);
+    }
+
+    #[test]
+    fn pictures_of_a_few_pixels_and_odd_features_have_finite_results() {
+        for (width, height) in [(1, 1), (2, 1), (1, 7), (5, 3)] {
+            let n = width * height;
+            let color: Vec<Vec3> = (0..n).map(|i| Vec3::splat(i as f32 * 1e4)).collect();
+            let depth: Vec<f32> = (0..n).map(|i| if i % 2 == 0 { f32::INFINITY } else { 1e20 }).collect();
+            let guides = Guides {
+                albedo: &vec![Vec3::ZERO; n],
+                normal: &vec![Vec3::ZERO; n],
+                depth: &depth,
+                emitters: &vec![n > 5; n],
+            };
+            let found =
+                denoise(&DenoiseInput { width, height, color: &color, half_steps: None, guides }, &|| false).unwrap();
+            assert!(found.color.iter().all(|color| color.is_finite()) && found.error.is_finite(), "{found:?}");
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Denoised pictures of scenes against references: better than the raw ones, from one sample to many.
+
+use crate::common::*;
+use firstlight::render::{Denoised, Environment, Film, Prepared, RenderSettings, advance, denoise_film, gather_guides};
+use glam::{UVec2, Vec3};
+
+const SIZE: (u32, u32) = (64, 48);
+
+fn denoised(scene: &Prepared, film: &Film) -> Denoised {
+    let settings = RenderSettings::default();
+    let features = gather_guides(scene, &settings, UVec2::from(SIZE), 16, &|| false).expect("nothing stops it");
+    denoise_film(scene, film, &features, &|| false).expect("nothing stops it")
+}
+
+fn relative_mse(colors: &[Vec3], reference: &[Vec3]) -> f64 {
+    let of = |(color, truth): (&Vec3, &Vec3)| {
+        let off = *color - *truth;
+        f64::from((off * off / (*truth * *truth + 0.01)).element_sum())
+    };
+    colors.iter().zip(reference).map(of).sum::<f64>() / (3 * colors.len()) as f64
+}
+
+/// A sphere that throws a shadow, a mirror, and a lamp that is seen.
+fn room() -> Prepared {
+    scene(
+        vec![
+            (plane(Vec3::Y * -1.0, Vec3::Y), 0),
+            (plane(Vec3::Z * -4.0, Vec3::Z), 1),
+            (sphere(Vec3::new(-0.8, -0.3, -2.0), 0.7), 1),
+            (sphere(Vec3::new(1.0, -0.4, -2.2), 0.6), 2),
+            (quad(Vec3::new(-0.5, 1.6, -3.0), Vec3::X, Vec3::Z * 0.8), 3),
+        ],
+        vec![
+            diffuse(0.3),
+            diffuse(0.7),
+            firstlight::render::Material::Mirror {
+                reflectance: firstlight::render::ColorInput::Constant(Vec3::splat(0.9)),
+            },
+            emissive(12.0),
+        ],
+        Environment::Constant(Vec3::splat(0.05)),
+        camera(Vec3::new(0.0, 0.5, 3.0), Vec3::new(0.0, 0.0, -2.0), 55.0),
+    )
+}
+
+#[test]
+fn no_number_of_samples_makes_it_worse_than_raw() {
+    let scene = room();
+    let mut reference = Film::new(SIZE.0, SIZE.1);
+    let settings = RenderSettings { seed: 99, ..RenderSettings::default() };
+    advance(&scene, &settings, &mut reference, 2048, &|| false);
+    let reference = reference.means();
+    let mut film = Film::new(SIZE.0, SIZE.1);
+    for (spp, most) in [(1, 0.3), (3, 0.5), (4, 0.5), (16, 0.7), (40, 1.0), (128, 1.05)] {
+        advance(&scene, &RenderSettings::default(), &mut film, spp, &|| false);
+        let found = denoised(&scene, &film);
+        let (raw, error) = (relative_mse(&film.means(), &reference), relative_mse(&found.color, &reference));
+        assert!(error < most * raw, "{spp} samples: {error} of {raw}");
+        let told = found.error / error.sqrt();
+        println!("{spp}: {} told {told}", error / raw);
+        assert!(spp < 16 || (0.65..1.5).contains(&told), "{spp} samples: told {} for {}", found.error, error.sqrt());
+    }
+}
+
+/// The same samples in other tiles, in two films, and by other threads.
+#[test]
+fn parts_tiles_and_threads_change_no_byte() {
+    let scene = room();
+    let settings = RenderSettings::default();
+    let mut whole = Film::new(SIZE.0, SIZE.1);
+    advance(&scene, &settings, &mut whole, 8, &|| false);
+    let expected = denoised(&scene, &whole);
+
+    let mut other_tiles = Film::with_tile_size(SIZE.0, SIZE.1, 16);
+    advance(&scene, &settings, &mut other_tiles, 8, &|| false);
+    // The scale of the variance is a mean over tiles, in their order.
+    let off = |found: &Denoised| {
+        let pairs = expected.color.iter().zip(&found.color);
+        pairs.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max)
+    };
+    assert!(off(&denoised(&scene, &other_tiles)) < 0.05);
+
+    let mut parts = [0, 4].map(|first| {
+        let mut film = Film::new(SIZE.0, SIZE.1).starting_at(first);
+        advance(&scene, &settings, &mut film, 4, &|| false);
+        film
+    });
+    let (first, second) = parts.split_at_mut(1);
+    first[0].merge(&second[0]).unwrap();
+    assert_eq!(denoised(&scene, &first[0]), expected);
+
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(pool.install(|| denoised(&scene, &whole)), expected);
+}
