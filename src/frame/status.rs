@@ -67,6 +67,8 @@ pub struct Status {
     pub estimated_error: Option<f64>,
     /// How caustics are looked for, where the scene may have some and it is known.
     pub caustics: Option<CausticChoice>,
+    /// Relative error of the denoised picture, where that is shown.
+    pub denoised_error: Option<f64>,
     /// Why the samples were last dropped.
     pub restart_cause: String,
     /// How often they were.

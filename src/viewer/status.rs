@@ -29,9 +29,11 @@ pub fn figures(status: &Status) -> String {
     if status.divider > 1 {
         write!(line, " (1/{})", status.divider).expect("a string takes all");
     }
-    match status.estimated_error {
-        Some(error) => write!(line, "   error {}", percent(error)),
-        None => write!(line, "   error –"),
+    match (status.estimated_error, status.denoised_error) {
+        (Some(error), Some(denoised)) => write!(line, "   error {} (denoised {})", percent(error), percent(denoised)),
+        (Some(error), None) => write!(line, "   error {}", percent(error)),
+        (None, Some(denoised)) => write!(line, "   error – (denoised {})", percent(denoised)),
+        (None, None) => write!(line, "   error –"),
     }
     .expect("a string takes all");
     if !status.restart_cause.is_empty() {

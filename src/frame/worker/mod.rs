@@ -91,6 +91,8 @@ pub struct Stats {
     pub error: Option<f64>,
     /// How it looks for caustics, where the scene may have some; of the film at full resolution.
     pub caustics: Option<CausticChoice>,
+    /// Relative error of the denoised picture, where that is shown.
+    pub denoised_error: Option<f64>,
     /// Rays of the last steps, and the seconds that they took.
     pub recent_rays: RayCounts,
     pub recent_seconds: f64,

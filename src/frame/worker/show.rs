@@ -3,17 +3,31 @@
 use super::thread::Loop;
 use super::views::ViewKey;
 use super::{Stats, lock};
-use crate::render::{Inspected, Inspection, depths, develop, inspect, tint_sharp_zone};
+use crate::render::{
+    FEATURE_SAMPLES, Inspected, Inspection, denoise_film, depths, develop, develop_colors, gather_guides, inspect,
+    tint_sharp_zone,
+};
 use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
+
+/// So many times as long as denoising has taken, samples are taken before the next.
+const SAMPLES_FIRST: u32 = 4;
 
 impl Loop<'_> {
     /// Develops the film and hands it over, unless the last picture still waits to be taken and will do for now.
     pub(super) fn show(&mut self, last: bool) {
         let film = self.film.as_ref().filter(|(_, film)| film.spp() > 0).or(self.previous.as_ref());
         let (Some(job), Some((divider, film))) = (&self.job, film) else { return };
+        // While things move, every millisecond counts: coarse pictures are raw.
+        let denoises = self.look.inspection == Inspection::Denoised && *divider == 1;
+        let key = ViewKey {
+            generation: job.generation,
+            inspection: self.look.inspection,
+            size: UVec2::new(film.width(), film.height()),
+        };
         let stats = Stats {
+            denoised_error: self.stats.denoised_error.filter(|_| denoises),
             film_width: film.width(),
             film_height: film.height(),
             divider: *divider,
@@ -32,6 +46,10 @@ impl Loop<'_> {
                 return;
             }
         }
+        let waits = |&(of, until): &(ViewKey, Instant)| of == key && Instant::now() < until;
+        if denoises && !last && !self.redraw && self.views.denoised.as_ref().is_some_and(waits) {
+            return;
+        }
         let start = Instant::now();
         let pool = lock(&self.shared.pool).clone();
         let (width, height) = (job.width, job.height);
@@ -39,13 +57,23 @@ impl Loop<'_> {
         let interrupt = &self.shared.interrupt;
         // Another look or job is on its way: this picture would not be seen.
         let stop = || interrupt.load(Ordering::Relaxed);
-        let key = ViewKey {
-            generation: job.generation,
-            inspection: self.look.inspection,
-            size: UVec2::new(film.width(), film.height()),
-        };
         let mut legend = None;
-        if self.look.inspection == Inspection::Picture {
+        if denoises {
+            let known = self.views.guides.take().filter(|(of, _)| *of == key).map(|(_, guides)| guides);
+            let made = pool.install(|| {
+                let gather = || gather_guides(&job.prepared, &job.settings, key.size, FEATURE_SAMPLES, &stop);
+                let guides = known.or_else(gather)?;
+                let denoised = denoise_film(&job.prepared, film, &guides, &stop)?;
+                develop_colors(&denoised.color, key.size.into(), &self.display, (width, height), &mut picture.rgba);
+                Some((guides, denoised.error))
+            });
+            let Some((guides, error)) = made else { return };
+            self.views.guides = Some((key, guides));
+            let now = Instant::now();
+            self.views.denoised = Some((key, now + SAMPLES_FIRST * (now - start)));
+            self.stats.denoised_error = Some(error);
+            lock(&self.shared.outbox).stats.denoised_error = Some(error);
+        } else if matches!(self.look.inspection, Inspection::Picture | Inspection::Denoised) {
             pool.install(|| develop(film, &self.display, width, height, &mut picture.rgba));
         } else {
             let known = self.views.inspected.take().filter(|(of, _)| *of == key && !key.inspection.is_of_film());
@@ -71,7 +99,9 @@ impl Loop<'_> {
         }
         self.n_pictures += 1;
         (picture.width, picture.height, picture.number) = (width, height, self.n_pictures);
-        (picture.inspection, picture.legend) = (self.look.inspection, legend);
+        let is_raw = self.look.inspection == Inspection::Denoised && !denoises;
+        picture.inspection = if is_raw { Inspection::Picture } else { self.look.inspection };
+        picture.legend = legend;
         (picture.generation, picture.divider, picture.spp) = (job.generation, *divider, film.spp());
         {
             let mut outbox = lock(&self.shared.outbox);

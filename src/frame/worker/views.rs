@@ -1,7 +1,8 @@
 //! What was made of the film last and may do again.
 
-use crate::render::{Inspected, Inspection};
+use crate::render::{FeatureBuffers, Inspected, Inspection};
 use glam::UVec2;
+use std::time::Instant;
 
 /// What was made last and may do again.
 #[derive(Default)]
@@ -10,6 +11,10 @@ pub struct Views {
     pub inspected: Option<(ViewKey, Inspected)>,
     /// Depths of the film's pixels, and what for.
     pub depths: Option<(ViewKey, Vec<f32>)>,
+    /// What guides the denoiser, and what for.
+    pub guides: Option<(ViewKey, FeatureBuffers)>,
+    /// What was denoised last, and when it may be again: samples come first.
+    pub denoised: Option<(ViewKey, Instant)>,
 }
 
 /// What a view of the scene was made for.

@@ -251,6 +251,10 @@ pub static BINDINGS: &[KeyGroup] = &[
             },
             Binding { triggers: &[inspect("0", Inspection::Picture)], effect: "show the picture" },
             Binding {
+                triggers: &[named(NamedKey::F2, Action::Inspect(Inspection::Denoised))],
+                effect: "show the denoised picture, the raw one",
+            },
+            Binding {
                 triggers: &[text("j", Action::Explain)],
                 effect: "explain the pixel under the mouse: its paths, and what each light contributes",
             },

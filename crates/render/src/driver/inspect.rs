@@ -24,6 +24,8 @@ pub enum Inspection {
     /// The picture itself.
     #[default]
     Picture,
+    /// The picture without most of its noise, see [`denoise_film`](crate::driver::denoised::denoise_film).
+    Denoised,
     /// Shading normals: red to the right, green up, blue towards the viewer, a half for zero.
     Normals,
     /// Metres along the view axis.
@@ -46,8 +48,9 @@ pub enum Inspection {
 
 impl Inspection {
     /// All views, in the order of menus.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Picture,
+        Self::Denoised,
         Self::Normals,
         Self::Depth,
         Self::Albedo,
@@ -63,6 +66,7 @@ impl Inspection {
     pub fn label(self) -> &'static str {
         match self {
             Self::Picture => "picture",
+            Self::Denoised => "denoised",
             Self::Normals => "normals",
             Self::Depth => "depth",
             Self::Albedo => "albedo",
@@ -77,7 +81,7 @@ impl Inspection {
 
     /// Whether it changes with every sample.
     pub fn is_of_film(self) -> bool {
-        matches!(self, Self::Picture | Self::Error | Self::Samples | Self::Luminance)
+        matches!(self, Self::Picture | Self::Denoised | Self::Error | Self::Samples | Self::Luminance)
     }
 }
 
@@ -122,7 +126,8 @@ pub fn inspect(
     };
     let plain = |rgb| Inspected { width, height, rgb, legend: None };
     Some(match kind {
-        Inspection::Picture => plain(Vec::new()),
+        // Pictures are developed, not looked up.
+        Inspection::Picture | Inspection::Denoised => plain(Vec::new()),
         Inspection::Normals => plain(first_hits(snapshot, size, stop, |seen| match seen {
             Some((vertex, _)) => {
                 let camera = &snapshot.camera;
