@@ -28,11 +28,11 @@ pub fn parse_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A relative error to stop at: `0.05`, or the same as `5%`. Above 1 only with the sign: who writes 5 means percent.
+/// A relative error to stop at: `0.05`, or the same as `5%`. From 1 on only with the sign: 5 is meant as 5 %.
 pub fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = number_and_unit(text);
     match number.parse::<f64>().map(|value| value * unit) {
-        Ok(share) if unit == 1.0 && share > 1.0 && share.is_finite() => {
+        Ok(share) if unit == 1.0 && share >= 1.0 && share.is_finite() => {
             let per_cent = 100.0 * share;
             Err(format!("{number} means {per_cent} %: write {number}% for {number} percent"))
         }
@@ -145,7 +145,7 @@ mod tests {
         for (text, share) in [("0.05", 0.05), ("5%", 0.05), ("0.5 %", 0.005), ("1e-3", 1e-3), ("150%", 1.5)] {
             assert!((parse_share(text).unwrap() - share).abs() < 1e-15, "{text}");
         }
-        assert_eq!(parse_share("1"), Ok(1.0));
+        assert_eq!(parse_share("100%"), Ok(1.0));
         for text in ["5", "1.5", "5 ", "1e3"] {
             let number = text.trim();
             let error = parse_share(text).unwrap_err();
@@ -155,6 +155,7 @@ mod tests {
             );
         }
         assert!(parse_share("5").unwrap_err().starts_with("5 means 500 %"));
+        assert!(parse_share("1").unwrap_err().starts_with("1 means 100 %"));
         for text in ["", "%", "5%%", "5 percent", "-5%", "0%", "nan%", "inf", "%5"] {
             assert!(parse_share(text).unwrap_err().contains("0.05 or 5%"), "{text}");
         }

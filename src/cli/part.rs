@@ -15,7 +15,7 @@ use firstlight::cluster::part::Part;
 use firstlight::frame::{
     FeatureLayers, Target, read_film_file, read_film_summary, render_region_until, write_film_with_features,
 };
-use firstlight::render::{Film, Region};
+use firstlight::render::{Film, Region, worker_threads};
 use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{FileKind, Files, InputFile, SceneSource};
 use glam::UVec2;
@@ -34,7 +34,7 @@ pub fn run(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
     let args = &RenderArgs { uniform: args.part_by != PartBy::Frames || args.uniform, ..args.clone() };
     let part = args.part.as_deref().expect("only parts come here");
     let part = Part::parse(part).map_err(|error| Failure::Usage(format!("--part: {error}")))?;
-    let pool = rayon::ThreadPoolBuilder::new()
+    let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Retry(format!("error: cannot start worker threads: {error}")))?;

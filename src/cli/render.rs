@@ -14,7 +14,7 @@ use firstlight::frame::{
     OfflineReport, Target, read_film_file, render_offline_until, render_region_until, write_errors,
     write_film_with_features,
 };
-use firstlight::render::{BadSample, Film, Region};
+use firstlight::render::{BadSample, Film, Region, worker_threads};
 use firstlight::report::cpu_seconds;
 use firstlight::scene::whole_file::{Replace, WholeFile};
 use firstlight::scene::{Files, SceneSource};
@@ -107,7 +107,7 @@ pub fn run_one(args: &RenderArgs, stop: &Stop) -> Result<(), Failure> {
             return Err(Failure::Usage(message));
         }
     }
-    let pool = rayon::ThreadPoolBuilder::new()
+    let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;

@@ -6,7 +6,9 @@ use super::failure::Failure;
 use super::number::{parse_positive, parse_size};
 use super::stop::Stop;
 use clap::Args;
-use firstlight::render::{ErrorMetric, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques};
+use firstlight::render::{
+    ErrorMetric, Prepared, Purpose, RenderSettings, Room, SampleAllocation, Techniques, worker_threads,
+};
 use firstlight::report::{
     Ablation, ConvergenceCurve, CurveLimits, CurveStep, Key, LinearPicture, Reference, ReferenceStore, SceneOutcome,
     csv, foreign_share, measure_curve, page, summary_text,
@@ -85,7 +87,7 @@ pub fn run(args: &ReportArgs, stop: &Stop) -> Result<(), Failure> {
     let mut files = OverwriteArgs::default().files();
     files.read_all(args.reference.clone())?;
     files.write_all([html.clone(), table.clone()])?;
-    let pool = rayon::ThreadPoolBuilder::new()
+    let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;

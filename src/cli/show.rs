@@ -87,6 +87,9 @@ fn open_window(args: &ShowArgs) -> Result<(), Failure> {
     }
     let threads = args.threads.map(usize::from);
     let folder = args.save_to.clone();
+    if !folder.is_dir() {
+        return Err(Failure::Problems(vec![format!("{}: there is no such folder for --save-to", folder.display())]));
+    }
     let options = ViewerOptions {
         source,
         width,

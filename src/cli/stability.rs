@@ -3,6 +3,7 @@
 use super::console::{Bar, lines, print};
 use super::failure::Failure;
 use clap::Args;
+use firstlight::render::worker_threads;
 use firstlight::report::cpu_seconds;
 use firstlight::stability::{CASES, Case, Tally, Worst};
 use std::time::Instant;
@@ -40,7 +41,7 @@ pub fn run(args: &StabilityArgs) -> Result<(), Failure> {
     if let Some((stage, ray)) = args.replay {
         return replay(args, &cases, stage, ray);
     }
-    let pool = rayon::ThreadPoolBuilder::new()
+    let pool = worker_threads()
         .num_threads(args.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::Failed(format!("cannot start worker threads: {error}")))?;

@@ -2,7 +2,7 @@
 
 use super::{Error, Image, RenderOptions};
 use crate::frame::{check_film_source, render_offline_until};
-use crate::render::{Film, NoRoom};
+use crate::render::{Film, NoRoom, worker_threads};
 use crate::scene::{
     Description, DisplaySettings, Extraction, FilmSize, LoadOptions, LoadedScene, MetadataDraft, Rendering, SceneError,
     SceneInputs, SceneSource, Trees, load,
@@ -86,12 +86,8 @@ impl Scene {
     /// If an option is out of range, the world has no camera, or there is not enough memory.
     pub fn render(&self, options: &RenderOptions) -> Result<Image, Error> {
         options.check()?;
-        match options.threads {
-            Some(threads) => {
-                rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(|| self.work(options))
-            }
-            None => self.work(options),
-        }
+        // Zero is one thread for each processor.
+        worker_threads().num_threads(options.threads.unwrap_or(0)).build()?.install(|| self.work(options))
     }
 
     fn work(&self, options: &RenderOptions) -> Result<Image, Error> {

@@ -227,11 +227,11 @@ impl BackgroundTasks {
         self.spawn("firstlight picture", work, |board, _| board.reading -= 1);
     }
 
-    /// A mesh or a picture that was asked for by an edit is under way.
+    /// Returns whether a mesh, an image or a kd-tree that an edit needs is still under way, or waits to be taken.
     pub fn is_editing(&self) -> bool {
         self.with(|board| {
-            let waits = |finished: &Finished| matches!(finished, Finished::Mesh(_) | Finished::Picture { .. });
-            board.reading > 0 || !board.remaking.is_empty() || board.finished.iter().any(waits)
+            let waits = |finished: &Finished| !matches!(finished, Finished::Scene { .. });
+            board.building > 0 || board.reading > 0 || !board.remaking.is_empty() || board.finished.iter().any(waits)
         })
     }
 

@@ -190,7 +190,7 @@ impl Player {
     fn update(&mut self) {
         self.session.world_mut().insert_resource(StopAt(Target { spp: Some(1), ..Target::default() }));
         self.session.update(self.clock);
-        // What was asked for beside the picture comes before what is asked for next.
+        // What an edit needs comes before the next command: a mesh that undo brings back is left out until it has a tree.
         while self.session.world().resource::<BackgroundTasks>().is_editing() {
             std::thread::sleep(Duration::from_millis(2));
             self.session.update(self.clock);

@@ -56,7 +56,7 @@ impl SceneSource {
             _ if path.exists() => {
                 let message = format!(
                     "unsupported file format: expected a scene (.ron), a model ({models}) or a picture rendered by \
-                     firstlight (.png, .exr); convert other models to .obj"
+                     firstlight (.png, .exr); convert other models to .glb or .obj"
                 );
                 Err(SceneError::in_file(path, message))
             }

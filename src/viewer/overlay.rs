@@ -134,8 +134,9 @@ pub fn help(context: &Context, help: &mut Help, navigation: Navigation) {
         .resizable(false)
         .fixed_size(Vec2::new(columns as f32 * column_width + 20.0, height))
         .show(context, |ui| {
-            let field =
-                egui::TextEdit::singleline(search).hint_text("search: blur, undo, video …").desired_width(220.0);
+            let field = egui::TextEdit::singleline(search)
+                .hint_text("search: blur, undo, video … (H closes)")
+                .desired_width(220.0);
             let field = ui.add(field);
             if std::mem::take(fresh) {
                 field.request_focus();

@@ -4,7 +4,7 @@ use crate::frame::{
     FeatureLayers, FeatureNames, LayeredPicture, PictureFormat, PictureLayer, Print, Target, Waker,
     render_offline_until,
 };
-use crate::render::{Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings};
+use crate::render::{Display, FEATURE_SAMPLES, Film, Prepared, RenderSettings, worker_threads};
 use crate::scene::file::check_film_size;
 use crate::scene::{ImageSamples, MetadataDraft};
 use std::path::{Path, PathBuf};
@@ -96,7 +96,7 @@ impl Saver {
             let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
             check_film_size(size.0, size.1).map_err(|error| failed(&error))?;
             // A separate pool: the window's threads belong to the visible image, and must not wait for this.
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = worker_threads().num_threads(threads).build();
             let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
             let mut film = Film::try_new(size.0, size.1).map_err(|error| failed(&error))?;
             let (target, stop) = (Target { spp: Some(spp), ..Target::default() }, || ending.load(Ordering::Relaxed));
@@ -122,7 +122,7 @@ impl Saver {
             let film = film.recv().map_err(|_| "there was no picture to save".to_owned())?;
             let Shown { prepared, names, settings, threads, size } = shown;
             let failed = |reason: &dyn std::fmt::Display| format!("the picture was not saved: {reason}");
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = worker_threads().num_threads(threads).build();
             let pool = pool.map_err(|error| failed(&format!("cannot start threads: {error}")))?;
             let of_film = (film.width(), film.height());
             let stop = || ending.load(Ordering::Relaxed);

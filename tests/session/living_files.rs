@@ -199,6 +199,29 @@ fn the_scene_is_saved_beside_the_picture_and_edits_are_not_lost_to_the_disk() {
     driver.run_until_said(MessageKind::Error, "there is no folder");
 }
 
+/// A mesh that undo brings back gets its kd-tree beside the picture; a replay waits for it.
+#[test]
+fn a_replay_has_the_mesh_that_was_deleted_and_brought_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("session.rec");
+    let source = SceneSource::Builtin("gallery".to_owned());
+    let mut driver = Driver::open(source.clone(), 2, 1);
+    driver.session.record(&recording, &source, None).unwrap();
+    driver.settle();
+    let before = driver.session.film_snapshot().unwrap();
+    for command in [Command::Edit(Edit::SelectAll), Command::Edit(Edit::Delete), Command::Edit(Edit::Undo)] {
+        driver.session.send(command);
+        driver.frame();
+    }
+    driver.settle();
+    let shown = driver.session.film_snapshot().unwrap();
+    driver.session.end_record();
+    assert!(shown.means() == before.means(), "undo brings all back");
+    let options = firstlight::frame::ReplayOptions { threads: Some(1), spp: None };
+    let played = firstlight::frame::replay(&recording, options, &|| false).unwrap();
+    assert!(played.film.means() == shown.means());
+}
+
 /// A session that does a bit of everything, and another one that plays it.
 #[test]
 fn a_recording_leads_to_the_same_bits_with_any_number_of_threads() {

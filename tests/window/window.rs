@@ -213,7 +213,7 @@ fn a_dense_screen_gets_fine_pictures_and_one_asked_for_on_the_way_out_is_kept() 
 #[test]
 fn a_paused_window_sleeps() {
     let Some(desktop) = Desktop::start() else { return };
-    let program = desktop.open(&["cornell", "--size", "160x120"], &[]);
+    let mut program = desktop.open(&["cornell", "--size", "160x120"], &[]);
     until("the box to be seen", || has_content(&program.pixels()).then_some(()));
     program.key("p");
     std::thread::sleep(Duration::from_secs(3));
@@ -221,6 +221,10 @@ fn a_paused_window_sleeps() {
     std::thread::sleep(Duration::from_secs(2));
     let used = program.cpu_seconds() - before;
     assert!(used <= 0.1, "{used} CPU seconds in 2 s of doing nothing");
+    // Once is not enough to lose the samples.
+    program.key("Escape");
+    std::thread::sleep(Duration::from_millis(300));
+    program.must_live();
     program.key("Escape");
     assert!(program.ended().success());
 }

@@ -43,6 +43,7 @@ pub use driver::inspect::{
     Inspected, Inspection, Legend, depths, inspect, relative_errors, scale_color, tint_sharp_zone,
 };
 pub use driver::renderer::{BadSample, PassReport, advance, advance_region, replay_sample};
+pub use driver::threads::worker_threads;
 pub use film::develop::{Display, ToneCurve, decode_srgb, develop, develop_colors, develop_pixel, encode_srgb};
 pub use film::error::{MergeError, RecordError};
 pub use film::estimate::ErrorEstimate;

@@ -15,6 +15,7 @@ mod views;
 use super::{LatencyHistogram, Picture, Target};
 use crate::render::{
     BadSample, CausticChoice, Display, Explanation, Film, Inspection, Prepared, RayCounts, Region, RenderSettings,
+    worker_threads,
 };
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -330,7 +331,7 @@ impl Drop for Worker {
 }
 
 fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<rayon::ThreadPool>, String> {
-    rayon::ThreadPoolBuilder::new()
+    worker_threads()
         .num_threads(threads)
         .thread_name(move |i| format!("{name} {i}"))
         .start_handler(move |_| {

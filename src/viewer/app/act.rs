@@ -144,7 +144,8 @@ impl App {
             Action::Leave if !self.session.world().resource::<Selection>().0.is_empty() => {
                 self.session.send(Command::Edit(Edit::SelectNone));
             }
-            Action::Leave | Action::Quit => self.leaving.wanted = true,
+            Action::Leave => self.leave_by_key(now),
+            Action::Quit => self.leaving.wanted = true,
         }
         self.repaint_at = Some(now);
     }

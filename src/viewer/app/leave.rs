@@ -13,6 +13,9 @@ use winit::event_loop::ActiveEventLoop;
 /// Delay after the last edit before edits are stored, so that they are not stored during a drag.
 const STORE_DELAY: Duration = Duration::from_secs(2);
 
+/// Time for a second Escape.
+const ESCAPE_AGAIN: Duration = Duration::from_secs(3);
+
 impl App {
     /// Tracks edits and saving, shows pending questions, and closes the window when nothing prevents it.
     pub(super) fn follow_edits(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
@@ -53,6 +56,18 @@ impl App {
             self.ask(Question::Restore(left), now);
         }
         self.keep_edits(unsaved, now);
+    }
+
+    /// Quits when Escape, with nothing left to close, is pressed twice: the samples of minutes would be gone. Unsaved
+    /// edits are asked about in any case.
+    pub(super) fn leave_by_key(&mut self, now: Instant) {
+        let is_second = self.leaving.last_escape.is_some_and(|last| now < last + ESCAPE_AGAIN);
+        if is_second || self.session.has_unsaved_edits() {
+            self.leaving.wanted = true;
+            return;
+        }
+        self.leaving.last_escape = Some(now);
+        self.toasts.add(Tone::News, "Press Esc again to quit", now);
     }
 
     /// Executes a command that may replace the scene; with unsaved edits, after the user has decided about them.

@@ -23,6 +23,8 @@ pub(super) struct Leaving {
     pub left_behind: VecDeque<LeftBehind>,
     /// Revision of the session when edits were last checked.
     pub seen: u64,
+    /// When Escape was pressed last with nothing left to close.
+    pub last_escape: Option<Instant>,
     /// When unsaved edits are to be stored.
     pub keep_at: Option<Instant>,
     pub restored: Receiver<Result<PathBuf, String>>,
@@ -43,6 +45,7 @@ impl Leaving {
             recovery,
             left_behind,
             seen: 0,
+            last_escape: None,
             keep_at: None,
             restored,
             sender,

@@ -335,7 +335,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             Binding { triggers: &[named(NamedKey::F11, Action::ToggleFullscreen)], effect: "full screen on, off" },
             Binding {
                 triggers: &[named(NamedKey::Escape, Action::Leave)],
-                effect: "close this list, close the explanation, deselect, or quit",
+                effect: "close this list, close the explanation, deselect; twice: quit",
             },
             Binding { triggers: &[ctrl("q", Action::Quit)], effect: "quit" },
         ],
@@ -362,7 +362,7 @@ pub static BINDINGS: &[KeyGroup] = &[
             Binding { triggers: &[Trigger::Mouse("Panel: Display")], effect: "exposure, tone curve, inspection view" },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Add")],
-                effect: "a sphere, a plane, a cube, a light, a built-in mesh or a model (OBJ, PLY, STL)",
+                effect: "a sphere, a plane, a cube, a light, a built-in mesh or a model (glTF, OBJ, PLY, STL)",
             },
             Binding {
                 triggers: &[Trigger::Mouse("Panel: Selected")],

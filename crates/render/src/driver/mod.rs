@@ -6,3 +6,4 @@ pub(crate) mod explain;
 pub(crate) mod features;
 pub(crate) mod inspect;
 pub(crate) mod renderer;
+pub(crate) mod threads;
