@@ -375,7 +375,7 @@ impl Film {
         tile.block_of(local).spp
     }
 
-    /// How wrong the picture still is, as far as its own samples tell; `None` before the fourth sample of a pixel.
+    /// Estimates the error of the image from its own samples; `None` before the second sample per pixel.
     pub fn error_estimate(&self) -> Option<ErrorEstimate> {
         self.error_estimate_in(None)
     }
