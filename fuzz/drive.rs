@@ -6,7 +6,7 @@
 
 use bevy_ecs::world::World;
 use firstlight::frame::read_film_file_within;
-use firstlight::render::{Film, FilmLayout, FilmRecord, N_PLANES, Prepared, RenderSettings, advance};
+use firstlight::render::{CausticPlan, Film, FilmLayout, FilmRecord, N_PLANES, Prepared, RenderSettings, advance};
 use firstlight::scene::file::{ObjectPart, SceneFile};
 use firstlight::scene::model::{ModelFormat, ModelNormals, ModelOptions, load_model};
 use firstlight::scene::{
@@ -147,11 +147,14 @@ pub fn film(bytes: &[u8]) {
     }
     let numbers = [0.0, 1.0, -0.5, f64::INFINITY, f64::NAN, 1e300, 5e-324];
     let plane = |k: usize| (0..n_pixels as usize).map(|i| numbers[(i * 3 + k) % numbers.len()]).collect();
-    let record = FilmRecord { layout, planes: (0..N_PLANES).map(plane).collect() };
+    let mut record = FilmRecord { layout, planes: (0..N_PLANES).map(plane).collect() };
     match Film::from_record(&record) {
         Ok(film) => {
             // The sums to the last bit, NaN included; what there is no light or no doubling for is not kept.
             let again = film.to_record();
+            // Light paths without a plan have the plan of films that do not tell it.
+            let FilmLayout { light_traced, caustics, .. } = &mut record.layout;
+            *caustics = caustics.or(light_traced.as_ref().map(|_| CausticPlan::UNKNOWN));
             assert_eq!(again.layout, record.layout);
             assert_eq!(format!("{:?}", &again.planes[..6]), format!("{:?}", &record.planes[..6]));
             go_on(film);

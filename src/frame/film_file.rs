@@ -473,7 +473,7 @@ fn checksum_of_numbers(planes: &[Vec<f64>]) -> Fingerprint {
 mod tests {
     use super::*;
     use crate::frame::{Target, render_offline};
-    use crate::render::{OldTileRecord, RenderSettings, TileRecord};
+    use crate::render::{CausticPlan, OldTileRecord, RenderSettings, Techniques, TileRecord};
     use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
     /// A film of a scene with light paths, and its note.
@@ -484,7 +484,10 @@ mod tests {
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
         let mut film = Film::new(3, 2);
         let target = Target { spp: Some(spp), ..Target::default() };
-        render_offline(&extraction.prepared, &RenderSettings::default(), &mut film, target, |_| true);
+        // As many light paths as films of older formats have.
+        let techniques = Techniques { caustic_plan: Some(CausticPlan::UNKNOWN), ..Techniques::default() };
+        let settings = RenderSettings { techniques, ..RenderSettings::default() };
+        render_offline(&extraction.prepared, &settings, &mut film, target, |_| true);
         let samples = ImageSamples { first: 0, spp, uneven: false };
         let draft = MetadataDraft::of(&mut world, Some(&loaded));
         let note = draft.note(Path::new("a.exr"), (3, 2), samples, crate::render::Display::default().into());

@@ -144,7 +144,7 @@ fn a_part_that_is_stopped_is_resumed_from_its_last_film() {
     use std::time::{Duration, Instant};
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let line = "render cornell-balls --size 64x64 --spp 512 --part 2/2 --film part.exr --save-every 0.1 --threads 1";
+    let line = "render cornell-balls --size 64x64 --spp 4096 --part 2/2 --film part.exr --save-every 0.1 --threads 1";
     let whole = line.replace("part.exr", "whole.exr");
     does(path, &whole);
     let spawn = || {
