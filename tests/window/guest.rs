@@ -195,7 +195,7 @@ fn the_number_of_threads_is_that_of_the_panel_at_once() {
     program.key("n");
     std::thread::sleep(Duration::from_secs(3));
     // The number in the row of threads: clicked, it is typed over.
-    program.drag(1, (1124, 127), (0, 0));
+    program.drag(1, (1124, 149), (0, 0));
     std::thread::sleep(Duration::from_millis(700));
     program.key("ctrl+a");
     program.type_text("3");

@@ -22,22 +22,22 @@ pub fn render(ui: &mut Ui, scale: &mut u32, session: &Session, around: &Around, 
         });
         let allocation = session.world().get_resource::<Rendering>().map(|of_scene| of_scene.0.allocation);
         let allocation = allocation.unwrap_or_default();
-        row(ui, "more samples", |ui| {
+        row(ui, "sampling", |ui| {
             use SampleAllocation::{Adaptive, Uniform};
             let is_display = matches!(allocation, Adaptive(ErrorMetric::Display { .. }));
             let choices = [
-                (allocation == Uniform, "nowhere", Uniform, "as many samples in every pixel"),
+                (allocation == Uniform, "uniform", Uniform, "the same number of samples in every pixel"),
                 (
                     allocation == Adaptive(ErrorMetric::RelativeMse),
-                    "where relMSE is larger",
+                    "adaptive, relMSE",
                     Adaptive(ErrorMetric::RelativeMse),
-                    "lowers the relative error of linear light, which is the error estimate",
+                    "more samples where the relative error of linear light is large; the error estimate is of that",
                 ),
                 (
                     is_display,
-                    "where it shows",
+                    "adaptive, display",
                     Adaptive(ErrorMetric::Display { exposure_stops: session.status().display.exposure_stops }),
-                    "lowers the error of the picture as it is displayed now",
+                    "more samples where the error of the displayed picture is large",
                 ),
             ];
             let shown = choices.iter().find(|choice| choice.0).map_or("", |choice| choice.1);
