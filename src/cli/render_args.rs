@@ -249,7 +249,7 @@ impl RenderCommand {
     fn in_folder(&self, folder: &Path, scene: &SceneArgs) -> Result<PathBuf, Failure> {
         if !folder.is_dir() {
             let (name, n) = (folder.display(), self.scenes.scenes.len());
-            return Err(Failure::Usage(format!("{name}: not a folder: {n} scenes need -o FOLDER")));
+            return Err(Failure::Usage(format!("{name}: not a folder that exists: {n} scenes need -o FOLDER")));
         }
         let mut name = file_stem(&scene.scene);
         name.push(".");
