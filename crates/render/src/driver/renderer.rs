@@ -136,7 +136,11 @@ pub fn advance_region(
         }
         if total.completed {
             film.has_spent(goal);
-            film.record_light();
+            // Light paths of a pass that was stopped may be ahead of the tiles. They are looked at when the tiles have come
+            // as far: earlier, what blocks are compared with would depend on where it was stopped.
+            if film.light.as_ref().is_some_and(|layer| layer.spp == goal) {
+                film.record_light();
+            }
         }
     }
     total
