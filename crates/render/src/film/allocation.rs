@@ -1,18 +1,18 @@
-//! Which blocks of pixels get the next samples.
+//! Sample allocation: which blocks of pixels get the next samples.
 //!
-//! Samples are allocated in rounds. A round begins when a film has spent its budget, a power of two of samples per pixel
-//! on average, and doubles that. What the round will do is decided at its beginning, from the film alone, and kept with the
-//! film: which blocks double their samples, once or twice, and in which order. So a film is a function of scene, seed and
-//! settings, whatever the threads and portions that it is rendered in, and one that is stopped goes on as it was begun.
+//! Samples are allocated in rounds. A round begins when a film has spent its budget, a power of two of samples per
+//! pixel on average, and doubles the budget. At its beginning it is decided, from the film alone, which blocks double
+//! their samples, once or twice, and in which order; the decision is stored in the film. So a film is a function of
+//! scene, seed and settings, independent of threads and portions, and a film that was stopped resumes as it was begun.
 //!
-//! Blocks have powers of two of samples whenever no pass is under way, so that the evenness of each pixel's sequence is
-//! kept, and doublings measure the error. The best allocation has n ∝ √variance; with powers of two it loses 2 %. The
-//! doubling that lowers the error most per sample comes first: that which changes variance / n from n to 2n, which costs n,
-//! by variance / (2 n²).
+//! Between passes the sample count of every block is a power of two, so that each pixel's sequence stays stratified,
+//! and doublings measure the error. The optimal allocation has n ∝ √variance; powers of two lose 2 %. Doublings are
+//! ordered by the reduction of the error per sample: doubling from n to 2n lowers variance / n by variance / (2n), for
+//! n samples, so by variance / (2 n²) per sample.
 //!
-//! The samples that decide are also those that are weighed, which is a bias (a block that was lucky to look dark gets
-//! fewer samples to find out). It is kept small: the variance of a block is that of nine blocks over up to three
-//! doublings, no block falls below a quarter of the mean, and it falls with 1 / n, while noise falls with 1 / √n.
+//! The decision uses the samples that are allocated by it, which is a bias (a block that happens to look dark gets
+//! fewer samples to correct that). It is kept small: the variance of a block is averaged over nine blocks and up to
+//! three doublings, and no block falls below a quarter of the mean. It falls with 1 / n, while noise falls with 1 / √n.
 
 use crate::core::settings::ErrorMetric;
 use crate::film::block::{Block, MAX_DOUBLINGS, NEVER, Steps, doubled};
@@ -21,23 +21,24 @@ use crate::film::tile::FilmTile;
 use glam::{DVec3, UVec2};
 use rayon::prelude::*;
 
-/// Samples that every pixel gets before anything is known of its error.
+/// Samples per pixel before the first allocation by error.
 pub(crate) const FIRST_ROUND: u32 = 8;
 
-/// No block has fewer samples than this part of the mean, and none more than that many times the mean.
+/// No block has less than 1 / `LEAST_SHARE` of the mean samples per pixel, and none more than `MOST_SHARE` times the
+/// mean.
 const LEAST_SHARE: u32 = 4;
 const MOST_SHARE: u32 = 16;
 
-/// A first uneven round must lower the squared error by this share at least: what is even is quicker to look at and to
-/// foretell, and a smaller gain may be chance.
+/// Relative reduction of the squared error that a first uneven round must achieve: an even film is faster to display
+/// and to predict, and a smaller gain may be noise.
 const LEAST_GAIN: f64 = 0.05;
 
-/// What is known of a block when a round begins.
+/// State of a block at the beginning of a round.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     n_pixels: u32,
     spp: u32,
-    /// Of one sample, relative to the squared level, the mean over pixels and channels; `None` is not known.
+    /// Variance of one sample relative to the squared level, mean over pixels and channels; `None` if unknown.
     variance: Option<f64>,
 }
 
@@ -47,16 +48,16 @@ struct Grid {
     blocks: Vec<Candidate>,
 }
 
-/// A doubling of a block.
+/// A possible doubling of a block's samples.
 struct Doubling {
     block: usize,
-    /// Fall of the squared error for a sample of a pixel; infinite where it must be.
+    /// Reduction of the squared error per sample; infinite for a mandatory doubling.
     gain: f64,
-    /// Samples of all of its pixels.
+    /// Samples that it takes, over all pixels of the block.
     cost: u64,
 }
 
-/// Decides a round of a film with these tiles, whose blocks lie in a grid of `size` blocks, and tells the blocks.
+/// Decides a round of a film with these tiles, whose blocks form a grid of `size` blocks, and stores it in the blocks.
 ///
 /// - `from`: mean samples per pixel that have been spent.
 /// - `irregular`: see [`Round::irregular`].
@@ -73,13 +74,14 @@ pub(crate) fn begin_round(
     let n_pixels: u64 = grid.blocks.iter().map(|block| u64::from(block.n_pixels)).sum();
     let doublings = grid.best_doublings(to);
     let total: u64 = grid.blocks.iter().map(|block| u64::from(block.n_pixels) * u64::from(block.spp)).sum();
-    // What earlier rounds spent too much or too little is made up for, where it is not a region that was ahead.
+    // Compensates what earlier rounds spent too much or too little, by at most half of a round: a region may be far
+    // ahead.
     let usual = n_pixels * u64::from(to - from);
     let budget = (n_pixels * u64::from(to)).saturating_sub(total).clamp(usual / 2, usual + usual / 2);
     let mut due = vec![[NEVER; MAX_DOUBLINGS]; grid.blocks.len()];
     let mut spent = 0;
     for doubling in doublings {
-        // To the nearest.
+        // Rounded to the nearest doubling.
         let at = spent + doubling.cost / 2;
         if at > budget && doubling.gain.is_finite() {
             break;
@@ -101,7 +103,8 @@ pub(crate) fn begin_round(
     Round { from, to, budget: from, even, irregular }
 }
 
-/// A round that is over, of a film that was changed in another way: the next one is decided from what there is.
+/// Returns a finished round, for a film whose samples were changed otherwise: the next round is decided from its
+/// counts.
 pub(crate) fn end_round(tiles: &mut [FilmTile], budget: u32) -> Round {
     for block in tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
         (block.base, block.due) = (block.spp, [NEVER; MAX_DOUBLINGS]);
@@ -109,7 +112,7 @@ pub(crate) fn end_round(tiles: &mut [FilmTile], budget: u32) -> Round {
     Round { from: budget, to: budget, budget, even: false, irregular: true }
 }
 
-/// The index of a block in a grid of that width.
+/// Returns the index of a block in a grid of that width.
 fn place_of(tile: &FilmTile, block: &Block, width: usize) -> usize {
     let at = (tile.origin + block.start) / crate::film::block::BLOCK_SIZE;
     at.y as usize * width + at.x as usize
@@ -140,8 +143,8 @@ impl Grid {
         grid
     }
 
-    /// Gives each block the variance of itself and its neighbours, which count less; that of the whole picture where none
-    /// of them is known.
+    /// Replaces the variance of each block by a weighted mean over itself and its neighbours, or by that of the whole
+    /// image where none of them is known.
     fn smooth(&mut self) {
         const WEIGHTS: [[f64; 3]; 3] = [[1.0, 2.0, 1.0], [2.0, 8.0, 2.0], [1.0, 2.0, 1.0]];
         let (width, height) = (self.width, self.blocks.len() / self.width);
@@ -169,7 +172,7 @@ impl Grid {
         }
     }
 
-    /// All doublings that there may be on the way to a mean of `to` samples, the best first.
+    /// Returns all permitted doublings up to a mean of `to` samples per pixel, the most effective first.
     fn best_doublings(&self, to: u32) -> Vec<Doubling> {
         let mut doublings = Vec::new();
         for (place, block) in self.blocks.iter().enumerate() {
@@ -187,12 +190,13 @@ impl Grid {
                 spp = next;
             }
         }
-        // Stable: equal ones in the order of the blocks, and the doublings of a block in theirs.
+        // The sort is stable: equal gains stay in the order of the blocks, and the doublings of a block in their own
+        // order.
         doublings.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         doublings
     }
 
-    /// Whether an even film gains too little by not staying so.
+    /// Whether an even film should stay even, because an uneven allocation gains too little.
     fn is_better_even(&self, due: &[[u32; MAX_DOUBLINGS]], from: u32, to: u32) -> bool {
         if self.blocks.iter().any(|block| block.spp != from) {
             return false;
@@ -210,8 +214,8 @@ impl Grid {
     }
 }
 
-/// Variance of one sample, relative to the squared level, the mean over pixels and channels, as far as doublings tell it
-/// and as if samples were independent; the later ones have more samples and count more.
+/// Returns the variance of one sample, relative to the squared level, mean over pixels and channels, as measured by
+/// doublings and under the assumption of independent samples. Later doublings have more samples and a larger weight.
 fn variance_of(steps: &Steps, n_values: u32) -> Option<f64> {
     let (mut sum, mut weights) = (0.0, 0.0);
     for ago in 0..Steps::KEPT {
@@ -224,13 +228,13 @@ fn variance_of(steps: &Steps, n_values: u32) -> Option<f64> {
     (weights > 0.0).then(|| sum / weights)
 }
 
-/// How much a relative error is worth on a display: the squared slope of the encoded value over that of the relative
-/// error, the mean over pixels and channels. Above white, which is 1 after exposure, little is.
+/// Returns the weight of a relative error on a display: the squared slope of the encoded value with respect to the
+/// relative error, mean over pixels and channels. It is small above white, which is 1 after exposure.
 fn display_weight(tile: &FilmTile, block: &Block, exposure_stops: f32) -> f64 {
     let exposure = f64::from(exposure_stops).exp2();
     let encoded = |light: f64| (1.0 - (-light.max(0.0) * exposure).exp()).powf(1.0 / 2.2);
     let of = |light: f64| {
-        // Over a step that a noisy mean may be off by, so that black is no pole.
+        // A finite difference as wide as the error of a noisy mean, so that black is no pole.
         let step = 0.1 * light.abs() + 0.01;
         let slope = (encoded(light + step) - encoded(light - step)) / (2.0 * step);
         slope * slope * (light * light + 0.01)
@@ -249,7 +253,7 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// An adaptive film of what pixels see, without any scene.
+    /// Renders an adaptive film of a function of pixel and random numbers, without a scene.
     fn film_of(seed: u32, budget: u32, light: &(dyn Fn(u32, u32, glam::Vec2) -> f32 + Sync)) -> Film {
         let mut film = Film::new(SIDE, SIDE);
         while film.spp() < budget {
@@ -276,14 +280,14 @@ mod tests {
         film
     }
 
-    /// Half of the picture has little noise; in the other one sample in 400 brings half of the light.
+    /// One half of the image has little noise; in the other one sample in 400 carries half of the light.
     fn rare(x: u32, _y: u32, u: glam::Vec2) -> f32 {
         let firefly = if x >= SIDE / 2 && u.x < 1.0 / 400.0 { 200.0 } else { 0.0 };
         let base = if x >= SIDE / 2 { 0.5 } else { 0.9 + 0.2 * u.y };
         base + firefly
     }
 
-    /// The bias of deciding by the samples that are weighed, at its worst: few samples, and half of the light in one of 400.
+    /// The bias of deciding by the allocated samples, at its worst: few samples, and half of the light in one of 400.
     #[test]
     fn rare_bright_samples_lose_little_of_their_mean() {
         const RENDERS: u32 = 400;

@@ -1,39 +1,40 @@
-//! How wrong is the picture? Told from its own samples, without giving up any of their evenness.
+//! Estimates the error of an image from its own samples, without giving up any of their stratification.
 //!
 //! Let Iₙ be a pixel's mean over the first n = 2ᵏ samples. Its samples are an Owen-scrambled net, and so are the next
-//! n, with the same distribution. Then E|Iₙ − I₂ₙ|² = var Iₙ − var I₂ₙ exactly, however the two halves correlate:
-//! I₂ₙ is the mean of both, so cov(Iₙ, I₂ₙ) = var I₂ₙ. Summed over the picture these differences of consecutive
-//! doublings are large sums and tell both the error and how fast it falls: where it falls as n^−a, they do too, and
-//! var I₂ₙ is the difference over 2ᵃ − 1. Independent batches would tell the same, and cost the evenness between them.
+//! n, with the same distribution. Then E|Iₙ − I₂ₙ|² = var Iₙ − var I₂ₙ exactly, however the two halves correlate: I₂ₙ
+//! is the mean of both, so cov(Iₙ, I₂ₙ) = var I₂ₙ. Summed over the image, the differences of consecutive doublings give
+//! both the error and its rate of convergence: where the variance falls as n^−a, so do they, and var I₂ₙ is the
+//! difference divided by 2ᵃ − 1. Independent batches would give the same, at the cost of the stratification across
+//! batches.
 //!
-//! What a difference is relative to must not come from the pixel alone: one bright sample that few pixels have drawn
-//! yet (a caustic) would raise the very value that its own error is divided by, and hide itself: see [`local_level`].
-
-//! Blocks of pixels may have doubled their samples a different number of times. Each brings what its own last doublings
-//! changed: the sum over the picture is then that of an estimate of each block's present error.
+//! The level that a difference is relative to must not come from the pixel alone: one bright sample that only few
+//! pixels have drawn yet (a caustic) would raise the value that its own error is divided by, and so hide its error; see
+//! [`local_level`]. Blocks of pixels may have doubled their samples a different number of times. Each contributes its
+//! own latest doublings; the sum over the image then estimates the present error of all blocks.
 
 use crate::film::block::Steps;
 use glam::DVec3;
 
-/// The error of the whole picture.
+/// The estimated error of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
     /// Root of relMSE, the mean over pixels and channels of variance / (mean² + 0.01).
     pub relative: f64,
-    /// Bounds of an interval that holds the true value of this picture with a probability of about 95 %, and more where
-    /// the slope is well known; it is wide as long as only few doublings tell how fast the error falls.
+    /// Lower bound of an interval that contains the true value for this image with a probability of about 95 %, and
+    /// more where the slope is well known. The interval is wide as long as the rate of convergence rests on few
+    /// doublings.
     pub low: f64,
     /// Upper bound of that interval; see `low`.
     pub high: f64,
-    /// relMSE is expected to fall as samples^−`exponent` from here on, from doubling to doubling; 1 for independent samples.
+    /// relMSE is expected to fall as samples^−`exponent` from here on; 1 for independent samples.
     pub exponent: f64,
-    /// Samples a pixel that the picture has, the mean over it.
+    /// Mean samples per pixel of the image.
     spp: u32,
-    /// All pixels have that number of samples, and will have.
+    /// Whether all pixels have the same number of samples, now and later.
     is_even: bool,
 }
 
-/// What the doublings of all parts of a picture have changed.
+/// The measured doublings of all parts of an image.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Evidence {
     parts: Vec<Part>,
@@ -41,27 +42,27 @@ pub(crate) struct Evidence {
     n_values: Vec<f64>,
 }
 
-/// A block of pixels, or the traced light in a tile.
+/// A block of pixels, or the light-traced part of a tile.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     tile: usize,
     steps: Steps,
-    /// Samples now, at least those of the newest step.
+    /// Samples per pixel now, at least those of the newest doubling.
     spp: u32,
 }
 
 impl Evidence {
-    /// Begins a tile; its parts follow.
+    /// Adds a tile; its parts follow.
     pub fn add_tile(&mut self, n_pixels: usize) {
         self.n_values.push(3.0 * n_pixels as f64);
     }
 
-    /// A part of the tile that was begun last, of `spp` samples.
+    /// Adds a part with `spp` samples per pixel to the tile that was added last.
     pub fn add_part(&mut self, steps: Steps, spp: u32) {
         self.parts.push(Part { tile: self.n_values.len() - 1, steps, spp });
     }
 
-    /// What the doubling so many before the last changed in each tile, if all parts know it.
+    /// Returns the squared change per tile by the doubling `ago` doublings before the newest, if all parts know it.
     fn of_tiles(&self, ago: usize) -> Option<Vec<f64>> {
         let mut of_tiles = vec![0.0; self.n_values.len()];
         for part in &self.parts {
@@ -72,10 +73,10 @@ impl Evidence {
 }
 
 impl ErrorEstimate {
-    /// Relative error at a number of samples a pixel, at least 1.
+    /// Predicts the relative error at `spp` samples per pixel, at least 1.
     ///
-    /// Between powers of two the samples of an even picture are several nets of different size, one for each bit of their
-    /// number, and each counts with its share: where errors fall fast, 96 samples are no better than 64.
+    /// Between powers of two the samples of an even image consist of several nets of different size, one per bit of
+    /// their number, each weighted by its share: where errors fall fast, 96 samples are no better than 64.
     pub fn relative_at(&self, spp: u32) -> f64 {
         let (now, spp) = (self.spp.max(1), spp.max(1));
         let fall = if self.is_even {
@@ -86,20 +87,23 @@ impl ErrorEstimate {
         self.relative * fall.sqrt()
     }
 
-    /// Samples a pixel that bring the relative error down to `target`, to within an eighth; `u32::MAX` if none do.
+    /// Samples per pixel that bring the relative error down to `target`, rounded up by at most an eighth; `u32::MAX` if
+    /// none do.
     pub fn spp_for(&self, target: f64) -> u32 {
         let candidates = (3..29).flat_map(|bit| (8..16u32).map(move |eighths| eighths << bit >> 3));
         (1..8).chain(candidates).find(|&spp| self.relative_at(spp) <= target).unwrap_or(u32::MAX)
     }
 
-    /// - `spp`: samples a pixel that the picture has, the mean over it; `is_even`: all pixels have as many.
+    /// Returns `None` before the first doubling of every part.
+    ///
+    /// - `spp`: mean samples per pixel of the image; `is_even`: whether all pixels have the same number.
     pub(crate) fn new(evidence: &Evidence, spp: u32, is_even: bool) -> Option<Self> {
         let tiles: Vec<Option<Vec<f64>>> = (0..Steps::KEPT).map(|ago| evidence.of_tiles(ago)).collect();
         let newest = tiles[0].as_ref().filter(|_| !evidence.parts.is_empty())?;
         let n_values: f64 = evidence.n_values.iter().sum();
         let mean = |steps: &[f64]| steps.iter().sum::<f64>() / n_values;
         let last = mean(newest);
-        // Tiles are independent of each other: their scatter is the uncertainty of a sum over them, relative to it.
+        // Tiles are independent: their scatter gives the relative uncertainty of a sum over them.
         let n_tiles = evidence.n_values.len() as f64;
         let scatter_about = |steps: &[f64], expected: &dyn Fn(usize) -> f64| {
             let squares = steps.iter().enumerate().map(|(i, step)| (step - expected(i)).powi(2));
@@ -112,7 +116,7 @@ impl ErrorEstimate {
             }
             scatter_about(steps, &|tile| mean * evidence.n_values[tile]) / mean
         };
-        // Doublings that all blocks have seen, less one.
+        // Number of doublings that all blocks have seen, less one.
         let level = evidence.parts.iter().map(|part| part.steps.at.ilog2() as usize - 1).min()?;
         let slope = |longest: usize, expected: &Expected| {
             let known = (1..=longest).rev().find_map(|span| Some((span, tiles[span].as_ref()?)));
@@ -125,10 +129,11 @@ impl ErrorEstimate {
                 None => *expected,
             }
         };
-        // The first steps say little of how fast later ones fall; independent samples where there is only one.
+        // The first steps say little about the later slope; with a single step the samples are assumed to be
+        // independent.
         let earliest = level.saturating_sub(2).max(level.saturating_sub(1).min(2));
         let so_far = slope(level - earliest, &SO_FAR);
-        // Further on all that is known helps.
+        // The slope from here on uses all steps that are known.
         let exponent = slope(level.min(2), &FROM_HERE_ON).exponent;
         let growth = so_far.exponent.exp2();
         let mut known = (0, 0, 1.0);
@@ -141,8 +146,9 @@ impl ErrorEstimate {
         });
         let relative_mse = now.sum::<f64>() / n_values / (growth - 1.0);
 
-        // On the logarithm, where the sum of positive terms is closer to symmetric. Two looks at the same tiles, from one
-        // doubling to the next, scatter as this one and the truth do; of a first one only the tiles themselves are known.
+        // On the logarithm, where a sum of positive terms is closer to symmetric. The scatter of the same tiles from
+        // one doubling to the next equals that between the estimate and the true error; at the first doubling only the
+        // scatter over the tiles is known.
         let of_noise = match tiles[1].as_ref().filter(|_| level > 0) {
             Some(before) if n_tiles >= 2.0 && last > 0.0 && mean(before) > 0.0 => {
                 let fall = last / mean(before);
@@ -150,7 +156,7 @@ impl ErrorEstimate {
             }
             _ => sigma(newest),
         };
-        // And the slope of the last doubling, that the difference is made an error with, is not known for sure.
+        // The slope that converts the last difference to an error is uncertain, too.
         let of_slope = growth * std::f64::consts::LN_2 / (growth - 1.0) * so_far.uncertainty;
         let factor = (0.5 * student_t(n_tiles - 1.0) * of_noise).hypot(0.5 * 1.96 * of_slope).exp();
         let relative = relative_mse.sqrt();
@@ -158,14 +164,14 @@ impl ErrorEstimate {
     }
 }
 
-/// The variance of so many samples, at least 1, in nets of different size, one for each bit of their number, where that of
-/// a net falls as samples^−`exponent`; 1 for one sample.
+/// Returns the variance of `spp` samples, at least 1, that consist of nets of different size, one per bit of their
+/// number, where the variance of a net falls as samples^−`exponent`; 1 for one sample.
 fn of_nets(spp: u32, exponent: f64) -> f64 {
     let nets = (0..32).filter(|bit| spp >> bit & 1 == 1).map(|bit| f64::from(1u32 << bit));
     nets.map(|n| (n / f64::from(spp)).powi(2) * n.powf(-exponent)).sum()
 }
 
-/// Between plain random sampling and the best that scrambled nets do on smooth integrands (Owen 1997).
+/// From independent samples to the best rate of scrambled nets for smooth integrands (Owen 1997).
 const MIN_EXPONENT: f64 = 1.0;
 const MAX_EXPONENT: f64 = 3.0;
 
@@ -176,15 +182,16 @@ struct Expected {
     uncertainty: f64,
 }
 
-/// Of pictures so far, before anything is seen: about that of independent samples, which errs on the side of caution.
+/// Prior for the exponent so far: about that of independent samples, which is conservative.
 const SO_FAR: Expected = Expected { exponent: MIN_EXPONENT, uncertainty: 0.5 };
 
-/// From eight samples on: mean and deviation of how the true error of the built-in scenes falls to 64, a little rounded
-/// towards caution (1.28 and 0.20).
+/// Prior from eight samples on: mean and standard deviation of the exponent over the built-in scenes up to 64 samples
+/// (1.28 and 0.20), rounded conservatively.
 const FROM_HERE_ON: Expected = Expected { exponent: 1.2, uncertainty: 0.316 };
 
 impl Expected {
-    /// After an exponent was seen that is as uncertain as that: a slope from few bright pixels is worth little.
+    /// Returns the posterior after observing an exponent with this uncertainty: a slope from few bright pixels has
+    /// little weight.
     fn and_seen(&self, seen: f64, uncertainty: f64) -> Self {
         let (expected, of_seen) = (self.uncertainty.powi(2), uncertainty.powi(2));
         let trust = expected / (expected + of_seen);
@@ -193,8 +200,8 @@ impl Expected {
     }
 }
 
-/// What a normal variable's 1.96 becomes when its deviation is itself known from `freedom` + 1 values only: 97.5 % of
-/// Student's t lie below. To half a per cent (Cornish and Fisher's expansion from four degrees on).
+/// Returns the 97.5 % quantile of Student's t, which replaces a normal variable's 1.96 when its deviation is estimated
+/// from `freedom` + 1 values. Accurate to half a per cent (Cornish–Fisher expansion from four degrees of freedom on).
 fn student_t(freedom: f64) -> f64 {
     match freedom {
         ..1.5 => 12.706,
@@ -204,19 +211,19 @@ fn student_t(freedom: f64) -> f64 {
     }
 }
 
-/// How far the slope of a single doubling lies from the long one where edges rule, even without any noise: nets of odd
-/// and of even powers of two divide the square differently.
+/// Deviation of the slope of a single doubling from the long-term slope where edges dominate, even without noise: nets
+/// of odd and of even powers of two subdivide the square differently.
 const WOBBLE: f64 = 0.25;
 
-/// What the error of pixel `i` is relative to: its own mean, but no more than its neighbours' mean and its own darker
-/// half.
+/// Returns the level of pixel `i` for relative errors, W·m⁻²·sr⁻¹ per channel: its own mean, but at most its
+/// neighbours' mean or the mean of its own darker half, whichever is larger.
 ///
-/// A bright sample that came once raises one half alone, and few of the neighbours. A light of a single pixel, which
-/// its neighbours know nothing of, is bright in both halves.
+/// A single bright sample raises one half only, and few of the neighbours. A light that covers one pixel, and so none
+/// of its neighbours, is bright in both halves.
 pub(crate) fn local_level(means: &[DVec3], before: DVec3, width: usize, i: usize) -> DVec3 {
     let (x, y, height) = (i % width, i / width, means.len() / width);
     let darker_half = before.min(2.0 * means[i] - before);
-    // Three by three pixels around it, moved inwards at a border.
+    // The 3 × 3 pixels around it, shifted inwards at a border.
     let around = |k: usize, n: usize| {
         let first = k.saturating_sub(1).min(n.saturating_sub(3));
         first..(first + 3).min(n)
@@ -238,7 +245,7 @@ mod tests {
     use crate::sampling::Sampler;
     use glam::{UVec2, Vec3};
 
-    /// Runs pixels with a known mean and compares the estimate with the true error.
+    /// Renders pixels with a known mean; returns the estimate and the true error.
     fn run(spp: u32, integrand: impl Fn(glam::Vec2) -> f64, mean: f64) -> (ErrorEstimate, f64) {
         let n_tiles = 64;
         let mut evidence = Evidence::default();
@@ -270,14 +277,14 @@ mod tests {
         for spp in [8, 16, 64, 128, 96] {
             for (name, (estimate, truth)) in [("smooth", run(spp, smooth, 1.0)), ("edge", run(spp, edge, edge_mean))] {
                 let ratio = estimate.relative / truth;
-                // What is promised from 16 samples on; before that there is one slope to go by.
+                // The documented accuracy holds from 16 samples on; with fewer there is a single slope.
                 let good = if spp < 16 { 0.75..1.35 } else { 0.8..1.25 };
                 assert!(good.contains(&ratio), "{name} at {spp} spp: {estimate:?} for {truth}");
             }
         }
     }
 
-    /// One sample in 2,000 is bright and brings a twentieth of the light: most pixels have not met it yet.
+    /// One sample in 2,000 is bright and carries a twentieth of the light: most pixels have not drawn it yet.
     #[test]
     fn rare_bright_samples_do_not_hide_their_own_error() {
         let rare = |u: glam::Vec2| if u.x < 0.0005 { 100.95 } else { 0.95 };
@@ -296,12 +303,12 @@ mod tests {
             means[4] = DVec3::splat(middle);
             means
         };
-        // A light of one pixel: 19 in the first half, 21 in the second.
+        // A light that covers one pixel: 19 in the first half, 21 in the second.
         assert_eq!(local_level(&around(20.0), DVec3::splat(19.0), width, 4), DVec3::splat(19.0));
         // A firefly in the second half, or in the first.
         assert!((local_level(&around(10.05), dark, width, 4) - dark).length() < 1e-12);
         assert!((local_level(&around(10.05), DVec3::splat(20.0), width, 4) - dark).length() < 1e-12);
-        // A pixel in a corner has the same neighbours, and a block of one pixel has itself alone.
+        // A pixel in a corner has the same neighbours, and a block of one pixel only itself.
         let mut corner = vec![dark; 9];
         corner[0] = DVec3::splat(10.05);
         assert!((local_level(&corner, dark, width, 0) - dark).length() < 1e-12);

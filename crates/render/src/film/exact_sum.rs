@@ -1,19 +1,19 @@
 //! Sums of samples that do not depend on the order in which they are added, bit for bit.
 //!
-//! A sum is kept in two `f64`: the sum itself, rounded to nearest, and what rounding left out (Knuth 1997, vol. 2,
-//! 4.2.2, theorem B; Dekker 1971). Samples are `f32`, and those below 2⁻⁴⁰ are rounded to multiples of 2⁻⁶⁴
-//! W·m⁻²·sr⁻¹, so every sample is a multiple of that. As long as a sum stays below 2⁴⁰ (10¹² W·m⁻²·sr⁻¹), the two parts
-//! hold it exactly, and a pair that says it is unique: films that were rendered apart add up to the film that was
-//! rendered in one go. Above that, a sum is right to 106 bits, but its last bits depend on the order.
+//! A sum consists of two `f64`: the sum rounded to nearest, and its rounding error (Knuth 1997, vol. 2, 4.2.2, theorem
+//! B; Dekker 1971). Samples are `f32`, and those below 2⁻⁴⁰ are rounded to multiples of 2⁻⁶⁴ W·m⁻²·sr⁻¹, so every
+//! sample is a multiple of that. As long as a sum stays below 2⁴⁰ (10¹² W·m⁻²·sr⁻¹), the two parts represent it
+//! exactly, and that pair is unique: films that were rendered apart add up to the film that was rendered in one go.
+//! Above that, a sum is accurate to 106 bits, but its last bits depend on the order.
 
 use glam::{DVec3, Vec3};
 
-/// Sum of the samples of one pixel, W·m⁻²·sr⁻¹ a channel.
+/// Sum of the samples of one pixel, W·m⁻²·sr⁻¹ per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExactSum {
     /// The sum, rounded to nearest.
     pub sum: DVec3,
-    /// What is to be added to `sum` for the exact one.
+    /// Exact sum minus `sum`.
     pub rest: DVec3,
 }
 
@@ -33,15 +33,15 @@ impl ExactSum {
     #[inline]
     fn add_exact(&mut self, value: DVec3, value_rest: DVec3) {
         let (sum, lost) = two_sum(self.sum, value);
-        // Multiples of 2⁻⁶⁴ below 2⁻¹¹: no rounding here.
+        // Multiples of 2⁻⁶⁴ below 2⁻¹¹: this addition does not round.
         let rest = self.rest + value_rest + lost;
-        // The larger one first, so three operations are enough (Dekker's fast sum).
+        // The larger summand comes first, so three operations are enough (Dekker's fast two-sum).
         self.sum = sum + rest;
         self.rest = rest - (self.sum - sum);
     }
 }
 
-/// `a + b` rounded, and what rounding left out.
+/// Returns `a + b` rounded, and the rounding error.
 #[inline]
 fn two_sum(a: DVec3, b: DVec3) -> (DVec3, DVec3) {
     let sum = a + b;
@@ -49,10 +49,10 @@ fn two_sum(a: DVec3, b: DVec3) -> (DVec3, DVec3) {
     (sum, (a - (sum - b_part)) + (b - b_part))
 }
 
-/// To a multiple of 2⁻⁶⁴. Above 2⁻⁴⁰ the 24 bits of an `f32` end on one anyway.
+/// Rounds to a multiple of 2⁻⁶⁴. Above 2⁻⁴⁰ the 24 bits of an `f32` end on one anyway.
 #[inline]
 fn on_grid(value: DVec3) -> DVec3 {
-    /// The last bit of numbers about this large is 2⁻⁶⁴, so that adding it rounds.
+    /// The last bit of numbers of this size is 2⁻⁶⁴, so adding it rounds.
     const ROUNDER: f64 = 1.5 / (1u64 << 12) as f64;
     const COARSE_ENOUGH: f64 = 1.0 / (1u64 << 40) as f64;
     let round = |x: f64| if x.abs() < COARSE_ENOUGH { (x + ROUNDER) - ROUNDER } else { x };
@@ -77,7 +77,7 @@ mod tests {
         sum
     }
 
-    /// From far below the grid to a hundred million, of both signs (some filters have negative weights).
+    /// From far below the grid to 10⁸, of both signs (some filters have negative weights).
     fn sample() -> impl Strategy<Value = f32> {
         (any::<bool>(), -90.0..27.0_f32, 1.0..2.0_f32)
             .prop_map(|(negative, exponent, mantissa)| if negative { -1.0 } else { 1.0 } * mantissa * exponent.exp2())
@@ -94,7 +94,7 @@ mod tests {
             let one_go = sum_of(&samples);
             let expected = in_integers(&samples);
             let unit = (1u128 << 64) as f64;
-            // Each part is a whole number of units, and small enough to be one exactly.
+            // Each part is an integer number of units, and small enough for `i128`.
             let (sum, rest) = ((one_go.sum.x * unit) as i128, (one_go.rest.x * unit) as i128);
             prop_assert_eq!(sum + rest, expected);
             prop_assert_eq!(one_go.sum.x, expected as f64 / unit, "rounded to nearest");

@@ -1,43 +1,44 @@
-//! Feature buffers: what each pixel shows, without light. Means and variances of albedo, normal, position and depth, and
-//! shares of objects and materials.
+//! Feature buffers: properties of the visible surfaces per pixel, without lighting. Means and variances of albedo,
+//! normal, position and depth, and shares of objects and materials.
 //!
-//! They are a function of scene, camera, size, seed, filter and the number of feature samples alone: samples 0 up to that
-//! number of each pixel, whichever samples a film of the picture has. So films of parts of a picture have the same
-//! feature buffers, bit for bit, and so has the film that they add up to.
+//! They are a function of scene, camera, size, seed, filter and the number of feature samples: they use samples 0 up to
+//! that number of each pixel, whichever samples the film has. So films of parts of an image have the same feature
+//! buffers, bit for bit, and so has their merged film.
 
 use glam::Vec3;
 use std::cmp::Reverse;
 
-/// Feature buffers of a picture, row by row from the top; all lists have a number for each pixel.
+/// Feature buffers of an image; each list has one entry per pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureBuffers {
-    /// Pixels.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height in pixels.
     pub height: u32,
-    /// Samples of each pixel, at least 1.
+    /// Samples per pixel, at least 1.
     pub samples: u32,
-    /// Colour of the first surface that is not specular, times that of the mirrors and the glass on the way, 0..1. White,
-    /// or the colour of the way, where the way leaves the scene. Emitters: their radiance, scaled to at most 1.
+    /// Colour of the first non-specular surface, times the colours of the mirrors and glass on the path to it, 0..1.
+    /// For a path that leaves the scene, the product of those colours alone (white without any). Emitters: their
+    /// radiance, scaled to at most 1.
     pub albedo: Vec<Vec3>,
-    /// Shading normal of that surface in world space, on the side that is seen, at most of length 1: the mean of unit
-    /// vectors and, for samples that see nothing, zero.
+    /// Shading normal of that surface in world space, on the visible side: the mean of unit vectors, and of zero for
+    /// samples that hit nothing, so its length is at most 1.
     pub normal: Vec<Vec3>,
-    /// Position in the frame of the snapshot, metres: the mean over samples that see a surface; zero where none does.
+    /// Position in the snapshot's frame, metres, mean over the samples that hit a surface; zero where none does.
     pub position: Vec<Vec3>,
-    /// Metres along the view axis, counted along the whole way: of a mirror image, as far as it lies behind the mirror.
-    /// The mean over samples that see a surface; infinite where none does.
+    /// Depth along the view axis in metres, summed over the whole path: a mirror image lies behind the mirror. Mean
+    /// over the samples that hit a surface; infinite where none does.
     pub depth: Vec<f32>,
-    /// Share of samples that see a surface, 0..1.
+    /// Share of the samples that hit a surface, 0..1.
     pub coverage: Vec<f32>,
     /// Variances of the means.
     pub variance: FeatureVariances,
-    /// Where they were asked for.
+    /// Shares of objects and materials, if requested.
     pub ids: Option<FeatureIds>,
 }
 
-/// Variances of the means of [`FeatureBuffers`], in squares of their units: of one sample, over the number of samples. All
-/// zero where there is one sample alone.
+/// Variances of the means of [`FeatureBuffers`], in squares of their units: the variance of one sample divided by the
+/// number of samples. All zero for a single sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureVariances {
     /// Per channel.
@@ -46,12 +47,12 @@ pub struct FeatureVariances {
     pub normal: Vec<Vec3>,
     /// Per axis.
     pub position: Vec<Vec3>,
-    /// Of those samples that see a surface.
+    /// Over the samples that hit a surface.
     pub depth: Vec<f32>,
 }
 
-/// Which objects and materials a pixel shows. What counts is the surface that the camera ray itself meets: a mirror or a glass is
-/// itself, not what is seen in it, so that it can be told from what is around it.
+/// Objects and materials per pixel, those of the surface that the camera ray hits first: a mirror or a glass counts as
+/// itself, not as the object seen in it, so that it can be separated from its neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureIds {
     /// By index of the object in the snapshot.
@@ -60,28 +61,28 @@ pub struct FeatureIds {
     pub materials: Vec<IdShares>,
 }
 
-/// The ids that most samples of a pixel see, most samples first and small ids before large ones.
+/// The ids that most samples of a pixel hit, sorted by descending number of samples, then by ascending id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IdShares {
-    /// An id and how many samples see it; 0 samples for none.
+    /// Pairs of an id and its number of samples; 0 samples for an unused entry.
     pub ranks: [(u32, u32); Self::RANKS],
 }
 
 impl IdShares {
-    /// How many ids a pixel keeps.
+    /// Number of ids stored per pixel.
     pub const RANKS: usize = 6;
 
     /// No ids.
     pub const NONE: Self = Self { ranks: [(u32::MAX, 0); Self::RANKS] };
 
-    /// Those that there are.
+    /// The used entries.
     pub fn iter(&self) -> impl Iterator<Item = (u32, u32)> {
         self.ranks.into_iter().take_while(|&(_, samples)| samples > 0)
     }
 }
 
 impl FeatureBuffers {
-    /// Memory that a pixel takes, bytes.
+    /// Bytes per pixel.
     pub const BYTES_A_PIXEL: usize = 6 * size_of::<Vec3>() + 3 * size_of::<f32>() + 2 * size_of::<IdShares>();
 
     pub(crate) fn new(width: u32, height: u32, samples: u32, with_ids: bool) -> Self {
@@ -103,8 +104,7 @@ impl FeatureBuffers {
     }
 }
 
-/// Ids that the samples of one pixel have seen so far: exact up to [`IdCounts::MOST`] different ones, then new ones are
-/// left out.
+/// Sample counts per id of one pixel: exact up to [`IdCounts::MOST`] different ids; further ids are not counted.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct IdCounts {
     ids: [u32; Self::MOST],
@@ -115,7 +115,7 @@ pub(crate) struct IdCounts {
 impl IdCounts {
     const MOST: usize = 16;
 
-    /// Another sample sees this.
+    /// Counts a sample that hits this id.
     #[inline]
     pub fn add(&mut self, id: u32) {
         if let Some(at) = self.ids[..self.n].iter().position(|&known| known == id) {

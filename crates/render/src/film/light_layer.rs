@@ -1,7 +1,7 @@
-//! Where traced light is summed up: over the whole picture, because it may fall into any pixel.
+//! Sums of light tracing: over the whole image, because a light path may contribute to any pixel.
 //!
-//! Each sample of the picture has its own paths, in batches that are traced by any worker. Sums do not depend on their order, so neither
-//! threads nor portions change them, and layers of different samples add up like films do.
+//! Each sample of the image has its own light paths, in batches that any worker may trace. Sums do not depend on their
+//! order, so neither threads nor portions change them, and layers of different samples can be merged like films.
 
 use crate::core::counts::RayCounts;
 use crate::film::exact_sum::ExactSum;
@@ -16,54 +16,54 @@ use std::ops::Range;
 /// Sums over all light paths so far.
 #[derive(Clone, Debug)]
 pub(crate) struct LightLayer {
-    /// Row by row from the top.
+    /// Sum per pixel, row by row from the top.
     pub sums: Vec<ExactSum>,
     batches: Batches,
-    /// Numbers of the batches that were traced, ascending, with gaps between the ranges; new ones lengthen the last.
+    /// Numbers of the traced batches, ascending, with gaps between the ranges; new batches extend the last range.
     pub done: Vec<Range<u64>>,
-    /// Samples of the whole picture that are complete.
+    /// Samples per pixel of the whole image that are complete.
     pub spp: u32,
 }
 
-/// What [`LightLayer::advance`] did.
+/// Result of [`LightLayer::advance`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LayerReport {
     pub completed: bool,
     pub rays: RayCounts,
-    /// How many splats were not finite and were left out.
+    /// Number of splats that were rejected because they were not finite.
     pub n_bad: u64,
 }
 
 impl LightLayer {
-    /// - `first_sample`: number of the sample to begin with.
-    /// - `stride`: camera paths for each light path, at least 1.
+    /// - `first_sample`: number of the first sample.
+    /// - `stride`: camera paths per light path, at least 1.
     pub fn new(size: UVec2, first_sample: u32, stride: u32) -> Self {
         Self::in_memory(Vec::new(), size, first_sample, stride)
     }
 
-    /// The same with `sums`, whatever they are, as its memory.
+    /// Like [`Self::new`], reusing the memory of `sums`, whose values are discarded.
     pub fn in_memory(mut sums: Vec<ExactSum>, size: UVec2, first_sample: u32, stride: u32) -> Self {
         let n_pixels = (size.x * size.y) as usize;
         sums.truncate(n_pixels);
         sums.par_iter_mut().for_each(|sum| *sum = ExactSum::default());
-        // By all threads, for new memory is slow when it is first touched.
+        // In parallel, because the first access to new memory is slow.
         sums.par_extend(rayon::iter::repeat_n(ExactSum::default(), n_pixels - sums.len()));
         let batches = Batches::of_film(sums.len(), stride);
         let first = batches.of_sample(first_sample);
         Self { sums, batches, done: std::iter::once(first..first).collect(), spp: 0 }
     }
 
-    /// Samples of the picture that some of the paths belong to, more than are complete when it was stopped.
+    /// Samples per pixel that have any of their light paths: more than are complete after a stop.
     pub fn begun(&self) -> u32 {
         self.n_done().div_ceil(u64::from(self.batches.per_sample)) as u32
     }
 
-    /// Samples of the picture whose paths are all there; what [`Self::spp`] should be.
+    /// Samples per pixel whose light paths are complete; the value that [`Self::spp`] should have.
     pub fn complete(&self) -> u32 {
         (self.n_done() / u64::from(self.batches.per_sample)) as u32
     }
 
-    /// How many batches the samples below `sample` have.
+    /// Number of batches of the samples below `sample`.
     pub fn batches_before(&self, sample: u32) -> u64 {
         self.batches.of_sample(sample)
     }
@@ -72,7 +72,7 @@ impl LightLayer {
         self.done.iter().map(|range| range.end - range.start).sum()
     }
 
-    /// Mean over the paths so far.
+    /// Mean radiance of a pixel over the light paths so far, W·m⁻²·sr⁻¹.
     pub fn mean(&self, pixel: usize) -> DVec3 {
         match self.n_done() {
             0 => DVec3::ZERO,
@@ -80,13 +80,13 @@ impl LightLayer {
         }
     }
 
-    /// As [`Block::knows_less_than`](crate::film::block::Block::knows_less_than).
+    /// Like [`Block::knows_less_than`](crate::film::block::Block::knows_less_than).
     pub fn knows_less_than(&self, other: &Self) -> bool {
         let start = |layer: &Self| std::cmp::Reverse(layer.done.first().map_or(0, |range| range.start));
         (other.spp, start(other)) > (self.spp, start(self))
     }
 
-    /// Adds the paths of a layer of the same picture that has none of these.
+    /// Adds the paths of another layer of the same image; the layers must have no batch in common.
     pub fn merge(&mut self, other: &Self) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
         let last = self.done.last().map_or(0, |range| range.end);
@@ -106,14 +106,14 @@ impl LightLayer {
         self.spp = self.complete();
     }
 
-    /// Traces paths until they are enough for `target_spp` samples of the picture, or until `stop` says so; what a
-    /// batch had not finished is dropped.
+    /// Traces light paths up to `target_spp` samples per pixel of the image, or until `stop` returns true; unfinished
+    /// batches are discarded.
     pub fn advance(&mut self, pass: &CausticPass, target_spp: u32, stop: &(dyn Fn() -> bool + Sync)) -> LayerReport {
         let mut report = LayerReport { completed: true, ..LayerReport::default() };
         let size = self.batches.size;
         let mut left = self.batches.of_sample(target_spp).saturating_sub(self.n_done());
         let mut next = self.done.last().map_or(0, |range| range.end);
-        // Enough at once to keep all workers busy, few enough for a stop to lose little.
+        // Enough at once to keep all workers busy, few enough that a stop discards little.
         let at_once = 4 * rayon::current_num_threads() as u64;
         'all: while left > 0 {
             let traced: Vec<Option<(Vec<Splat>, RayCounts)>> = (next..next + left.min(at_once))

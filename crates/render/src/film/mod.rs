@@ -1,4 +1,4 @@
-//! Where light is summed up, how far it is from the truth, and how it becomes a picture.
+//! Film: sums of samples, error estimate, sample allocation, and development for the display.
 
 pub(crate) mod allocation;
 pub(crate) mod block;

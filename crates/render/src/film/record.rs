@@ -1,4 +1,4 @@
-//! A film as plain numbers, for keeping it on disk, and back.
+//! Conversion of a film to and from plain numbers, for storage.
 
 use crate::core::caustic_plan::CausticPlan;
 use crate::film::block::{Block, MAX_DOUBLINGS, NEVER, Steps};
@@ -11,99 +11,100 @@ use crate::film::tiles::Film;
 use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
-/// Numbers for each pixel: three channels of the sum, of its rest, of the mean at the last power of two; of sum and rest
-/// of the traced light, and of its mean at the last power of two.
+/// Planes of a record, one number per pixel each: three channels each of the sum, of its rest and of the mean at the
+/// last power of two; then the same of light tracing.
 pub const N_PLANES: usize = 18;
 
-/// All that is in a film.
+/// All data of a film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmRecord {
-    /// Size, tiles and samples.
+    /// Size, tiles and sample ranges.
     pub layout: FilmLayout,
-    /// Row by row from the top, [`N_PLANES`] of them.
+    /// [`N_PLANES`] planes, each row by row from the top.
     pub planes: Vec<Vec<f64>>,
 }
 
-/// What is not a number for each pixel.
+/// The data of a film that is not stored per pixel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FilmLayout {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Pixels.
+    /// Side of a tile in pixels.
     pub tile_size: u32,
     /// Row by row from the top.
     pub tiles: Vec<TileRecord>,
-    /// How samples are allocated, where the film is not even.
+    /// The sample allocation, unless the film is even.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub round: Option<RoundRecord>,
-    /// What is known of the traced light, where there is such light.
+    /// State of light tracing, if there is any.
     #[serde(rename = "lamps")]
     pub light_traced: Option<LightTracingRecord>,
-    /// How caustics are looked for; `None` without samples. Films that do not tell it have a light path for every four
-    /// camera paths, where they have light paths.
+    /// How caustics are rendered; `None` without samples. Older films without this field have one light path per four
+    /// camera paths, if they have light paths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub caustics: Option<CausticPlan>,
 }
 
-/// From which mean of samples per pixel to which a round of the allocation goes, and how far it is.
+/// A round of the sample allocation and its progress; all numbers are mean samples per pixel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoundRecord {
-    /// Where it began.
+    /// Budget at which it began.
     pub from: u32,
-    /// Where it ends.
+    /// Budget at which it ends.
     pub to: u32,
-    /// What has been spent.
+    /// Budget spent so far.
     pub budget: u32,
-    /// Whether all pixels get as many samples.
+    /// Whether all pixels get the same number of samples.
     pub even: bool,
-    /// Whether there are samples that no round gave it.
+    /// Whether the film has samples that no round allocated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub irregular: bool,
 }
 
-/// Light paths that are in the film.
+/// Light paths of a film.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LightTracingRecord {
-    /// First batch and the one after the last, of each range.
+    /// First batch and the one after the last, per range.
     pub batches: Vec<(u64, u64)>,
-    /// Samples of the whole picture that are complete.
+    /// Samples per pixel of the whole image that are complete.
     pub spp: u32,
 }
 
-/// Which samples a tile has, and what is known of its error.
+/// Sample ranges and error statistics of a tile.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TileRecord {
-    /// Row by row from the top.
+    /// Blocks, row by row from the top.
     pub blocks: Vec<BlockRecord>,
-    /// Pixel of the tile and number of each sample that was left out.
+    /// Rejected samples: pixel index in the tile and sample number.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bad: Vec<(u32, u32)>,
-    /// How many samples the means of traced light at the last power of two have.
+    /// Samples per pixel in the means of light tracing at the last power of two.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub light_mean_of: u32,
-    /// What doublings of the traced light changed.
+    /// Squared changes by the latest doublings of light tracing.
     #[serde(default, skip_serializing_if = "StepsRecord::is_none")]
     pub light_steps: StepsRecord,
 }
 
-/// Which samples a block has, and what is known of its error.
+/// Sample ranges and error statistics of a block.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
-    /// First sample and the one after the last, of each range.
+    /// First sample and the one after the last, per range.
     pub samples: Vec<(u32, u32)>,
-    /// How many samples the means at the last power of two have.
+    /// Samples per pixel in the means at the last power of two.
     pub mean_of: u32,
-    /// What doublings changed.
+    /// Squared changes by the latest doublings.
     #[serde(default, skip_serializing_if = "StepsRecord::is_none")]
     pub steps: StepsRecord,
-    /// Samples when the round began, and the budgets from which on they are doubled.
+    /// Samples per pixel when the round began, and the budgets from which on they are doubled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub due: Option<(u32, Vec<u32>)>,
 }
 
-/// Samples after the newest doubling, and the bits of what that one and those before it changed; 0 before the first.
+/// Samples per pixel after the newest doubling (0 before the first), and the bits of the `f32` values of `Steps`,
+/// newest first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepsRecord(pub u32, pub Vec<u32>);
 
@@ -116,7 +117,7 @@ impl StepsRecord {
         if steps.at == 0 { Self::default() } else { Self(steps.at, steps.values.map(f32::to_bits).to_vec()) }
     }
 
-    /// - `mean_of`: samples of the means that the next doubling is measured from.
+    /// - `mean_of`: samples per pixel in the means from which the next doubling is measured.
     fn steps(&self, mean_of: u32) -> Result<Steps, RecordError> {
         let Self(at, bits) = self;
         if *at == 0 && bits.is_empty() {
@@ -134,37 +135,37 @@ fn is_zero(n: &u32) -> bool {
     *n == 0
 }
 
-/// The layout of films of before blocks had samples of their own.
+/// Layout of films from before blocks had their own sample counts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OldFilmLayout {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Pixels.
+    /// Side of a tile in pixels.
     pub tile_size: u32,
     /// Row by row from the top.
     pub tiles: Vec<OldTileRecord>,
-    /// What is known of the traced light, where there is such light.
+    /// State of light tracing, if there is any.
     #[serde(rename = "lamps")]
     pub light_traced: Option<LightTracingRecord>,
 }
 
-/// Which samples a tile has; what it said of its error is not read.
+/// Sample ranges of a tile; its error statistics are not read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OldTileRecord {
-    /// First sample and the one after the last, of each range.
+    /// First sample and the one after the last, per range.
     pub samples: Vec<(u32, u32)>,
-    /// Pixel of the tile and number of each sample that was left out.
+    /// Rejected samples: pixel index in the tile and sample number.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bad: Vec<(u32, u32)>,
 }
 
 impl OldFilmLayout {
-    /// Planes of such a film: the first of those of today.
+    /// Planes of such a film: the first ones of the current format.
     pub const N_PLANES: usize = 15;
 
-    /// The same samples, of which the error is known again when they double.
+    /// Converts to the current layout with the same samples; the error is unknown until they double.
     pub fn renewed(self) -> FilmLayout {
         let Self { width, height, tile_size, tiles, light_traced } = self;
         let n_tiles_x = width.div_ceil(tile_size.max(1)).max(1);
@@ -172,7 +173,7 @@ impl OldFilmLayout {
             let at = UVec2::new(i as u32 % n_tiles_x, i as u32 / n_tiles_x).saturating_mul(UVec2::splat(tile_size));
             let size = UVec2::new(width, height).saturating_sub(at).min(UVec2::splat(tile_size));
             let block = BlockRecord { samples: tile.samples, mean_of: 0, steps: StepsRecord::default(), due: None };
-            // Tiles that are not there are refused later.
+            // Missing tiles are rejected later.
             let blocks = vec![block; Block::count(size)];
             TileRecord { blocks, bad: tile.bad, light_mean_of: 0, light_steps: StepsRecord::default() }
         };
@@ -182,7 +183,7 @@ impl OldFilmLayout {
 }
 
 impl FilmLayout {
-    /// Whether every sample of `other` is here too, if both are of one picture.
+    /// Whether this film contains every sample of `other`, given that both are of the same image.
     pub fn has_all_of(&self, other: &Self) -> bool {
         fn covers<T: PartialOrd>(ranges: &[(T, T)], others: &[(T, T)]) -> bool {
             let is_covered = |(start, end): &(T, T)| start >= end || ranges.iter().any(|(s, e)| s <= start && end <= e);
@@ -201,7 +202,7 @@ impl FilmLayout {
 }
 
 impl Film {
-    /// What is not a number for each pixel.
+    /// Returns the data that is not stored per pixel.
     pub fn layout(&self) -> FilmLayout {
         let is_uneven = self.round.is_some_and(|round| !round.even);
         let of_block = |block: &Block| BlockRecord {
@@ -211,7 +212,7 @@ impl Film {
             due: is_uneven.then(|| (block.base, block.due.into_iter().filter(|due| *due != NEVER).collect())),
         };
         let record = |tile: &FilmTile| {
-            // In an order that does not tell in which one blocks came along.
+            // Sorted, so that it does not depend on the order in which blocks were rendered.
             let mut bad = tile.bad.clone();
             bad.sort_unstable_by_key(|&(pixel, sample)| (sample, pixel));
             TileRecord {
@@ -238,7 +239,7 @@ impl Film {
         }
     }
 
-    /// All numbers of the film; [`Self::from_record`] is the inverse.
+    /// Converts the film to numbers; [`Self::from_record`] is the inverse.
     pub fn to_record(&self) -> FilmRecord {
         let n_pixels = self.width() as usize * self.height() as usize;
         let mut planes = vec![vec![0.0; n_pixels]; N_PLANES];
@@ -267,10 +268,10 @@ impl Film {
         FilmRecord { layout: self.layout(), planes }
     }
 
-    /// The film with these numbers; the inverse of [`Self::to_record`].
+    /// Restores a film; the inverse of [`Self::to_record`].
     ///
     /// # Errors
-    /// When the numbers contradict each other.
+    /// If the numbers contradict each other.
     pub fn from_record(record: &FilmRecord) -> Result<Self, RecordError> {
         let FilmLayout { width, height, tile_size, tiles, round: _, light_traced, caustics } = &record.layout;
         let (width, height, tile_size) = (*width, *height, *tile_size);
@@ -326,7 +327,7 @@ impl Film {
 }
 
 impl FilmTile {
-    /// Which samples there are, and what is known of their error; no numbers of pixels.
+    /// Restores the sample ranges and the error statistics, without the planes.
     fn take_samples(&mut self, record: &TileRecord) -> Result<(), RecordError> {
         if record.blocks.len() != self.blocks.len() {
             return Err(RecordError::Size);
@@ -367,7 +368,7 @@ fn checked_mean(samples: u32) -> Result<u32, RecordError> {
 }
 
 impl FilmLayout {
-    /// The round of a film with these samples.
+    /// Restores and checks the round of a film with these samples.
     fn round(&self, film: &Film) -> Result<Option<Round>, RecordError> {
         let Some(&RoundRecord { from, to, budget, even, irregular }) = self.round.as_ref() else { return Ok(None) };
         let round = Round { from, to, budget, even, irregular };
@@ -379,7 +380,7 @@ impl FilmLayout {
     }
 }
 
-/// - `most`: that no range may go beyond.
+/// - `most`: upper limit of the end of all ranges.
 fn check_ranges<T: PartialOrd>(ranges: &[(T, T)], most: T) -> Result<(), RecordError> {
     let ascending = ranges.windows(2).all(|pair| pair[0].1 < pair[1].0);
     let whole = ranges.iter().all(|(start, end)| start <= end);

@@ -1,11 +1,11 @@
-//! A part of the picture that gets all samples for a while.
+//! A part of the image that gets all samples for a while.
 //!
-//! Only whole tiles are advanced, each by its own sample numbers, so a region changes no sample anywhere: it decides
-//! which ones are taken, and since that does not depend on what they find, every mean stays unbiased.
+//! Only whole tiles are advanced, each by its own sample numbers, so a region changes no sample: it selects which
+//! samples are taken. The selection does not depend on their values, so every mean stays unbiased.
 
 use glam::UVec2;
 
-/// A rectangle of whole tiles of a film, pixels; `end` is excluded. Not empty.
+/// A rectangle of whole tiles of a film, in pixels; `end` is excluded. Not empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// Column and row of the first pixel, from the upper left corner.

@@ -1,11 +1,11 @@
-//! Memory for pictures, asked for before it is needed: a picture that is too large is an error with its size, not the
-//! end of the process.
+//! Memory for images, reserved before it is needed: an image that is too large is an error that says its size, instead
+//! of the end of the process.
 
 use crate::film::exact_sum::ExactSum;
 use crate::film::features::FeatureBuffers;
 use glam::{DVec3, Vec3};
 
-/// A picture that there is no memory for.
+/// There is not enough memory for an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a picture of {width} x {height} would take {} of memory, and that much cannot be had: make it smaller", size(*.bytes))]
 pub struct NoRoom {
@@ -13,29 +13,29 @@ pub struct NoRoom {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Memory that it would take, bytes.
+    /// Required memory in bytes.
     pub bytes: u64,
 }
 
-/// Memory that is kept free until it is dropped. Nothing is written to it, so that it takes no time.
+/// Memory that is reserved until it is dropped. It is never written, so the reservation takes no time.
 #[derive(Debug)]
 pub struct Room {
     _memory: Vec<u8>,
 }
 
-/// What a picture is wanted for, besides its pixels on the film: bytes of a pixel on the way to the disk, and there
-/// packed at its worst, in a list that doubles as it grows.
+/// What an image is used for besides its film: determines the bytes per pixel of the buffers for writing it, and of the
+/// compressed file at its worst in a list that doubles as it grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// Four bytes developed, and three packed twice.
+    /// Four developed bytes, and three compressed ones, twice.
     Png,
-    /// Three numbers, as rows and as channels, and packed.
+    /// Three numbers, as rows and as channels, and compressed.
     Exr,
-    /// All numbers of the film, as planes and as two channels each, and packed.
+    /// All numbers of the film, as planes and as two channels each, and compressed.
     FilmFile,
-    /// A film with feature buffers, or a picture with all layers: the buffers, and more channels.
+    /// A film with feature buffers, or an image with all layers: the buffers, and more channels.
     Layers,
-    /// Feature buffers, and the lists of the denoiser.
+    /// Feature buffers, and the buffers of the denoiser.
     Denoised,
 }
 
@@ -51,30 +51,30 @@ impl Purpose {
     }
 }
 
-/// Memory that a pixel of a film takes: its sums, its mean at the last power of two, and how far that had moved.
+/// Bytes per pixel of a film: its sum, its mean at the last power of two, and the last change of the mean.
 pub(crate) const BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>() + size_of::<Vec3>();
 
-/// And for traced light, where there is such light.
+/// Bytes per pixel of light tracing, if there is any.
 pub(crate) const LIGHT_BYTES_A_PIXEL: usize = size_of::<ExactSum>() + size_of::<DVec3>() + size_of::<Vec3>();
 
-/// For what a large picture takes besides, such as the workers' memory: an eighth, and no more than this.
+/// Margin for the rest that a large image takes, such as the workers' memory: an eighth, and at most this many bytes.
 const MOST_BESIDES: u64 = 32 << 20;
 
 impl Room {
-    /// Keeps memory free for writing or reading files, one after the other.
+    /// Reserves memory for writing or reading files one after the other: as much as the largest of them needs.
     ///
     /// # Errors
-    /// When there is not so much.
+    /// If there is not enough memory.
     pub fn for_files(width: u32, height: u32, purposes: &[Purpose]) -> Result<Self, NoRoom> {
         Self::of(width, height, most(purposes))
     }
 
-    /// Keeps as much memory free as a film takes, and then for what it is wanted for.
+    /// Reserves memory for a film and then for its purposes.
     ///
-    /// - `light_traced`: there will be traced light on it.
+    /// - `light_traced`: whether the film will have sums of light tracing.
     ///
     /// # Errors
-    /// When there is not so much.
+    /// If there is not enough memory.
     pub fn for_film(width: u32, height: u32, light_traced: bool, purposes: &[Purpose]) -> Result<Self, NoRoom> {
         let film = BYTES_A_PIXEL + size_of::<f32>() + if light_traced { LIGHT_BYTES_A_PIXEL } else { 0 };
         Self::of(width, height, film as u64 + most(purposes))
@@ -95,7 +95,7 @@ fn most(purposes: &[Purpose]) -> u64 {
     purposes.iter().map(|purpose| purpose.bytes_a_pixel()).max().unwrap_or(0)
 }
 
-/// Bytes, for people.
+/// Formats a number of bytes for people.
 fn size(bytes: u64) -> String {
     let mib = bytes as f64 / f64::from(1 << 20);
     if mib < 1024.0 { format!("{mib:.0} MiB") } else { format!("{:.1} GiB", mib / 1024.0) }
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_film_refuses_what_there_is_no_memory_for() {
-        // More than any address space has, in tiles of which each is small.
+        // More than any address space, in tiles that are small.
         let error = Film::try_new(1 << 31, 1 << 31).unwrap_err();
         assert_eq!((error.width, error.height), (1 << 31, 1 << 31));
         let film = Film::try_new(70, 40).unwrap();

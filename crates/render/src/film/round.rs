@@ -1,17 +1,17 @@
-//! How far an allocation of samples is: plain data that a film keeps. `allocation.rs` decides it.
+//! Progress of the sample allocation: plain data that is stored in the film. `allocation.rs` decides it.
 
-/// From one budget, in mean samples per pixel of the film, to the next.
+/// A step of the allocation from one budget to the next, in mean samples per pixel of the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Round {
-    /// The budget at which it was decided.
+    /// The budget at which the round was decided.
     pub from: u32,
-    /// That at which it ends.
+    /// The budget at which it ends.
     pub to: u32,
-    /// What has been spent: everything that is due up to it is there.
+    /// The budget spent so far: all samples that are due up to it have been taken.
     pub budget: u32,
-    /// All pixels get as many samples.
+    /// Whether all pixels get the same number of samples.
     pub even: bool,
-    /// The film has samples that no round gave it: those of a part, or of a region. Its number of samples does not say
-    /// how to make it again.
+    /// Whether the film has samples that no round allocated: those of a part, or of a region. Then its sample count
+    /// does not suffice to reproduce it.
     pub irregular: bool,
 }

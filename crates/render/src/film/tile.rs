@@ -1,4 +1,4 @@
-//! The pixels of one tile: what a worker owns while it adds samples.
+//! The pixels of one tile: the unit that a worker owns while it adds samples.
 
 use crate::film::block::{BLOCK_PIXELS, BLOCK_SIZE, Block, Steps};
 use crate::film::estimate::local_level;
@@ -8,45 +8,45 @@ use crate::film::region::Region;
 use glam::{DVec3, UVec2, Vec3};
 use std::collections::TryReserveError;
 
-/// The pixels of one tile, row by row, in blocks that each have the same samples.
+/// The pixels of one tile, row by row, in blocks of equal sample counts.
 #[derive(Clone, Debug)]
 pub(crate) struct FilmTile {
-    /// Upper left pixel.
+    /// Upper left pixel in the film.
     pub origin: UVec2,
     pub size: UVec2,
-    /// Row by row.
+    /// Blocks, row by row.
     pub blocks: Vec<Block>,
-    /// Sum of radiance a pixel, W·m⁻²·sr⁻¹.
+    /// Sum of radiance per pixel, W·m⁻²·sr⁻¹.
     pub sums: Vec<ExactSum>,
-    /// Pixel (index in this tile) and number of each sample that was left out because it was not finite.
+    /// Pixel (index in this tile) and sample number of each sample that was rejected because it was not finite.
     pub bad: Vec<(u32, u32)>,
-    /// Means at the last power of two of each block's samples; empty before the first.
+    /// Mean radiance at the last power of two of each block's samples; empty before the first.
     pub before: Vec<DVec3>,
-    /// Each pixel's share of its block's last step, mean over channels; empty where it is not known.
+    /// Squared relative change of each pixel in its block's last doubling, mean over channels; empty if unknown.
     pub last: Vec<f32>,
-    /// How far each pixel's mean moved in that step, W·m⁻²·sr⁻¹; NaN where it is not known, empty where it is known of none.
+    /// Change of each pixel's mean in that doubling, W·m⁻²·sr⁻¹; NaN where unknown, empty if unknown for all pixels.
     pub half_steps: Vec<Vec3>,
-    /// The same of traced light.
+    /// The same for light tracing.
     pub light: TileLight,
 }
 
-/// What the error estimate knows of the traced light in a tile.
+/// Error statistics of light tracing in a tile.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TileLight {
-    /// Samples of the means; 0 before the first.
+    /// Samples per pixel in `before`; 0 before the first.
     pub mean_of: u32,
-    /// Means at the last power of two.
+    /// Mean radiance per pixel at the last power of two.
     pub before: Vec<DVec3>,
-    /// Each pixel's share of the last step, mean over channels; empty where it is not known.
+    /// Squared relative change of each pixel in the last doubling, mean over channels; empty if unknown.
     pub last: Vec<f32>,
-    /// How far each pixel's mean moved in that step; empty where it is not known.
+    /// Change of each pixel's mean in that doubling; empty if unknown.
     pub half_steps: Vec<Vec3>,
-    /// What doublings changed.
+    /// Squared changes by the latest doublings.
     pub steps: Steps,
 }
 
 impl TileLight {
-    /// The mean at the last power of two.
+    /// The mean at the last power of two; zero before the first.
     fn before(&self, local: usize) -> DVec3 {
         if self.mean_of > 0 { self.before[local] } else { DVec3::ZERO }
     }
@@ -79,7 +79,7 @@ impl FilmTile {
         Ok(Self { origin, size, blocks, sums, bad: Vec::new(), before, last, half_steps, light: TileLight::default() })
     }
 
-    /// Has the memory ready that traced light needs.
+    /// Reserves the memory for light tracing.
     pub fn try_reserve_light(&mut self) -> Result<(), TryReserveError> {
         let n = self.n_pixels();
         self.light.before.try_reserve_exact(n)?;
@@ -87,7 +87,7 @@ impl FilmTile {
         self.light.last.try_reserve_exact(n)
     }
 
-    /// As new, to begin with sample number `first`.
+    /// Removes all samples; the next one has number `first`.
     pub fn clear(&mut self, first: u32) {
         let Self { origin: _, size: _, blocks, sums, bad, before, last, half_steps, light } = self;
         blocks.iter_mut().for_each(|block| block.clear(first));
@@ -103,7 +103,7 @@ impl FilmTile {
         self.sums.len()
     }
 
-    /// Samples that every pixel has at least.
+    /// Smallest sample count of any pixel.
     pub fn spp(&self) -> u32 {
         self.blocks.iter().map(|block| block.spp).min().unwrap_or(0)
     }
@@ -114,7 +114,7 @@ impl FilmTile {
         &self.blocks[(y / BLOCK_SIZE * self.size.x.div_ceil(BLOCK_SIZE) + x / BLOCK_SIZE) as usize]
     }
 
-    /// Blocks in column order and the columns of the tile that they have in row `y` of it.
+    /// Returns the blocks that contain row `y` of the tile, from left to right.
     pub fn blocks_in_row(&self, y: u32) -> &[Block] {
         let n = self.size.x.div_ceil(BLOCK_SIZE) as usize;
         &self.blocks[(y / BLOCK_SIZE) as usize * n..][..n]
@@ -124,7 +124,7 @@ impl FilmTile {
         self.mean_of(local, self.block_of(local).spp)
     }
 
-    /// - `spp`: of its block.
+    /// - `spp`: sample count of its block.
     fn mean_of(&self, local: usize, spp: u32) -> DVec3 {
         let n_bad = self.bad.iter().filter(|(pixel, _)| *pixel as usize == local).count() as u32;
         match spp - n_bad {
@@ -133,7 +133,7 @@ impl FilmTile {
         }
     }
 
-    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels.
+    /// Returns the change of a pixel by its last doubling: the squared relative difference, mean over channels.
     pub fn last_step(&self, local: usize) -> f32 {
         let of = |steps: Steps, last: &[f32]| {
             if steps.at > 0 { last.get(local).copied().unwrap_or(0.0) } else { 0.0 }
@@ -141,7 +141,7 @@ impl FilmTile {
         of(self.block_of(local).steps, &self.last) + of(self.light.steps, &self.light.last)
     }
 
-    /// Adds one sample of every pixel of a block, row by row; `sample` is its number, the next one.
+    /// Adds one sample of every pixel of a block, row by row; `sample` is its number, which must be the next one.
     pub fn add_sample(&mut self, block: usize, sample: u32, radiance: &[Vec3]) {
         let of = &mut self.blocks[block];
         debug_assert_eq!(sample, of.next_sample(), "samples come in order");
@@ -158,10 +158,11 @@ impl FilmTile {
         }
     }
 
-    /// At powers of two, tells the error estimate how far the blocks are; it must be told each of them.
+    /// Records the means of blocks whose sample count is a power of two, and their last doubling, for the error
+    /// estimate. Must be called at each power of two.
     ///
-    /// - `even`: all blocks get as many samples, so that the level of a pixel may be that of its neighbours in other blocks,
-    ///   too. Otherwise it would depend on which block came first, and so on the portions of a pass.
+    /// - `even`: all blocks get the same number of samples, so the level of a pixel may use its neighbours in other
+    ///   blocks. Otherwise it would depend on the order in which blocks are rendered, and so on the portions of a pass.
     pub fn record(&mut self, even: bool) {
         let is_news = |block: &Block| block.spp.is_power_of_two() && block.mean_of != block.spp;
         if !self.blocks.iter().any(is_news) {
@@ -179,7 +180,7 @@ impl FilmTile {
         }
     }
 
-    /// - `of_tile`: what all pixels of the tile show, if that counts; else the list is empty.
+    /// - `of_tile`: mean radiance of all pixels of the tile, or empty if the level must come from the block alone.
     fn record_block(&mut self, block: usize, of_tile: &[DVec3]) {
         let Block { spp, mean_of, size, .. } = self.blocks[block];
         let (mut seen, mut shown) = ([DVec3::ZERO; BLOCK_PIXELS], [DVec3::ZERO; BLOCK_PIXELS]);
@@ -191,7 +192,7 @@ impl FilmTile {
         if self.before.is_empty() {
             self.before.resize(self.sums.len(), DVec3::ZERO);
         }
-        // What came in too large a lump tells nothing.
+        // More than one doubling at once gives no estimate.
         if mean_of > 0 && mean_of == spp / 2 {
             if self.last.is_empty() {
                 self.last.resize(self.sums.len(), 0.0);
@@ -225,9 +226,10 @@ impl FilmTile {
         self.blocks[block].mean_of = spp;
     }
 
-    /// When the samples of traced light are a power of two, tells the error estimate how far it is.
+    /// Records the light-traced means if the samples of light tracing are a power of two, and their last doubling, for
+    /// the error estimate.
     ///
-    /// - `width`: of the film.
+    /// - `width`: width of the film in pixels.
     pub fn record_light(&mut self, layer: &LightLayer, width: u32) {
         let (spp, mean_of) = (layer.spp, self.light.mean_of);
         if !spp.is_power_of_two() || mean_of == spp {
@@ -252,15 +254,15 @@ impl FilmTile {
             }
             light.steps.push(spp, sum);
         }
-        // Not the new list itself: this one's memory is reserved, for as long as the film is there.
+        // Copies into the existing list, because its memory is reserved for as long as the film exists.
         self.light.before.clear();
         self.light.before.extend_from_slice(&now);
         self.light.mean_of = spp;
     }
 
-    /// Adds the samples of another tile, which has none of these.
+    /// Adds the samples of another tile; the tiles must have no sample in common.
     ///
-    /// - `light_knows_more`: whether the other one knows more of the error of traced light.
+    /// - `light_knows_more`: whether the other tile's error statistics of light tracing rest on more samples.
     pub fn merge(&mut self, other: &Self, light_knows_more: bool) {
         for (sum, other) in self.sums.iter_mut().zip(&other.sums) {
             sum.merge(other);
@@ -288,7 +290,7 @@ impl FilmTile {
     }
 }
 
-/// Of lists that are either empty or have all pixels.
+/// Copies one entry between lists that are either empty or complete.
 fn copy_one<T: Copy + Default>(from: &[T], to: &mut Vec<T>, at: usize, n: usize) {
     if let Some(value) = from.get(at) {
         to.resize(n, T::default());
@@ -296,7 +298,7 @@ fn copy_one<T: Copy + Default>(from: &[T], to: &mut Vec<T>, at: usize, n: usize)
     }
 }
 
-/// The squared difference over the squared level, summed over channels.
+/// Returns the squared difference over the squared level plus 0.01, summed over channels.
 fn relative_square(difference: DVec3, level: DVec3) -> f64 {
     (difference * difference / (level * level + 0.01)).element_sum()
 }

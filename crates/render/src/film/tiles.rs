@@ -1,7 +1,7 @@
-//! Where light is summed up: linear, unclamped, in tiles that workers own one at a time.
+//! The film: linear, unclamped sums of samples, in tiles that workers own one at a time.
 //!
-//! Sums do not depend on the order of samples, so films of the same picture with different samples can be added up
-//! ([`Film::merge`]) to the very film that has all of them.
+//! Sums do not depend on the order of samples, so films of the same image with different samples can be merged
+//! ([`Film::merge`]) to exactly the film that has all of them.
 
 use crate::core::caustic_plan::CausticPlan;
 use crate::core::settings::ErrorMetric;
@@ -18,11 +18,12 @@ use crate::film::tile::FilmTile;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
 
-/// Sums and counts of one picture.
+/// Sums and sample counts of one image.
 ///
-/// All pixels of a block of 8 × 8 have the same number of samples. In an even film all blocks have as many; after a pass
-/// that was stopped early, or one over a [`Region`] alone, they may differ, and the next pass over all evens them out. In
-/// an adaptive film samples go where the error is, and what counts is the mean over the picture, its budget.
+/// All pixels of a block of 8 × 8 have the same number of samples. In an even film all blocks have the same number;
+/// after a pass that was stopped, or a pass over a [`Region`], they may differ, and the next pass over all tiles evens
+/// them out. In an adaptive film samples go where the error is, and the sample count of the film is the mean over the
+/// image, its budget.
 #[derive(Clone, Debug)]
 pub struct Film {
     width: u32,
@@ -30,20 +31,21 @@ pub struct Film {
     pub(crate) tiles: Vec<FilmTile>,
     tiles_x: u32,
     tile_size: u32,
-    /// How samples are allocated until the next budget; `None` as long as the film is even.
+    /// The sample allocation up to the next budget; `None` as long as the film has no rounds.
     pub(crate) round: Option<Round>,
-    /// From paths that began at the lights; `None` until there is some.
+    /// Sums of light tracing; `None` until there are any.
     pub(crate) light: Option<LightLayer>,
-    /// Memory of such a layer that is not in use.
+    /// Memory of a light layer that is not in use.
     idle_light: Vec<ExactSum>,
-    /// How caustics are looked for: of all its samples, so known from the first one on.
+    /// How caustics are rendered: the same for all samples, so fixed from the first one on.
     pub(crate) caustic_plan: Option<CausticPlan>,
     /// See [`Self::set_preview`].
     pub(crate) is_preview: bool,
 }
 
 impl Film {
-    /// The tiles of which these pixels have a part, from `start` up to `end`, excluded; `None` where there is none.
+    /// The smallest region of whole tiles that contains the pixels from `start` up to `end`, excluded; `None` if there
+    /// are none.
     pub fn region(&self, start: UVec2, end: UVec2) -> Option<Region> {
         let (size, side) = (UVec2::new(self.width(), self.height()), self.tile_size());
         let end = end.min(size);
@@ -54,7 +56,8 @@ impl Film {
         Some(Region { start: start / side * side, end: (last * side).min(size) })
     }
 
-    /// The same, of a rectangle in fractions of the picture from its upper left corner: left, top, right and bottom.
+    /// Like [`Self::region`], for a rectangle in fractions of the image from its upper left corner: left, top, right
+    /// and bottom, clamped to 0..1.
     pub fn region_of(&self, [left, top, right, bottom]: [f64; 4]) -> Option<Region> {
         let size = UVec2::new(self.width(), self.height()).as_dvec2();
         let pixel = |x: f64, y: f64| glam::DVec2::new(x, y).clamp(glam::DVec2::ZERO, glam::DVec2::ONE) * size;
@@ -63,49 +66,58 @@ impl Film {
 }
 
 impl Film {
-    /// Pixels along the side of a tile, unless asked otherwise.
+    /// Default side of a tile in pixels.
     pub const TILE_SIZE: u32 = 32;
 
-    /// Samples of a pixel are numbered below this.
+    /// Sample numbers of a pixel are below this.
     pub const MAX_SAMPLES: u32 = 1 << 31;
 
-    /// Memory that a pixel takes: its sums, its mean at the last power of two, and how far that had moved.
+    /// Bytes per pixel: its sum, its mean at the last power of two, and the last change of the mean.
     pub const BYTES_A_PIXEL: usize = room::BYTES_A_PIXEL;
 
-    /// Memory that a pixel takes for traced light, where there is such light.
+    /// Bytes per pixel of light tracing, if there is any.
     pub const LIGHT_BYTES_A_PIXEL: usize = room::LIGHT_BYTES_A_PIXEL;
 
-    /// Width and height in pixels, at least 1 each. Panics where there is no memory for it.
+    /// Creates an empty film.
+    ///
+    /// - `width`, `height`: pixels, at least 1 each.
+    ///
+    /// # Panics
+    /// If a size is 0, or there is not enough memory.
     pub fn new(width: u32, height: u32) -> Self {
         Self::with_tile_size(width, height, Self::TILE_SIZE)
     }
 
-    /// The same, or how much memory it would have taken.
+    /// Like [`Self::new`], with an error that says the required memory.
     ///
     /// # Errors
-    /// When the memory cannot be had.
+    /// If there is not enough memory.
+    ///
+    /// # Panics
+    /// If a size is 0.
     pub fn try_new(width: u32, height: u32) -> Result<Self, NoRoom> {
         Self::try_with_tile_size(width, height, Self::TILE_SIZE)
     }
 
-    /// The picture does not depend on `tile_size`, bit for bit.
+    /// Like [`Self::new`], with a side of the tiles in pixels. The image does not depend on it, bit for bit.
     ///
     /// # Panics
-    /// When a size is 0, or the memory cannot be had.
+    /// If a size is 0, or there is not enough memory.
     pub fn with_tile_size(width: u32, height: u32, tile_size: u32) -> Self {
         Self::try_with_tile_size(width, height, tile_size).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// All that a render will need for it is there then, but for traced light ([`Self::reserve_light`]).
+    /// Like [`Self::with_tile_size`], with an error. Allocates everything that a render needs, except for light tracing
+    /// ([`Self::reserve_light`]).
     ///
     /// # Errors
-    /// When the memory cannot be had.
+    /// If there is not enough memory.
     ///
     /// # Panics
-    /// When a size is 0.
+    /// If a size is 0.
     pub fn try_with_tile_size(width: u32, height: u32, tile_size: u32) -> Result<Self, NoRoom> {
         assert!(width > 0 && height > 0 && tile_size > 0, "a film of {width} × {height} has no pixels");
-        // In one piece first: a system that promises small pieces beyond what it has refuses such a large one.
+        // In one piece first: a system that overcommits small allocations refuses one that is too large.
         drop(Room::for_film(width, height, false, &[])?);
         let bytes = u64::from(width) * u64::from(height) * (Self::BYTES_A_PIXEL + size_of::<f32>()) as u64;
         let no_room = |_| NoRoom { width, height, bytes };
@@ -131,10 +143,10 @@ impl Film {
         })
     }
 
-    /// Has memory ready for traced light.
+    /// Reserves memory for light tracing.
     ///
     /// # Errors
-    /// When the memory cannot be had.
+    /// If there is not enough memory.
     pub fn reserve_light(&mut self) -> Result<(), NoRoom> {
         if self.light.is_some() {
             return Ok(());
@@ -148,7 +160,7 @@ impl Film {
         self.idle_light.try_reserve_exact(missing).map_err(no_room)
     }
 
-    /// The same without samples, to begin with sample number `first`.
+    /// Removes all samples; the next one has number `first`.
     pub fn starting_at(mut self, first: u32) -> Self {
         self.clear();
         for block in self.tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
@@ -172,13 +184,13 @@ impl Film {
         self.tile_size
     }
 
-    /// Samples per pixel: of an even film those that every pixel has at least, of an adaptive one the mean that has been
+    /// Samples per pixel: for an even film the minimum over all pixels, for an adaptive film the mean that has been
     /// spent.
     pub fn spp(&self) -> u32 {
         self.spp_in(None)
     }
 
-    /// The same of a region, in which every pixel has so many at least, or of the whole film.
+    /// Like [`Self::spp`] for the whole film; for a region, the minimum over its pixels.
     pub fn spp_in(&self, region: Option<&Region>) -> u32 {
         let light_traced = self.light.as_ref().map(|light| light.spp);
         match (&self.round, region) {
@@ -195,7 +207,7 @@ impl Film {
         self.tiles.iter().flat_map(|tile| &tile.blocks)
     }
 
-    /// Samples per pixel that have been begun: more than [`spp`](Self::spp) if a pass was stopped.
+    /// Samples per pixel that any pixel has begun: more than [`spp`](Self::spp) if a pass was stopped.
     pub fn max_spp(&self) -> u32 {
         let light_traced = self.light.as_ref().map(LightLayer::begun);
         let begun = |block: &Block| match &self.round {
@@ -206,13 +218,13 @@ impl Film {
         self.blocks().map(begun).chain(light_traced).chain(budget).max().unwrap_or(0)
     }
 
-    /// Whether another film of as many samples may not be the same: it was stopped in the middle of a pass, or has samples
-    /// of a region or of a part that its allocation did not give it.
+    /// Whether another film with the same sample count may differ: this one was stopped in the middle of a pass, or has
+    /// samples of a region or of a part that its allocation did not assign.
     pub fn is_uneven(&self) -> bool {
         self.max_spp() > self.spp() || self.round.is_some_and(|round| round.irregular)
     }
 
-    /// The fewest and the most samples that a pixel has, and the mean over all pixels.
+    /// Returns the minimum of samples per pixel, their mean over all pixels, and the maximum.
     pub fn sample_counts(&self) -> (u32, f64, u32) {
         let (mut least, mut most, mut sum) = (u32::MAX, 0, 0.0);
         for block in self.blocks() {
@@ -222,12 +234,13 @@ impl Film {
         (least, sum / (f64::from(self.width) * f64::from(self.height)), most)
     }
 
-    /// A film like a new one, in the memory of this one: for a large film, memory is what takes time.
+    /// Removes all samples and keeps the memory, because allocating a large film is slow.
     pub fn clear(&mut self) {
         self.clear_unless(&|| false);
     }
 
-    /// The same until `stop` says so. Then it is false, and the film is good for nothing but being cleared again.
+    /// Like [`Self::clear`], until `stop` returns true. Then it returns false, and the film must be cleared before any
+    /// other use.
     pub fn clear_unless(&mut self, stop: &(dyn Fn() -> bool + Sync)) -> bool {
         self.caustic_plan = None;
         if let Some(layer) = self.light.take() {
@@ -243,20 +256,20 @@ impl Film {
         })
     }
 
-    /// Says that it is shown while things move: its samples need not be those of another film of the same size, so nothing
-    /// is measured that the first of them would have to wait for. To be said before that.
+    /// Marks the film as a preview, shown during motion: its samples may differ from those of another film of the same
+    /// size, so no pilot paths delay the first of them. Must be called before the first sample.
     pub fn set_preview(&mut self, is_preview: bool) {
         self.is_preview = is_preview;
     }
 
-    /// How caustics are looked for; `None` before the first sample.
+    /// How caustics are rendered; `None` before the first sample.
     pub fn caustic_plan(&self) -> Option<CausticPlan> {
         self.caustic_plan
     }
 
-    /// Makes room for traced light, if there is none.
+    /// Creates the sums of light tracing if there are none.
     ///
-    /// - `stride`: camera paths for each light path, at least 1.
+    /// - `stride`: camera paths per light path, at least 1.
     pub(crate) fn want_light(&mut self, stride: u32) {
         if self.light.is_none() {
             let size = UVec2::new(self.width, self.height);
@@ -265,21 +278,22 @@ impl Film {
         }
     }
 
-    /// The number of the first sample.
+    /// Number of the first sample.
     pub fn first_sample(&self) -> u32 {
         self.blocks().filter_map(|block| block.ranges.first()).map(|range| range.start).min().unwrap_or(0)
     }
 
-    /// Samples that were left out because they were not finite.
+    /// Number of samples that were rejected because they were not finite.
     pub fn n_bad(&self) -> u64 {
         self.tiles.iter().map(|tile| tile.bad.len() as u64).sum()
     }
 
-    /// Adds the samples of another film of the same picture: the film is then the one that has the samples of both,
-    /// bit for bit.
+    /// Adds the samples of another film of the same image: the result equals the film that was rendered with the
+    /// samples of both, bit for bit.
     ///
     /// # Errors
-    /// When the films differ in size, or have a sample in common. Then nothing has been added.
+    /// If the films differ in size, tile size or number of light paths, or have a sample in common. Then this film is
+    /// unchanged.
     pub fn merge(&mut self, other: &Self) -> Result<(), MergeError> {
         if (self.width, self.height) != (other.width, other.height) {
             return Err(MergeError::Sizes((self.width, self.height), (other.width, other.height)));
@@ -319,13 +333,13 @@ impl Film {
         Ok(())
     }
 
-    /// Mean radiance of a pixel, row 0 at the top; black where there is no sample yet.
+    /// Mean radiance of a pixel, W·m⁻²·sr⁻¹, row 0 at the top; black if it has no samples.
     pub fn mean(&self, x: u32, y: u32) -> Vec3 {
         let (tile, local) = self.locate(x, y);
         (tile.mean(local) + self.light_traced(x, y)).as_vec3()
     }
 
-    /// The part of [`Self::mean`] that light paths have found.
+    /// The part of [`Self::mean`] from light paths.
     pub fn light_traced(&self, x: u32, y: u32) -> DVec3 {
         self.light.as_ref().map_or(DVec3::ZERO, |layer| layer.mean((y * self.width + x) as usize))
     }
@@ -341,7 +355,7 @@ impl Film {
         })
     }
 
-    /// The same as [`Self::row`], given to `take` with the column: quicker, where every picture is read.
+    /// Like [`Self::row`], passing column and radiance to `take`: faster where whole images are read.
     pub(crate) fn for_each_in_row(&self, y: u32, mut take: impl FnMut(usize, Vec3)) {
         let tiles = &self.tiles[(y / self.tile_size * self.tiles_x) as usize..][..self.tiles_x as usize];
         for tile in tiles {
@@ -369,7 +383,7 @@ impl Film {
         (0..self.height).flat_map(|y| self.row(y)).collect()
     }
 
-    /// Samples taken of a pixel so far.
+    /// Samples per pixel of the camera paths at a pixel, non-finite ones included.
     pub fn samples(&self, x: u32, y: u32) -> u32 {
         let (tile, local) = self.locate(x, y);
         tile.block_of(local).spp
@@ -380,7 +394,7 @@ impl Film {
         self.error_estimate_in(None)
     }
 
-    /// The same of a region alone.
+    /// Like [`Self::error_estimate`], for a region.
     pub fn error_estimate_in(&self, region: Option<&Region>) -> Option<ErrorEstimate> {
         let mut evidence = Evidence::default();
         let is_even = region.is_some() || self.is_even();
@@ -395,31 +409,31 @@ impl Film {
         ErrorEstimate::new(&evidence, spp, is_even)
     }
 
-    /// Whether every pixel gets as many samples.
+    /// Whether every pixel gets the same number of samples.
     fn is_even(&self) -> bool {
         self.round.is_none_or(|round| round.even)
     }
 
-    /// How far a pixel moved when its samples last doubled: the squared relative difference, mean over channels; its
-    /// mean over many pixels is the variance that is left. 0 before the second sample.
+    /// Returns the change of a pixel by the last doubling of its samples: the squared relative difference, mean over
+    /// channels. Its mean over many pixels is the remaining relative variance. 0 before the second sample.
     pub fn doubling_step(&self, x: u32, y: u32) -> f32 {
         let (tile, local) = self.locate(x, y);
         tile.last_step(local)
     }
 
-    /// Tells the error estimate how far traced light is, if that has come to a power of two.
+    /// Records light tracing for the error estimate, if its sample count is a power of two.
     pub(crate) fn record_light(&mut self) {
         let Some(layer) = &self.light else { return };
         let width = self.width;
         self.tiles.par_iter_mut().for_each(|tile| tile.record_light(layer, width));
     }
 
-    /// Decides the next round of an adaptive film, if the last one is over.
+    /// Decides the next round of an adaptive film, if the previous one is over.
     pub(crate) fn begin_round_if_due(&mut self, metric: ErrorMetric) {
         let spp = self.spp();
         let (least, mean, most) = self.sample_counts();
         let (from, irregular) = match &self.round {
-            // Blocks lie across tiles of other sizes, and have no neighbours then.
+            // Tiles of other sizes cut blocks, which then have no neighbours.
             _ if !self.tile_size.is_multiple_of(BLOCK_SIZE) => return,
             Some(round) if spp < round.to => return,
             Some(round) => (spp, round.irregular),
@@ -430,14 +444,14 @@ impl Film {
         self.round = Some(begin_round(&mut self.tiles, size, from, irregular, metric));
     }
 
-    /// All that was to be done up to a budget is done.
+    /// Records that all samples due up to a budget have been taken.
     pub(crate) fn has_spent(&mut self, budget: u32) {
         if let Some(round) = &mut self.round {
             round.budget = round.budget.max(budget);
         }
     }
 
-    /// Takes the counts as they are, whatever the round was to make of them; the next one is decided from there.
+    /// Ends the round at the present sample counts; the next one is decided from them.
     pub(crate) fn leave_round(&mut self) {
         let (least, mean, most) = self.sample_counts();
         self.round = if least == most { None } else { Some(end_round(&mut self.tiles, mean.round() as u32)) };

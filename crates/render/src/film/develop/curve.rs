@@ -1,27 +1,29 @@
-//! How bright light is squeezed into what a screen can show, a colour or sixteen at a time with the same bits.
+//! Tone curves, for one colour or for sixteen with the same bits.
 
 use firstlight_simd::{Float, Real, Simd, Vector, select, select_vector};
 use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// How bright light is squeezed into what a screen can show.
+/// Tone curve: maps exposed radiance to the range of a display.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ToneCurve {
-    /// Clip at 1: what the numbers say.
+    /// Clips at 1.
     #[serde(alias = "Linear")]
     Linear,
-    /// Khronos PBR Neutral: keeps colours true, rolls off highlights.
+    /// Khronos PBR Neutral: preserves colours, compresses highlights.
     #[default]
     #[serde(alias = "Neutral")]
     Neutral,
-    /// A filmic curve: Hill's fit of the ACES reference transform.
+    /// Filmic: Hill's fit of the ACES reference rendering and output transforms.
     #[serde(alias = "Filmic")]
     Filmic,
 }
 
 impl ToneCurve {
-    /// - `light`: not negative, exposed.
+    /// Returns display light, 0..1 per channel.
+    ///
+    /// - `light`: exposed radiance, not negative.
     #[inline]
     pub fn apply(self, light: Vec3) -> Vec3 {
         match self {
@@ -31,7 +33,7 @@ impl ToneCurve {
         }
     }
 
-    /// See [`Self::apply`].
+    /// Like [`Self::apply`], for sixteen colours.
     #[inline(always)]
     pub(crate) fn apply_lanes<S: Simd>(self, light: Vector<S>) -> Vector<S> {
         match self {
@@ -46,7 +48,7 @@ impl ToneCurve {
     }
 }
 
-/// Where [`pbr_neutral`] begins to bend.
+/// Brightness from which on [`pbr_neutral`] compresses.
 const START: f32 = 0.8 - 0.04;
 const DESATURATION: f32 = 0.15;
 
@@ -62,7 +64,7 @@ fn pbr_neutral(color: Vec3) -> Vec3 {
     let d = 1.0 - START;
     let new_peak = 1.0 - d * d / (peak + d - START);
     let grey = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
-    // Infinite light is white, not NaN.
+    // Infinite radiance becomes white, not NaN.
     if !peak.is_finite() { Vec3::ONE } else { (color * (new_peak / peak)).lerp(Vec3::splat(new_peak), grey) }
 }
 
@@ -89,7 +91,8 @@ fn pbr_neutral_lanes<S: Simd>(color: Vector<S>) -> Vector<S> {
     select_vector(peak.lt(peak.all(START)), color, bent)
 }
 
-/// Columns of Hill's fit of the ACES reference rendering and output transforms for sRGB: into its space, and back.
+/// Columns of Hill's fit of the ACES reference rendering and output transforms for sRGB: into the fit's space, and
+/// back.
 const INTO_ACES: [Vec3; 3] =
     [Vec3::new(0.59719, 0.07600, 0.02840), Vec3::new(0.35458, 0.90834, 0.13383), Vec3::new(0.04823, 0.01566, 0.83777)];
 const OUT_OF_ACES: [Vec3; 3] = [
@@ -100,7 +103,7 @@ const OUT_OF_ACES: [Vec3; 3] = [
 
 fn aces_fitted(color: Vec3) -> Vec3 {
     let [into, out] = [INTO_ACES, OUT_OF_ACES].map(|[x, y, z]| Mat3::from_cols(x, y, z));
-    // Past this the curve is flat, and the quotient of two squares would overflow.
+    // Above this the curve is flat, and the quotient of two squares would overflow.
     let v = (into * color).min(Vec3::splat(1e6));
     let curve = (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
     (out * curve).clamp(Vec3::ZERO, Vec3::ONE)
@@ -129,7 +132,7 @@ fn each<S: Simd>(color: Vector<S>, f: impl Fn(Float<S>) -> Float<S>) -> Vector<S
     Vector { x: f(color.x), y: f(color.y), z: f(color.z) }
 }
 
-/// A matrix of these columns times a colour.
+/// Multiplies the matrix with these columns by a colour.
 #[inline(always)]
 fn transformed<S: Simd>(columns: &[Vec3; 3], color: Vector<S>) -> Vector<S> {
     let [a, b, c] = *columns;

@@ -1,7 +1,7 @@
-//! From linear light on the film to the numbers a screen wants. A view of the film: it never changes it.
+//! Development of a film for the display: linear radiance to sRGB bytes. The film is never changed.
 //!
-//! The window does this for every picture that it shows, on the processors that trace rays, so sixteen pixels go
-//! through it at a time.
+//! The window develops every image that it shows on the processors that trace rays, so sixteen pixels are developed at
+//! a time.
 
 mod curve;
 mod scale;
@@ -18,35 +18,37 @@ pub use crate::film::develop::srgb::{decode_srgb, encode_srgb};
 /// Display settings; changing them keeps all samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Display {
-    /// Factors of two.
+    /// Exposure in stops (factors of two).
     pub exposure_stops: f32,
-    /// From exposed radiance to display light.
+    /// Map from exposed radiance to display light.
     pub tone_curve: ToneCurve,
 }
 
 impl Display {
-    /// Linear radiance to linear display light, 0..1 a channel.
+    /// Converts linear radiance to linear display light, 0..1 per channel.
     #[inline]
     pub fn tone_mapped(&self, radiance: Vec3) -> Vec3 {
         self.tone_curve.apply((radiance * self.exposure_stops.exp2()).max(Vec3::ZERO))
     }
 }
 
-/// One pixel as an sRGB-encoded byte triple.
+/// Develops one pixel to three sRGB-encoded bytes.
 #[inline]
 pub fn develop_pixel(radiance: Vec3, display: &Display) -> [u8; 3] {
     display.tone_mapped(radiance).to_array().map(encode_srgb)
 }
 
-/// Fills `rgba` with `width * height` opaque pixels: the film itself, or, when the sizes differ, scaled bilinearly.
+/// Develops a film to `width * height` opaque RGBA pixels, row by row from the top; scales bilinearly if the sizes
+/// differ.
 pub fn develop(film: &Film, display: &Display, width: u32, height: u32, rgba: &mut Vec<u8>) {
     develop_rows([film.width(), film.height()], display, [width, height], rgba, &|row, y| row.read(film, y));
 }
 
-/// The same of a picture that is no film: `colors` is the radiance of `from[0] * from[1]` pixels, row by row from the top.
+/// Like [`develop`] for an image that is not a film: `colors` is the radiance of `from.0 * from.1` pixels, row by row
+/// from the top.
 ///
 /// # Panics
-/// When it is another number of pixels.
+/// If `colors` has another length.
 pub fn develop_colors(
     colors: &[Vec3],
     from: (u32, u32),
@@ -59,7 +61,7 @@ pub fn develop_colors(
     develop_rows([from.0, from.1], display, [width, height], rgba, &row_of);
 }
 
-/// - `read`: fills a row with the radiance of the pixels of a row.
+/// - `read`: fills a row with the radiance of a row of the image.
 fn develop_rows(
     from: [u32; 2],
     display: &Display,
@@ -83,7 +85,7 @@ fn develop_rows(
     scale::scale(set, &small, from, to, rgba);
 }
 
-/// Radiance of a row of pixels, a list for each channel with room up to a multiple of sixteen.
+/// Radiance of a row of pixels, one list per channel, padded to a multiple of sixteen.
 #[derive(Default)]
 struct Row([Vec<f32>; 3]);
 
@@ -104,7 +106,7 @@ impl Row {
         }
     }
 
-    /// - `rgba`: of as many pixels as were read.
+    /// - `rgba`: as many pixels as the row has.
     fn develop(&self, set: InstructionSet, display: Display, rgba: &mut [u8]) {
         let row = &self.0;
         dispatch!(set, develop_row(row: &[Vec<f32>; 3], display: Display, rgba: &mut [u8]));
@@ -131,7 +133,7 @@ fn exposed<S: Simd>(s: S, radiance: &[f32], exposure: f32) -> Float<S> {
     (Float::load(s, radiance) * exposure).at_least(0.0)
 }
 
-/// The first pixels, as many as there is room for; red in the lowest byte.
+/// Writes the first pixels, as many as fit; red is the lowest byte.
 #[inline(always)]
 fn write_pixels<S: Simd>(pixels: Bits<S>, rgba: &mut [u8]) {
     for (pixel, to) in pixels.to_array().iter().zip(rgba.chunks_exact_mut(4)) {

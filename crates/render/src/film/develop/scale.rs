@@ -1,10 +1,10 @@
-//! A picture at another size, bilinearly: what is shown while things move.
+//! Bilinear scaling of RGBA images, for previews during motion.
 
 use crate::film::develop::write_pixels;
 use firstlight_simd::{Bits, InstructionSet, LANES, Simd, Word, dispatch, padded};
 use rayon::prelude::*;
 
-/// From one size to the other, pixels wide and high; both sides are in bytes, four a pixel.
+/// Scales from one size (width, height in pixels) to another; both images have four bytes per pixel.
 pub fn scale(set: InstructionSet, from: &[u8], from_size: [u32; 2], to_size: [u32; 2], to: &mut [u8]) {
     let ([from_width, from_height], [width, height]) = (from_size, to_size);
     let columns = PixelColumns::new(width, from_width);
@@ -21,7 +21,7 @@ pub fn scale(set: InstructionSet, from: &[u8], from_size: [u32; 2], to_size: [u3
     });
 }
 
-/// Two neighbours and how much of the second, out of 256.
+/// Two neighbours and the weight of the second, 0..=256.
 struct Tap {
     low: u32,
     high: u32,
@@ -29,7 +29,7 @@ struct Tap {
 }
 
 impl Tap {
-    /// Pixel centre `i` of `n` in a row of `n_source`.
+    /// Returns the tap for pixel centre `i` of `n` in a row of `n_source` pixels.
     fn new(i: u32, n: u32, n_source: u32) -> Self {
         let position = ((f64::from(i) + 0.5) * f64::from(n_source) / f64::from(n) - 0.5).max(0.0);
         let low = (position as u32).min(n_source - 1);
@@ -38,18 +38,18 @@ impl Tap {
     }
 }
 
-/// Bytes 0 and 2 of a pixel, with room above each.
+/// Mask of bytes 0 and 2 of a pixel, with space above each.
 const EVEN: u32 = 0x00ff_00ff;
-/// Half a byte for each of them, so that sums are rounded.
+/// Half a unit for each of them, so that sums are rounded.
 const HALF: u32 = 0x0080_0080;
 
-/// All four bytes; `weight` of `b`, 0..=256.
+/// Mixes all four bytes; `weight` of `b`, 0..=256.
 fn mix(a: u32, b: u32, weight: u32) -> u32 {
     let mix_even = |a: u32, b: u32| (((a & EVEN) * (256 - weight) + (b & EVEN) * weight + HALF) >> 8) & EVEN;
     mix_even(a, b) | mix_even(a >> 8, b >> 8) << 8
 }
 
-/// The taps of a row, a list for each part with room up to a multiple of sixteen.
+/// The taps of a row, one list per field, padded to a multiple of sixteen.
 struct PixelColumns {
     low: Vec<u32>,
     high: Vec<u32>,
@@ -62,7 +62,7 @@ impl PixelColumns {
         Self { low: list(|tap| tap.low), high: list(|tap| tap.high), weight: list(|tap| tap.weight) }
     }
 
-    /// - `from`: pixels, with room up to a multiple of sixteen.
+    /// - `from`: pixels, padded to a multiple of sixteen.
     fn scale_row(&self, set: InstructionSet, from: &[u32], to: &mut [u8]) {
         let columns = self;
         dispatch!(set, scale_row(columns: &PixelColumns, from: &[u32], to: &mut [u8]));
@@ -114,7 +114,7 @@ mod tests {
                     let above = at(u, v, c) * (1.0 - fx) + at(u + 1.0, v, c) * fx;
                     let below = at(u, v + 1.0, c) * (1.0 - fx) + at(u + 1.0, v + 1.0, c) * fx;
                     let expected = above * (1.0 - fy) + below * fy;
-                    // Twice rounded to a byte, and weights to 1/256.
+                    // Rounded to a byte twice, and weights to 1/256.
                     assert!(
                         (f64::from(*byte) - expected).abs() <= 3.0,
                         "{set:?} {from_size:?} {to_size:?} {x} {y} {c}"

@@ -3,25 +3,25 @@
 use firstlight_simd::{Bits, Float, Real, Simd, Word};
 use std::sync::OnceLock;
 
-/// Light below this is 0: the first border between two bytes lies above.
+/// Bits of a number below the first threshold between two bytes: everything below it is encoded as 0.
 const LEAST: u32 = (127 - 13) << 23;
-/// Numbers that share sign, exponent and 8 bits after the point share an entry.
+/// Numbers that share sign, exponent and 8 bits of the mantissa share an entry.
 const SHIFT: u32 = 15;
 const ENTRIES: usize = (((127 << 23) - LEAST) >> SHIFT) as usize + 1;
 
-/// Bytes of all numbers between 0 and 1: the curve is so flat that at most one border between two bytes lies within
-/// numbers that share an entry.
+/// Bytes of all numbers in 0..1: the curve is so flat that at most one threshold between two bytes lies within the
+/// numbers of an entry.
 struct Table {
-    /// The byte of the least number of an entry.
+    /// The byte of the smallest number of an entry.
     bytes: [u32; ENTRIES],
-    /// From here on it is the next byte.
+    /// Threshold from which on the next byte applies.
     borders: [f32; ENTRIES],
 }
 
 fn table() -> &'static Table {
     static TABLE: OnceLock<Table> = OnceLock::new();
     TABLE.get_or_init(|| {
-        // The least number that is nearer to a byte than to the one before it.
+        // Thresholds: the smallest number that is nearer to a byte than to the one before it.
         let borders: Vec<f32> = (1..256).map(|byte| decode_srgb((f64::from(byte) - 0.5) / 255.0) as f32).collect();
         let first = |i: usize| f32::from_bits(LEAST + ((i as u32) << SHIFT));
         let byte = |x: f32| borders.partition_point(|&border| border <= x);
@@ -32,7 +32,7 @@ fn table() -> &'static Table {
     })
 }
 
-/// Rounded to the nearest of 256 values, exactly; what lies outside of 0..1 is taken to it, and NaN to 0.
+/// Encodes linear light as sRGB, rounded exactly to the nearest of 256 values. Clamps to 0..1; NaN becomes 0.
 #[inline]
 pub fn encode_srgb(linear: f32) -> u8 {
     let table = table();
@@ -41,7 +41,7 @@ pub fn encode_srgb(linear: f32) -> u8 {
     (table.bytes[i as usize] + u32::from(x >= table.borders[i as usize])) as u8
 }
 
-/// The same of sixteen numbers.
+/// Like [`encode_srgb`], for sixteen numbers.
 pub(crate) struct Encoder<S: Simd> {
     s: S,
     table: &'static Table,
@@ -57,7 +57,7 @@ impl<S: Simd> Encoder<S> {
     #[inline(always)]
     pub fn encode(&self, linear: Float<S>) -> Bits<S> {
         let s = self.s;
-        // The least number of the table before the bits are taken, since bytes are 0 up to it.
+        // Clamped to the table's smallest number before its bits are taken; all numbers up to it are encoded as 0.
         let x = linear.at_least(f32::from_bits(LEAST)).at_most(1.0);
         let i = (x.to_bits() + LEAST.wrapping_neg()).shift_right(SHIFT);
         let byte = Bits::gather(&self.table.bytes, i);
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn encoding_rounds_to_the_nearest_byte() {
         let table = table();
-        // No entry has two borders.
+        // No entry contains two thresholds.
         assert!((1..ENTRIES).all(|i| table.bytes[i] - table.bytes[i - 1] <= 1));
         let near_borders = (1..256).flat_map(|byte| {
             let border = (decode_srgb((f64::from(byte) - 0.5) / 255.0) as f32).to_bits();
