@@ -1,8 +1,9 @@
-//! Means over the surroundings of a pixel.
+//! Box filters.
 
 use rayon::prelude::*;
 
-/// Twice the mean over a square of `2 * radius + 1` pixels: nearly a Gaussian. At the border there are fewer.
+/// Applies a box filter of `2 * radius + 1` pixels per side twice, which is nearly a Gaussian. At the border the box is
+/// cut.
 pub(super) fn blur(values: &[f32], width: usize, height: usize, radius: usize) -> Vec<f32> {
     box_mean(&box_mean(values, width, height, radius), width, height, radius)
 }

@@ -1,9 +1,10 @@
-//! The honest part: how much of the filtered picture to believe, pixel by pixel, and how wrong the result still is.
+//! Combination of the raw and the filtered image per pixel, and its error estimate.
 //!
-//! Raw and filtered are mixed as James and Stein shrink (1961): by the share that the expected variance has of the
-//! squared difference between both. Where the filter is right they differ by noise alone and it is believed; where it is
-//! biased they differ by more than noise, and the more samples there are, the less noise there is. So the result goes to
-//! the same limit as the raw picture, and is worse than it nowhere that the variance is known to a factor of two.
+//! Raw and filtered values are mixed by James–Stein shrinkage (1961): the filtered share is the expected variance
+//! divided by the squared difference between both. Where the filter is unbiased, the two differ by noise alone and the
+//! filter dominates; where it is biased, they differ by more than the noise, which vanishes with more samples. So the
+//! result converges to the same limit as the raw image, and is nowhere worse than it if the variance is known to a
+//! factor of two.
 
 use super::blur::blur;
 use super::input::DenoiseInput;
@@ -11,19 +12,19 @@ use super::regression::{Filtered, Regression};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Raw and filtered, mixed.
+/// The combined image.
 pub(super) struct Combined {
     pub color: Vec<Vec3>,
-    /// How much of each pixel is filtered, 0..1.
+    /// Filtered share of each pixel, 0..1.
     pub share: Vec<f32>,
-    /// Estimated relMSE, the mean over pixels and channels of (x − truth)² / (level² + 0.01).
+    /// Estimated relMSE, the mean over pixels and channels of (x − reference)² / (level² + 0.01).
     pub relative_mse: f64,
 }
 
-/// Part of the squared difference that is taken for what it would be if the filter were right: the local mean of squared
-/// differences is itself noisy, and where it is large by chance grains of noise would be left.
+/// Share of the squared difference that is replaced by its expectation for an unbiased filter: the local mean of
+/// squared differences is noisy itself, and where it is large at random, grains of noise would remain.
 const TRUST: f32 = 0.4;
-/// Pixels around a pixel, either way, that tell how large noise and difference are, twice.
+/// Radius in pixels of the two box filters that average variance and difference.
 const RADIUS: usize = 2;
 
 pub(super) fn combine(input: &DenoiseInput, found: &Regression, filtered: &Filtered) -> Combined {
@@ -37,12 +38,12 @@ pub(super) fn combine(input: &DenoiseInput, found: &Regression, filtered: &Filte
         })
         .collect();
     let color = (0..n).map(|i| input.color[i].lerp(filtered.color[i], share[i])).collect();
-    // Relative to a filtered picture that blurs lights, their noise would be the error of the whole.
+    // Relative to a filtered image that blurs lights, their noise would dominate the error of the whole image.
     let by_bright = |i: usize| bright_level(input, found, filtered.color[i], i);
     let Surroundings { variance, own, difference } = Surroundings::of(input, found, filtered, &by_bright);
     let risk = |i: usize| {
         let rest = 1.0 - share[i];
-        // Never less than what the filter has left of the noise.
+        // Never less than the noise that the filter leaves.
         let of_filtered = (difference[i] - variance[i] + 2.0 * own[i]).max(own[i]);
         rest * rest * variance[i] + 2.0 * share[i] * rest * own[i] + share[i] * share[i] * of_filtered
     };
@@ -50,13 +51,13 @@ pub(super) fn combine(input: &DenoiseInput, found: &Regression, filtered: &Filte
     Combined { color, share, relative_mse: risk / (3 * n) as f64 }
 }
 
-/// Means over the surroundings of each pixel, relative to the square of how bright it is, sums over channels.
+/// Local means around each pixel, relative to the squared level, sums over channels.
 struct Surroundings {
-    /// Of the raw picture.
+    /// Variance of the raw image.
     variance: Vec<f32>,
-    /// Covariance of raw and filtered.
+    /// Covariance of raw and filtered image.
     own: Vec<f32>,
-    /// Squared, of raw and filtered.
+    /// Squared difference of raw and filtered image.
     difference: Vec<f32>,
 }
 
@@ -83,11 +84,11 @@ fn mean(color: Vec3) -> f32 {
     color.element_sum() / 3.0
 }
 
-/// One over the square of how bright a pixel is at least: as filtered, or as both halves of its samples say. A single
-/// bright sample is in one half alone.
+/// Returns one over the squared level of a pixel plus 0.01: the level is the filtered value, or the darker half of its
+/// samples if that is brighter. A single bright sample is in one half only.
 fn bright_level(input: &DenoiseInput, found: &Regression, filtered: Vec3, i: usize) -> f32 {
     let darker_half = match input.half_steps {
-        // Who shows a bit of a light is as bright as it happens to be: the filter knows nothing of such pixels.
+        // Pixels that partly show a light: the filter has no information about them, so their own value is used.
         _ if found.at_emitters[i] => input.color[i],
         Some(halves) => input.color[i] - halves.steps[i].abs(),
         None => Vec3::ZERO,
@@ -95,7 +96,7 @@ fn bright_level(input: &DenoiseInput, found: &Regression, filtered: Vec3, i: usi
     1.0 / (mean(filtered.max(darker_half)).powi(2) + 0.01)
 }
 
-/// Means over surroundings, of what is at emitters and of what is not apart from each other.
+/// Returns local means of values, separately for pixels at emitters and for all others.
 fn smooth_apart(values: &[f32], input: &DenoiseInput, at_emitters: &[bool]) -> Vec<f32> {
     let (width, height) = (input.width, input.height);
     let of = |is: bool| {

@@ -1,39 +1,39 @@
-//! The best linear function of the features in one window, and how wrong it is there.
+//! The best linear function of the features in one window, and its error.
 
 use super::moments::{Blocks, COUNT, FEATURE, LIGHT, MIXED, N_FEATURES, SQUARE, Sums, VARIANCE, WEIGHT, X, Y, product};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Squared error of light over albedo that no fit is better than: one that has no noise and no misfit where it was made
-/// still knows nothing of pixels that are unlike those.
+/// Lower limit of the squared misfit of light over albedo: a fit without noise and misfit in its window is still
+/// uncertain for pixels with other features.
 const LEAST_MISFIT: f32 = 1e-4;
 
-/// Light as a linear function of the features, as ridge regression finds it in a window.
+/// Light as a linear function of the features, by ridge regression in a window.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
-    /// Of the features in the window.
+    /// Mean features of the window.
     mean: [f32; N_FEATURES],
-    /// One over the variance of each feature, and what keeps it from zero.
+    /// One over the variance of each feature plus the ridge term.
     precision: [f32; N_FEATURES],
-    /// Of light in the window, a channel each.
+    /// Mean light of the window, per channel.
     light: [f32; 3],
     slope: [[f32; 3]; N_FEATURES],
-    /// Mean squared distance of the fit from the light itself, without noise: what no fit of this kind can explain.
+    /// Mean squared residual of the fit minus the noise: the part that no fit of this kind can explain.
     pub misfit: f32,
     /// Mean variance of the noise in the window.
     pub noise: f32,
-    /// Residuals times this have the variance of the noise, where there is no misfit.
+    /// Factor that corrects the variance of residuals for the degrees of freedom of the fit.
     pub unbias: f32,
     /// One over the number of pixels.
     inverse_count: f32,
-    /// Of a pixel.
+    /// Mean weight of a pixel.
     pub mean_weight: f32,
 }
 
-/// What a fit says of one pixel.
+/// Prediction of a fit for one pixel.
 pub(super) struct Prediction {
     pub light: Vec3,
-    /// Squared distance from the mean features in standard deviations, and one.
+    /// 1 + squared distance from the mean features in standard deviations.
     distance: f32,
     inverse_count: f32,
 }
@@ -46,12 +46,13 @@ impl Prediction {
 }
 
 impl Fit {
-    /// Expected squared error of a prediction: features that are unlike the window's are not its business.
+    /// Returns the expected squared error of a prediction, which grows with the distance of the features from the
+    /// window's mean.
     pub fn expected_error(&self, prediction: &Prediction) -> f32 {
         (self.misfit + LEAST_MISFIT) * prediction.distance + self.noise * prediction.leverage()
     }
 
-    /// - `features`: with the position from the middle of the window's middle block.
+    /// - `features`: with the position relative to the centre of the window's central block.
     #[inline(always)]
     pub fn predict(&self, features: &[f32; N_FEATURES]) -> Prediction {
         let (mut light, mut distance) = (Vec3::from(self.light), 1.0);
@@ -75,7 +76,7 @@ pub(super) struct Fits {
 }
 
 impl Fits {
-    /// Each row of windows asks `stop` first; `None` when it said so.
+    /// Fits all windows; `stop` is called once per row of windows; `None` if it returned true.
     pub fn of(blocks: &Blocks, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let ridge = ridge(blocks.level);
         let rows: Option<Vec<Vec<Fit>>> = (0..blocks.height)
@@ -86,8 +87,8 @@ impl Fits {
         Some(Self { level: blocks.level, width: blocks.width, height: blocks.height, fits })
     }
 
-    /// Calls `take` with each window that holds a pixel, the pixel's features there, and how near it is to the middle,
-    /// 0..1.
+    /// Calls `take` with each window that contains a pixel, the pixel's features relative to it, and the pixel's
+    /// nearness to the centre, 0..1.
     #[inline(always)]
     pub fn around(
         &self,
@@ -113,14 +114,14 @@ impl Fits {
     }
 }
 
-/// Added to the variance of each feature: differences that are much smaller than this say nothing.
+/// Returns the ridge term per feature, added to its variance: much smaller differences are ignored.
 fn ridge(level: u32) -> [f32; N_FEATURES] {
     let side = (1u32 << level) as f32;
     let place = 0.02 * side * side;
     [3e-3, 3e-3, 3e-3, 1e-6, place, place, 1e-3]
 }
 
-// Indices as in the formulas, which go through rows and columns at once.
+// Indices as in the formulas, which use rows and columns at once.
 #[allow(clippy::needless_range_loop)]
 fn solve(sums: &Sums, ridge: &[f32; N_FEATURES]) -> Fit {
     let inverse_weight = 1.0 / sums[WEIGHT].max(1e-20);
@@ -137,13 +138,13 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES]) -> Fit {
         precision[i] = 1.0 / factor[i][i];
         freedom += variance * precision[i];
     }
-    // Cholesky's factor in place, with the reciprocals of its diagonal.
+    // Cholesky factor in place, with the reciprocals of its diagonal.
     for j in 0..N_FEATURES {
         let mut pivot = factor[j][j];
         for k in 0..j {
             pivot -= factor[j][k] * factor[j][k];
         }
-        // No smaller than what was added, but for rounding.
+        // The pivot is at least the ridge term, except for rounding.
         let reciprocal = 1.0 / pivot.max(0.5 * ridge[j]).sqrt();
         factor[j][j] = reciprocal;
         for i in j + 1..N_FEATURES {
@@ -179,7 +180,7 @@ fn solve(sums: &Sums, ridge: &[f32; N_FEATURES]) -> Fit {
         }
     }
     let residual = unexplained.max(0.0);
-    // What the fit has taken of the noise.
+    // Share of the noise that is left in the residuals.
     let left = (1.0 - freedom * inverse_count).max(0.1);
     let noise = sums[VARIANCE] * inverse_weight;
     Fit {

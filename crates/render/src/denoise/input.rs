@@ -1,33 +1,33 @@
-//! What a denoiser is given.
+//! Input of the denoiser.
 
 use crate::film::halves::HalfSteps;
 use glam::Vec3;
 
-/// What is known of the surfaces that the pixels show, each row by row from the top: the mean over a pixel.
+/// Properties of the visible surfaces, mean per pixel; each list row by row from the top.
 #[derive(Clone, Copy, Debug)]
 pub struct Guides<'a> {
-    /// The share of light that the surface reflects, 0..1 a channel; about 1 for emitters and where nothing is hit.
+    /// Reflected share of light, 0..1 per channel; about 1 for emitters and misses.
     pub albedo: &'a [Vec3],
-    /// Shading normal; shorter than 1 where a pixel shows several, zero where nothing is hit.
+    /// Shading normal, mean over the pixel, so of length at most 1; zero for misses.
     pub normal: &'a [Vec3],
-    /// Metres from the camera; zero or infinite where nothing is hit.
+    /// Depth in metres; zero or infinite for misses.
     pub depth: &'a [f32],
-    /// Whether a pixel shows an emitter, in part at least.
+    /// Whether a pixel shows an emitter, at least in part.
     pub emitters: &'a [bool],
 }
 
-/// A picture to be denoised; all lists are row by row from the top and have `width * height` entries.
+/// An image to be denoised; all lists are row by row from the top and have `width * height` entries.
 #[derive(Clone, Copy, Debug)]
 pub struct DenoiseInput<'a> {
-    /// Pixels.
+    /// Width in pixels.
     pub width: usize,
-    /// Pixels.
+    /// Height in pixels.
     pub height: usize,
     /// Mean radiance of each pixel, linear Rec. 709, W·m⁻²·sr⁻¹.
     pub color: &'a [Vec3],
-    /// What the halves of the samples say of the variance; `None` with a single sample a pixel.
+    /// Variance estimate from the halves of the samples; `None` for a single sample per pixel.
     pub half_steps: Option<&'a HalfSteps>,
-    /// Surfaces.
+    /// Properties of the visible surfaces.
     pub guides: Guides<'a>,
 }
 
@@ -38,7 +38,7 @@ impl DenoiseInput<'_> {
     }
 
     /// # Panics
-    /// When a list has another length than the picture has pixels.
+    /// If the length of a list is not the number of pixels.
     pub(super) fn check(&self) {
         let n = self.n_pixels();
         let Guides { albedo, normal, depth, emitters } = self.guides;

@@ -1,8 +1,8 @@
-//! A picture without most of its noise, that says how wrong it is: a filter guided by what surfaces are known to be
-//! (`regression`), and a combination of raw and filtered that converges to what the raw picture converges to (`combine`).
+//! Denoiser with an error estimate: a filter guided by feature buffers (`regression`), and a combination of raw and
+//! filtered image that converges to the limit of the raw image (`combine`).
 //!
-//! Pure functions of slices. Every pixel is a fixed sequence of operations, so the result depends neither on threads nor on
-//! the instruction set. Start reading at [`denoise`].
+//! Pure functions of slices. Every pixel is a fixed sequence of operations, so the result depends neither on threads
+//! nor on the instruction set. Start reading at [`denoise`].
 
 mod blur;
 mod combine;
@@ -15,22 +15,22 @@ pub use input::{DenoiseInput, Guides};
 
 use glam::Vec3;
 
-/// A denoised picture.
+/// A denoised image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Denoised {
-    /// Raw and filtered combined, radiance of each pixel row by row from the top.
+    /// Radiance of each pixel, raw and filtered combined, row by row from the top; W·m⁻²·sr⁻¹.
     pub color: Vec<Vec3>,
-    /// How much of each pixel is filtered, 0..1; it goes to zero as the raw picture becomes better than the filter.
+    /// Filtered share of each pixel, 0..1; it goes to zero as the raw image becomes better than the filter.
     pub share: Vec<f32>,
-    /// Estimated root of relMSE, as [`ErrorEstimate::relative`](crate::film::estimate::ErrorEstimate::relative) is of the raw
-    /// picture.
+    /// Estimated root of relMSE, like [`ErrorEstimate::relative`](crate::film::estimate::ErrorEstimate::relative) of
+    /// the raw image.
     pub error: f64,
 }
 
-/// Removes noise from a picture, on the current rayon pool; `None` when `stop` said so, which is asked often.
+/// Denoises an image, on the current rayon pool; `None` if `stop`, which is called often, returned true.
 ///
 /// # Panics
-/// When the lists of the input do not have as many entries as the picture has pixels.
+/// If the lists of the input do not have one entry per pixel.
 pub fn denoise(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Denoised> {
     input.check();
     let found = regression::regression(input, stop)?;
@@ -50,7 +50,7 @@ mod tests {
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;
 
-    /// A picture whose truth is known, with what is known of its surfaces.
+    /// An image with a known reference and known features.
     struct Scene {
         truth: Vec<Vec3>,
         albedo: Vec<Vec3>,
@@ -59,14 +59,14 @@ mod tests {
         emitters: Vec<bool>,
     }
 
-    /// What halves of samples with this much noise show.
+    /// The image and its half steps at a number of samples.
     struct Rendered {
         color: Vec<Vec3>,
         halves: HalfSteps,
     }
 
     impl Scene {
-        /// - `of`: albedo and light of each pixel.
+        /// - `of`: albedo and light of a pixel.
         fn of(of: impl Fn(usize, usize) -> (f32, Vec3)) -> Self {
             let pixels: Vec<(f32, Vec3)> = (0..WIDTH * HEIGHT).map(|i| of(i % WIDTH, i / WIDTH)).collect();
             Self {
@@ -78,7 +78,7 @@ mod tests {
             }
         }
 
-        /// - `noise`: standard deviation of each channel over its truth, of one sample.
+        /// - `noise`: standard deviation of one sample, relative to the reference.
         fn render(&self, spp: u32, noise: f32) -> Rendered {
             let normal = |pixel: usize, k: u32| {
                 let number = |k: u32| {
@@ -124,14 +124,14 @@ mod tests {
         if (x / 7 + y / 5).is_multiple_of(2) { 0.8 } else { 0.1 }
     }
 
-    /// Light that falls off to one side, on a floor whose colours are known.
+    /// Illumination with a gradient, on a floor whose colours are in the features.
     fn floor() -> Scene {
         Scene::of(|x, y| {
             (checker(x, y), Vec3::new(1.0, 0.8, 0.6) * (0.5 + x as f32 / WIDTH as f32 + 0.3 * y as f32 / HEIGHT as f32))
         })
     }
 
-    /// An edge of a shadow that no feature tells of.
+    /// The edge of a shadow, which is in no feature.
     fn shadow() -> Scene {
         Scene::of(|x, y| {
             let lit = Vec2::new(x as f32, y as f32).dot(Vec2::new(0.8, 0.6)) > 50.0;
@@ -146,7 +146,7 @@ mod tests {
             let rendered = scene.render(spp.max(2), if spp == 1 { 0.4 * 2.0_f32.sqrt() } else { 0.4 });
             let found = scene.denoise(&rendered, with_halves);
             let (raw, denoised) = (scene.relative_mse(&rendered.color), scene.relative_mse(&found.color));
-            // A single sample says nothing of its noise.
+            // A single sample has no variance estimate.
             let most = if with_halves { 0.04 } else { 0.06 };
             assert!(denoised < most * raw, "{spp} samples: {denoised} of {raw}");
         }
@@ -169,13 +169,13 @@ mod tests {
                 near.map(|i| f64::from(off(i))).sum::<f64>()
             };
             let (raw, denoised) = (at_edge(&rendered.color), at_edge(&found.color));
-            // What a few pixels say of their noise is not much: the edge itself is soft until they have more samples.
+            // The variance estimate from few pixels is noisy: the edge itself is blurred until there are more samples.
             let most = if spp < 256 { 4.0 } else { 1.25 };
             assert!(denoised < most * raw, "{spp} samples, at the edge: {denoised} of {raw}");
         }
     }
 
-    /// Nothing that the filter knows of: every pixel has its own light.
+    /// Light that is unrelated to the features: every pixel has its own.
     #[test]
     fn what_no_filter_can_know_is_left_alone() {
         let number = |x: usize, y: usize| f64::from(hash_u32((y * WIDTH + x) as u32)) / f64::from(u32::MAX);

@@ -1,22 +1,22 @@
 //! Sums of products of features and light over square blocks of pixels, from blocks of 2 × 2 upwards.
 //!
-//! All that linear regression wants to know of a window is such sums, and those of a window are the sums of its blocks: so
-//! a fit over 96 × 96 pixels costs no more than one over 6 × 6, and there are fewer of them.
+//! Linear regression in a window needs such sums only, and those of a window are the sums of its blocks: so a fit over
+//! 96 × 96 pixels costs no more than one over 6 × 6, and there are fewer of them.
 //!
-//! Positions in the picture count from the middle of the block, so that nothing is lost by cancellation; where blocks are
-//! added up they are shifted.
+//! Pixel positions are relative to the centre of the block, which avoids cancellation; they are shifted where blocks
+//! are added.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Features of a pixel: normal, nearness, position in the picture, mean albedo.
+/// Features per pixel: normal (3), nearness, position in the image (2), mean albedo.
 pub(super) const N_FEATURES: usize = 7;
-/// Column and row, pixels.
+/// Indices of the position features: column and row, pixels.
 pub(super) const X: usize = 4;
 pub(super) const Y: usize = 5;
 
-/// Where the sums lie: of weights, features, products of features, light a channel, its products with features, squares of
-/// light, variances; and the number of pixels. All but the last are weighted.
+/// Layout of [`Sums`]: weights, features, products of features, light per channel, its products with features, squares
+/// of light, variances, and the number of pixels. All but the last are weighted.
 pub(super) const WEIGHT: usize = 0;
 pub(super) const FEATURE: usize = 1;
 const PRODUCT: usize = FEATURE + N_FEATURES;
@@ -30,29 +30,29 @@ const N_SUMS: usize = COUNT + 1;
 /// The sums of one block or window.
 pub(super) type Sums = [f32; N_SUMS];
 
-/// Where the product of two features lies.
+/// Index of the product of two features.
 #[inline(always)]
 pub(super) const fn product(i: usize, j: usize) -> usize {
     let (i, j) = if i < j { (i, j) } else { (j, i) };
     PRODUCT + i * N_FEATURES - i * (i + 1) / 2 + j
 }
 
-/// What the sums are of, for each pixel.
+/// Input of the sums, per pixel.
 pub(super) struct Samples {
     pub width: usize,
     pub height: usize,
-    /// Without the position, which is zero here.
+    /// Features; the position is zero here.
     pub features: Vec<[f32; N_FEATURES]>,
     /// Light over albedo.
     pub light: Vec<Vec3>,
-    /// Variance of that, the sum over channels.
+    /// Variance of `light`, sum over channels.
     pub variance: Vec<f32>,
     pub weight: Vec<f32>,
 }
 
 /// The blocks of one size.
 pub(super) struct Blocks {
-    /// The side is two to the power of this, pixels.
+    /// The side of a block is 2^`level` pixels.
     pub level: u32,
     pub width: usize,
     pub height: usize,
@@ -60,7 +60,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Blocks of 2 × 2 pixels.
+    /// Sums blocks of 2 × 2 pixels.
     pub fn finest(samples: &Samples) -> Self {
         let (width, height) = (samples.width.div_ceil(2), samples.height.div_ceil(2));
         let sums = (0..width * height).into_par_iter().map(|block| {
@@ -82,7 +82,7 @@ impl Blocks {
         Self { level: 1, width, height, sums: sums.collect() }
     }
 
-    /// Blocks twice as large.
+    /// Merges to blocks with twice the side.
     pub fn coarser(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let quarter = 0.25 * (2u32 << self.level) as f32;
@@ -100,7 +100,7 @@ impl Blocks {
         Self { level: self.level + 1, width, height, sums: sums.collect() }
     }
 
-    /// Sums over the window of 3 × 3 blocks around a block, about its middle.
+    /// Returns the sums over the window of 3 × 3 blocks around a block, relative to its centre.
     pub fn window(&self, x: usize, y: usize) -> Sums {
         let side = (1u32 << self.level) as f32;
         let mut sums = [0.0; N_SUMS];
@@ -113,7 +113,7 @@ impl Blocks {
         sums
     }
 
-    /// - `dx`, `dy`: from the middle that counts to that of the block.
+    /// - `dx`, `dy`: from the reference centre to that of the block, pixels.
     #[inline(always)]
     fn add_shifted(&self, sums: &mut Sums, x: usize, y: usize, dx: f32, dy: f32) {
         let mut own = self.sums[y * self.width + x];
@@ -146,7 +146,7 @@ fn add_pixel(sums: &mut Sums, samples: &Samples, pixel: usize, x: f32, y: f32) {
     }
 }
 
-/// One feature counts from elsewhere: it is larger by `by`.
+/// Moves the origin of a feature: its values grow by `by`.
 #[inline(always)]
 fn shift(sums: &mut Sums, feature: usize, by: f32) {
     let square = product(feature, feature);
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// Windows of all sizes, also those that the border cuts, are what adding up their pixels one by one gives.
+    /// Windows of all sizes, including those cut by the border, equal the sum over their pixels.
     #[test]
     fn sums_of_windows_are_those_of_their_pixels() {
         let samples = samples(43, 29);

@@ -1,12 +1,13 @@
-//! The settled filter: light over albedo as a linear function of normal, depth, position and albedo, in windows of many
-//! sizes at once.
+//! The filter: light over albedo as a linear function of normal, depth, position and albedo, in windows of many sizes
+//! at once.
 //!
-//! First-order regression on features is what the best denoisers without learning do (Bitterli et al. 2016, "Nonlinearly
-//! weighted first-order regression for denoising Monte Carlo renderings"; Moon et al. 2014). Here windows of 6 × 6 to
-//! 96 × 96 pixels overlap everywhere, every pixel is predicted by all that hold it (collaboratively), and each prediction
-//! counts by its expected squared error: noise of the window over its number of pixels, and misfit, which is what
-//! residuals have more of than noise explains. So windows are large where light is even, small at the edges of shadows,
-//! and those that an edge does not cross win over those that it does.
+//! First-order regression on features is the basis of the best denoisers without learning (Bitterli et al. 2016,
+//! "Nonlinearly weighted first-order regression for denoising Monte Carlo renderings"; Moon et al. 2014). Here windows
+//! of 6 × 6 to 96 × 96 pixels overlap everywhere, and every pixel is predicted by all windows that contain it
+//! (collaborative filtering). Each prediction is weighted by its expected squared error: the noise of the window over
+//! its number of pixels, plus the misfit, which is the part of the residuals that noise does not explain. So large
+//! windows dominate where light is smooth, small ones at the edges of shadows, and windows that an edge does not cross
+//! dominate over those that it does.
 
 use super::blur::blur;
 use super::fit::Fits;
@@ -15,34 +16,35 @@ use super::moments::{Blocks, N_FEATURES, Samples};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// What a filter makes of a picture.
+/// A filtered image.
 pub(super) struct Filtered {
     /// Radiance of each pixel.
     pub color: Vec<Vec3>,
-    /// How much of each pixel is left in itself, 0..1.
+    /// Weight of each pixel's own value in its filtered value, 0..1.
     pub own: Vec<f32>,
 }
 
-/// Both candidates, and what was found out on the way.
+/// Both candidates, and the statistics behind them.
 pub(super) struct Regression {
-    /// From windows of all sizes, and from the small ones alone.
+    /// From windows of all sizes, and from small windows only.
     pub candidates: [Filtered; 2],
     /// Variance of the radiance of each pixel, sum over channels; noisy.
     pub variance: Vec<f32>,
-    /// Emitters and their neighbours.
+    /// Whether a pixel or a neighbour shows an emitter.
     pub at_emitters: Vec<bool>,
 }
 
-/// Sizes of windows: three times two to the power of 1..=5, pixels.
+/// Number of window sizes: 3 · 2ᵏ pixels for k in 1..=5.
 const N_LEVELS: u32 = 5;
-/// The small ones.
+/// Number of small window sizes.
 const N_SMALL: u32 = 2;
-/// No channel is divided by less, so that what dark surfaces reflect without it is not blown up.
+/// Lower limit of the albedo as a divisor, so that light that dark surfaces reflect independently of it is not
+/// amplified.
 const LEAST_ALBEDO: f32 = 0.04;
-/// Of pixels next to emitters in windows of others: they are brighter than all around them by orders of magnitude.
+/// Weight of pixels at emitters in the windows of others: they are brighter than all others by orders of magnitude.
 const WEIGHT_AT_EMITTERS: f32 = 1e-3;
 
-/// `None` when `stop` said so, which is asked once a row.
+/// Returns `None` if `stop`, which is called once per row, returned true.
 pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync)) -> Option<Regression> {
     let n = input.n_pixels();
     let guides = &input.guides;
@@ -51,7 +53,7 @@ pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync))
     let mut samples = samples(input, &albedo, &at_emitters);
     let mut blocks = Blocks::finest(&samples);
     if input.half_steps.is_none() {
-        // All that is known of the noise is what small windows do not explain.
+        // The only estimate of the noise is the residual of small windows.
         samples.variance = residuals(&samples, &Fits::of(&blocks, stop)?, stop)?;
         blocks = Blocks::finest(&samples);
     }
@@ -79,7 +81,8 @@ pub(super) fn regression(input: &DenoiseInput, stop: &(dyn Fn() -> bool + Sync))
     Some(Regression { candidates: [candidate(0), candidate(1)], variance, at_emitters })
 }
 
-/// How near each pixel is, −1/2..1/2: infinitely far is no special case, and the depth in the middle of the list is zero.
+/// Returns the nearness of each pixel, −1/2..1/2: a decreasing function of depth that is 0 at the median depth and −1/2
+/// at infinity.
 fn nearness(depth: &[f32]) -> Vec<f32> {
     let mut finite: Vec<f32> = depth.iter().copied().filter(|depth| depth.is_finite() && *depth > 0.0).collect();
     let middle = finite.len() / 2;
@@ -100,7 +103,7 @@ fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool]) -> Sampl
         let of_color = input.half_steps.map_or(Vec3::ZERO, |halves| halves.variance(i));
         (of_color / (albedo[i] * albedo[i])).element_sum()
     };
-    // Squares of radiance are what counts, and not those of radiance over albedo.
+    // Weighted by albedo², because the squared error of radiance counts, not that of radiance over albedo.
     let weight = |i: usize| {
         let mean = albedo[i].element_sum() / 3.0;
         mean * mean * if at_emitters[i] { WEIGHT_AT_EMITTERS } else { 1.0 }
@@ -115,7 +118,7 @@ fn samples(input: &DenoiseInput, albedo: &[Vec3], at_emitters: &[bool]) -> Sampl
     }
 }
 
-/// Whether it is true of a pixel or one of its eight neighbours.
+/// Whether `is` holds for a pixel or one of its eight neighbours.
 fn near(input: &DenoiseInput, is: impl Fn(usize) -> bool + Sync) -> Vec<bool> {
     let (width, height) = (input.width, input.height);
     let around = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
@@ -124,7 +127,8 @@ fn near(input: &DenoiseInput, is: impl Fn(usize) -> bool + Sync) -> Vec<bool> {
     (0..height).into_par_iter().flat_map_iter(|y| row(y).map(any).collect::<Vec<_>>()).collect()
 }
 
-/// Squared distance of each pixel from the fits of one level, scaled so that it is the variance where they are right.
+/// Returns the squared residual of each pixel for the fits of one level, scaled so that it estimates the variance where
+/// the fits are unbiased.
 fn residuals(samples: &Samples, fits: &Fits, stop: &(dyn Fn() -> bool + Sync)) -> Option<Vec<f32>> {
     let residual = |x: usize, y: usize| {
         let pixel = y * samples.width + x;
@@ -142,7 +146,7 @@ fn residuals(samples: &Samples, fits: &Fits, stop: &(dyn Fn() -> bool + Sync)) -
     Some(rows?.into_iter().flatten().collect())
 }
 
-/// Light over albedo of a pixel, and how much of it is its own: from all windows, and from small ones.
+/// Returns light over albedo of a pixel and the weight of its own value in it: from all windows, and from small ones.
 #[inline(always)]
 fn predict(samples: &Samples, levels: &[Fits], x: usize, y: usize) -> [(Vec3, f32); 2] {
     let pixel = y * samples.width + x;
@@ -165,9 +169,9 @@ fn predict(samples: &Samples, levels: &[Fits], x: usize, y: usize) -> [(Vec3, f3
     [(light / total.max(1e-30), own / total.max(1e-30)), small]
 }
 
-/// One picture of both candidates, each where its estimated risk is smaller (Stein 1981: the risk of a filter is known
-/// without the truth, from its distance from what it has filtered, the variance, and how much of a pixel is left in
-/// itself).
+/// Blends both candidates per pixel, with weights that favour the smaller estimated risk (SURE, Stein 1981: the risk of
+/// a filter follows from its squared distance from its input, the variance, and the weight of a pixel's own value;
+/// it needs no reference).
 pub(super) fn pick(input: &DenoiseInput, found: &Regression) -> Filtered {
     let n = input.n_pixels();
     let [all, small] = &found.candidates;

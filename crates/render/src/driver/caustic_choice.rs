@@ -1,4 +1,4 @@
-//! How caustics are looked for in a film, and what was found out about it.
+//! How caustics are rendered in a film, and the measurements behind that choice.
 
 use crate::core::caustic_plan::{CausticChoice, CausticPlan};
 use crate::core::settings::RenderSettings;
@@ -7,15 +7,16 @@ use crate::integrators::caustics::plan::{choose, for_preview, known};
 use crate::prepare::prepared::Prepared;
 use glam::UVec2;
 
-/// How caustics are looked for in a picture of `width` × `height` pixels, and why. Traces pilot paths if that is not known yet,
-/// some per cent of what one sample of every pixel takes, on the current rayon pool.
+/// Returns how caustics are rendered in an image of `width` × `height` pixels, and why. If that is not known yet,
+/// traces pilot paths on the current rayon pool, which costs some per cent of one sample per pixel.
 ///
-/// The same for every seed, number of threads, and part of the picture.
+/// The result is independent of seed, number of threads, and part of the image.
 pub fn caustic_choice(snapshot: &Prepared, settings: &RenderSettings, (width, height): (u32, u32)) -> CausticChoice {
     choose(snapshot, settings, UVec2::new(width, height), &|| false).expect("nobody stops it")
 }
 
-/// The same if it is known, as it is of every picture with samples; `None` otherwise. Takes no time.
+/// Like [`caustic_choice`] if the choice is already known, as it is for every image with samples; `None` otherwise.
+/// Traces nothing.
 pub fn known_caustic_choice(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -24,7 +25,8 @@ pub fn known_caustic_choice(
     known(snapshot, settings, UVec2::new(width, height))
 }
 
-/// How caustics are looked for in a film: as in its samples so far, else as is best. `None` when `stop` said so.
+/// Returns how caustics are rendered in a film: as in its samples so far, otherwise the best choice. `None` if `stop`
+/// returned true.
 pub(crate) fn plan_of_film(
     snapshot: &Prepared,
     settings: &RenderSettings,

@@ -1,4 +1,4 @@
-//! A film as the denoiser wants it.
+//! Conversion of a film to the input of the denoiser.
 
 use crate::core::settings::RenderSettings;
 use crate::denoise::{DenoiseInput, Denoised, Guides, denoise};
@@ -8,12 +8,12 @@ use crate::film::tiles::Film;
 use crate::prepare::prepared::Prepared;
 use glam::UVec2;
 
-/// Gathers the feature buffers that guide the denoiser, on the current rayon pool; `None` when `stop` said so.
+/// Gathers the feature buffers that guide the denoiser, on the current rayon pool; `None` if `stop` returned true.
 ///
-/// - `size`: of the film, pixels; `samples`: at least 1.
+/// - `size`: of the film, pixels; `samples`: per pixel, at least 1.
 ///
-/// By other samples than those of the picture: what a pixel happens to show of an edge would be noise of both, and taken
-/// for what it is.
+/// Uses other samples than the image: with the same ones, the noise of features at an edge would correlate with that of
+/// the image, and the denoiser would keep it.
 pub fn gather_guides(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -25,18 +25,18 @@ pub fn gather_guides(
     gather_features_and_ids(snapshot, &settings, size, samples, stop)
 }
 
-/// Any number that nobody chooses as a seed.
+/// Changes the seed, so that features and image have different samples.
 const OTHER_SEED: u32 = 0x9e37_79b9;
 
-/// Removes noise from what a film shows; the film itself stays as it is. On the current rayon pool; `None` when `stop`
-/// said so, which is asked often.
+/// Denoises the image of a film, which stays unchanged, on the current rayon pool; `None` if `stop`, which is called
+/// often, returned true.
 ///
 /// - `features`: of the same scene, camera and size, from [`gather_guides`].
 ///
-/// The result is a function of the samples alone, whatever the number of threads or the instruction set.
+/// The result is a function of the samples, independent of the number of threads and the instruction set.
 ///
 /// # Panics
-/// When film and features differ in size.
+/// If film and features differ in size.
 pub fn denoise_film(
     snapshot: &Prepared,
     film: &Film,

@@ -1,8 +1,8 @@
-//! Why a pixel looks as it does: some of its samples traced again, with all that they find written down.
+//! Explains the value of a pixel: traces some of its samples again and records every contribution.
 //!
-//! The very same waves are traced as for the picture, with the same numbers ([`crate::integrators::record::Record`] only looks on), so what is
-//! told here is what the film got, bit for bit: light by light and bounce by bounce, in parts that add up to the whole.
-//! Start reading at [`explain`].
+//! The same waves are traced as for the image, with the same random numbers ([`crate::integrators::record::Record`]
+//! only observes), so the recorded values are those in the film, bit for bit: per light and per bounce, in parts that
+//! sum to the whole. Start reading at [`explain`].
 
 use crate::core::settings::{Integrator, RenderSettings};
 use crate::driver::renderer::trace_recorded;
@@ -17,16 +17,16 @@ use glam::{DVec3, UVec2};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// A part of a pixel's light.
+/// A part of a pixel's radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contribution {
     /// Where the light comes from.
     pub source: LightSource,
-    /// Surfaces between the light and the camera; 0 is the light itself.
+    /// Number of surfaces between the light and the camera; 0 for the light itself.
     pub bounces: u32,
-    /// Whether the path runs into the light or samples it.
+    /// Whether the contribution comes from BSDF sampling or from light sampling.
     pub found_by: FoundBy,
-    /// Of the mean, W·m⁻²·sr⁻¹.
+    /// Share of the mean, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
 }
 
@@ -37,15 +37,15 @@ pub struct Explanation {
     pub pixel: UVec2,
     /// Width and height of the film in pixels.
     pub film_size: UVec2,
-    /// Numbers of the samples that are traced.
+    /// Numbers of the traced samples.
     pub samples: Range<u32>,
-    /// One a sample, in order.
+    /// One path per sample, in order.
     pub paths: Vec<TracedPath>,
 }
 
-/// Traces samples of a pixel as the picture does. `None` for the classic model, which has no paths.
+/// Traces samples of a pixel as in the image. `None` for the classic model, which has no paths, and for an empty range.
 ///
-/// Light that light paths bring ([`light_traced`]) is not among it: those belong to no pixel.
+/// Contributions of light paths ([`light_traced`]) are not included: those paths belong to no pixel.
 pub fn explain(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -62,7 +62,7 @@ pub fn explain(
 }
 
 impl Explanation {
-    /// Samples that are not finite, which the film leaves out.
+    /// Number of samples that are not finite; the film rejects them.
     pub fn n_bad(&self) -> usize {
         self.paths.iter().filter(|path| !path.radiance.is_finite()).count()
     }
@@ -71,21 +71,22 @@ impl Explanation {
         self.paths.iter().filter(|path| path.radiance.is_finite())
     }
 
-    /// What a film has of these samples, light paths aside; W·m⁻²·sr⁻¹.
+    /// Mean of these samples in a film, without light paths; W·m⁻²·sr⁻¹.
     pub fn mean(&self) -> DVec3 {
         let mut sum = ExactSum::default();
         self.good().for_each(|path| sum.add(path.radiance));
         sum.sum / self.good().count().max(1) as f64
     }
 
-    /// Standard deviation of [`Self::mean`] a channel, if samples were independent; even ones are better.
+    /// Standard deviation of [`Self::mean`] per channel, if samples were independent; stratified samples have less.
     pub fn deviation(&self) -> DVec3 {
         let (n, mean) = (self.good().count() as f64, self.mean());
         let squares: DVec3 = self.good().map(|path| (path.radiance.as_dvec3() - mean).powf(2.0)).sum();
         if n > 1.0 { (squares / (n * (n - 1.0))).map(f64::sqrt) } else { DVec3::INFINITY }
     }
 
-    /// The parts of [`Self::mean`], by source, bounces and how they were found; what brought nothing is left out.
+    /// The parts of [`Self::mean`], by source, number of bounces and sampling technique; parts without radiance are
+    /// left out.
     pub fn contributions(&self) -> Vec<Contribution> {
         let mut sums: BTreeMap<(LightSource, u32, FoundBy), DVec3> = BTreeMap::new();
         for path in self.good() {
@@ -109,9 +110,9 @@ impl Explanation {
     }
 }
 
-/// What light paths bring into a pixel, the mean over these samples of the whole picture; W·m⁻²·sr⁻¹.
+/// Returns the contribution of light paths to a pixel, mean over these samples of the whole image; W·m⁻²·sr⁻¹.
 ///
-/// They may fall anywhere, so all of them are traced. `None` when `stop` said so.
+/// A light path may contribute to any pixel, so all of them are traced. `None` if `stop` returned true.
 pub fn light_traced(
     snapshot: &Prepared,
     settings: &RenderSettings,

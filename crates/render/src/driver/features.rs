@@ -1,9 +1,10 @@
-//! Gathers feature buffers: a pass over the first samples of each pixel that traces no more than what is seen.
+//! Gathers feature buffers: a pass over the first samples of each pixel that traces camera rays up to the first
+//! non-specular surface.
 //!
-//! Beside the passes for light, not a part of them: it needs camera rays alone, so it costs a small share of a sample,
-//! is the same for both integrators, and a few samples are enough because features hold much less noise than light.
-//! Workers take bands of rows; the samples of a pixel are summed up in their order by one worker, so the result does not
-//! depend on how many there are. Start reading at [`gather_features`].
+//! The pass is separate from rendering: it needs camera paths only, so it costs a small share of a sample, is the same
+//! for both integrators, and a few samples suffice because features are much less noisy than light. Workers take bands
+//! of rows; the samples of a pixel are summed in order by one worker, so the result does not depend on the number of
+//! workers. Start reading at [`gather_features`].
 
 use crate::core::filter::FilterSampler;
 use crate::core::settings::RenderSettings;
@@ -19,20 +20,20 @@ use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Samples of each pixel that [`gather_features`] is asked for where pictures are saved: enough for smooth edges, and a
-/// small share of the time of a picture.
+/// Samples per pixel of [`gather_features`] for saved images: enough for smooth edges, at a small share of the time of
+/// an image.
 pub const FEATURE_SAMPLES: u32 = 16;
 
-/// Looks at what each pixel shows, on the current rayon pool, by its samples 0 up to `samples`.
+/// Gathers the features of each pixel from its samples 0 up to `samples`, on the current rayon pool. `None` if `stop`,
+/// which is called often, returned true.
 ///
 /// - `size`: of the film, pixels, at least 1 each; `samples`: at least 1.
 ///
-/// The result is a function of what it is given alone, whatever the number of threads or the instruction set. `None` when `stop`
-/// said so, which is asked often.
+/// The result is a function of the arguments, independent of the number of threads and the instruction set.
 ///
 /// # Panics
-/// When `size` or `samples` is 0, or [`RenderSettings::check`] or [`Camera::check`](crate::core::camera::Camera::check)
-/// refuses what it is given.
+/// If `size` or `samples` is 0, or [`RenderSettings::check`] or [`Camera::check`](crate::core::camera::Camera::check)
+/// fails.
 pub fn gather_features(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -43,7 +44,7 @@ pub fn gather_features(
     gather(snapshot, settings, size, samples, false, stop)
 }
 
-/// The same with objects and materials.
+/// Like [`gather_features`], with the ids of objects and materials.
 ///
 /// # Panics
 /// As [`gather_features`].
@@ -57,7 +58,7 @@ pub fn gather_features_and_ids(
     gather(snapshot, settings, size, samples, true, stop)
 }
 
-/// Rows of a band, and columns of a part of it: blocks of 4 × 4 rays run side by side.
+/// Rows per band, and columns per part of it: blocks of 4 × 4 rays are traced together.
 const BAND: u32 = 8;
 const PART: u32 = 128;
 
@@ -103,7 +104,7 @@ fn gather(
     done.all(|done| done).then_some(buffers)
 }
 
-/// What all parts share.
+/// Input of all parts.
 struct Look<'a> {
     snapshot: &'a Prepared,
     settings: &'a RenderSettings,
@@ -162,7 +163,7 @@ struct Worker {
 }
 
 impl Worker {
-    /// Looks at a part of a band; false when `stop` said so.
+    /// Gathers the features of a part of a band; false if `stop` returned true.
     fn look_at(
         &mut self,
         look: &Look,
@@ -197,7 +198,7 @@ impl Worker {
                     }
                     for i in 0..n_pixels {
                         let (ray, sampler, _) = lens.ray(UVec2::new(pixels.x[i], pixels.y[i]), sample);
-                        // The weights of a filter that is negative somewhere are those of light, not of colours.
+                        // Weight 1: a filter with negative lobes weights radiance, not features.
                         let path = CameraPath { ray, sampler, slot: slot(sample) + pixels.local[i], weight: 1.0 };
                         paths.push(&{ path.ray }, &path.into());
                     }
@@ -237,14 +238,14 @@ impl Worker {
 }
 
 impl Band<'_> {
-    /// A pixel of one sample.
+    /// Stores a pixel with a single sample.
     fn set_one(&mut self, at: usize, seen: &Seen) {
         (self.albedo[at], self.normal[at], self.position[at]) = (seen.albedo, seen.normal, seen.position);
         self.depth[at] = seen.depth;
         self.coverage[at] = if seen.depth.is_finite() { 1.0 } else { 0.0 };
     }
 
-    /// A pixel of several samples.
+    /// Stores a pixel with several samples.
     fn set_mean(&mut self, at: usize, sums: &Sums, samples: u32) {
         let n = samples as f32;
         (self.albedo[at], self.albedo_variance[at]) = sums.albedo.mean(n);
@@ -261,13 +262,13 @@ impl Band<'_> {
     }
 }
 
-/// Of one pixel.
+/// Sums of one pixel.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     albedo: Moments,
     normal: Moments,
     position: Moments,
-    /// In the first place.
+    /// The depth is component 0.
     depth: Moments,
     n_surfaces: u32,
 }
@@ -285,7 +286,7 @@ impl Sums {
     }
 }
 
-/// A sum and a sum of squares, about the first value, so that what is far away loses no digits.
+/// Sum and sum of squares relative to the first value, so that large values lose no digits.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     first: Option<Vec3>,
@@ -301,7 +302,7 @@ impl Moments {
         self.squares += away * away;
     }
 
-    /// Mean and variance of the mean of `n` values, at least 1.
+    /// Returns the mean and the variance of the mean of `n` values, `n` at least 1.
     fn mean(&self, n: f32) -> (Vec3, Vec3) {
         let mean = self.first.unwrap_or_default() + self.sum / n;
         let spread = (self.squares - self.sum * self.sum / n).max(Vec3::ZERO);

@@ -1,8 +1,7 @@
-//! What the picture is made of, in colours: normals, depth, cost, error. Looks at the scene and the film, and changes
-//! neither.
+//! Inspections: views of the scene and the film in colours, such as normals, depth, cost and error. Neither is changed.
 //!
-//! Views of the scene need one ray a pixel, through its middle and the middle of the lens, and stay the same while
-//! samples come in; views of the film are read off it. Start reading at [`inspect`].
+//! Views of the scene need one ray per pixel, through the centre of the pixel and of the lens, and stay the same while
+//! samples are added; views of the film are computed from its sums. Start reading at [`inspect`].
 
 use crate::core::material::MaterialId;
 use crate::core::settings::RenderSettings;
@@ -18,31 +17,31 @@ use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What is shown in place of the picture.
+/// What is displayed in place of the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Inspection {
-    /// The picture itself.
+    /// The image itself.
     #[default]
     Picture,
-    /// The picture without most of its noise, see [`denoise_film`](crate::driver::denoised::denoise_film).
+    /// The denoised image, see [`denoise_film`](crate::driver::denoised::denoise_film).
     Denoised,
-    /// Shading normals: red to the right, green up, blue towards the viewer, a half for zero.
+    /// Shading normals in camera space: red is right, green up, blue towards the viewer; half intensity is zero.
     Normals,
-    /// Metres along the view axis.
+    /// Depth along the view axis, metres.
     Depth,
-    /// The colour that a surface gives back, without any light.
+    /// Albedo, without lighting.
     Albedo,
-    /// Relative error of each pixel, as its last doubling of samples tells it.
+    /// Relative error per pixel, from its last doubling of samples.
     Error,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     Samples,
-    /// Nodes of kd-trees that the nearest hit takes.
+    /// Kd-tree nodes visited to find the closest hit.
     TreeSteps,
-    /// Blocks of triangles that the nearest hit takes.
+    /// Blocks of triangles tested to find the closest hit.
     TriangleTests,
-    /// Bounces of one path, the mean over 4 × 4 pixels.
+    /// Bounces of one path, mean over 4 × 4 pixels.
     Bounces,
-    /// Brightness in factors of two.
+    /// Luminance in stops (factors of two).
     Luminance,
 }
 
@@ -79,37 +78,37 @@ impl Inspection {
         }
     }
 
-    /// Whether it changes with every sample.
+    /// Whether the view changes with every sample.
     pub fn is_of_film(self) -> bool {
         matches!(self, Self::Picture | Self::Denoised | Self::Error | Self::Samples | Self::Luminance)
     }
 }
 
-/// What the ends of the colour scale stand for.
+/// Values at the ends of the colour scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Legend {
-    /// Dark blue.
+    /// Value of dark blue.
     pub low: f32,
-    /// Red.
+    /// Value of red.
     pub high: f32,
-    /// Unit of both ends, as written beside the scale.
+    /// Unit of both values, as displayed beside the scale.
     pub unit: &'static str,
 }
 
-/// A view in bytes, as large as the film that it belongs to.
+/// An inspection as bytes, in the size of its film.
 #[derive(Clone, Debug, Default)]
 pub struct Inspected {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// sRGB-encoded, row by row from the top.
+    /// sRGB-encoded pixels, row by row from the top.
     pub rgb: Vec<[u8; 3]>,
-    /// `None` where the colours speak for themselves.
+    /// `None` for views without a colour scale.
     pub legend: Option<Legend>,
 }
 
-/// Makes the view, on the current rayon pool; `None` when `stop` said so, which is asked once a row.
+/// Computes a view, on the current rayon pool; `None` if `stop`, which is called once per row, returned true.
 pub fn inspect(
     kind: Inspection,
     snapshot: &Prepared,
@@ -126,7 +125,7 @@ pub fn inspect(
     };
     let plain = |rgb| Inspected { width, height, rgb, legend: None };
     Some(match kind {
-        // Pictures are developed, not looked up.
+        // These are developed from radiance instead.
         Inspection::Picture | Inspection::Denoised => plain(Vec::new()),
         Inspection::Normals => plain(first_hits(snapshot, size, stop, |seen| match seen {
             Some((vertex, _)) => {
@@ -143,7 +142,7 @@ pub fn inspect(
         })?),
         Inspection::Depth => {
             let depths = depths(snapshot, size, stop)?;
-            // Logarithmic: what is near differs by less than what is far.
+            // Logarithmic, because relative differences of depth matter.
             let values: Vec<f32> = depths.iter().map(|depth| depth.log2()).collect();
             let (low, high) = range_of(&values, 0.005);
             let view = scaled(values, (low, high), "");
@@ -184,20 +183,21 @@ pub fn inspect(
 /// Luminance of linear Rec. 709.
 const REC_709: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
-/// Relative error of each pixel, row by row from the top, as its last doubling of samples tells it: the mean over 5 × 5
-/// pixels, all of them scaled so that the root of the mean of their squares is the error of the whole picture. `None`
-/// where that is not known yet.
+/// Returns the relative error of each pixel, row by row from the top, from its last doubling of samples: the mean over
+/// 5 × 5 pixels, scaled so that the root mean square over the image is the estimated error of the whole image. `None`
+/// while that is unknown.
 pub fn relative_errors(film: &Film) -> Option<Vec<f32>> {
     let told = film.error_estimate()?.relative;
     let size = UVec2::new(film.width(), film.height());
     let steps = smoothed(&film_values(film, |film, x, y| film.doubling_step(x, y)), size);
     let mean = steps.iter().map(|&step| f64::from(step)).sum::<f64>() / steps.len() as f64;
-    // Nothing is wrong where nothing moved.
+    // Without any change the error is 0.
     let scale = if mean > 0.0 { told * told / mean } else { 0.0 };
     Some(steps.iter().map(|&step| (scale * f64::from(step)).sqrt() as f32).collect())
 }
 
-/// Metres along the view axis to what each pixel shows; infinite where it shows nothing.
+/// Returns the depth along the view axis of each pixel in metres, row by row from the top; infinite for a miss. `None`
+/// if `stop` returned true.
 pub fn depths(snapshot: &Prepared, size: UVec2, stop: &(dyn Fn() -> bool + Sync)) -> Option<Vec<f32>> {
     let forward = snapshot.camera.forward;
     hits_by_row(snapshot, size, stop, |ray, hit| hit.map_or(f32::INFINITY, |hit| hit.t * ray.dir.dot(forward)))
@@ -217,7 +217,7 @@ fn first_hits<T: Send>(
     })
 }
 
-/// What the rays through the middles of the pixels meet first, row by row from the top.
+/// Traces the rays through the pixel centres and applies `see` to their closest hits, row by row from the top.
 fn hits_by_row<T: Send>(
     snapshot: &Prepared,
     size: UVec2,
@@ -262,7 +262,7 @@ fn film_values(film: &Film, value: impl Fn(&Film, u32, u32) -> f32 + Sync) -> Ve
     (0..width * height).into_par_iter().map(|i| value(film, i % width, i / width)).collect()
 }
 
-/// The mean over 5 × 5 pixels: a variance of its own pixel alone would be mostly noise.
+/// Mean over 5 × 5 pixels: the variance estimate of a single pixel would be mostly noise.
 fn smoothed(values: &[f32], size: UVec2) -> Vec<f32> {
     let [width, height] = size.to_array().map(|n| n as usize);
     let rows: Vec<f32> = (0..width * height)
@@ -284,7 +284,7 @@ fn smoothed(values: &[f32], size: UVec2) -> Vec<f32> {
         .collect()
 }
 
-/// The finite values without this share at either end.
+/// Returns the range of the finite values after removing this share at either end.
 fn range_of(values: &[f32], share: f32) -> (f32, f32) {
     let mut sorted: Vec<f32> = values.iter().copied().filter(|value| value.is_finite()).collect();
     if sorted.is_empty() {
@@ -293,11 +293,12 @@ fn range_of(values: &[f32], share: f32) -> (f32, f32) {
     sorted.sort_unstable_by(f32::total_cmp);
     let off = (share * sorted.len() as f32) as usize;
     let (low, high) = (sorted[off.min(sorted.len() - 1)], sorted[(sorted.len() - 1).saturating_sub(off)]);
-    // Everything alike still needs two ends.
+    // A constant image still needs two distinct ends.
     if high > low { (low, high) } else { (low, low + 1.0) }
 }
 
-/// From dark blue at 0 over green to red at 1, each step brighter or warmer than the one before; grey for no number.
+/// Colour scale from dark blue at 0 over green to red at 1, each step brighter or warmer than the one before; grey for
+/// NaN and infinities.
 pub fn scale_color(value: f32) -> [u8; 3] {
     const STOPS: [[f32; 3]; 7] = [
         [20.0, 16.0, 70.0],
@@ -317,9 +318,10 @@ pub fn scale_color(value: f32) -> [u8; 3] {
     a.lerp(b, place - i as f32).to_array().map(|c| c.round() as u8)
 }
 
-/// Tints what is sharp and draws the focal plane as a line, over a developed picture.
+/// Tints the pixels in focus and draws the focal plane as a line, over a developed image.
 ///
-/// - `depths`: of a film of `film_size`, see [`depths`]; `zone`: near and far limit; `focus`: all metres.
+/// - `depths`: of a film of `film_size`, see [`depths`]; `zone`: near and far limit of acceptable sharpness; `focus`:
+///   focal distance; all in metres along the view axis.
 pub fn tint_sharp_zone(rgba: &mut [u8], size: UVec2, depths: &[f32], film_size: UVec2, zone: (f32, f32), focus: f32) {
     const SHARP: Vec3 = Vec3::new(70.0, 220.0, 120.0);
     const PLANE: [u8; 3] = [255, 225, 90];
@@ -332,7 +334,7 @@ pub fn tint_sharp_zone(rgba: &mut [u8], size: UVec2, depths: &[f32], film_size: 
         for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
             let (x, y) = (x as u32, y as u32);
             let here = depth_at(x, y);
-            // Where the plane passes between this pixel and the next one on the same surface.
+            // The focal plane passes between this pixel and the next one on the same surface.
             let crosses = |other: f32| {
                 (here - focus).signum() != (other - focus).signum() && (here - other).abs() < 0.1 * here.min(other)
             };
@@ -381,10 +383,10 @@ mod tests {
 
     #[test]
     fn the_sharp_zone_is_tinted_and_the_plane_is_a_line() {
-        // A floor that runs away: one depth a row.
+        // A receding floor: one depth per row.
         let (size, depths) = (UVec2::new(4, 8), (0..32).map(|i| 10.0 - (i / 4) as f32).collect::<Vec<_>>());
         let mut rgba = vec![0; 4 * 32];
-        // Rows lie at 10, 9, … 3 m; steps of 1 m are more than a tenth of what lies nearer than 10 m.
+        // Rows lie at 10, 9, … 3 m; steps of 1 m exceed a tenth of any depth below 10 m.
         tint_sharp_zone(&mut rgba, size, &depths, size, (5.5, 8.5), 9.5);
         let row = |y: usize| [rgba[16 * y], rgba[16 * y + 1]];
         assert_eq!(row(1), [0, 0], "in front of the far limit only from 8.5 m on");

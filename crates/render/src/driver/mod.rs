@@ -1,4 +1,4 @@
-//! Passes over a film, and questions about a picture.
+//! Passes over a film: rendering, feature buffers, denoising, explanation of a pixel, inspections.
 
 pub(crate) mod caustic_choice;
 pub(crate) mod denoised;

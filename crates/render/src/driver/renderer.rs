@@ -1,4 +1,4 @@
-//! One pass over the film: which tiles need samples, spread over the workers of the current rayon pool.
+//! One pass over the film: takes missing samples of its tiles, in parallel on the current rayon pool.
 
 use crate::core::caustic_plan::CausticPlan;
 use crate::core::counts::RayCounts;
@@ -25,7 +25,7 @@ use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// A sample that cannot be right; replay it with the same scene, seed and settings.
+/// An invalid sample; replay it with the same scene, seed and settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BadSample {
     /// Column of the pixel, from the left.
@@ -36,32 +36,32 @@ pub struct BadSample {
     pub sample: u32,
 }
 
-/// What a call of [`advance`] did.
+/// Result of [`advance`].
 #[derive(Clone, Debug, Default)]
 pub struct PassReport {
-    /// False when it was stopped before every tile reached the target.
+    /// False if it was stopped before every tile reached the target.
     pub completed: bool,
-    /// Rays that were traced, by class.
+    /// Traced rays by class.
     pub rays: RayCounts,
-    /// How many samples were left out because they were not finite.
+    /// Number of samples that were rejected because they were not finite.
     pub n_bad: u64,
     /// The first few of them.
     pub bad: Vec<BadSample>,
-    /// How many samples are brighter than anything in the scene can be: a fault of the program.
+    /// Number of samples brighter than any radiance in the scene can be, which is a bug of the program.
     pub n_above: u64,
     /// The first few of them.
     pub above: Vec<BadSample>,
 }
 
-/// Takes samples until every pixel has `target_spp` of them, or of an adaptive film the mean over all, or until `stop`
-/// says so.
+/// Takes samples until every pixel has `target_spp` of them (in an adaptive film: the mean over all pixels), or until
+/// `stop` returns true.
 ///
-/// Tiles are spread over the current rayon pool. `stop` is asked often, from all workers; what a wave had not
-/// finished is dropped, never half kept.
+/// Tiles are rendered in parallel on the current rayon pool. `stop` is called often, by all workers; the samples of an
+/// unfinished wave are discarded.
 ///
 /// # Panics
-/// When [`RenderSettings::check`] or [`Camera::check`](crate::core::camera::Camera::check) refuses what it is given: the picture would be
-/// black, and its error estimate nothing.
+/// If [`RenderSettings::check`] or [`Camera::check`](crate::core::camera::Camera::check) fails: the image would be
+/// black, and its error estimate meaningless.
 pub fn advance(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -72,8 +72,8 @@ pub fn advance(
     advance_region(snapshot, settings, film, None, target_spp, stop)
 }
 
-/// The same for the tiles of a region alone, whose pixels get as many samples each. Traced light falls where it falls, so
-/// the others may get more of it.
+/// Like [`advance`], for the tiles of a region only; all of its pixels get the same number of samples. Light paths are
+/// traced for the whole image, so other pixels may get contributions from them.
 ///
 /// # Panics
 /// As [`advance`].
@@ -115,7 +115,7 @@ pub fn advance_region(
         if let Some(metric) = metric {
             film.begin_round_if_due(metric);
         }
-        // Rounds end at powers of two, and the error of traced light is told there.
+        // Rounds end at powers of two, and the error of light tracing is recorded there.
         let next = (film.spp_in(region) + 1).checked_next_power_of_two();
         let goal = match &pass.caustics {
             None if metric.is_none() => target_spp,
@@ -136,8 +136,8 @@ pub fn advance_region(
         }
         if total.completed {
             film.has_spent(goal);
-            // Light paths of a pass that was stopped may be ahead of the tiles. They are looked at when the tiles have come
-            // as far: earlier, what blocks are compared with would depend on where it was stopped.
+            // After a stop, light paths may be ahead of the tiles. They are recorded when the tiles have caught up:
+            // earlier, the levels to which blocks are compared would depend on where the pass was stopped.
             if film.light.as_ref().is_some_and(|layer| layer.spp == goal) {
                 film.record_light();
             }
@@ -153,9 +153,10 @@ fn advance_tiles(
     budget: u32,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> PassReport {
-    // In a region there is none but an even one.
+    // A region is always sampled evenly.
     let round = film.round.filter(|_| region.is_none());
-    // One after the other, for whoever is free: divided beforehand, the half with the model in it would be waited for.
+    // Tiles are handed out one by one: with a fixed division, all workers would wait for the half that contains the
+    // model.
     let mut reports: Vec<(usize, PassReport)> = film
         .tiles
         .iter_mut()
@@ -174,7 +175,7 @@ fn advance_tiles(
 }
 
 impl PassReport {
-    /// Rays and samples that cannot be right of another.
+    /// Adds rays and invalid samples of another report.
     fn add(&mut self, other: Self) {
         self.rays += other.rays;
         self.n_bad += other.n_bad;
@@ -184,10 +185,10 @@ impl PassReport {
     }
 }
 
-/// How many bad samples a report names.
+/// Maximum number of invalid samples that a report lists.
 const MAX_LISTED_BAD: usize = 16;
 
-/// Paths in flight at once: enough to keep the kernel busy, few enough for their state to stay in the cache.
+/// Paths in flight at once: enough to fill the SIMD kernels, few enough for their state to stay in the cache.
 const WAVE_SIZE: usize = 4096;
 
 /// Scratch memory of one worker.
@@ -195,24 +196,24 @@ const WAVE_SIZE: usize = 4096;
 struct Wave {
     path: PathWave,
     phong: PhongWave,
-    /// Block by block; their places are those in the block.
+    /// Pixels block by block; `local` is the index in the block.
     pixels: Pixels,
-    /// Of the tile whose pixels these are.
+    /// Origin and size of the tile of these pixels.
     origin: UVec2,
     size: UVec2,
-    /// Which of the pixels each block has.
+    /// Range of `pixels` per block.
     blocks: Vec<Range<usize>>,
     runs: Vec<Run>,
     radiance: Vec<Vec3>,
 }
 
-/// One sample of each of some pixels.
+/// One sample of each pixel of a range.
 #[derive(Clone, Debug)]
 struct Run {
-    /// Of those of the wave.
+    /// Range in the wave's pixels.
     pixels: Range<usize>,
     sample: u32,
-    /// Where the radiance of the pixel at place 0 goes.
+    /// Index in `radiance` of the pixel with local index 0.
     slot: u32,
 }
 
@@ -221,14 +222,14 @@ impl Wave {
         Self { pixels: Pixels { x: vec![pixel.x], y: vec![pixel.y], local: vec![0] }, ..Self::default() }
     }
 
-    /// One for each of these samples of all pixels, each `stride` after the one before it.
+    /// Returns one run of all pixels per sample; the slots of consecutive runs are `stride` apart.
     fn runs_of(&self, samples: Range<u32>, stride: u32) -> Vec<Run> {
         let all = 0..self.pixels.local.len();
         let slots = (0..).map(|i| i * stride);
         samples.zip(slots).map(|(sample, slot)| Run { pixels: all.clone(), sample, slot }).collect()
     }
 
-    /// Takes the pixels of a tile; those of one that is as large as the last only have to be moved.
+    /// Takes the pixels of a tile; those of a tile of the same size as the previous one are only shifted.
     fn take_tile(&mut self, tile: &FilmTile) {
         let (origin, size) = (tile.origin, tile.size);
         if size != self.size || self.pixels.local.is_empty() {
@@ -247,8 +248,8 @@ impl Wave {
         (self.origin, self.size) = (origin, size);
     }
 
-    /// Takes the next samples of the blocks of a tile, as many as are in flight at once: of each that is not done some, so
-    /// that all come along together. `missing` is how many each lacks.
+    /// Takes the next samples of the blocks of a tile, as many as are in flight at once; every unfinished block gets
+    /// some, so that all blocks advance together. `missing` is the number of missing samples per block.
     fn take_runs(&mut self, tile: &FilmTile, missing: &[u32]) {
         self.runs.clear();
         let n_pixels: usize = tile.blocks.iter().zip(missing).filter(|(_, n)| **n > 0).map(|(b, _)| b.n_pixels()).sum();
@@ -256,7 +257,7 @@ impl Wave {
         let mut slot = 0;
         for ((block, pixels), missing) in tile.blocks.iter().zip(&self.blocks).zip(missing) {
             let first = block.next_sample();
-            // Not beyond the next power of two, where the error estimate looks at the block.
+            // Not beyond the next power of two, where the error estimate records the block.
             let to_power = doubled(block.spp) - block.spp;
             for sample in first..first + at_once.min(*missing).min(to_power) {
                 self.runs.push(Run { pixels: pixels.clone(), sample, slot });
@@ -267,7 +268,7 @@ impl Wave {
         self.radiance.resize(slot as usize, Vec3::ZERO);
     }
 
-    /// Traces the runs, and adds what their pixels see to `radiance`.
+    /// Traces the runs and adds the radiance of their pixels to `radiance`; `None` if `stop` returned true.
     fn trace(
         &mut self,
         pass: &Pass,
@@ -306,7 +307,7 @@ impl Wave {
     }
 }
 
-/// What all tiles share.
+/// Input of all tiles.
 struct Pass<'a> {
     snapshot: &'a Prepared,
     settings: &'a RenderSettings,
@@ -314,9 +315,9 @@ struct Pass<'a> {
     camera_media: Vec<u32>,
     filter: FilterSampler,
     size: UVec2,
-    /// Of samples, see [`crate::prepare::bound`].
+    /// Upper bound of the radiance of a sample, see [`crate::prepare::bound`].
     bound: Option<f32>,
-    /// Depth from which on all paths are ended by chance.
+    /// Depth from which on all paths are subject to Russian roulette.
     endless: u32,
 }
 
@@ -327,7 +328,7 @@ impl FilmTile {
     }
 }
 
-/// - `round`: which blocks of the tile get samples; all of them without one.
+/// - `round`: decides which blocks of the tile get samples; without a round, all of them.
 fn advance_tile(
     pass: &Pass,
     tile: &mut FilmTile,
@@ -342,7 +343,8 @@ fn advance_tile(
     if missing.iter().all(|missing| *missing == 0) {
         return report;
     }
-    // Rather than begin what would be dropped: with some hundred tiles left, their first rays alone take milliseconds.
+    // Checked before starting work that would be discarded: with hundreds of tiles left, their first rays alone take
+    // milliseconds.
     if stop() {
         report.completed = false;
         return report;
@@ -387,8 +389,8 @@ fn advance_tile(
     report
 }
 
-/// Traces one sample of one pixel alone: the same light that [`advance`] adds to the film, but for that of paths from
-/// the lights, which belong to no pixel.
+/// Traces one sample of one pixel: the same radiance that [`advance`] adds to the film, without light paths, which
+/// belong to no pixel.
 pub fn replay_sample(snapshot: &Prepared, settings: &RenderSettings, film_size: UVec2, at: BadSample) -> Vec3 {
     let pass = Pass::planned(snapshot, settings, film_size);
     if let Some(caustics) = &pass.caustics {
@@ -401,7 +403,7 @@ pub fn replay_sample(snapshot: &Prepared, settings: &RenderSettings, film_size: 
     radiance[0]
 }
 
-/// Traces samples of one pixel as [`advance`] does, and writes down what their paths find.
+/// Traces samples of one pixel as [`advance`] does, and records their paths.
 pub(crate) fn trace_recorded(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -427,7 +429,8 @@ pub(crate) fn trace_recorded(
     paths
 }
 
-/// Bounces of the first sample of each pixel, the mean over blocks of 4 × 4; `None` when `stop` said so.
+/// Returns the bounces of the first sample of each pixel, mean over blocks of 4 × 4 pixels; `None` if `stop` returned
+/// true.
 pub(crate) fn mean_bounces(
     snapshot: &Prepared,
     settings: &RenderSettings,
@@ -435,7 +438,7 @@ pub(crate) fn mean_bounces(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Vec<f32>> {
     const SIDE: u32 = 4;
-    // Camera paths alone; traced light has no pixel to begin with.
+    // Camera paths only: light paths do not start at a pixel.
     let pass = Pass::new(snapshot, settings, size, CausticPlan::NONE);
     let blocks = UVec2::new(size.x.div_ceil(SIDE), size.y.div_ceil(SIDE));
     let means: Option<Vec<f32>> = (0..blocks.x * blocks.y)
@@ -460,7 +463,7 @@ pub(crate) fn mean_bounces(
 }
 
 impl<'a> Pass<'a> {
-    /// The pass of a picture whose plan is found first, if it is not known.
+    /// Returns the pass for an image, after choosing the plan for caustics if it is not known.
     fn planned(snapshot: &'a Prepared, settings: &'a RenderSettings, size: UVec2) -> Self {
         let choice = choose(snapshot, settings, size, &|| false).expect("nobody stops it");
         Self::new(snapshot, settings, size, choice.plan)
@@ -483,14 +486,14 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The pixels of a rectangle in squares of 4 × 4, so that 16 rays that follow each other run side by side.
+/// Returns the pixels of a rectangle in squares of 4 × 4, so that 16 consecutive rays are coherent.
 pub(super) fn pixels_in_blocks(origin: UVec2, size: UVec2) -> Pixels {
     let mut pixels = Pixels::default();
     add_pixels(origin, size, &mut pixels);
     pixels
 }
 
-/// Adds them to others; places are counted from 0 row by row.
+/// Appends the pixels of a rectangle in squares of 4 × 4; `local` counts from 0 row by row.
 fn add_pixels(origin: UVec2, size: UVec2, pixels: &mut Pixels) {
     const SIDE: u32 = 4;
     const _: () = assert!(BLOCK_SIZE.is_multiple_of(SIDE));

@@ -1,12 +1,12 @@
-//! Threads that have the stack that rendering needs.
+//! Threads with enough stack for rendering.
 
 use rayon::ThreadPoolBuilder;
 
-/// Bytes of stack per worker. Without optimisation, the frames of shading kernels for sixteen lanes exceed the two
-/// megabytes that threads have by default. Only what is touched is ever taken from memory.
+/// Stack size per worker in bytes. Without optimisation, the stack frames of SIMD shading kernels exceed the default of
+/// 2 MiB. Only touched pages take memory.
 const STACK: usize = 16 << 20;
 
-/// Returns a builder of rayon pools whose workers have enough stack to render in a build of any optimisation.
+/// Returns a builder of rayon pools whose workers have enough stack to render at any optimisation level.
 ///
 /// One worker per processor, unless [`ThreadPoolBuilder::num_threads`] says otherwise.
 pub fn worker_threads() -> ThreadPoolBuilder {
