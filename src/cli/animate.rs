@@ -1,4 +1,4 @@
-//! `firstlight render --turntable N` and `--bookmarks 1,2,3 --frames N`: numbered pictures of a camera that moves.
+//! `firstlight render --turntable N` and `--bookmarks 1,2,3 --frames N`: numbered images of a moving camera.
 
 use super::console::{inform, remark};
 use super::failure::Failure;
@@ -13,17 +13,17 @@ use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Which frames are rendered.
+/// The frames to render.
 pub(super) struct Sequence {
-    /// From 0.
+    /// Frame indices, from 0.
     pub frames: Range<usize>,
-    /// Frames that are there already stay.
+    /// Whether existing frames are kept.
     pub is_part: bool,
-    /// Images whose place is taken.
+    /// Number of existing images that are replaced.
     pub n_replaced: usize,
 }
 
-/// Renders every frame to `FILE-0001.png` and so on; each is a picture as any other, and opens as one.
+/// Renders every frame to `FILE-0001.png` and so on; each has its own metadata and opens like any other image.
 pub(super) fn animate(
     args: &RenderArgs,
     mut job: RenderJob,
@@ -59,7 +59,7 @@ pub(super) fn animate(
     Ok(())
 }
 
-/// Whether a frame is there already, as it would be rendered.
+/// Whether a frame exists already with the metadata that it would be rendered with.
 fn is_complete(job: &RenderJob, path: &Path, target: Target) -> Result<bool, Failure> {
     let Ok(there) = ImageMetadata::read(path) else { return Ok(false) };
     let samples = ImageSamples { first: 0, spp: there.spp, uneven: there.uneven };
@@ -68,7 +68,7 @@ fn is_complete(job: &RenderJob, path: &Path, target: Target) -> Result<bool, Fai
     Ok(ours == there && target.spp.is_none_or(|spp| spp == there.spp))
 }
 
-/// The names of all pictures, if there are to be several.
+/// The names of all images of an animation; `None` for a single image.
 pub(super) fn frames(args: &RenderArgs) -> Option<impl Iterator<Item = PathBuf>> {
     let n = args.turntable.or(args.bookmarks.as_ref().and(args.frames))? as usize;
     Some((1..=n).map(move |number| numbered(&args.output, number, digits(n))))
@@ -78,7 +78,7 @@ fn digits(n: usize) -> usize {
     n.to_string().len().max(4)
 }
 
-/// Where the camera is in each frame.
+/// The camera of each frame.
 fn way(args: &RenderArgs, job: &mut RenderJob) -> Result<Vec<Rig>, Failure> {
     let rig = job.rig().ok_or_else(|| Failure::Failed("the scene has no camera".to_owned()))?;
     if let Some(n) = args.turntable {
@@ -101,7 +101,7 @@ fn way(args: &RenderArgs, job: &mut RenderJob) -> Result<Vec<Rig>, Failure> {
     Ok(along(&stops, args.frames.unwrap_or(1)))
 }
 
-/// `FILE-0007.png` of `FILE.png`.
+/// Returns `FILE-0007.png` for `FILE.png`.
 fn numbered(path: &Path, number: usize, digits: usize) -> PathBuf {
     let mut name = path.file_stem().map_or_else(|| "frame".into(), OsStr::to_os_string);
     name.push(format!("-{number:0digits$}."));

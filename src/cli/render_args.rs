@@ -1,4 +1,4 @@
-//! What `firstlight render` is asked for.
+//! Arguments of `firstlight render`.
 
 use super::args::{FilterArg, IntegratorArg, OverwriteArgs, SceneArgs, ScenesArgs};
 use super::failure::Failure;
@@ -155,7 +155,7 @@ pub struct RenderArgs {
     pub has_next: bool,
 }
 
-/// An output that is no file.
+/// The name of standard output.
 pub const STDOUT: &str = "-";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -186,7 +186,7 @@ pub enum PartBy {
 }
 
 impl RenderCommand {
-    /// The only job, where it is a part of something larger.
+    /// The only job, if it is a part of an image or a sequence; `None` without --part.
     pub fn part(&self) -> Result<Option<RenderArgs>, Failure> {
         let render = &self.render;
         if render.part.is_none() {
@@ -208,14 +208,14 @@ impl RenderCommand {
                     "--part-by frames needs -o FILE: all parts write to the same names".to_owned(),
                 ));
             }
-            // What the film is shown as.
+            // A placeholder: a part has a film, but no image.
             (None, _) => PathBuf::from("part.png"),
             (Some(output), PartBy::Frames) => output.clone(),
         };
         Ok(Some(RenderArgs { scene, output, ..render.clone() }))
     }
 
-    /// One for each scene.
+    /// One job per scene.
     pub fn jobs(&self) -> Result<Vec<RenderArgs>, Failure> {
         let scenes: Vec<SceneArgs> = self.scenes.each().collect();
         let several = scenes.len() > 1;
@@ -245,7 +245,7 @@ impl RenderCommand {
         Ok(jobs)
     }
 
-    /// Where the picture of one of several scenes goes.
+    /// Image file of one of several scenes.
     fn in_folder(&self, folder: &Path, scene: &SceneArgs) -> Result<PathBuf, Failure> {
         if !folder.is_dir() {
             let (name, n) = (folder.display(), self.scenes.scenes.len());
@@ -259,17 +259,17 @@ impl RenderCommand {
 }
 
 impl RenderArgs {
-    /// Whether the picture goes to standard output.
+    /// Whether the image goes to standard output.
     pub fn to_stdout(&self) -> bool {
         self.output == Path::new(STDOUT)
     }
 
-    /// The output in words.
+    /// Name of the output for messages.
     pub fn output_name(&self) -> String {
         if self.to_stdout() { "standard output".to_owned() } else { self.output.display().to_string() }
     }
 
-    /// Of the picture: as asked for, and not another than its name says.
+    /// Image format: as requested, and matching the extension of the output.
     pub fn picture_format(&self) -> Result<PictureFormat, Failure> {
         if self.to_stdout() {
             return self.check_layers(self.default_format());
@@ -282,7 +282,7 @@ impl RenderArgs {
         self.check_layers(of_name)
     }
 
-    /// Layers need a format that has them.
+    /// Checks that the format supports the requested layers.
     fn check_layers(&self, format: PictureFormat) -> Result<PictureFormat, Failure> {
         self.layers.check()?;
         if !self.layers.is_empty() && format != PictureFormat::Exr {
@@ -292,7 +292,7 @@ impl RenderArgs {
         Ok(format)
     }
 
-    /// Where no name says it.
+    /// Format if no file name determines it.
     fn default_format(&self) -> PictureFormat {
         match self.format {
             Some(FormatArg::Exr) => PictureFormat::Exr,
@@ -306,7 +306,7 @@ pub fn file_stem(scene: &OsStr) -> OsString {
     Path::new(scene).file_stem().unwrap_or(OsStr::new("scene")).to_owned()
 }
 
-/// `firstlight-NAME.png` in the current folder, with a number when that is taken, also by one of the `others`.
+/// Returns `firstlight-NAME.png` in the current folder, with a number if that exists or is used by one of the `others`.
 pub fn free_name(scene: &OsStr, extension: &str, others: &[RenderArgs]) -> PathBuf {
     let name = |end: String| {
         let mut name = OsString::from("firstlight-");
@@ -319,7 +319,7 @@ pub fn free_name(scene: &OsStr, extension: &str, others: &[RenderArgs]) -> PathB
     ends.map(name).find(is_free).expect("numbers do not end")
 }
 
-/// `64..128` as sample numbers.
+/// Parses `64..128` as sample numbers.
 pub fn parse_range(text: &str) -> Result<Range<u32>, String> {
     let (start, end) = text.split_once("..").ok_or("expected A..B, such as 64..128: from A up to, not including, B")?;
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a sample number"));
@@ -333,7 +333,7 @@ pub fn parse_range(text: &str) -> Result<Range<u32>, String> {
     }
 }
 
-/// `X,Y,W,H` as four numbers of pixels.
+/// Parses `X,Y,W,H` as four numbers of pixels.
 fn parse_region(text: &str) -> Result<[u32; 4], String> {
     let wrong = || format!("`{text}` is not a rectangle: expected X,Y,W,H in pixels, such as 640,360,200,100");
     let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();

@@ -1,5 +1,5 @@
-//! Feature buffers of a picture with what they need outside of it: world positions, and the names of objects and
-//! materials. What films keep and layered pictures show.
+//! Feature buffers of an image with world positions and the names of objects and materials: the form in which films
+//! store them and layered images use them.
 
 use super::explain::SnapshotNames;
 use crate::render::{
@@ -10,21 +10,21 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Feature buffers of a picture, with names.
+/// Feature buffers of an image, with names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureLayers {
-    /// Positions count from the origin of the world, and there are objects and materials.
+    /// Feature buffers with ids; positions are in world space.
     pub buffers: FeatureBuffers,
-    /// Names of the objects, by id. Objects that share a name are one for a mask.
+    /// Names of the objects, by id. Objects that share a name share a mask.
     pub objects: Vec<String>,
     /// Names of the materials, by id.
     pub materials: Vec<String>,
 }
 
-/// What feature buffers need of a scene besides its snapshot.
+/// Scene information for feature buffers that is not in the snapshot.
 #[derive(Clone, Debug)]
 pub struct FeatureNames {
-    /// Metres: the world point that is (0, 0, 0) of the snapshot.
+    /// World position of the snapshot's origin, metres.
     origin: DVec3,
     objects: Vec<String>,
     materials: Vec<String>,
@@ -39,7 +39,8 @@ impl FeatureNames {
 }
 
 impl FeatureLayers {
-    /// Looks at a scene by samples 0 up to `samples` of each pixel, on the current rayon pool; `None` when `stop` said so.
+    /// Gathers the features of a scene from samples 0 up to `samples` of each pixel, on the current rayon pool; `None`
+    /// if `stop` returned true.
     ///
     /// - `names`: of the same snapshot; `size`: of the film, pixels.
     pub fn gather(
@@ -58,7 +59,7 @@ impl FeatureLayers {
         Some(Self { buffers, objects, materials })
     }
 
-    /// Those of one picture that was rendered in two parts: both have the same, or one has more samples and is kept.
+    /// Merges those of two parts of an image: the ones with more samples are kept; otherwise both are equal.
     pub fn of_parts(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         match (a, b) {
             (Some(a), Some(b)) => Some(if b.buffers.samples > a.buffers.samples { b } else { a }),
@@ -66,14 +67,14 @@ impl FeatureLayers {
         }
     }
 
-    /// What is not a number for each pixel.
+    /// Returns the data that is not stored per pixel.
     pub(super) fn header(&self) -> FeatureHeader {
         let Self { buffers, objects, materials } = self;
         FeatureHeader { samples: buffers.samples, objects: objects.clone(), materials: materials.clone() }
     }
 }
 
-/// Names by material of the snapshot; what has no name is called by its number.
+/// Names by material of the snapshot; unnamed materials are called by their number.
 fn material_names(extraction: &Extraction, inputs: &SceneInputs) -> Vec<String> {
     let of_materials = inputs.materials.iter().map(|material| (material.entity, &material.name));
     let of_lights = inputs.lights.iter().map(|light| (light.entity, &light.name));
@@ -86,7 +87,7 @@ fn material_names(extraction: &Extraction, inputs: &SceneInputs) -> Vec<String> 
     extraction.material_entities().enumerate().map(name).collect()
 }
 
-/// What stands in the header of a film that has feature buffers.
+/// Data of feature buffers in the header of a film.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct FeatureHeader {
     samples: u32,
@@ -97,7 +98,7 @@ pub(super) struct FeatureHeader {
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
 
-/// Layers of feature buffers by name, as in an OpenEXR picture: every list but those of ids.
+/// Layers of feature buffers by name, as in an OpenEXR image: every list except ids.
 pub(super) const LAYERS: [&str; 9] = [
     "albedo",
     "normal",
@@ -110,7 +111,7 @@ pub(super) const LAYERS: [&str; 9] = [
     "depth_variance",
 ];
 
-/// The channels of one of [`LAYERS`], each with its name and a number for each pixel.
+/// The channels of one of [`LAYERS`], each with its name and one value per pixel.
 pub(super) fn channels_of(buffers: &FeatureBuffers, layer: &str) -> Vec<(String, Vec<f32>)> {
     let vectors = |channels: [&str; 3], list: &[Vec3]| {
         let channel = |(k, name): (usize, &str)| (format!("{layer}.{name}"), list.iter().map(|v| v[k]).collect());
@@ -131,7 +132,7 @@ pub(super) fn channels_of(buffers: &FeatureBuffers, layer: &str) -> Vec<(String,
     }
 }
 
-/// Ids and how many samples see them, rank by rank, as a film keeps them.
+/// Ids and their sample counts, rank by rank, as stored in a film.
 pub(super) fn id_channels(buffers: &FeatureBuffers) -> Vec<(String, Vec<u32>)> {
     let Some(ids) = &buffers.ids else { return Vec::new() };
     let mut channels = Vec::new();
@@ -145,12 +146,12 @@ pub(super) fn id_channels(buffers: &FeatureBuffers) -> Vec<(String, Vec<u32>)> {
     channels
 }
 
-/// The feature buffers whose channels these are; the inverse of [`channels_of`] and [`id_channels`].
+/// Restores feature buffers from channels; the inverse of [`channels_of`] and [`id_channels`].
 ///
-/// - `numbers`, `words`: the channel of a name, with a number for each pixel.
+/// - `numbers`, `words`: return the channel of a name, one value per pixel.
 ///
 /// # Errors
-/// When a channel is missing or has numbers that no feature has.
+/// If a channel is missing or has values out of the range of its feature.
 pub(super) fn read_layers<E: From<String>>(
     header: FeatureHeader,
     (width, height): (u32, u32),

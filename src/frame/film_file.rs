@@ -1,10 +1,10 @@
-//! Films on disk: an OpenEXR picture that any viewer shows, with everything that is needed to go on with it.
+//! Film files: OpenEXR images that any viewer displays, with all data that is needed to resume rendering.
 //!
-//! Red, green and blue are the means, as in any picture. Beside them, each `f64` of a pixel (see
-//! [`FilmRecord`]) lies in two channels of 32-bit integers, its upper and its lower half, so nothing is rounded. Sample
-//! numbers and the state of the error estimate are RON text in the attribute `firstlight.film` of the layer; the note of
-//! the picture ([`ImageMetadata`]) says which scene it is, and makes it open as any picture. The same attribute has a checksum of
-//! every byte of the file but its own digits, so that a change of anything is noticed. Feature buffers, where the film keeps
+//! Red, green and blue are the means, as in any image. Each `f64` of a pixel (see [`FilmRecord`]) is stored in two
+//! further channels of 32-bit integers, its upper and its lower half, so nothing is rounded. Sample numbers and the
+//! state of the error estimate are RON text in the attribute `firstlight.film` of the layer; the image metadata
+//! ([`ImageMetadata`]) identifies the scene, and makes the film open like any image. The same attribute has a checksum
+//! of every byte of the file except its own digits, so that any change is detected. Feature buffers, if the film has
 //! them, are further channels ([`FeatureLayers`]).
 
 use super::feature_layers::{FeatureHeader, FeatureLayers, LAYERS, channels_of, id_channels, read_layers};
@@ -26,29 +26,29 @@ use std::io::{BufReader, Read, Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// A film and what it is a film of.
+/// A film file that was read.
 #[derive(Clone, Debug)]
 pub struct FilmFile {
-    /// The film, with all of its numbers.
+    /// The film with all of its data.
     pub film: Film,
     /// Scene, view and settings that it was rendered with.
     pub shot: ImageMetadata,
-    /// What each pixel shows, where the film was asked to keep it.
+    /// Feature buffers, if the film has them.
     pub features: Option<FeatureLayers>,
-    /// What cannot be known of it; for people, with its name.
+    /// Warning for the user about missing information, with the name of the file.
     pub warning: Option<String>,
 }
 
-/// What a film says of itself before its numbers.
+/// Summary of a film file, without its pixels.
 #[derive(Clone, Debug)]
 pub struct FilmSummary {
     /// Scene, view and settings that it was rendered with.
     pub shot: ImageMetadata,
-    /// Which samples it has.
+    /// Layout and sample ranges.
     pub layout: FilmLayout,
 }
 
-/// Why a file is not read as a film.
+/// Why a film file cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct FilmError {
@@ -59,23 +59,23 @@ pub struct FilmError {
     pub problem: FilmProblem,
 }
 
-/// What is wrong with the file of a film; the words follow its path.
+/// The problem with a film file; the text follows its path.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilmProblem {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The file is something else.
+    /// The file is not a film.
     #[error("is not a firstlight film: films are written by render --film FILE.exr")]
     NoFilm,
-    /// The film is of a format that this version does not know.
+    /// The film has a format that this version does not know.
     #[error("was written by a newer version of firstlight")]
     Newer,
-    /// The file is not as it was written.
+    /// The file is truncated or was changed.
     #[error("is truncated or damaged: {0}")]
     Damaged(String),
-    /// No film may have that size.
+    /// The size is out of range.
     #[error(transparent)]
     Size(#[from] BadValue),
     /// The film has more pixels than the limits allow.
@@ -86,10 +86,10 @@ pub enum FilmProblem {
         /// Pixels that a film may have.
         limit: u64,
     },
-    /// There is no memory for the film.
+    /// There is not enough memory for the film.
     #[error(transparent)]
     Memory(#[from] NoRoom),
-    /// The metadata of the film is not what this program writes.
+    /// The metadata of the film is invalid.
     #[error(transparent)]
     Metadata(#[from] MetadataError),
 }
@@ -101,7 +101,7 @@ impl From<String> for FilmProblem {
 }
 
 impl FilmError {
-    /// Whether the same may succeed later, or on another machine: the disk cannot be reached, or there is no memory.
+    /// Whether a retry, or another machine, may succeed: the disk is not reachable, or memory is short.
     pub fn may_pass(&self) -> bool {
         match &self.problem {
             FilmProblem::Read(error) => error.may_pass(),
@@ -110,7 +110,7 @@ impl FilmError {
         }
     }
 
-    /// Whether the file is not as it was written.
+    /// Whether the file is truncated or was changed.
     pub fn is_damaged(&self) -> bool {
         matches!(self.problem, FilmProblem::Damaged(_))
     }
@@ -122,20 +122,20 @@ impl From<FilmError> for String {
     }
 }
 
-/// What stands in the attribute.
+/// Contents of the attribute.
 #[derive(Serialize, Deserialize)]
 struct Header<Layout> {
-    /// A newer program that writes something else counts this up.
+    /// Format version; increased by incompatible changes.
     format: u32,
-    /// 32 digits, of all bytes of the file with zeros in their place. In format 1, of the numbers of all pixels alone.
+    /// Checksum of all bytes of the file with zeros in place of these 32 digits. In format 1, of the pixel values only.
     check: String,
     layout: Layout,
-    /// Of the feature buffers, where the film has them; programs that do not know them skip their channels.
+    /// Header of the feature buffers, if there are any; programs that do not know them skip their channels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     features: Option<FeatureHeader>,
 }
 
-/// What every format begins with.
+/// The beginning of every format.
 #[derive(Deserialize)]
 struct HeaderStart {
     format: u32,
@@ -144,44 +144,44 @@ struct HeaderStart {
 
 const FORMAT: u32 = 3;
 
-/// Tiles had the same samples in all of their pixels, and no mean of traced light was kept.
+/// Format in which all pixels of a tile had the same samples, and light tracing had no stored mean.
 const TILES_FORMAT: u32 = 2;
 
-/// Header and note are not under its checksum.
+/// Format in which header and metadata are not covered by the checksum.
 const OLD_FORMAT: u32 = 1;
 
-/// How every OpenEXR file begins.
+/// Magic number of OpenEXR files.
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
-/// Stands where the checksum will be.
+/// Placeholder for the checksum.
 const NO_CHECK: &str = "00000000000000000000000000000000";
 
-/// Of all channels at least: three means, and two words for each number of the film.
+/// Bytes per pixel of all channels, at least: three means, and two words for each number of the film.
 const BYTES_A_PIXEL: u64 = 4 * (3 + 2 * OldFilmLayout::N_PLANES as u64);
 
-/// Writes a film with the note of what it shows; whole or not at all. It may take the place of a film of the same
-/// picture whose samples it has, and of no other.
+/// Writes a film with its metadata atomically. May replace a film of the same image whose samples are all in this one,
+/// and no other film.
 ///
 /// # Errors
-/// When samples would be lost, another process has the file, or it cannot be written.
+/// If samples would be lost, another process has the file open, or it cannot be written.
 pub fn write_film_file(film: &Film, note: &str, path: &Path) -> Result<(), WriteError> {
     let claim = WholeFile::claim(path, Replace::Anything)?;
     check_replaced_film(film, note, path)?;
     write_film_into(film, note, claim)
 }
 
-/// The same into a file that was claimed before, whatever it replaces.
+/// Like [`write_film_file`], into a file that was claimed before, without a check of what it replaces.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If it cannot be written.
 pub fn write_film_into(film: &Film, note: &str, out: WholeFile) -> Result<(), WriteError> {
     write_film_with_features(film, None, note, out)
 }
 
-/// The same with what each pixel shows, where that is to be kept.
+/// Like [`write_film_into`], with feature buffers if given.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If it cannot be written.
 pub fn write_film_with_features(
     film: &Film,
     features: Option<&FeatureLayers>,
@@ -202,7 +202,7 @@ pub fn write_film_with_features(
     out.finish()
 }
 
-/// A whole file in memory.
+/// Encodes a whole file in memory.
 fn encode(
     film: &Film,
     planes: &[Vec<f64>],
@@ -210,7 +210,7 @@ fn encode(
     note: &str,
     header: &Header<impl Serialize>,
 ) -> Result<Vec<u8>, exr::error::Error> {
-    // Plain structs and numbers can always be written.
+    // Serialising plain data cannot fail.
     let header = ron::to_string(header).expect("a film's header is plain data");
     let mut channels = mean_channels(film);
     for (plane, name) in planes.iter().zip(plane_names()) {
@@ -238,7 +238,7 @@ fn encode(
     Ok(memory.into_inner())
 }
 
-/// Where the digits of the checksum are.
+/// Returns the position of the checksum's digits.
 fn place_of_check(bytes: &[u8]) -> Option<Range<usize>> {
     let find = |what: &[u8], from: usize| {
         let within = bytes.get(from..)?;
@@ -250,16 +250,16 @@ fn place_of_check(bytes: &[u8]) -> Option<Range<usize>> {
     bytes.get(place.clone()).map(|_| place)
 }
 
-/// Of everything but what is at `place`.
+/// Returns the checksum of everything except the bytes at `place`.
 fn checksum(bytes: &[u8], place: &Range<usize>) -> Fingerprint {
     let (before, after) = (&bytes[..place.start], &bytes[place.end..]);
     Fingerprint::default().with([before, NO_CHECK.as_bytes(), after].concat())
 }
 
-/// Whether `film` can take the place of what is at `path` and lose nothing.
+/// Checks that `film` can replace the file at `path` without losing samples.
 ///
 /// # Errors
-/// When a film is there that has other samples, is of another picture, or cannot be read.
+/// If there is a film with other samples, of another image, or that cannot be read.
 pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), WriteError> {
     if !is_film(path) {
         return Ok(());
@@ -272,8 +272,8 @@ pub fn check_replaced_film(film: &Film, note: &str, path: &Path) -> Result<(), W
     if film.layout().has_all_of(&old.film.layout()) { Ok(()) } else { Err(refused("with other samples".to_owned())) }
 }
 
-/// Refuses a picture that is a damaged film. A picture is opened by its note alone, but the note of a film is under the
-/// checksum of all of it.
+/// Rejects an image that is a damaged film. An image is opened by its metadata alone, but that of a film is covered by
+/// the checksum of the whole file.
 ///
 /// # Errors
 /// As [`read_film_file`].
@@ -284,11 +284,11 @@ pub fn check_film_source(source: &SceneSource) -> Result<(), FilmError> {
     }
 }
 
-/// Reads what a film says of itself, without its numbers. Nothing is checked against the checksum, which is that of the
-/// whole file.
+/// Reads the header and the metadata of a film, without its pixels. The checksum covers the whole file and is not
+/// verified.
 ///
 /// # Errors
-/// A sentence that names the file: when it is not there, or no film.
+/// If the file does not exist or is not a film; the message names it.
 pub fn read_film_summary(path: &Path) -> Result<FilmSummary, FilmError> {
     let limits = Limits::of_this_process();
     summary(path, &limits).map_err(|problem| FilmError { path: path.to_path_buf(), problem })
@@ -310,7 +310,7 @@ fn summary(path: &Path, limits: &Limits) -> Result<FilmSummary, FilmProblem> {
     Ok(FilmSummary { shot, layout })
 }
 
-/// The layout of a film, from its attribute.
+/// Reads the layout of a film from its attribute.
 fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
     let header = meta.headers.first().ok_or(FilmProblem::NoFilm)?;
     let Some(AttributeValue::Text(text)) = header.own_attributes.other.get(&Text::from(FILM_KEY)) else {
@@ -325,7 +325,7 @@ fn layout_in(meta: &exr::meta::MetaData) -> Result<FilmLayout, FilmProblem> {
     Ok(header_of(format, &text).map_err(damaged)?.0)
 }
 
-/// Layout and feature buffers of a film of this format, as the text of its attribute says them.
+/// Parses the layout and the feature header of a film of this format.
 fn header_of(format: u32, text: &str) -> Result<(FilmLayout, Option<FeatureHeader>), ron::error::SpannedError> {
     if format > TILES_FORMAT {
         ron::from_str::<Header<FilmLayout>>(text).map(|header| (header.layout, header.features))
@@ -334,15 +334,15 @@ fn header_of(format: u32, text: &str) -> Result<(FilmLayout, Option<FeatureHeade
     }
 }
 
-/// Reads a film back, to the last bit.
+/// Reads a film exactly.
 ///
 /// # Errors
-/// A sentence that names the file: when it is not there, no film, cut short or damaged.
+/// If the file does not exist, is not a film, is truncated or damaged; the message names it.
 pub fn read_film_file(path: &Path) -> Result<FilmFile, FilmError> {
     read_film_file_within(path, &Limits::of_this_process())
 }
 
-/// The same with limits of one's own.
+/// Like [`read_film_file`], with other limits.
 ///
 /// # Errors
 /// As [`read_film_file`].
@@ -353,7 +353,7 @@ pub fn read_film_file_within(path: &Path, limits: &Limits) -> Result<FilmFile, F
 fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
     let limit = FileKind::Film.limit(limits);
     let mut file = InputFile::open_within(path, FileKind::Film, limit)?;
-    // Before gigabytes of something else are read.
+    // Checked before gigabytes of something else are read.
     let mut start = [0; 4];
     let n = file.read(&mut start).and_then(|n| file.rewind().map(|()| n)).map_err(ReadError::from)?;
     if start[..n] != MAGIC {
@@ -363,7 +363,7 @@ fn read(path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
     decode(&bytes, path, limits)
 }
 
-/// A film from the bytes of its file.
+/// Decodes a film from the bytes of its file.
 fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmProblem> {
     if bytes.get(..4) != Some(&MAGIC) {
         return Err(FilmProblem::NoFilm);
@@ -396,7 +396,7 @@ fn decode(bytes: &[u8], path: &Path, limits: &Limits) -> Result<FilmFile, FilmPr
     if n_pixels > limits.film_pixels {
         return Err(FilmProblem::TooLarge { pixels: n_pixels, limit: limits.film_pixels });
     }
-    // What claims to be larger than its bytes could unpack to is refused before any memory is asked for it.
+    // A size that the bytes cannot unpack to is rejected before memory is allocated for it.
     const MOST_UNPACKED: u64 = 1100;
     if n_pixels * BYTES_A_PIXEL > MOST_UNPACKED * bytes.len() as u64 {
         return Err(damaged(&"the file is too short for its size"));
@@ -476,7 +476,7 @@ mod tests {
     use crate::render::{CausticPlan, OldTileRecord, RenderSettings, Techniques, TileRecord};
     use crate::scene::{Extraction, ImageSamples, LoadOptions, MetadataDraft, SceneInputs, SceneSource, load};
 
-    /// A film of a scene with light paths, and its note.
+    /// A film of a scene with light paths, and its metadata.
     fn tiny(spp: u32) -> (Film, String) {
         let loaded = load(&SceneSource::Builtin("cornell-balls".to_owned()), &LoadOptions::default()).unwrap();
         let mut world = bevy_ecs::world::World::new();
@@ -484,7 +484,7 @@ mod tests {
         let extraction = Extraction::new(&SceneInputs::of(&mut world), &loaded.trees);
         let mut film = Film::new(3, 2);
         let target = Target { spp: Some(spp), ..Target::default() };
-        // As many light paths as films of older formats have.
+        // The same number of light paths as in films of older formats.
         let techniques = Techniques { caustic_plan: Some(CausticPlan::UNKNOWN), ..Techniques::default() };
         let settings = RenderSettings { techniques, ..RenderSettings::default() };
         render_offline(&extraction.prepared, &settings, &mut film, target, |_| true);
@@ -513,7 +513,7 @@ mod tests {
                 assert!(read_bytes(&changed).is_err(), "byte {at} ^ {flip:#x}");
             }
         }
-        // The changes that a person would make.
+        // Plausible changes by hand.
         let text = |text: &str| text.as_bytes().to_vec();
         for (from, to) in [
             (text("samples:[(0,4)]"), text("samples:[(0,8)]")),
@@ -532,7 +532,7 @@ mod tests {
         }
     }
 
-    /// The file that an older program wrote of the film.
+    /// The film as a file of an older format.
     fn old_file(film: &Film, note: &str, format: u32) -> Vec<u8> {
         let FilmRecord { layout, mut planes } = film.to_record();
         planes.truncate(OldFilmLayout::N_PLANES);
@@ -558,11 +558,11 @@ mod tests {
             let old = old_file(&film, &note, format);
             let kept = read_bytes(&old).unwrap();
             assert!(kept.film.means() == film.means() && kept.film.spp() == 4);
-            // What it knew of its error is known again after the next two doublings.
+            // Its error is known again after the next two doublings.
             assert!(kept.film.error_estimate().is_none());
             let warning = kept.warning.unwrap_or_default();
             assert_eq!(warning.contains("a.exr: is a film of an older format"), format == OLD_FORMAT, "{warning}");
-            // The numbers were always under the checksum, and the two counts of samples must agree.
+            // The pixel values are always covered by the checksum, and the two sample counts must agree.
             let find = |what: &[u8]| old.windows(what.len()).position(|part| part == what).unwrap();
             let mut changed = old.clone();
             changed[find(b"check:\"") + 7] ^= 1;
@@ -574,7 +574,7 @@ mod tests {
         }
     }
 
-    /// Attributes are bytes, whatever the library thinks of letters.
+    /// Attributes are bytes, whatever encoding the library assumes.
     #[test]
     fn a_note_may_have_letters_of_any_language() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,15 +1,15 @@
-//! A picture with layers: one OpenEXR file with light in its plain channels and everything else beside it, by names that
+//! Images with layers: one OpenEXR file with radiance in its plain channels and further channels whose names
 //! compositing programs know.
 //!
 //! | layer | channels |
 //! |---|---|
-//! | light | `R`, `G`, `B` |
+//! | radiance | `R`, `G`, `B` |
 //! | albedo, and its variance | `albedo.R` …, `albedo_variance.R` … |
 //! | normal, position | `normal.X` …, `position.X` … |
 //! | depth, coverage, samples, error | `depth.Z`, `coverage.Y`, `samples.Y`, `error.Y` |
 //! | objects, materials | `CryptoObject00.R` …, `CryptoMaterial00.R` … (Cryptomatte, see [`super::cryptomatte`]) |
 //!
-//! All channels are 32-bit floats, packed without loss. Start reading at [`LayeredPicture::write`].
+//! All channels are 32-bit floats with lossless compression. Start reading at [`LayeredPicture::write`].
 
 use super::cryptomatte::Cryptomatte;
 use super::feature_layers::{FeatureLayers, channels_of};
@@ -24,36 +24,36 @@ use exr::prelude::{
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Depth where nothing is seen: programs that blur or scale a layer have no use for an infinite number.
+/// Depth in metres of pixels without a surface: programs that blur or scale a layer cannot use infinity.
 const FAR: f32 = 1e10;
 
-/// What a picture can have besides its light.
+/// Layers of an image besides its radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PictureLayer {
-    /// Colour without light.
+    /// Albedo, without lighting.
     Albedo,
     /// Shading normal in world space.
     Normal,
-    /// Metres along the view axis.
+    /// Depth along the view axis, metres.
     Depth,
-    /// Metres in world space.
+    /// Position in world space, metres.
     Position,
-    /// Share of samples that see a surface.
+    /// Share of samples that hit a surface.
     Coverage,
-    /// Masks of objects.
+    /// Cryptomatte of objects.
     Object,
-    /// Masks of materials.
+    /// Cryptomatte of materials.
     Material,
-    /// Variances of the means of albedo, normal, depth and position, of those that are there.
+    /// Variances of the means of those of albedo, normal, depth and position that are present.
     Variance,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     Samples,
-    /// Estimated relative error of each pixel.
+    /// Estimated relative error per pixel.
     Error,
 }
 
 impl PictureLayer {
-    /// All of them.
+    /// All layers.
     pub const ALL: [Self; 10] = [
         Self::Albedo,
         Self::Normal,
@@ -83,7 +83,7 @@ impl PictureLayer {
         }
     }
 
-    /// The layers that an EXR file has, be it a picture or a film that keeps what they are made of; none of another file.
+    /// Returns the layers of an EXR file, an image or a film with feature buffers; empty for other files.
     pub fn in_file(path: &Path) -> Vec<Self> {
         let channels = exr_channels(path).unwrap_or_default();
         let has = |name: &str| channels.iter().any(|channel| channel == name);
@@ -102,30 +102,30 @@ impl PictureLayer {
         Self::ALL.into_iter().filter(is_there).collect()
     }
 
-    /// Whether it is made of feature buffers; the others come from the film.
+    /// Whether the layer comes from feature buffers; the others come from the film.
     pub fn is_feature(self) -> bool {
         !matches!(self, Self::Samples | Self::Error)
     }
 }
 
-/// A film as a picture with layers.
+/// A film as an image with layers.
 #[derive(Clone, Copy)]
 pub struct LayeredPicture<'a> {
-    /// The film, linear.
+    /// The film, linear radiance.
     pub film: &'a Film,
-    /// Of the same picture; asked for by layers that are features.
+    /// Features of the same image; required by layers that are features.
     pub features: Option<&'a FeatureLayers>,
-    /// Which layers.
+    /// The requested layers.
     pub layers: &'a [PictureLayer],
-    /// What the picture says about itself.
+    /// Metadata of the image.
     pub note: Option<&'a str>,
 }
 
 impl LayeredPicture<'_> {
-    /// Writes the picture: to a temporary name first, which then takes the place of `path`.
+    /// Writes the image to a temporary file, which then replaces `path`.
     ///
     /// # Errors
-    /// When the error is asked for and not known yet, or the file cannot be written.
+    /// If the error layer is requested and not known yet, or the file cannot be written.
     pub fn write(&self, path: &Path, replace: Replace) -> Result<(), WriteError> {
         drop(self.room().map_err(|error| unwritable(path, error))?);
         let channels = self.channels().ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
@@ -135,20 +135,20 @@ impl LayeredPicture<'_> {
         out.finish()
     }
 
-    /// The picture as the bytes of a file; `path` is what errors call it.
+    /// Encodes the image as the bytes of a file; `path` is used in errors.
     ///
     /// # Errors
-    /// When the error is asked for and not known yet, or there is not enough memory.
+    /// If the error layer is requested and not known yet, or there is not enough memory.
     pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, WriteError> {
         drop(self.room()?);
         let channels = self.channels().ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
         self.encode(channels).map_err(|error| WriteError::Encode(Box::new(error)))
     }
 
-    /// Writes the picture into `folder` as `STEM-0001.exr`, or with the first higher number that is free. Answers with the path.
+    /// Writes the image into `folder` as `STEM-0001.exr`, or with the next free number. Returns the path.
     ///
     /// # Errors
-    /// As [`Self::write`], and when no number is free.
+    /// As [`Self::write`], and if no number is free.
     pub fn write_new(&self, folder: &Path, stem: &str) -> Result<PathBuf, WriteError> {
         let name = |number: u32| folder.join(format!("{stem}-{number:04}.exr"));
         let path = name(0);
@@ -167,7 +167,7 @@ impl LayeredPicture<'_> {
         self.layers.contains(&layer)
     }
 
-    /// The masks that are asked for.
+    /// The requested Cryptomattes.
     fn mattes(&self) -> Vec<Cryptomatte<'_>> {
         let Some(FeatureLayers { buffers, objects, materials }) = self.features else { return Vec::new() };
         let Some(ids) = &buffers.ids else { return Vec::new() };
@@ -182,7 +182,7 @@ impl LayeredPicture<'_> {
         mattes
     }
 
-    /// Names and numbers of all channels but light; `None` where the error is not known.
+    /// Names and values of all channels except radiance; `None` if the error is requested and not known.
     fn channels(&self) -> Option<Vec<(String, Vec<f32>)>> {
         let mut channels = Vec::new();
         if let Some(FeatureLayers { buffers, .. }) = self.features {
@@ -217,7 +217,7 @@ impl LayeredPicture<'_> {
         Some(channels)
     }
 
-    /// A whole file in memory, because the encoder seeks.
+    /// Encodes a whole file in memory, because the encoder seeks.
     fn encode(&self, channels: Vec<(String, Vec<f32>)>) -> Result<Vec<u8>, exr::error::Error> {
         let mut all = mean_channels(self.film);
         all.extend(channels.into_iter().map(|(name, list)| AnyChannel::new(name.as_str(), FlatSamples::F32(list))));
@@ -226,7 +226,7 @@ impl LayeredPicture<'_> {
             attributes.other.insert(Text::from(name.as_str()), exr_text(&value));
         }
         let size = (self.film.width() as usize, self.film.height() as usize);
-        // Lines rather than tiles, and the packing that all programs read.
+        // Scan lines rather than tiles, and a compression that all programs read.
         let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(all));
         let mut image = Image::from_layer(layer);
         if let Some(note) = self.note {
@@ -240,16 +240,16 @@ impl LayeredPicture<'_> {
     }
 }
 
-/// Brings the attributes of a file with one header into the order of their names: the library keeps them in a table whose order
-/// is another each time, and the same picture is to have the same bytes.
+/// Sorts the attributes of a file with one header by name: the library stores them in a table of random order, and the
+/// same image must give the same bytes.
 fn sort_attributes(bytes: &mut [u8]) {
-    // Magic number and version come first.
+    // Length of magic number and version.
     const START: usize = 8;
     let text_end = |from: usize| bytes[from..].iter().position(|&byte| byte == 0).map(|length| from + length);
     let mut attributes = Vec::new();
     let mut at = START;
     while let Some(name_end) = text_end(at).filter(|&end| end > at) {
-        // Name, type and size, then so many bytes.
+        // Name, type, size, then that many bytes.
         let Some(size_at) = text_end(name_end + 1).map(|end| end + 1) else { return };
         let Some(size) = bytes.get(size_at..size_at + 4).and_then(|size| size.try_into().ok()) else { return };
         let end = size_at + 4 + u32::from_le_bytes(size) as usize;

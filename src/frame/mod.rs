@@ -1,16 +1,16 @@
-//! The frame: what happens in which order between an input and a picture, and who does the work.
+//! The frame: what happens in which order between an input and an image, and on which thread.
 //!
 //! | stage | system | what it does |
 //! |---|---|---|
 //! | [`Stage::Input`] | `input` | commands become changes of components |
-//! | [`Stage::Edit`] | `edit` | scenes that were read beside the picture take their place |
-//! | [`Stage::Rebuild`] | `rebuild` | finds what changed, makes that part of the snapshot anew |
-//! | [`Stage::Reset`] | `reset` | drops the samples if they are worthless, and says why |
+//! | [`Stage::Edit`] | `edit` | scenes that were loaded in the background replace the current one |
+//! | [`Stage::Rebuild`] | `rebuild` | detects changes, rebuilds the affected part of the snapshot |
+//! | [`Stage::Reset`] | `reset` | discards invalid samples, and states the reason |
 //! | [`Stage::Accumulate`] | `accumulate` | gives the workers their job |
-//! | [`Stage::Develop`] | `develop` | tells them how the film is to be developed |
-//! | [`Stage::Present`] | `present` | fetches finished pictures |
+//! | [`Stage::Develop`] | `develop` | passes the display settings to the workers |
+//! | [`Stage::Present`] | `present` | fetches finished images |
 //!
-//! A [`Session`] holds all of it. The workers follow a [`Scheduler`] that knows no threads and no clock.
+//! A [`Session`] owns all of it. The workers follow a [`Scheduler`] that knows no threads and no clock.
 
 mod adopt;
 mod background;

@@ -7,20 +7,22 @@ use crate::scene::BadValue;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
-/// When a picture is good enough; the first that is reached ends it. Without any, it goes on for ever.
+/// When to stop: at the first limit that is reached. Without any, rendering never ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Target {
-    /// Samples per pixel; of an adaptive film the mean over all pixels.
+    /// Samples per pixel; for an adaptive film the mean over all pixels.
     pub spp: Option<u32>,
     /// Seconds of rendering.
     pub seconds: Option<f64>,
-    /// Relative error of the whole picture, as it estimates it itself.
+    /// Estimated relative error of the whole image.
     pub error: Option<f64>,
 }
 
 impl Target {
+    /// Checks the values.
+    ///
     /// # Errors
-    /// When it can never be reached, or always is.
+    /// If a limit is not a positive number.
     pub fn check(&self) -> Result<(), BadValue> {
         for (field, value) in [("seconds", self.seconds), ("error", self.error)] {
             if value.is_some_and(|value| !(value > 0.0)) {
@@ -34,7 +36,7 @@ impl Target {
         Ok(())
     }
 
-    /// Whether a film with so many samples a pixel, seconds of rendering and relative error is good enough.
+    /// Whether a limit is reached at these samples per pixel, seconds of rendering and relative error.
     pub fn reached(&self, spp: u32, seconds: f64, error: Option<f64>) -> bool {
         self.spp.is_some_and(|goal| spp >= goal)
             || self.seconds.is_some_and(|goal| seconds >= goal)
@@ -42,39 +44,40 @@ impl Target {
     }
 }
 
-/// How far it is, told a few times a second.
+/// Progress of a render, reported a few times per second.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Samples that every pixel has; of an adaptive film the mean over all pixels.
+    /// Minimum samples per pixel; for an adaptive film the mean over all pixels.
     pub spp: u32,
     /// Seconds of rendering so far.
     pub seconds: f64,
     /// Rays traced so far, by class.
     pub rays: RayCounts,
-    /// Error of the film, as soon as it can be estimated.
+    /// Error of the film, once it can be estimated.
     pub error: Option<ErrorEstimate>,
 }
 
-/// What was done.
+/// Result of a render.
 #[derive(Clone, Debug, Default)]
 pub struct OfflineReport {
-    /// Wall time.
+    /// Wall time in seconds.
     pub seconds: f64,
     /// Rays traced, by class.
     pub rays: RayCounts,
-    /// Samples that were not finite and were left out.
+    /// Number of samples that were rejected because they were not finite.
     pub n_bad: u64,
     /// The first few of them.
     pub bad: Vec<BadSample>,
-    /// Samples brighter than anything in the scene can be, see [`PassReport::n_above`](crate::render::PassReport::n_above).
+    /// Number of samples brighter than any radiance in the scene can be, see
+    /// [`PassReport::n_above`](crate::render::PassReport::n_above).
     pub n_above: u64,
     /// The first few of them.
     pub above: Vec<BadSample>,
 }
 
-/// Adds samples to `film` until `target`; `progress` returns false to stop early.
+/// Adds samples to `film` until `target` is reached; `progress` returns false to stop early.
 ///
-/// Given a time, at least one sample a pixel is taken, and the film may end with a part of a pass.
+/// With a time limit, at least one sample per pixel is taken, and the film may end with a partial pass.
 pub fn render_offline(
     prepared: &Prepared,
     settings: &RenderSettings,
@@ -85,8 +88,8 @@ pub fn render_offline(
     render_offline_until(prepared, settings, film, target, &|| false, progress)
 }
 
-/// The same, ended within milliseconds by `stop`, which is asked often and by all workers; the film then may have a
-/// part of a pass, and even pixels without a sample.
+/// Like [`render_offline`], ended within milliseconds by `stop`, which is called often by all workers; the film then
+/// may have a partial pass, or pixels without a sample.
 pub fn render_offline_until(
     prepared: &Prepared,
     settings: &RenderSettings,
@@ -98,7 +101,8 @@ pub fn render_offline_until(
     render_region_until(prepared, settings, film, None, target, stop, progress)
 }
 
-/// The same for a region of the film, or all of it; samples, error and target are those of the region.
+/// Like [`render_offline_until`], for a region of the film, or all of it; samples, error and target are those of the
+/// region.
 pub fn render_region_until(
     prepared: &Prepared,
     settings: &RenderSettings,
@@ -108,7 +112,7 @@ pub fn render_region_until(
     stop: &(dyn Fn() -> bool + Sync),
     mut progress: impl FnMut(Progress) -> bool,
 ) -> OfflineReport {
-    /// Seconds between reports, about.
+    /// Approximate seconds between reports.
     const SLICE: f64 = 0.25;
     let start = Instant::now();
     let deadline =
@@ -139,7 +143,7 @@ pub fn render_region_until(
         if !go_on || stop() || target.reached(spp, seconds, error) {
             break;
         }
-        // Whole passes as long as a slice, growing gently while the rate is still unknown.
+        // Whole passes that take about a slice, growing slowly while the rate is unknown.
         let rate = f64::from(next - before) / slice_start.elapsed().as_secs_f64().max(1e-9);
         step = ((rate * SLICE) as u32).clamp(1, step.saturating_mul(4));
     }
@@ -147,16 +151,17 @@ pub fn render_region_until(
     report
 }
 
-/// Where the error of an adaptive film is looked at: it is measured anew with every block that doubles its samples, and
-/// where it is looked at must not depend on how quick the machine is. Eight times from one power of two to the next.
+/// Returns the next sample count at which the error of an adaptive film is checked: eight times between two powers of
+/// two. The error changes with every block that doubles its samples, and the checks must not depend on the speed of the
+/// machine.
 fn next_look(now: u32) -> u32 {
     let step = (1 << now.max(1).ilog2()) / 8;
     let step = step.max(1);
     (now / step + 1).saturating_mul(step)
 }
 
-/// The first number of samples up to `at_most` at which an even film could turn out to be good enough: where its error so
-/// far, extended, is down to `target`, or at the next power of two, where it is measured anew.
+/// Returns the first sample count up to `at_most` at which an even film could reach the target: where its extrapolated
+/// error is down to `target`, or the next power of two, where the error is measured again.
 fn first_worth_a_look(film: &Film, region: Option<&Region>, target: f64, at_most: u32) -> u32 {
     let now = film.spp_in(region);
     let measured_next = (now + 1).checked_next_power_of_two().unwrap_or(u32::MAX);
@@ -172,7 +177,7 @@ mod tests {
     use crate::render::advance;
     use crate::scene::{Extraction, LoadOptions, Rendering, SceneInputs, SceneSource, load};
 
-    /// Looks after every single sample, and finds no earlier one.
+    /// Compared with a check after every sample.
     #[test]
     fn a_target_error_ends_at_the_first_sample_that_meets_it() {
         let scene = load(&SceneSource::Builtin("cornell".to_owned()), &LoadOptions::default()).unwrap();

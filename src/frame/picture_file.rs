@@ -1,6 +1,6 @@
-//! Pictures on disk: developed as PNG, linear as EXR; whole or not at all.
+//! Image files: developed as PNG, linear as EXR; written atomically.
 //!
-//! Either may carry a note about itself ([`NOTE_KEY`]): in a PNG a text chunk (iTXt), in an EXR an attribute.
+//! Both may carry metadata ([`NOTE_KEY`]): a text chunk (iTXt) in a PNG, an attribute in an EXR.
 
 use crate::render::{Display, Film, NoRoom, Purpose, Room, develop, develop_colors, relative_errors};
 use crate::scene::WriteError;
@@ -13,20 +13,20 @@ use glam::Vec3;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What kinds of pictures can be written.
+/// Image file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureFormat {
     /// 8 bits, sRGB, exposed and tone-mapped.
     Png,
-    /// 32-bit floats, linear Rec. 709, as the film has it.
+    /// 32-bit floats, linear Rec. 709 radiance.
     Exr,
 }
 
 impl PictureFormat {
-    /// The kind that a file name asks for.
+    /// Returns the format of a file name's extension.
     ///
     /// # Errors
-    /// When it asks for none, or for one that is not written.
+    /// If there is no extension, or an unknown one.
     pub fn of(path: &Path) -> Result<Self, WriteError> {
         match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
             Some("png") => Ok(Self::Png),
@@ -36,7 +36,7 @@ impl PictureFormat {
         }
     }
 
-    /// The end of the names of such files.
+    /// File name extension of the format.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -45,22 +45,22 @@ impl PictureFormat {
     }
 }
 
-/// A film as a picture.
+/// A film as an image file.
 #[derive(Clone, Copy)]
 pub struct Print<'a> {
-    /// The film, linear.
+    /// The film, linear radiance.
     pub film: &'a Film,
     /// Exposure and tone curve of a PNG.
     pub display: &'a Display,
-    /// Pixels of a PNG, which a coarser film is stretched to; linear light stays as it was measured.
+    /// Size of a PNG in pixels, to which a coarser film is scaled; an EXR keeps the size of the film.
     pub size: (u32, u32),
-    /// What the picture says about itself.
+    /// Metadata of the image.
     pub note: Option<&'a str>,
-    /// Shown in place of what the film has: radiance of as many pixels, row by row from the top.
+    /// Radiance to write in place of the film's, one entry per pixel, row by row from the top.
     pub denoised: Option<&'a [Vec3]>,
 }
 
-/// Writes a film as its name asks, without a note.
+/// Writes a film in the format of the file name, without metadata.
 ///
 /// # Errors
 /// As [`Print::write`].
@@ -72,7 +72,7 @@ pub fn write_film(film: &Film, display: &Display, path: &Path) -> Result<(), Wri
 /// Writes the relative error of each pixel ([`relative_errors`]) as a grey EXR: 0.05 is 5 %.
 ///
 /// # Errors
-/// When it is not known yet, or the file cannot be written.
+/// If it is not known yet, or the file cannot be written.
 pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), WriteError> {
     let errors = relative_errors(film).ok_or_else(|| WriteError::ErrorUnknown(path.to_path_buf()))?;
     let channel = |name: &str| AnyChannel::new(name, FlatSamples::F32(errors.clone()));
@@ -84,19 +84,19 @@ pub fn write_errors(film: &Film, path: &Path, replace: Replace) -> Result<(), Wr
 }
 
 impl Print<'_> {
-    /// Writes the picture as its name asks: to a temporary name first, which then takes the place of `path`.
+    /// Writes the image in the format of the file name, to a temporary file that then replaces `path`.
     ///
     /// # Errors
-    /// When the name asks for no kind of picture, or the file cannot be written.
+    /// If the name has no known extension, or the file cannot be written.
     pub fn write(&self, path: &Path, replace: Replace) -> Result<(), WriteError> {
         self.encode_beside(PictureFormat::of(path)?, path, replace)?.finish()
     }
 
-    /// Writes the picture into `folder` as `STEM-0001`, or with the first higher number that is free: never over a
-    /// file that is there, even one that another program makes at the same moment. Answers with the path.
+    /// Writes the image into `folder` as `STEM-0001`, or with the next free number: never over an existing file, even
+    /// if another program creates it at the same time. Returns the path.
     ///
     /// # Errors
-    /// When no number is free, or the file cannot be written.
+    /// If no number is free, or the file cannot be written.
     pub fn write_new(&self, folder: &Path, stem: &str, format: PictureFormat) -> Result<PathBuf, WriteError> {
         let name = |number: u32| folder.join(format!("{stem}-{number:04}.{}", format.extension()));
         let file = self.encode_beside(format, &name(0), Replace::AllButFilms)?;
@@ -104,10 +104,10 @@ impl Print<'_> {
         file.finish_new((1..=u32::MAX).map(name))?.ok_or_else(taken)
     }
 
-    /// The picture as the bytes of a file.
+    /// Encodes the image as the bytes of a file.
     ///
     /// # Errors
-    /// When there is not enough memory for them.
+    /// If there is not enough memory.
     pub fn bytes(&self, format: PictureFormat) -> Result<Vec<u8>, WriteError> {
         drop(self.room(format)?);
         let mut bytes = Vec::new();
@@ -118,7 +118,7 @@ impl Print<'_> {
         Ok(bytes)
     }
 
-    /// Memory for what is written: the encoders do not ask whether it can be had.
+    /// Reserves the memory for encoding: the encoders do not check for it.
     fn room(&self, format: PictureFormat) -> Result<Room, NoRoom> {
         match format {
             PictureFormat::Png => Room::for_files(self.size.0, self.size.1, &[Purpose::Png]),
@@ -126,7 +126,7 @@ impl Print<'_> {
         }
     }
 
-    /// The whole picture in a temporary file in the folder of `path`.
+    /// Writes the image to a temporary file in the folder of `path`.
     fn encode_beside(&self, format: PictureFormat, path: &Path, replace: Replace) -> Result<WholeFile, WriteError> {
         drop(self.room(format).map_err(|error| unwritable(path, error))?);
         let mut out = WholeFile::begin(path, replace)?;
@@ -150,7 +150,7 @@ impl Print<'_> {
                 develop_colors(colors, from, self.display, (width, height), &mut rgb);
             }
         }
-        // In place: no pixel is opaque more than another.
+        // In place: all pixels are opaque, so alpha is dropped.
         let n_pixels = rgb.len() / 4;
         (0..n_pixels).for_each(|i| rgb.copy_within(4 * i..4 * i + 3, 3 * i));
         rgb.truncate(3 * n_pixels);
@@ -175,7 +175,7 @@ impl Print<'_> {
     }
 }
 
-/// Channels of the size of `film` as an EXR in memory, because the encoder seeks.
+/// Encodes channels of the size of `film` as an EXR in memory, because the encoder seeks.
 fn encode(
     film: &Film,
     channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
@@ -193,7 +193,7 @@ fn encode(
     Ok(memory.into_inner())
 }
 
-/// What the film shows, as the red, green and blue channels of an EXR.
+/// The mean radiance of a film as the red, green and blue channels of an EXR.
 pub(super) fn mean_channels(film: &Film) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
     channels_of(&film.means())
 }

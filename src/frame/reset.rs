@@ -1,14 +1,14 @@
-//! What a change costs: the smallest thing that is right.
+//! The cost of a change: the smallest correct invalidation.
 //!
 //! | changed | level | kept |
 //! |---|---|---|
 //! | exposure, tone curve | [`Level::Redraw`] | all samples |
 //! | target, threads, pause | [`Level::Reschedule`] | all samples |
-//! | camera, lens, light model, depth, seed | [`Level::Restart`] | trees, lights, textures |
-//! | material, texture, environment, light power, a light without size moved | [`Level::Shading`] | all trees |
+//! | camera, lens, integrator, depth, seed | [`Level::Restart`] | trees, lights, textures |
+//! | material, texture, environment, light power, delta light moved | [`Level::Shading`] | all trees |
 //! | object or other light moved, given other materials, any added, removed | [`Level::TopTree`] | every mesh's own tree |
-//! | a mesh or a cloud of spheres | [`Level::MeshTree`] | other trees |
-//! | picture size | [`Level::Resize`] | the scene side |
+//! | a mesh or a group of spheres | [`Level::MeshTree`] | other trees |
+//! | image size | [`Level::Resize`] | the scene side |
 
 use crate::render::{Display, RenderSettings};
 use crate::scene::{
@@ -19,33 +19,33 @@ use bevy_ecs::prelude::Entity;
 use std::collections::HashMap;
 use std::fmt;
 
-/// How much a change makes worthless. From `Restart` on, all samples.
+/// What a change invalidates. From `Restart` on, all samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// The film is developed again.
     Redraw,
-    /// What is rendered next is decided again.
+    /// The next step of rendering is decided again.
     Reschedule,
-    /// The samples are dropped.
+    /// The samples are discarded.
     Restart,
-    /// The tables of materials and lights are built again, and the samples dropped.
+    /// The tables of materials and lights are rebuilt, and the samples discarded.
     Shading,
-    /// The tree over the objects is built again, with all of [`Self::Shading`].
+    /// The top-level tree is rebuilt, and everything of [`Self::Shading`].
     TopTree,
-    /// A mesh or a group of spheres needs a tree of its own, with all of [`Self::TopTree`].
+    /// A mesh or a group of spheres needs a new tree, and everything of [`Self::TopTree`].
     MeshTree,
-    /// The film gets another size and begins empty.
+    /// The film is replaced by an empty one of another size.
     Resize,
 }
 
-/// One thing that is not as it was.
+/// One detected change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// What it makes worthless.
+    /// What it invalidates.
     pub level: Level,
-    /// For the log and the status line.
+    /// Description for the log and the status line.
     pub cause: String,
-    /// It says it all: of a new scene everything is new.
+    /// Whether it subsumes all other changes: after opening a scene everything is new.
     pub is_all: bool,
 }
 
@@ -59,22 +59,22 @@ impl Changes {
         self.0.push(Change { level, cause: cause.into(), is_all: false });
     }
 
-    /// Another scene, or another state of the files of this one.
+    /// Adds the change to another scene, or to another state of this scene's files.
     pub fn add_scene(&mut self, cause: impl Into<String>) {
         self.0.push(Change { level: Level::Restart, cause: cause.into(), is_all: true });
     }
 
-    /// Whether some change has exactly this level.
+    /// Whether there is a change of exactly this level.
     pub fn has(&self, level: Level) -> bool {
         self.0.iter().any(|change| change.level == level)
     }
 
-    /// Whether the samples are worthless now.
+    /// Whether the samples are invalid.
     pub fn restarts(&self) -> bool {
         self.0.iter().any(|change| change.level >= Level::Restart)
     }
 
-    /// What of the snapshot has to be made anew.
+    /// The part of the snapshot that has to be rebuilt.
     pub fn part(&self) -> Option<SnapshotPart> {
         let part = |level| match level {
             Level::Redraw | Level::Reschedule | Level::Resize => None,
@@ -90,7 +90,7 @@ impl Changes {
 pub const SCENE_OPENED: &str = "scene opened";
 
 impl fmt::Display for Changes {
-    /// The causes of the restart, the weightiest first, no more than three.
+    /// The causes of the restart, the most expensive first, at most three.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(all) = self.0.iter().find(|change| change.is_all) {
             return f.write_str(&all.cause);
@@ -106,7 +106,7 @@ impl fmt::Display for Changes {
     }
 }
 
-/// What differs between two readings of the world. Values decide, not who touched them.
+/// Compares two states of the scene by value.
 pub fn compare(old: &SceneInputs, new: &SceneInputs) -> Changes {
     let mut changes = Changes::default();
     compare_cameras(old.camera.as_ref(), new.camera.as_ref(), &mut changes);
@@ -117,7 +117,7 @@ pub fn compare(old: &SceneInputs, new: &SceneInputs) -> Changes {
     changes
 }
 
-/// What differs between two sets of settings.
+/// Compares two sets of settings.
 pub fn compare_settings(old: &RenderSettings, new: &RenderSettings, changes: &mut Changes) {
     if old.integrator != new.integrator {
         changes.add(Level::Restart, "integrator");
@@ -155,7 +155,7 @@ fn compare_cameras(old: Option<&CameraInput>, new: Option<&CameraInput>, changes
     if old.projection != new.projection {
         changes.add(Level::Restart, "field of view");
     }
-    // A lens that is off shows nothing of its numbers.
+    // The parameters of a disabled lens are not visible.
     let (old, new) = (old.lens, new.lens);
     let open = |radius: f64, enabled: bool| if enabled { radius } else { 0.0 };
     let (old_radius, new_radius) = (open(old.radius, old.enabled), open(new.radius, new.enabled));
@@ -171,7 +171,8 @@ fn compare_cameras(old: Option<&CameraInput>, new: Option<&CameraInput>, changes
     }
 }
 
-/// The pivot is not in the picture, unless it moves the origin that the picture is rounded about.
+/// Whether two views give the same image. The pivot is not visible, unless it changes the origin about which
+/// coordinates are rounded.
 fn looks_the_same(old: &View, new: &View) -> bool {
     let pose = |view: &View| (view.eye, view.forward, view.up);
     pose(old) == pose(new) && origin_for(old) == origin_for(new)
@@ -200,7 +201,7 @@ fn compare_objects(old: &ObjectInput, new: &ObjectInput, label: &str, changes: &
 }
 
 fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut Changes) {
-    // A sphere is in the tree; all other lights are in the table of lights alone.
+    // A sphere light is in the tree; all other lights are in the light table only.
     let is_sphere = |light: &LightInput| light.light.radius() > 0.0;
     let level = if is_sphere(old) || is_sphere(new) { Level::TopTree } else { Level::Shading };
     let place = |light: &LightInput| {
@@ -226,7 +227,7 @@ fn compare_lights(old: &LightInput, new: &LightInput, label: &str, changes: &mut
         }
         _ => changes.add(level, format!("kind of {label}")),
     }
-    // What is wrong with a light is told when everything is made anew.
+    // Invalid lights are reported when everything is rebuilt.
     let problem = |light: &LightInput| light.light.check(&light.placement).err();
     if problem(old) != problem(new) {
         changes.add(Level::TopTree, label.to_owned());
@@ -239,11 +240,11 @@ fn compare_materials(old: &MaterialInput, new: &MaterialInput, label: &str, chan
     }
 }
 
-/// What has an identity of its own.
+/// An item with an identity of its own.
 trait Named {
     fn entity(&self) -> Entity;
     fn name(&self) -> Option<&str>;
-    /// What it is called without a name.
+    /// Name of the item if the user gave none.
     fn kind(&self) -> &'static str;
 }
 
@@ -267,7 +268,7 @@ macro_rules! named {
 }
 named!(ObjectInput: |object| object.shape.kind(), LightInput: |light| light.light.name(), MaterialInput: |_| "material");
 
-/// Finds what came, what went, and what changed; `structure` is the level of coming and going.
+/// Finds added, removed and changed items; `structure` is the level of additions and removals.
 fn compare_lists<T: Named + PartialEq>(
     old: &[T],
     new: &[T],
@@ -276,12 +277,12 @@ fn compare_lists<T: Named + PartialEq>(
     differ: impl Fn(&T, &T, &str, &mut Changes),
     changes: &mut Changes,
 ) {
-    // As the lists of the panel call it.
+    // Labels as in the lists of the panel.
     let label = |(i, item): (usize, &T)| match item.name() {
         Some(name) => format!("{kind} `{name}`"),
         None => format!("{} {i}", item.kind()),
     };
-    // The usual case, in which everything stands where it stood.
+    // The common case: the same entities in the same order.
     let same_entities = old.len() == new.len() && old.iter().zip(new).all(|(a, b)| a.entity() == b.entity());
     if same_entities {
         for (i, (old, new)) in old.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new) {

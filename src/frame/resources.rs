@@ -1,4 +1,4 @@
-//! What the systems of a frame share, beside the scene itself.
+//! Resources that the systems of a frame share, apart from the scene itself.
 
 use super::offline::Target;
 use super::reset::Changes;
@@ -9,11 +9,11 @@ use bevy_ecs::prelude::Resource;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The time of this frame, on the clock of whoever runs it.
+/// The time of this frame, on the caller's clock.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct Clock(pub Duration);
 
-/// The size of the picture, pixels. Without pixels (a minimised window) the last film is kept and rendering rests.
+/// The image size. Without pixels (a minimised window) the last film is kept and rendering stops.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureSize {
     /// Width in pixels.
@@ -23,7 +23,7 @@ pub struct PictureSize {
 }
 
 impl PictureSize {
-    /// Whether it has no pixels.
+    /// Whether there are no pixels.
     pub fn is_empty(self) -> bool {
         self.width == 0 || self.height == 0
     }
@@ -34,50 +34,51 @@ impl PictureSize {
     }
 }
 
-/// When the picture is good enough.
+/// When to stop rendering.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct StopAt(pub Target);
 
-/// Worker threads at most.
+/// Maximum number of worker threads.
 pub(super) const MAX_THREADS: usize = 1024;
 
-/// Worker threads; 0 is one a processor.
+/// Number of worker threads; 0 for one per processor.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Threads(pub usize);
 
-/// Rendering rests, and all samples are kept.
+/// Rendering is paused, and all samples are kept.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Paused(pub bool);
 
-/// Nobody can see the picture: rendering rests, whatever else is asked for.
+/// The image is not visible: rendering stops, whatever else is requested.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hidden(pub bool);
 
-/// What is shown in place of the picture, and over it; no sample depends on this.
+/// What is displayed in place of the image and over it; samples do not depend on it.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ViewMode(pub ViewOptions);
 
-/// The part of the picture that gets all samples, in fractions of it: left, top, right, bottom.
+/// The region that gets all samples, in fractions of the image: left, top, right, bottom.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct RenderRegion(pub Option<[f64; 4]>);
 
-/// The far end of the pipe.
+/// The render thread.
 #[derive(Resource)]
 pub struct Renderer(pub Worker);
 
-/// The scene that is open, for saving and reopening.
+/// The open scene, for saving and reopening.
 #[derive(Resource, Clone)]
 pub struct CurrentScene(pub Arc<LoadedScene>);
 
-/// The moment of the open model's animations that is asked for, seconds, or the stored pose; until it is being read.
+/// The requested time of the open model's animations in seconds, or `Some(None)` for the stored pose; `None` once it is
+/// being loaded.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct WantedMoment(pub Option<Option<f64>>);
 
-/// How many scenes have taken their place so far.
+/// Number of scenes that have been opened so far.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SceneGeneration(pub u64);
 
-/// What the workers have been given, to compare with.
+/// What the workers were given last, to compare with.
 #[derive(Resource, Default)]
 pub struct RenderState {
     pub inputs: SceneInputs,
@@ -92,28 +93,28 @@ pub struct RenderState {
     pub(super) threads: Option<usize>,
     pub(super) paused: bool,
     pub(super) region: Option<[f64; 4]>,
-    /// The world has changes that wait for a tree.
+    /// Whether the world has changes that wait for a tree.
     pub(super) waiting: bool,
-    /// Better trees of what is shown are there.
+    /// Whether final trees of the rendered scene are available.
     pub(super) better_trees: bool,
-    /// Meshes whose better trees are being built, by address.
+    /// Shapes whose final trees are being built.
     pub(super) improving: Vec<Shape>,
-    /// Drop all samples at the next frame, for this reason.
+    /// Discard all samples at the next frame, for this reason.
     pub(super) restart: Option<&'static str>,
-    /// A scene has taken its place, for this reason.
+    /// A scene has been opened, for this reason.
     pub(super) adopted: Option<String>,
     pub(super) generation: u64,
-    /// Grows when anything but the camera has been touched.
+    /// Increases when anything but the camera is changed.
     pub(super) revision: u64,
 }
 
 impl RenderState {
-    /// Of the picture that is rendered now.
+    /// Generation of the image that is being rendered.
     pub(super) fn generation(&self) -> u64 {
         self.generation
     }
 
-    /// Grows whenever lists of what is in the scene may have become wrong; a camera that moves makes none wrong.
+    /// Increases whenever lists of the scene's contents may be outdated; camera motion does not count.
     pub fn revision(&self) -> u64 {
         self.revision
     }
@@ -127,6 +128,6 @@ impl RenderState {
     }
 }
 
-/// What this frame found to be different.
+/// The changes detected in this frame.
 #[derive(Resource, Default)]
 pub struct FrameChanges(pub Changes);

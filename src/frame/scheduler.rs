@@ -1,94 +1,93 @@
-//! What to render next, decided without threads and without a clock: it is told the times.
+//! Decides what to render next, without threads and without a clock: timings are passed in.
 //!
-//! After a restart comes a coarse picture that is there within a frame, then sharper ones, then samples at full
-//! resolution in slices, so that the picture is shown up to twenty times a second at first and twice when it has
-//! been converging for some seconds, until the target is reached. Where it takes long to show a picture, it is shown less
-//! often.
-//! The resolution while things move follows from the measured speed, with a band in which it stays as it is.
+//! A restart is followed by a coarse image within a frame, then by finer ones, then by samples at full resolution in
+//! slices: up to twenty images per second at first, and two per second after a few seconds, until the target is
+//! reached. If displaying an image is slow, it happens less often. The resolution during motion follows from the
+//! measured speed, with hysteresis.
 //!
-//! The one who renders asks [`Scheduler::next`], does it, tells [`Scheduler::finished`], and asks again.
+//! The caller asks [`Scheduler::next`], executes the step, reports to [`Scheduler::finished`], and repeats.
 
 use super::Target;
 use std::time::Duration;
 
-/// A film side is divided by one of these.
+/// Divisors of the film's sides.
 const DIVIDERS: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 
-/// New pixels come within two frames of a 60 Hz screen, seconds.
+/// Maximum latency of new pixels in seconds: two frames of a 60 Hz screen.
 const REACTION: f64 = 1.0 / 30.0;
-/// A coarse picture must take no longer than this, seconds, where it takes next to nothing to put it on the window.
+/// Maximum render time of a coarse image in seconds, if displaying it takes almost no time.
 const SLOWEST: f64 = 1.0 / 80.0;
-/// Nor need it take less than this, however long that takes.
+/// Lower limit of that maximum, however long displaying takes.
 const QUICKEST: f64 = 1.0 / 200.0;
-/// A finer one is tried when it would take less than this part of what it may.
+/// A finer resolution is tried if it would take less than this part of the maximum.
 const FASTEST: f64 = 0.5;
-/// What a fresh choice aims at: between the two, so that it does not change at once.
+/// Part of the maximum that a new choice aims at: inside the hysteresis band, so that it does not change again at once.
 const AIM: f64 = 0.7;
 
-/// So long after the last restart things are taken to have come to rest, and the picture sharpens. Shorter, and the
+/// Time after the last restart at which motion is considered to have ended, and the image gets finer. Shorter, and the
 /// resolution would jump between two events of a slow mouse.
 const QUIET: Duration = Duration::from_millis(120);
 
-/// Seconds between pictures at full resolution: lively at first, then less often, since less changes.
+/// Seconds between images at full resolution: short at first, then longer, since less changes.
 const FIRST_SLICE: f64 = 0.05;
-/// After four and a half seconds, in which half a second changes the error by a twentieth: to draw a picture takes a
-/// processor that stands in for a graphics card ten milliseconds or more.
+/// Reached after four and a half seconds, when half a second changes the error by a twentieth. Drawing an image takes
+/// ten milliseconds or more on a processor without a GPU.
 const LAST_SLICE: f64 = 0.5;
-/// At least so many times what it takes to show a picture: to develop and draw it takes the processors some one and a half
-/// times as long, where they draw the window too, and that should be less than a tenth of their time.
+/// Minimum ratio of the slice to the time of displaying an image. Where the processors draw the window too, developing
+/// and drawing take about one and a half times that time, which should be below a tenth of theirs.
 const SLICE_OVER_SHOWING: f64 = 20.0;
-/// A picture at full resolution that comes within this part of a slice after another is not shown: what a slice has left
-/// over, when it was cut short by time.
+/// An image at full resolution within this part of a slice after the previous one is not displayed: it is the rest of a
+/// slice that was cut short by time.
 const TOO_SOON: f64 = 0.5;
-/// Between coarse pictures of one view, the first excepted: more would only keep the next input waiting.
+/// Seconds between coarse images of one view, except the first: more would delay the next input.
 const COARSE_SLICE: f64 = 0.05;
 
-/// A picture at full resolution that takes no longer needs no coarser ones on the way, seconds.
+/// Render time in seconds below which an image at full resolution needs no coarser ones before it.
 const QUICK: f64 = 0.1;
 
-/// From so many samples on, so many are taken of a tile at once: one at a time leaves the workers with small
-/// batches of rays, and a picture of which some tiles are a little ahead looks the same.
+/// From `EVEN_UNTIL` samples on, `AT_ONCE` samples are taken of a tile at a time: single ones leave the workers with
+/// small batches of rays, and a few tiles that are slightly ahead are not visible.
 const EVEN_UNTIL: u32 = 16;
 const AT_ONCE: u32 = 4;
 
-/// A speed that falls to less than one part in this many is believed at once.
+/// A speed that drops below 1 / `ANOTHER_SCENE` of the known one replaces it at once.
 const ANOTHER_SCENE: f64 = 4.0;
 
-/// Camera paths per second, before anything has been measured.
+/// Assumed camera paths per second before the first measurement.
 const GUESSED_RATE: f64 = 1e6;
 
-/// One thing to do.
+/// The next thing to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RenderStep {
-    /// Samples for a film whose sides are divided by `divider`; 1 is full resolution.
+    /// Take samples of a film whose sides are divided by `divider`; 1 is full resolution.
     ///
-    /// A film of another divider than the one before, or the first after a restart, begins empty.
+    /// The film starts empty if the divider differs from the previous one, or after a restart.
     Render {
-        /// What the sides of the film are divided by.
+        /// Divisor of the film's sides.
         divider: u32,
-        /// Until every pixel has so many samples…
+        /// Stop when every pixel has this many samples…
         target_spp: u32,
-        /// …or so much time has passed.
+        /// …or after this time.
         at_most: Option<Duration>,
     },
     /// Nothing to do until something changes.
     Sleep,
 }
 
-/// How a step went.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepReport {
     /// Camera paths traced.
     pub paths: u64,
-    /// Seconds that the step took.
+    /// Duration of the step in seconds.
     pub seconds: f64,
-    /// Samples that every pixel of the film has now, or of its region.
+    /// Minimum samples per pixel of the film or of its region now.
     pub spp: u32,
-    /// Relative error of the picture, as far as it is known.
+    /// Relative error of the image, if it is known.
     pub error: Option<f64>,
 }
 
-/// See the head of this file.
+/// Decides what to render next; see the head of this file.
 #[derive(Clone, Debug)]
 pub struct Scheduler {
     width: u32,
@@ -97,35 +96,35 @@ pub struct Scheduler {
     paused: bool,
     /// Camera paths per second.
     rate: Option<f64>,
-    /// Seconds from a finished picture to the moment at which it is on the window, lately.
+    /// Seconds from a finished image until it is displayed, running average.
     showing: f64,
-    /// What coarse pictures use; stays from one restart to the next.
+    /// Divider of coarse images; kept across restarts.
     coarse: u32,
     phase: Phase,
     restarted_at: Duration,
-    /// Seconds spent at full resolution since the restart.
+    /// Render time at full resolution since the restart, seconds.
     spent: f64,
-    /// When the last picture at full resolution was worth showing, since the restart.
+    /// When the last image at full resolution was worth displaying, since the restart.
     pictured_at: Option<Duration>,
-    /// Samples that every pixel of the current film has, or of its region.
+    /// Minimum samples per pixel of the current film or of its region.
     spp: u32,
-    /// Relative error of the current film, or of its region.
+    /// Relative error of the current film or of its region.
     error: Option<f64>,
-    /// Pixels of the part of the full film that gets all samples.
+    /// Number of pixels of the region that gets all samples.
     region: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// At this divider, which is above 1, since things move or have just moved.
+    /// During or just after motion, at this divider above 1.
     Coarse(u32),
-    /// On the way to full resolution.
+    /// On the way to full resolution, at this divider.
     Sharpening(u32),
     Full,
 }
 
 impl Scheduler {
-    /// Width and height of the whole picture, at least 1 each.
+    /// Creates a scheduler for an image of `width` × `height` pixels, at least 1 each.
     pub fn new(width: u32, height: u32, target: Target) -> Self {
         let mut scheduler = Self {
             width,
@@ -147,7 +146,7 @@ impl Scheduler {
         scheduler
     }
 
-    /// All samples are worthless from `now` on.
+    /// Restarts at the time `now`: all samples are discarded.
     pub fn restart(&mut self, now: Duration) {
         self.choose_coarse();
         self.phase = if self.coarse == 1 { Phase::Full } else { Phase::Coarse(self.coarse) };
@@ -155,24 +154,24 @@ impl Scheduler {
         (self.spent, self.pictured_at, self.spp, self.error) = (0.0, None, 0, None);
     }
 
-    /// A restart with another size.
+    /// Restarts with another image size.
     pub fn resize(&mut self, width: u32, height: u32, now: Duration) {
         (self.width, self.height) = (width, height);
         self.restart(now);
     }
 
-    /// Keeps all samples.
+    /// Changes the target; keeps all samples.
     pub fn set_target(&mut self, target: Target) {
         self.target = target;
     }
 
-    /// Keeps all samples.
+    /// Pauses or resumes; keeps all samples.
     pub fn set_paused(&mut self, paused: bool) {
         self.paused = paused;
     }
 
-    /// From now on only this many pixels of the full film get samples, or all of them again; they have `spp` so far,
-    /// and this error. Keeps all samples.
+    /// Restricts sampling to a region of this many pixels of the full film, with `spp` samples per pixel and this error
+    /// so far, or lifts the restriction. Keeps all samples.
     pub fn set_region(&mut self, n_pixels: Option<u64>, spp: u32, error: Option<f64>) {
         self.region = n_pixels;
         if self.phase == Phase::Full {
@@ -180,24 +179,24 @@ impl Scheduler {
         }
     }
 
-    /// Another number of threads renders at another speed.
+    /// Discards the measured speed, because the number of threads has changed.
     pub fn forget_speed(&mut self) {
         self.rate = None;
     }
 
-    /// A picture was on the window so long after it was finished.
+    /// Reports the time from a finished image until it was displayed.
     pub fn shown_after(&mut self, wait: Duration) {
         self.showing += 0.05 * (wait.as_secs_f64() - self.showing);
     }
 
-    /// Seconds spent at full resolution since the last restart.
+    /// Render time at full resolution since the last restart, seconds.
     pub fn spent(&self) -> f64 {
         self.spent
     }
 
-    /// The next thing to do at the time `now`, on the clock that all times passed in are of.
+    /// Returns the next step at the time `now`; all times are on the caller's clock.
     pub fn next(&mut self, now: Duration) -> RenderStep {
-        // A pause still shows what has changed, as sharp as it can be.
+        // During a pause, changes are still displayed, at full resolution.
         if self.paused && self.phase == Phase::Full && self.spp > 0 {
             return RenderStep::Sleep;
         }
@@ -217,7 +216,7 @@ impl Scheduler {
                 RenderStep::Render { divider, target_spp: self.spp.saturating_add(passes), at_most: Some(at_most) }
             }
             Phase::Full if self.reached() => RenderStep::Sleep,
-            // Nothing can be shown before every pixel has a sample.
+            // An image needs a sample in every pixel.
             Phase::Full if self.spp == 0 => RenderStep::Render { divider: 1, target_spp: 1, at_most: None },
             Phase::Full => {
                 let n_pixels = self.region.map_or(self.pixels(1), |n| n.max(1) as f64);
@@ -226,7 +225,7 @@ impl Scheduler {
                 let least = if self.spp < EVEN_UNTIL { 1 } else { AT_ONCE };
                 let passes = (slice * self.speed() / n_pixels).clamp(f64::from(least), 65_536.0) as u32;
                 let goal = self.target.spp.unwrap_or(u32::MAX);
-                // A pass that takes longer than a slice is shown unfinished.
+                // A pass that takes longer than a slice is displayed unfinished.
                 let at_most = Duration::from_secs_f64(1.5 * slice);
                 RenderStep::Render {
                     divider: 1,
@@ -237,14 +236,14 @@ impl Scheduler {
         }
     }
 
-    /// Takes note of a step that was not cut short by a restart, and tells whether its picture is worth showing: at full
-    /// resolution not soon after another one.
+    /// Records the result of a step that was not cut short by a restart; returns whether its image should be displayed,
+    /// which at full resolution excludes images that follow another one too soon.
     pub fn finished(&mut self, step: RenderStep, report: StepReport, now: Duration) -> bool {
         let RenderStep::Render { divider, .. } = step else { return false };
-        // Very short steps measure the start of the threads more than the speed of the rays.
+        // Very short steps measure the start of the threads rather than the speed of the rays.
         if report.paths >= 256 && report.seconds > 0.0 {
             let measured = report.paths as f64 / report.seconds;
-            // What is so much slower is another scene, and not a worker that had to wait.
+            // A much lower speed indicates another scene rather than a worker that had to wait.
             let known = self.rate.filter(|rate| measured > rate / ANOTHER_SCENE);
             self.rate = Some(known.map_or(measured, |rate| 0.5 * rate + 0.5 * measured));
         }
@@ -267,24 +266,24 @@ impl Scheduler {
         true
     }
 
-    /// Seconds between pictures at full resolution.
+    /// Seconds between images at full resolution.
     fn slice(&self) -> f64 {
         (FIRST_SLICE + 0.1 * self.spent).max(SLICE_OVER_SHOWING * self.showing).min(LAST_SLICE)
     }
 
-    /// Whether the target is reached, at full resolution.
+    /// Whether the target is reached at full resolution.
     pub fn reached(&self) -> bool {
         self.phase == Phase::Full && self.spp > 0 && self.target.reached(self.spp, self.spent, self.error)
     }
 
-    /// On to a film of half the divider, or to the full one when that is near or quick enough.
+    /// Switches to half the divider, or to full resolution if that is next or fast enough.
     fn sharpen(&mut self, divider: u32) {
         let quick = self.seconds_for(1) <= QUICK;
         self.phase = if divider <= 2 || quick { Phase::Full } else { Phase::Sharpening(divider / 2) };
         (self.spp, self.error) = (0, None);
     }
 
-    /// Leaves the coarse divider as it is while its time lies in the band, else takes the finest that fits.
+    /// Keeps the coarse divider while its time lies in the hysteresis band, otherwise chooses the finest that fits.
     fn choose_coarse(&mut self) {
         let slowest = self.slowest();
         let finer = DIVIDERS.iter().rev().find(|&&divider| divider < self.coarse).copied();
@@ -296,8 +295,8 @@ impl Scheduler {
         }
     }
 
-    /// What a coarse picture may take, seconds: an input may come while the picture before is put on the window, and its own
-    /// has to be put there too.
+    /// Maximum render time of a coarse image in seconds: an input may arrive while the previous image is being
+    /// displayed, and its own image has to be displayed too.
     fn slowest(&self) -> f64 {
         (REACTION - 2.0 * self.showing).clamp(QUICKEST, SLOWEST)
     }
@@ -306,7 +305,7 @@ impl Scheduler {
         self.rate.unwrap_or(GUESSED_RATE)
     }
 
-    /// Seconds for one sample of every pixel.
+    /// Seconds for one sample per pixel.
     fn seconds_for(&self, divider: u32) -> f64 {
         self.pixels(divider) / self.speed()
     }
@@ -320,13 +319,13 @@ impl Scheduler {
 mod tests {
     use super::*;
 
-    /// A renderer that takes `1 / rate` seconds a path, and nothing else.
+    /// A renderer that takes `1 / rate` seconds per path and has no other cost.
     struct Machine {
         scheduler: Scheduler,
         rate: f64,
         now: f64,
         spp: u32,
-        /// Paths that are in the film.
+        /// Number of paths in the film.
         paths: f64,
         film: Option<u32>,
         /// Divider and end time of each step.
@@ -344,7 +343,7 @@ mod tests {
             self.film = None;
         }
 
-        /// Does one step; false when there is nothing to do.
+        /// Executes one step; false if there is nothing to do.
         fn step(&mut self) -> bool {
             let step = self.scheduler.next(Duration::from_secs_f64(self.now));
             let RenderStep::Render { divider, target_spp, at_most } = step else { return false };
@@ -372,7 +371,7 @@ mod tests {
     fn while_moving_pictures_come_within_a_frame_or_two_and_keep_their_resolution() {
         for rate in [3e5, 1e6, 4e6, 3e7] {
             let mut machine = Machine::new(1280, 720, rate, Target::default());
-            // Come to rest first, so that the speed is known.
+            // Waits for the end of motion first, so that the speed is known.
             while machine.now < 2.0 {
                 machine.step();
             }
@@ -408,7 +407,7 @@ mod tests {
             let (divider, shown) = machine.shown[0];
             let took = shown - at;
             assert!(took <= slowest * 1.001, "{showing}: {took} s at 1/{divider}");
-            // As fine as it may be.
+            // As fine as possible.
             let finer = DIVIDERS.iter().rev().find(|&&finer| finer < divider).expect("a coarse one");
             assert!(machine.scheduler.seconds_for(*finer) > AIM * slowest, "{showing}: {took} s at 1/{divider}");
         }
@@ -422,9 +421,9 @@ mod tests {
         }
         let mut first = None;
         for i in 0..200 {
-            // The time a divider takes may wander by a third either way without leaving the band.
+            // The render time of a divider may vary by a third without leaving the band,
             machine.rate = 2e6 * (1.0 + 0.3 * (f64::from(i) * 0.7).sin());
-            // And so may the time that the window takes.
+            // and so may the display time.
             let showing = 0.01 * (1.0 + 0.3 * (f64::from(i) * 1.9).sin());
             machine.scheduler.shown_after(Duration::from_secs_f64(showing));
             machine.restart();
@@ -456,7 +455,7 @@ mod tests {
         assert!(dividers[0] > 4, "{dividers:?}");
         assert!(dividers.is_sorted_by(|a, b| a >= b), "{dividers:?}");
         assert_eq!(*dividers.last().unwrap(), 1);
-        // The way there costs less than one more pass.
+        // Reaching full resolution costs less than one more pass.
         let first_full = machine.shown.iter().find(|(divider, _)| *divider == 1).unwrap().1;
         assert!(first_full < 0.15 + 2.0 * 1920.0 * 1080.0 / 1e6, "{first_full}");
     }
@@ -469,7 +468,7 @@ mod tests {
             while machine.now < 10.0 {
                 let before = machine.shown.len();
                 machine.step();
-                // Never what a slice had left over.
+                // Never the rest of a slice.
                 if let [.., (1, last), (1, now)] = machine.shown[..]
                     && machine.shown.len() > before
                 {
@@ -481,7 +480,7 @@ mod tests {
                 shown as f64 / (until - from)
             };
             let (first, later) = (per_second(0.5, 1.0), per_second(5.0, 10.0));
-            // Drawing takes 1.6 times as long as it takes to show: less than a tenth.
+            // Drawing takes 1.6 times the display time: less than a tenth of the total.
             let most = 20.0_f64.min(0.1 / (1.6 * showing) + 1.0);
             assert!((2.0..=most).contains(&first), "{rate:e}, {showing}: {first} pictures a second");
             assert!((1.2..=2.3).contains(&later), "{rate:e}: {later} pictures a second");
@@ -494,7 +493,7 @@ mod tests {
         while machine.step() {}
         assert_eq!((machine.spp, machine.film), (1000, Some(1)));
         assert!(machine.scheduler.reached());
-        // More is asked for: all samples stay.
+        // With a higher target, all samples stay.
         machine.scheduler.set_target(Target { spp: Some(1500), ..Target::default() });
         while machine.step() {}
         assert_eq!(machine.spp, 1500);

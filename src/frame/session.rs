@@ -1,4 +1,4 @@
-//! One scene, its picture, and everything between: what a window or a script holds on to.
+//! A session: one scene, its image, and the threads that render it. The interface for a window or a script.
 
 use super::adopt::adopt;
 use super::background::BackgroundTasks;
@@ -36,37 +36,37 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-/// How to start.
+/// Options of a new session.
 #[derive(Clone, Default)]
 pub struct SessionOptions {
-    /// Width of the picture in pixels; 0 means that there is none yet, and the session waits for a size.
+    /// Width of the image in pixels; 0 if the size is not known yet, and the session waits for it.
     pub width: u32,
-    /// Height of the picture in pixels.
+    /// Height of the image in pixels.
     pub height: u32,
-    /// One a processor when not given.
+    /// Number of worker threads; one per processor if not given.
     pub threads: Option<usize>,
     /// Seed of the random numbers.
     pub seed: u32,
-    /// How samples are spread over the pixels of scenes that do not come from an image, which has its own.
+    /// Sample allocation for scenes that do not come from an image; an image has its own.
     pub allocation: SampleAllocation,
-    /// When the picture is good enough; without a target it is rendered for ever.
+    /// When to stop; without a target, rendering never ends.
     pub target: Target,
-    /// Workers give way to other threads, for one that draws a window too.
+    /// Workers yield to other threads, such as those that draw a window.
     pub yielding: bool,
-    /// Which axis of models points up; guessed when not given.
+    /// Up axis of models; guessed if not given.
     pub up: Option<UpAxis>,
-    /// Called from another thread when [`Session::update`] would find something new.
+    /// Called from another thread when [`Session::update`] would find new results.
     pub waker: Option<Waker>,
 }
 
-/// Why a session cannot start.
+/// Why a session cannot be created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
-    /// The size of the picture or the target is out of range.
+    /// The image size or the target is out of range.
     #[error(transparent)]
     Value(#[from] BadValue),
-    /// The system starts no more threads; a whole sentence.
+    /// The system cannot start more threads; a whole sentence.
     #[error("{0}")]
     Threads(String),
 }
@@ -77,22 +77,22 @@ impl From<SessionError> for String {
     }
 }
 
-/// The parts of a frame, in the order in which they run. Systems of a user's own fit in with `.in_set(…)`.
+/// Stages of a frame, in the order of execution. User systems join with `.in_set(…)`.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
-    /// Commands become changes.
+    /// Commands become changes of components.
     Input,
-    /// Scenes that were read take their place; a user's systems change what they like.
+    /// Loaded scenes replace the current one; user systems make their changes.
     Edit,
-    /// What changed is found, and the part of the snapshot that depends on it made anew.
+    /// Changes are detected, and the affected part of the snapshot is rebuilt.
     Rebuild,
-    /// The samples are dropped if they are worthless.
+    /// Samples are discarded if they are no longer valid.
     Reset,
     /// The workers get their job.
     Accumulate,
-    /// The workers are told how to develop it.
+    /// The workers get the display settings.
     Develop,
-    /// Finished pictures are fetched.
+    /// Finished images are fetched.
     Present,
 }
 
@@ -106,10 +106,11 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session without a scene: [`open`](Self::open) one, or spawn entities into its [`world_mut`](Self::world_mut).
+    /// Creates a session without a scene: [`open`](Self::open) one, or spawn entities into its
+    /// [`world_mut`](Self::world_mut).
     ///
     /// # Errors
-    /// When the threads cannot be started, or no picture may have that size.
+    /// If the threads cannot be started, or the image size or the target is out of range.
     pub fn new(options: SessionOptions) -> Result<Self, SessionError> {
         if options.width > 0 && options.height > 0 {
             check_film_size(options.width, options.height)?;
@@ -178,7 +179,7 @@ impl Session {
         frame.add_systems((
             (record, input).chain().in_set(Stage::Input),
             (edit, edit_scene, hold_focus, save, reload).chain().in_set(Stage::Edit),
-            // After a user's own systems, so that what they change can be undone too.
+            // After user systems, so that their changes can be undone too.
             (notice, remember).chain().after(Stage::Edit).before(Stage::Rebuild),
             rebuild.in_set(Stage::Rebuild),
             reset.in_set(Stage::Reset),
@@ -189,18 +190,18 @@ impl Session {
         Ok(Self { world, frame })
     }
 
-    /// Begins to read a scene beside the old picture. It takes its place in a later [`update`](Self::update); when it
-    /// cannot be read, that is a message in the [`status`](Self::status), and the old scene stays.
+    /// Starts to load a scene in the background. A later [`update`](Self::update) replaces the current scene by it; if
+    /// loading fails, the [`status`](Self::status) has a message, and the current scene stays.
     pub fn open(&mut self, source: SceneSource) {
         self.open_lit_by(source, None);
     }
 
-    /// The same with an image in place of the scene's own environment.
+    /// Like [`Self::open`], with an image in place of the scene's own environment.
     pub fn open_lit_by(&mut self, source: SceneSource, environment: Option<PathBuf>) {
         self.open_choice(source, environment, ModelChoice::default());
     }
 
-    /// The same of a model that has more than one camera, moment or variant.
+    /// Like [`Self::open_lit_by`], for a model with several cameras, times or variants.
     pub fn open_choice(&mut self, source: SceneSource, environment: Option<PathBuf>, choice: ModelChoice) {
         let aspect = self.world.resource::<PictureSize>().aspect();
         let up = self.world.resource::<ModelUp>().0;
@@ -208,41 +209,41 @@ impl Session {
         self.world.resource::<BackgroundTasks>().load(source, (up, environment), choice, aspect, pool, None);
     }
 
-    /// Takes over a scene that has been read already.
+    /// Replaces the current scene by one that has been loaded already.
     pub fn adopt(&mut self, scene: LoadedScene) {
         let now = self.world.resource::<Clock>().0;
         adopt(&mut self.world, scene, now);
     }
 
-    /// Will be carried out at the next [`update`](Self::update), in order.
+    /// Queues a command; the next [`update`](Self::update) executes all of them in order.
     pub fn send(&mut self, command: Command) {
         self.world.resource_mut::<CommandQueue>().0.push(command);
     }
 
-    /// Adds systems of a user's own; name the stage with `.in_set(…)`.
+    /// Adds user systems; select the stage with `.in_set(…)`.
     pub fn add_systems<M>(&mut self, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
         self.frame.add_systems(systems);
     }
 
-    /// Runs one frame. Never waits for the picture; `now` counts from any moment, and never goes back.
+    /// Runs one frame; never waits for the image. `now` is the time since any fixed moment, and must not decrease.
     pub fn update(&mut self, now: Duration) {
         self.world.resource_mut::<Clock>().0 = now;
         self.frame.run(&mut self.world);
         self.world.clear_trackers();
     }
 
-    /// The newest picture; empty before the first.
+    /// The newest image; empty before the first.
     pub fn picture(&self) -> &Picture {
         self.world.resource()
     }
 
-    /// The picture of this number is on the window. A session that is told holds its workers back until a coarse picture can
-    /// be seen; one that is never told does not.
+    /// Reports that the image of this number is displayed. With these reports, workers pause until a coarse image is
+    /// displayed; without any, they do not.
     pub fn note_seen(&self, number: u64) {
         self.world.resource::<Renderer>().0.note_seen(number);
     }
 
-    /// How rendering is getting on, and what there is to tell.
+    /// Progress, messages, and the state of rendering.
     pub fn status(&self) -> &Status {
         self.world.resource()
     }
@@ -252,46 +253,46 @@ impl Session {
         &self.world
     }
 
-    /// The world, to be changed; the next [`Self::update`] finds what has changed.
+    /// Mutable access to the world; the next [`Self::update`] detects the changes.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }
 
-    /// A copy of the film, for saving: linear light at the resolution that it has now. Takes a few milliseconds.
+    /// Returns a copy of the film for saving: linear radiance at the current resolution. Takes a few milliseconds.
     pub fn film_snapshot(&self) -> Option<Film> {
         self.world.resource::<Renderer>().0.film()
     }
 
-    /// The film of what is seen now, to be kept; never waits. It comes as soon as every pixel has a sample at full
-    /// resolution; a coarser one comes if the view changes or the workers rest before that. Without any, the other
-    /// end is closed.
+    /// Requests the film of the current view for saving; never blocks. It is sent once every pixel has a sample at full
+    /// resolution; a coarser one is sent if the view changes or the workers go to sleep before that. Without a film,
+    /// the channel is closed.
     pub fn keep_film(&self) -> Receiver<Film> {
         self.world.resource::<Renderer>().0.keep_film()
     }
 
-    /// What a picture of what is seen now is to say about itself: see [`MetadataDraft::note`].
+    /// Returns the metadata for an image of the current view: see [`MetadataDraft::note`].
     pub fn shot_draft(&mut self) -> MetadataDraft {
         let current = self.world.get_resource::<CurrentScene>().map(|current| current.0.clone());
         MetadataDraft::of(&mut self.world, current.as_deref())
     }
 
-    /// What the workers render now, and how.
+    /// The snapshot and the settings that are being rendered.
     pub fn rendered(&self) -> Option<(Prepared, RenderSettings)> {
         self.world.resource::<RenderState>().rendered()
     }
 
-    /// Names of what the workers render now, for layers of a picture.
+    /// Names of the objects and materials that are being rendered, for layers of an image.
     pub fn feature_names(&self) -> Option<FeatureNames> {
         let shown = self.world.resource::<RenderState>();
         Some(FeatureNames::of(shown.extraction.as_ref()?, &shown.inputs))
     }
 
-    /// How many scenes have taken their place so far.
+    /// Number of scenes that have been opened so far.
     pub fn n_adopted(&self) -> u64 {
         self.world.resource::<SceneGeneration>().0
     }
 
-    /// Where the open scene is saved: where it was saved last, or else the scene file that was opened.
+    /// Where the open scene is saved: the last saved file, or else the scene file that was opened.
     pub fn scene_file(&self) -> Option<PathBuf> {
         let saved = self.world.resource::<SavedAs>().path.clone();
         saved.or_else(|| match &self.world.get_resource::<CurrentScene>()?.0.source {
@@ -300,43 +301,43 @@ impl Session {
         })
     }
 
-    /// Whether something has been edited since the scene was opened or saved.
+    /// Whether there are edits since the scene was opened or saved.
     pub fn has_unsaved_edits(&self) -> bool {
         self.world.resource::<History>().is_unsaved()
     }
 
-    /// Something is to be saved, or is being saved.
+    /// Whether something is being saved, or will be.
     pub fn is_saving(&self) -> bool {
         !self.world.resource::<Saving>().is_idle() || !self.world.resource::<CommandQueue>().0.is_empty()
     }
 
-    /// The scene in words, as [`Command::SaveScene`] would write it.
+    /// The scene as text, as [`Command::SaveScene`] would write it.
     pub fn describe(&mut self) -> Description {
         let current = self.world.get_resource::<CurrentScene>().map(|current| current.0.clone());
         Description::of(&mut self.world, current.as_deref())
     }
 
-    /// As many threads as the workers have, for work beside them.
+    /// Pool for other work, with as many threads as the workers have.
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {
         self.world.resource::<Renderer>().0.pool()
     }
 
-    /// How long the workers took to drop what a change had made worthless, the latest times.
+    /// Latencies until the workers abandoned invalid work.
     pub fn cancels(&self) -> LatencyHistogram {
         self.world.resource::<Renderer>().0.cancels()
     }
 
-    /// The scene as the picture shows it.
+    /// The scene as it is rendered.
     pub fn inputs(&self) -> &SceneInputs {
         &self.world.resource::<RenderState>().inputs
     }
 
-    /// Lists of what is in the scene, which stay right for as long as [`revision`](Self::revision) does not change.
+    /// Lists of the scene's contents, which are valid as long as [`revision`](Self::revision) does not change.
     pub fn inventory(&self) -> Inventory {
         Inventory::of(&self.world, self.inputs())
     }
 
-    /// Grows when anything but the camera has been touched.
+    /// Increases when anything but the camera is changed.
     pub fn revision(&self) -> u64 {
         self.world.resource::<RenderState>().revision()
     }
@@ -346,12 +347,12 @@ impl Session {
         super::selection::box_of(&mut self.world, entity)
     }
 
-    /// Memory of all trees, bytes.
+    /// Memory of all trees in bytes.
     pub fn tree_bytes(&self) -> usize {
         self.world.resource::<RenderState>().trees.bytes()
     }
 
-    /// Nothing will come unless something is changed: the workers sleep and nothing is being read.
+    /// Whether there will be no new results without a change: the workers sleep and nothing is being loaded.
     pub fn is_idle(&self) -> bool {
         let renderer = &self.world.resource::<Renderer>().0;
         let nothing_to_show = !renderer.has_picture();
@@ -369,7 +370,7 @@ impl Session {
 
     /// When [`update`](Self::update) should be called even if nothing calls the waker; `None` for never.
     ///
-    /// Everything that happens beside the session calls the waker, so only commands that wait need a frame.
+    /// Everything in the background calls the waker, so only queued commands need a frame.
     pub fn next_wake(&self, now: Duration) -> Option<Duration> {
         (!self.world.resource::<CommandQueue>().0.is_empty()).then_some(now)
     }

@@ -1,4 +1,4 @@
-//! The systems of a frame, in the order in which they run. Each says what it reads and what it writes.
+//! The systems of a frame in the order of execution. Each states what it reads and writes.
 
 use super::adopt::{adopt, adopt_moment};
 use super::background::{BackgroundTasks, Finished};
@@ -19,7 +19,7 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::{Changed, DetectChanges, Or, Query, RemovedComponents, Res, ResMut, World};
 use bevy_ecs::system::SystemParam;
 
-/// Whether any component that the picture depends on was touched, came or went since the last frame.
+/// Detects whether any component that the image depends on was changed, added or removed since the last frame.
 #[derive(SystemParam)]
 pub struct Touched<'w, 's> {
     #[allow(clippy::type_complexity)]
@@ -53,12 +53,12 @@ pub struct Touched<'w, 's> {
     projections: RemovedComponents<'w, 's, Projection>,
     lenses: RemovedComponents<'w, 's, Lens>,
     ordinals: RemovedComponents<'w, 's, Ordinal>,
-    /// No picture shows a name, but messages and lists do.
+    /// Names are not visible in the image, but in messages and lists.
     names: RemovedComponents<'w, 's, Name>,
 }
 
 impl Touched<'_, '_> {
-    /// Empties the readers of removals, so that nothing is told twice.
+    /// Whether anything was touched. Drains the readers of removals, so that each is reported once.
     pub fn any(&mut self) -> bool {
         let removed = self.shapes.read().count()
             + self.placements.read().count()
@@ -76,7 +76,7 @@ impl Touched<'_, '_> {
     }
 }
 
-/// Puts finished work into the world: a scene that was read takes the place of the old one.
+/// Applies finished background work to the world, for example replaces the scene by one that was loaded.
 ///
 /// Reads [`BackgroundTasks`]; writes entities, the resources of the scene, [`CurrentScene`], [`Status`].
 pub fn edit(world: &mut World) {
@@ -105,9 +105,9 @@ pub fn edit(world: &mut World) {
     }
 }
 
-/// Finds out what changed, and makes anew that part of the snapshot and no other.
+/// Detects changes and rebuilds the affected part of the snapshot only.
 ///
-/// Reads everything that the picture depends on; writes [`RenderState`], [`FrameChanges`], [`SceneBounds`], [`Status`].
+/// Reads everything that the image depends on; writes [`RenderState`], [`FrameChanges`], [`SceneBounds`], [`Status`].
 #[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
 pub fn rebuild(
     mut touched: Touched,
@@ -126,7 +126,7 @@ pub fn rebuild(
         None => RenderSettings::default(),
         Some(rendering) => match rendering.0.check() {
             Ok(()) => rendering.0,
-            // As it was before somebody set what no picture comes of.
+            // Keeps the previous settings if the new ones are invalid.
             Err(bad) => {
                 if rendering.is_changed() {
                     status.say(clock.0, MessageKind::Error, bad.to_string());
@@ -143,7 +143,7 @@ pub fn rebuild(
     if let Some(cause) = shown.adopted.take() {
         changes.add_scene(cause);
     }
-    // Touched values are often equal to what they were; only a difference counts.
+    // Touched values are often equal to the previous ones; only differences count.
     let environment_changed = queries.environment() != shown.inputs.environment;
     if touched.any() || environment_changed || std::mem::take(&mut shown.waiting) || shown.extraction.is_none() {
         let mut inputs = queries.collect();
@@ -153,7 +153,7 @@ pub fn rebuild(
         }
         let missing = missing_trees(&inputs, &mut shown.trees);
         if !missing.is_empty() {
-            // The old picture stays until the trees are there, and the camera keeps moving in it.
+            // The old image stays until the trees are built; the camera keeps moving.
             beside.build(missing, true, renderer.0.pool());
             inputs = SceneInputs { camera: inputs.camera, ..shown.inputs.clone() };
         }
@@ -191,7 +191,8 @@ pub fn rebuild(
     if std::mem::take(&mut shown.better_trees)
         && let RenderState { extraction: Some(extraction), trees, generation, .. } = &mut *shown
     {
-        // The same hits, sooner: no sample is lost, and no restart is told. After a restart it comes with the job.
+        // The same hits, found faster: no sample is lost, and no restart is reported. After a restart it comes with the
+        // job.
         extraction.take_trees(trees);
         if !changes.restarts() {
             renderer.0.set_prepared(*generation, extraction.prepared.clone());
@@ -201,13 +202,14 @@ pub fn rebuild(
     found.0 = changes;
 }
 
-/// Not when the camera alone has moved. What was touched and looks the same here may be a material that nothing uses.
+/// Whether lists of the scene have changed, which is false if only the camera has moved. Touched values that look equal
+/// here may be a material that nothing uses.
 fn is_another_list(old: &SceneInputs, new: &SceneInputs) -> bool {
     let as_before = old.objects == new.objects && old.materials == new.materials && old.lights == new.lights;
     !as_before || old.camera == new.camera
 }
 
-/// What has been built in a hurry is built again at leisure, once it is seen.
+/// Starts building the final trees of those that have preview trees so far.
 fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &Renderer) {
     let hasty = shown.trees.hasty();
     shown.improving.retain(|shape| hasty.contains(shape));
@@ -218,7 +220,7 @@ fn improve_trees(shown: &mut RenderState, beside: &BackgroundTasks, renderer: &R
     }
 }
 
-/// Trees that have yet to be built. Small ones are built at once: that takes less than the frame has.
+/// Returns shapes whose trees have yet to be built. Small trees are built immediately, within the frame.
 fn missing_trees(inputs: &SceneInputs, trees: &mut Trees) -> Vec<Shape> {
     const AT_ONCE: usize = 2_000;
     let mut missing: Vec<Shape> = Vec::new();
@@ -240,7 +242,7 @@ fn missing_trees(inputs: &SceneInputs, trees: &mut Trees) -> Vec<Shape> {
     missing
 }
 
-/// Drops the samples when they are worthless, and says why.
+/// Discards the samples if they are invalid, and states the reason.
 ///
 /// Reads [`FrameChanges`], [`PictureSize`]; writes [`RenderState`], [`Status`].
 pub fn reset(
@@ -261,7 +263,7 @@ pub fn reset(
     }
 }
 
-/// Tells the workers what to add samples to, until when, and with how many threads.
+/// Passes the job, the target, the region and the number of threads to the workers.
 ///
 /// Reads [`RenderState`], [`StopAt`], [`Threads`], [`Paused`]; writes [`FrameChanges`] and to the [`Renderer`].
 #[allow(clippy::too_many_arguments)] // A system says what it reads and writes.
@@ -277,7 +279,7 @@ pub fn accumulate(
     mut found: ResMut<FrameChanges>,
 ) {
     let mut orders = Orders::default();
-    // The first frame finds what the worker was started with.
+    // The first frame sees the values with which the worker was started.
     if let Some(before) = shown.threads.replace(threads.0).filter(|before| *before != threads.0) {
         orders.threads = Some(threads.0);
         found.0.add(Level::Reschedule, format!("threads: {before} → {}", threads.0));
@@ -311,7 +313,7 @@ pub fn accumulate(
     renderer.0.order(orders);
 }
 
-/// Tells the workers how to develop the film; no sample is lost.
+/// Passes the display settings to the workers; no sample is lost.
 ///
 /// Reads [`DisplaySettings`]; writes [`RenderState`], [`FrameChanges`], and to the [`Renderer`].
 pub fn develop(
@@ -334,7 +336,7 @@ pub fn develop(
     }
 }
 
-/// Fetches what the workers have finished.
+/// Fetches the results of the workers.
 ///
 /// Reads the [`Renderer`] and [`BackgroundTasks`]; writes [`Picture`] and [`Status`].
 pub fn present(

@@ -1,12 +1,12 @@
-//! Films that are not in use, kept for their memory: to map and clear that anew takes longer than a first picture may.
+//! Unused films, kept for their memory: mapping and clearing new memory takes longer than the first image may.
 
 use crate::render::Film;
 
-/// At most one of each size.
+/// Unused films, at most one per size.
 #[derive(Default)]
 pub struct IdleFilms(Vec<Film>);
 
-/// The larger, the more is gained by keeping it: the film at full resolution, and the finest of the coarse ones.
+/// Number of films: the one at full resolution and the finest of the coarse ones gain most.
 const MOST: usize = 3;
 
 impl IdleFilms {
@@ -20,13 +20,13 @@ impl IdleFilms {
         }
     }
 
-    /// One of this width and height, as it was left.
+    /// Removes and returns the film of this width and height, with its old samples.
     pub fn take(&mut self, wanted: (u32, u32)) -> Option<Film> {
         let place = self.0.iter().position(|film| size(film) == wanted)?;
         Some(self.0.remove(place))
     }
 
-    /// For pictures of another size.
+    /// Drops all films, for example because the image size changes.
     pub fn forget(&mut self) {
         self.0.clear();
     }

@@ -1,11 +1,11 @@
-//! The thread that renders: it owns the film and a pool of workers, does what the [`Scheduler`](super::Scheduler)
-//! says, and hands over finished pictures. It never touches the world, and nobody ever waits for it longer than a lock
-//! is held.
+//! The render thread: owns the film and a pool of workers, follows the [`Scheduler`](super::Scheduler), and hands over
+//! finished images. It never accesses the world, and other threads wait for it only while a lock is held.
 //!
-//! A new job raises a flag that the workers look at all the time, so that they drop what they are at within
-//! milliseconds. Every job has a generation; a picture carries the one of its job.
+//! A new job sets a flag that the workers poll, so that they abandon their work within milliseconds. Every job has a
+//! generation number; an image carries that of its job.
 //!
-//! Here is the near end; `thread` is the far one, `show` what it hands over, and `idle` the memory it keeps.
+//! This file is the handle used by the session; `thread` is the thread itself, `show` makes the images, and `idle`
+//! keeps memory.
 
 mod idle;
 mod show;
@@ -24,19 +24,19 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Threads that trees are built on, beside those that render. Were they the same, a picture would wait for a tree: who waits
-/// for a part of the one may be given a part of the other to do.
+/// Threads that build trees, in a pool separate from the workers: work stealing in a shared pool would otherwise run
+/// tree builds while an image waits.
 const BESIDE: &str = "beside";
 const WORKERS: &str = "firstlight";
 
-/// How far yielding threads give way, workers and those beside them alike: they have a third of the weight of others. Who has asked for a mesh or a
-/// tree waits for that, and not for more samples of the picture before it.
+/// Niceness of yielding threads: a third of the default weight. It is the same for both pools, so that samples of the
+/// previous image do not slow down tree builds.
 const NICENESS: i32 = 5;
 
-/// Called whenever there is something new to be looked at.
+/// Called when there are new results.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
 
-/// What to render from now on.
+/// What to render.
 #[derive(Clone)]
 pub struct Job {
     pub generation: u64,
@@ -46,94 +46,94 @@ pub struct Job {
     pub height: u32,
 }
 
-/// What is shown of it; no sample depends on this.
+/// Display of the job; samples do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ViewOptions {
-    /// What is shown in place of the picture.
+    /// What is displayed in place of the image.
     pub inspection: Inspection,
-    /// Tint what is sharp, and draw the focal plane.
+    /// Tints the pixels in focus and draws the focal plane.
     pub sharp_zone: bool,
 }
 
-/// A pixel to be explained.
+/// A request to explain a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Question {
-    /// Of the job that the place belongs to; the question is void when another one has come.
+    /// Generation of the job that the position belongs to; the question is dropped when another job arrives.
     pub generation: u64,
-    /// Fractions of the picture from its upper left corner.
+    /// Position in fractions of the image from its upper left corner.
     pub x: f64,
     pub y: f64,
     pub n_samples: u32,
 }
 
-/// Why the pixel looks as it does, and what the film has there.
+/// The explanation of a pixel.
 #[derive(Clone, Debug)]
 pub struct Answer {
     pub explanation: Explanation,
-    /// What light paths have brought there so far; `None` where the film is not at full resolution.
+    /// Radiance from light paths at the pixel so far; `None` if the film is not at full resolution.
     pub light_traced: Option<DVec3>,
 }
 
-/// How far the current job is.
+/// Progress of the current job.
 #[derive(Clone, Debug, Default)]
 pub struct Stats {
     pub generation: u64,
-    /// Of the film that the picture was developed from.
+    /// Size of the film that the image was developed from.
     pub film_width: u32,
     pub film_height: u32,
     pub divider: u32,
-    /// Samples that every pixel of that film has.
+    /// Minimum samples per pixel of that film.
     pub spp: u32,
-    /// What gets all samples now, in pixels of that film, and how many it has.
+    /// Region that gets all samples, in pixels of that film, and its samples per pixel.
     pub region: Option<(Region, u32)>,
-    /// Seconds of rendering since the restart.
+    /// Render time since the restart, seconds.
     pub seconds: f64,
-    /// Relative error of the whole picture, or of the region, when it is known.
+    /// Relative error of the whole image, or of the region, once it is known.
     pub error: Option<f64>,
-    /// How it looks for caustics, where the scene may have some; of the film at full resolution.
+    /// How caustics are rendered, if the scene may have any; for the film at full resolution.
     pub caustics: Option<CausticChoice>,
-    /// Relative error of the denoised picture, where that is shown.
+    /// Relative error of the denoised image, if that is displayed.
     pub denoised_error: Option<f64>,
-    /// Rays of the last steps, and the seconds that they took.
+    /// Rays of the latest steps, and the time that they took in seconds.
     pub recent_rays: RayCounts,
     pub recent_seconds: f64,
-    /// Since the restart.
+    /// Rays since the restart.
     pub rays: RayCounts,
-    /// Seconds from the restart to the last of these rays, whatever they were spent on.
+    /// Wall time from the restart to the last of these rays, seconds.
     pub elapsed: f64,
     pub n_bad: u64,
     pub bad: Vec<BadSample>,
     pub n_above: u64,
     pub threads: usize,
-    /// Nothing is left to do: the target is reached, or it is paused.
+    /// Whether there is nothing left to do: the target is reached, or rendering is paused.
     pub asleep: bool,
-    /// The target is reached.
+    /// Whether the target is reached.
     pub done: bool,
-    /// What went wrong in the renderer itself.
+    /// Failure of the renderer itself.
     pub failure: Option<String>,
 }
 
-/// What is to be done from now on, as far as it has changed. All of it takes effect at once: a target without the
-/// region that it is meant for would give samples to the rest.
+/// Changed instructions for the thread. All of them take effect together: a target without its region would give
+/// samples to the rest of the image.
 #[derive(Default)]
 pub struct Orders {
-    /// Throws all samples away; the rest keeps them.
+    /// Discards all samples; the other fields keep them.
     pub job: Option<Job>,
     pub target: Option<Target>,
     pub paused: Option<bool>,
-    /// 0 is one a processor.
+    /// Number of threads; 0 for one per processor.
     pub threads: Option<usize>,
-    /// What gets the next samples, in fractions of the picture: left, top, right, bottom.
+    /// The region that gets the next samples, in fractions of the image: left, top, right, bottom.
     pub region: Option<Option<[f64; 4]>>,
 }
 
 impl Orders {
-    /// Whether nothing has changed.
+    /// Whether there are no changes.
     pub fn is_empty(&self) -> bool {
         matches!(self, Self { job: None, target: None, paused: None, threads: None, region: None })
     }
 
-    /// Later orders take the place of earlier ones.
+    /// Merges later orders, which override earlier ones.
     fn follow(&mut self, later: Self) {
         let Self { job, target, paused, threads, region } = later;
         self.job = job.or(self.job.take());
@@ -144,13 +144,13 @@ impl Orders {
     }
 }
 
-/// Messages to the thread; a later one of a kind takes the place of an earlier one.
+/// Messages to the thread; a later message of a kind replaces an earlier one.
 #[derive(Default)]
 struct Inbox {
     orders: Orders,
-    /// When the first job that has not been taken over was posted, if the thread was at work then.
+    /// When the oldest job that has not been taken was posted, if the thread was busy then.
     posted: Option<Instant>,
-    /// Of the job of this generation: gives the same samples.
+    /// A better snapshot for the job of this generation, which gives the same samples.
     prepared: Option<(u64, Prepared)>,
     display: Option<Display>,
     look: Option<ViewOptions>,
@@ -160,11 +160,11 @@ struct Inbox {
     quit: bool,
 }
 
-/// What the thread has to show.
+/// Results of the thread.
 #[derive(Default)]
 struct Outbox {
     picture: Picture,
-    /// The picture has not been taken yet.
+    /// Whether the image has not been taken yet.
     fresh: bool,
     stats: Stats,
 }
@@ -172,11 +172,11 @@ struct Outbox {
 struct Shared {
     inbox: Mutex<Inbox>,
     arrived: Condvar,
-    /// Something lies in the inbox: come and look.
+    /// Set when the inbox has a message; polled by the workers.
     interrupt: AtomicBool,
-    /// The thread waits for a message.
+    /// Whether the thread waits for a message.
     sleeping: AtomicBool,
-    /// Number of the newest picture that is on a window; 0 when nobody tells.
+    /// Number of the newest image displayed in a window; 0 if the window does not report it.
     seen: AtomicU64,
     outbox: Mutex<Outbox>,
     pool: Mutex<Arc<rayon::ThreadPool>>,
@@ -186,15 +186,17 @@ struct Shared {
     yielding: bool,
 }
 
-/// The near end of the thread.
+/// Handle of the render thread.
 pub struct Worker {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Worker {
-    /// `threads`: 0 is one a processor.
-    /// With `yielding`, workers give way to other threads, such as those that draw a window.
+    /// Starts the thread.
+    ///
+    /// - `threads`: 0 for one per processor.
+    /// - `yielding`: workers yield to other threads, such as those that draw a window.
     pub fn start(threads: usize, yielding: bool, target: Target, waker: Option<Waker>) -> Result<Self, String> {
         let shared = Arc::new(Shared {
             inbox: Mutex::default(),
@@ -230,53 +232,55 @@ impl Worker {
         });
     }
 
-    /// Keeps all samples: the snapshot of the job of this generation that gives the same ones, sooner.
+    /// Replaces the snapshot of the job of this generation by one that gives the same samples faster; keeps all
+    /// samples.
     pub fn set_prepared(&self, generation: u64, prepared: Prepared) {
         self.post(|inbox| inbox.prepared = Some((generation, prepared)));
     }
 
-    /// Keeps all samples.
+    /// Changes exposure and tone curve; keeps all samples.
     pub fn set_display(&self, display: Display) {
         self.post(|inbox| inbox.display = Some(display));
     }
 
-    /// Keeps all samples.
+    /// Changes the view; keeps all samples.
     pub fn set_look(&self, look: ViewOptions) {
         self.post(|inbox| inbox.look = Some(look));
     }
 
-    /// Why a pixel looks as it does; never waits. When the answer cannot come any more, the other end is closed.
+    /// Asks for the explanation of a pixel; never blocks. The sender is dropped if there can be no answer any more.
     pub fn ask(&self, question: Question) -> Receiver<Answer> {
         let (sender, receiver) = channel();
         self.post(|inbox| inbox.question = Some((question, sender)));
         receiver
     }
 
-    /// How long the thread took to drop what it was at when a job came, the latest times.
+    /// Latencies from posting a job until the thread abandoned its previous work.
     pub fn cancels(&self) -> LatencyHistogram {
         lock(&self.shared.cancels).clone()
     }
 
-    /// As many threads as render, for work beside them such as building trees.
+    /// Pool for other work, such as building trees, with as many threads as render.
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {
         lock(&self.shared.beside).clone()
     }
 
-    /// A copy of the film as it is now; waits until the workers have dropped what they are at, some milliseconds.
+    /// Returns a copy of the film; blocks until the workers have paused, some milliseconds. `None` without a film, or
+    /// after five seconds.
     pub fn film(&self) -> Option<Film> {
         let (sender, receiver) = channel();
         self.post(|inbox| inbox.film_wanted.push(sender));
         receiver.recv_timeout(Duration::from_secs(5)).ok()
     }
 
-    /// The film of what is seen now, worth keeping: see [`Session::keep_film`](super::Session::keep_film).
+    /// Requests the film of the current view for saving: see [`Session::keep_film`](super::Session::keep_film).
     pub fn keep_film(&self) -> Receiver<Film> {
         let (sender, receiver) = channel();
         self.post(|inbox| inbox.to_keep.push(sender));
         receiver
     }
 
-    /// Takes the newest picture, if there is a new one, in exchange for an old one's memory.
+    /// Swaps `picture` with the newest image if there is a new one; returns whether it did.
     pub fn take(&self, picture: &mut Picture) -> bool {
         let mut outbox = lock(&self.shared.outbox);
         if !outbox.fresh {
@@ -291,14 +295,14 @@ impl Worker {
         lock(&self.shared.outbox).stats.clone()
     }
 
-    /// Whether a picture lies ready that nobody has taken.
+    /// Whether there is an image that has not been taken.
     pub fn has_picture(&self) -> bool {
         lock(&self.shared.outbox).fresh
     }
 
-    /// The picture of this number is on the window.
+    /// Reports that the image of this number is displayed.
     pub fn note_seen(&self, number: u64) {
-        // Under the lock, as with any message; but it is no reason to drop anything.
+        // Under the lock, like any message, but without interrupting the workers.
         let inbox = lock(&self.shared.inbox);
         self.shared.seen.store(number, Ordering::Release);
         drop(inbox);
@@ -313,7 +317,7 @@ impl Worker {
     fn post(&self, write: impl FnOnce(&mut Inbox)) {
         let mut inbox = lock(&self.shared.inbox);
         write(&mut inbox);
-        // Under the lock, or the thread could look at the flag, then miss the call, then wait for ever.
+        // Under the lock: otherwise the thread could check the flag, miss the notification, and wait forever.
         self.shared.interrupt.store(true, Ordering::Release);
         drop(inbox);
         self.shared.arrived.notify_all();
@@ -324,7 +328,7 @@ impl Drop for Worker {
     fn drop(&mut self) {
         self.post(|inbox| inbox.quit = true);
         if let Some(thread) = self.thread.take() {
-            // A panic over there has been reported already.
+            // A panic of the thread has been reported already.
             let _ = thread.join();
         }
     }
@@ -344,17 +348,17 @@ fn make_pool(threads: usize, name: &'static str, yielding: bool) -> Result<Arc<r
         .map_err(|error| format!("cannot start {threads} worker threads: {error}"))
 }
 
-/// From now on this thread takes what others leave of the processor, most of it while there are others.
+/// Lowers the priority of this thread, so that it gets the processor time that others leave.
 fn yield_to_others() {
-    // Elsewhere than on Linux a thread's own niceness cannot be set.
+    // Niceness per thread exists on Linux only.
     #[cfg(target_os = "linux")]
     {
-        // It may always be raised, and without it all is as it was.
+        // Niceness may always be raised; if it fails, the priority stays as it is.
         let _ = rustix::process::setpriority_process(None, NICENESS);
     }
 }
 
-/// The data behind a lock is whole at every moment at which a thread could panic.
+/// Locks a mutex; poisoning is ignored, because the data is consistent at every point where a thread could panic.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! From the film to what is seen: developed or inspected, as large as the window, with what lies over it.
+//! From the film to the displayed image: developed or inspected, scaled to the window size, with overlays.
 
 use super::thread::Loop;
 use super::views::ViewKey;
@@ -11,15 +11,16 @@ use glam::UVec2;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// So many times as long as denoising has taken, samples are taken before the next.
+/// Ratio of sampling time to denoising time: the next denoising waits until that much time has been spent on samples.
 const SAMPLES_FIRST: u32 = 4;
 
 impl Loop<'_> {
-    /// Develops the film and hands it over, unless the last picture still waits to be taken and will do for now.
+    /// Develops the film and hands the image over, unless the previous image has not been taken yet and `last` is
+    /// false.
     pub(super) fn show(&mut self, last: bool) {
         let film = self.film.as_ref().filter(|(_, film)| film.spp() > 0).or(self.previous.as_ref());
         let (Some(job), Some((divider, film))) = (&self.job, film) else { return };
-        // While things move, every millisecond counts: coarse pictures are raw.
+        // Coarse images are never denoised, for latency.
         let denoises = self.look.inspection == Inspection::Denoised && *divider == 1;
         let key = ViewKey {
             generation: job.generation,
@@ -55,7 +56,7 @@ impl Loop<'_> {
         let (width, height) = (job.width, job.height);
         let picture = &mut self.spare;
         let interrupt = &self.shared.interrupt;
-        // Another look or job is on its way: this picture would not be seen.
+        // Another view or job has arrived: this image would not be displayed.
         let stop = || interrupt.load(Ordering::Relaxed);
         let mut legend = None;
         if denoises {
@@ -114,7 +115,7 @@ impl Loop<'_> {
     }
 }
 
-/// Without mixing: colours that stand for numbers have no mean.
+/// Scales by nearest neighbour: colours that stand for numbers cannot be averaged.
 fn enlarge(view: &Inspected, width: u32, height: u32, rgba: &mut Vec<u8>) {
     rgba.clear();
     rgba.reserve(4 * width as usize * height as usize);

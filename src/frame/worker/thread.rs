@@ -1,4 +1,4 @@
-//! The far end: takes over what has arrived, does the scheduler's next step, hands over, and sleeps.
+//! The loop of the render thread: reads messages, executes the scheduler's next step, hands over images, and sleeps.
 
 use super::idle::IdleFilms;
 use super::views::Views;
@@ -13,37 +13,37 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-/// So long a coarse picture is given to get onto the window before the workers go on.
+/// How long the workers wait for a coarse image to be displayed before they continue.
 const LONGEST_DRAW: Duration = Duration::from_millis(33);
 
-/// What the thread itself holds.
+/// State of the render thread.
 pub struct Loop<'a> {
     pub(super) shared: &'a Shared,
     clock: Instant,
-    /// When the job came.
+    /// Time of the last restart.
     restarted_at: Instant,
     pub(super) scheduler: Scheduler,
     pub(super) display: Display,
     pub(super) look: ViewOptions,
     pub(super) views: Views,
-    /// What gets all samples, in fractions of the picture.
+    /// Region that gets all samples, in fractions of the image.
     region: Option<[f64; 4]>,
-    /// The film has tiles that are ahead because they were asked to be.
+    /// Whether the film has tiles that are ahead because of a region.
     is_uneven: bool,
     question: Option<(Question, Sender<Answer>)>,
     pub(super) job: Option<Job>,
     pub(super) film: Option<(u32, Film)>,
-    /// The film before it, as long as the new one has pixels without a sample.
+    /// The previous film, as long as the new one has pixels without a sample.
     pub(super) previous: Option<(u32, Film)>,
     idle: IdleFilms,
     pub(super) stats: Stats,
-    /// Developed pictures that are not shared, for their memory.
+    /// An image that is not shared, for its memory.
     pub(super) spare: Picture,
-    /// The picture that was shown last is not of these settings.
+    /// Whether the image displayed last does not match the current settings.
     pub(super) redraw: bool,
-    /// Handed over so far.
+    /// Number of images handed over so far.
     pub(super) n_pictures: u64,
-    /// Who waits for a film worth keeping.
+    /// Requests for a film for saving.
     to_keep: Vec<Sender<Film>>,
 }
 
@@ -85,7 +85,7 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// Takes over what has arrived; false when it is time to go.
+    /// Reads all messages; returns false if the thread should end.
     fn read_inbox(&mut self) -> bool {
         let inbox = {
             let mut inbox = lock(&self.shared.inbox);
@@ -120,12 +120,12 @@ impl<'a> Loop<'a> {
         }
         for sender in inbox.film_wanted {
             if let Some((_, film)) = self.visible() {
-                // Whoever asked may have gone.
+                // The receiver may have been dropped.
                 let _ = sender.send(film.clone());
             }
         }
         self.to_keep.extend(inbox.to_keep);
-        // What is seen now is about to go.
+        // The current view is about to be discarded.
         self.hand_out(orders.job.is_some());
         if let Some(question) = inbox.question {
             self.question = Some(question);
@@ -158,11 +158,11 @@ impl<'a> Loop<'a> {
             && generation == job.generation
         {
             job.prepared = prepared;
-            // How many nodes a ray visits is another number now.
+            // The number of visited nodes per ray has changed.
             self.views = Views::default();
             self.redraw |= !self.look.inspection.is_of_film();
         }
-        // A place in another picture.
+        // The position belongs to another image.
         let generation = self.job.as_ref().map(|job| job.generation);
         self.question.take_if(|(question, _)| Some(question.generation) != generation);
         self.answer(false);
@@ -175,7 +175,7 @@ impl<'a> Loop<'a> {
         (*divider == 1 && film.spp() > 0).then(|| film.region_of(self.region?)).flatten()
     }
 
-    /// Tells the scheduler what there is to be rendered, and how far that is.
+    /// Passes the rendered region and its progress to the scheduler.
     fn scheduler_sees_region(&mut self) {
         let Some((1, film)) = &self.film else { return };
         let region = self.active_region();
@@ -185,8 +185,7 @@ impl<'a> Loop<'a> {
         self.scheduler.set_region(region.map(|region| region.n_pixels()), spp, error);
     }
 
-    /// Answers what was asked for, as soon as the film can tell its part, or without it if there will be `no_better`
-    /// one.
+    /// Answers the pending question once the film has its part of the answer; with `no_better`, at once.
     fn answer(&mut self, no_better: bool) {
         let (Some((question, _)), Some(job)) = (&self.question, &self.job) else { return };
         let film = self.film.as_ref().filter(|(divider, film)| *divider == 1 && film.spp() > 0);
@@ -206,7 +205,7 @@ impl<'a> Loop<'a> {
         let sender = self.question.take().map(|(_, sender)| sender);
         match (result, sender) {
             (Ok(Some(explanation)), Some(sender)) => {
-                // Whoever asked may have gone.
+                // The receiver may have been dropped.
                 let _ = sender.send(Answer { explanation, light_traced });
             }
             (Err(panic), _) => self.fail(panic.as_ref()),
@@ -230,7 +229,7 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// One step of the scheduler, and the picture that comes of it.
+    /// Executes one step of the scheduler, and shows its image.
     fn render(&mut self, step: RenderStep) {
         let RenderStep::Render { divider, mut target_spp, mut at_most } = step else { return };
         let Some(job) = &self.job else { return };
@@ -264,14 +263,14 @@ impl<'a> Loop<'a> {
         self.is_uneven |= region.is_some();
         let Some((_, film)) = &mut self.film else { return };
         if divider == 1 && !self.to_keep.is_empty() && !self.is_uneven {
-            // Who keeps a picture wants to be able to make it again, so all pixels get as many samples.
+            // A saved image must be reproducible from its sample count, so all pixels get the same number of samples.
             (target_spp, at_most) = (film.max_spp().max(1), None);
         }
         let pool = lock(&self.shared.pool).clone();
         let start = Instant::now();
         let mut settings = job.settings;
         if divider > 1 {
-            // What is gone in a moment is not worth a thought.
+            // Coarse films are short-lived: an allocation does not pay.
             settings.allocation = SampleAllocation::Uniform;
         }
         let interrupt = &self.shared.interrupt;
@@ -286,7 +285,7 @@ impl<'a> Loop<'a> {
             Err(panic) => return self.fail(panic.as_ref()),
         };
         let stats = &mut self.stats;
-        // Speed is that of the last half second or so.
+        // Ray rates are averages over about half a second.
         if stats.recent_seconds > 0.5 {
             stats.recent_seconds *= 0.5;
             for rays in [&mut stats.recent_rays.camera, &mut stats.recent_rays.bounce, &mut stats.recent_rays.shadow] {
@@ -316,7 +315,7 @@ impl<'a> Loop<'a> {
             self.idle.keep(film);
         }
         if region.is_none() && self.region.is_some() {
-            // From now on there may be one.
+            // There may be an active region from now on.
             self.scheduler_sees_region();
         }
         self.hand_out(false);
@@ -330,10 +329,10 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// A coarse picture has the processors to itself until it is on the window: where they have to draw that too, more samples
-    /// for a coarse film would only keep it waiting, or the next input.
+    /// Pauses the workers until a coarse image is displayed: if the processors draw the window too, more samples for a
+    /// coarse film would delay the image or the next input.
     ///
-    /// - `finished`: when its samples were there.
+    /// - `finished`: when its samples were complete.
     fn let_it_be_seen(&mut self, finished: Instant) {
         let number = self.n_pictures;
         let seen = || self.shared.seen.load(Ordering::Acquire);
@@ -342,14 +341,14 @@ impl<'a> Loop<'a> {
         }
         let inbox = lock(&self.shared.inbox);
         let waits = |_: &mut _| seen() < number && !self.shared.interrupt.load(Ordering::Acquire);
-        // Whether the window drew it in time or not, the next step follows.
+        // The next step follows whether the window displayed the image in time or not.
         drop(self.shared.arrived.wait_timeout_while(inbox, LONGEST_DRAW, waits));
         if seen() >= number {
             self.scheduler.shown_after(finished.elapsed());
         }
     }
 
-    /// Gives the film to who wants to keep it: at full resolution, or as it is if there will be `no_better` one.
+    /// Sends the film to the pending requests: at full resolution, or with `no_better` as it is.
     fn hand_out(&mut self, no_better: bool) {
         if self.to_keep.is_empty() {
             return;
@@ -365,7 +364,7 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// The newest film of which every pixel has a sample.
+    /// The newest film with a sample in every pixel.
     pub(super) fn visible(&self) -> Option<&(u32, Film)> {
         self.film.as_ref().filter(|(_, film)| film.spp() > 0).or(self.previous.as_ref())
     }
@@ -374,7 +373,7 @@ impl<'a> Loop<'a> {
     fn sleep(&mut self) {
         self.hand_out(true);
         self.answer(true);
-        // Without a film, asking in vain beats waiting in vain.
+        // Without a film, the requests fail instead of waiting forever.
         self.to_keep.clear();
         self.question = None;
         let shown = {
@@ -394,13 +393,14 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// A bug in the renderer must not take the window down: say so, and render nothing until something changes.
+    /// Handles a panic in the renderer, which must not end the window: reports it, and renders nothing until something
+    /// changes.
     fn fail(&mut self, panic: &(dyn std::any::Any + Send)) {
         let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
         self.give_up(format!("the renderer failed: {}", text.unwrap_or("no reason given")));
     }
 
-    /// Renders nothing until something changes, and says why.
+    /// Stops rendering until something changes, and reports the reason.
     fn give_up(&mut self, reason: String) {
         self.stats.failure = Some(reason);
         (self.job, self.film, self.previous) = (None, None, None);

@@ -1,23 +1,23 @@
-//! What was made of the film last and may do again.
+//! Cached results computed from the film or the scene.
 
 use crate::render::{FeatureBuffers, Inspected, Inspection};
 use glam::UVec2;
 use std::time::Instant;
 
-/// What was made last and may do again.
+/// Cached results; each has the key that it is valid for.
 #[derive(Default)]
 pub struct Views {
-    /// The view of the scene, and what for.
+    /// The latest inspection of the scene.
     pub inspected: Option<(ViewKey, Inspected)>,
-    /// Depths of the film's pixels, and what for.
+    /// Depth per pixel of the film.
     pub depths: Option<(ViewKey, Vec<f32>)>,
-    /// What guides the denoiser, and what for.
+    /// Feature buffers for the denoiser.
     pub guides: Option<(ViewKey, FeatureBuffers)>,
-    /// What was denoised last, and when it may be again: samples come first.
+    /// When denoising may run again: samples come first.
     pub denoised: Option<(ViewKey, Instant)>,
 }
 
-/// What a view of the scene was made for.
+/// Identifies what a cached result was computed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ViewKey {
     pub generation: u64,
