@@ -1,5 +1,5 @@
-//! A scene that was read takes the place of the old one: another scene, the same as its files are now, or the same model at
-//! another moment of its animations.
+//! Replaces the open scene by one that was loaded: another scene, the same after a change of its files, or the same
+//! model at another time of its animations.
 
 use super::focus::Focus;
 use super::history::History;
@@ -15,7 +15,7 @@ use bevy_ecs::prelude::World;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Makes `scene` the scene of `world`.
+/// Makes `scene` the open scene of `world`.
 pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     scene.spawn(world);
     let home = world.query::<(&View, &Projection, &Lens)>().iter(world).next().map_or_else(
@@ -41,10 +41,9 @@ pub fn adopt(world: &mut World, scene: LoadedScene, now: Duration) {
     world.resource_mut::<SceneGeneration>().0 += 1;
 }
 
-/// Puts a scene into the place of what it was before. What a person has set stays, unless the file says something new
-/// about it.
+/// Replaces a scene by another state of it. User settings stay, unless the file has changed them.
 ///
-/// - `cause`: of the restart, for people.
+/// - `cause`: of the restart, for messages.
 pub fn adopt_again(world: &mut World, old: &LoadedScene, mut scene: LoadedScene, cause: String, now: Duration) {
     let camera = SceneInputs::of(world).camera.filter(|_| scene.file.camera == old.file.camera);
     let developing = (scene.file.display == old.file.display).then(|| *world.resource::<DisplaySettings>());
@@ -70,7 +69,7 @@ pub fn adopt_again(world: &mut World, old: &LoadedScene, mut scene: LoadedScene,
     }
 }
 
-/// The open model at another moment: what a person has set stays, and what was told is not told again.
+/// Replaces the open model by its state at another time: user settings stay, and warnings are not repeated.
 pub fn adopt_moment(world: &mut World, mut scene: LoadedScene, now: Duration) {
     let Some(old) = world.get_resource::<CurrentScene>().map(|current| current.0.clone()) else {
         return adopt(world, scene, now);

@@ -1,4 +1,4 @@
-//! Work beside the picture: reading scenes and building trees on threads of their own, while the old picture stays.
+//! Background work: loading scenes and building trees on other threads, while the current image stays.
 
 use super::Waker;
 use super::film_file::check_film_source;
@@ -12,17 +12,17 @@ use bevy_ecs::prelude::{Entity, Resource};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What has come of it.
+/// A result of background work.
 pub enum Finished {
     Scene {
         source: SceneSource,
-        /// It is the open scene as it is in another way, and not another one.
+        /// Whether it is another state of the open scene rather than another scene.
         again: bool,
         result: Result<Box<LoadedScene>, SceneError>,
     },
     Trees(Trees),
     Mesh(Box<Remade>),
-    /// For a material.
+    /// An image for a material.
     Picture {
         entity: Entity,
         part: TextureSource,
@@ -33,29 +33,31 @@ pub enum Finished {
 #[derive(Default)]
 struct TaskBoard {
     finished: Vec<Finished>,
-    /// What the newest load is doing.
+    /// Progress of the newest load.
     progress: Option<String>,
-    /// The number of the newest load; an older one is dropped when it comes in.
+    /// Number of the newest load; results of older ones are dropped.
     newest_load: u64,
     building: usize,
-    /// Meshes that are wanted, with their numbers; the oldest first. A newer one for the same takes the place of an older.
+    /// Requested meshes with their numbers, the oldest first. A newer request for the same object replaces an older
+    /// one.
     remaking: Vec<(u64, Remake)>,
     newest_remake: u64,
-    /// There is a thread that makes them, one after the other: side by side, those that a slider left behind would keep the wanted one waiting.
+    /// Whether the thread that makes meshes runs. It makes one after the other: in parallel, outdated requests of a
+    /// slider would delay the current one.
     makes_meshes: bool,
-    /// Pictures that are being read for materials.
+    /// Number of images being read for materials.
     reading: usize,
-    /// What the last mesh was made from.
+    /// Input of the last mesh.
     base: Option<MeshBase>,
 }
 
 impl TaskBoard {
-    /// What the mesh that comes next is, for people.
+    /// Title of the mesh that is being made, for messages.
     fn mesh_in_the_making(&self) -> Option<String> {
         self.remaking.first().map(|(_, job)| job.title())
     }
 
-    /// The oldest mesh that is wanted; `None` ends the thread that makes them.
+    /// The oldest requested mesh; `None` ends the thread that makes them.
     fn next_remake(&mut self) -> Option<(u64, Remake)> {
         let next = self.remaking.first().cloned();
         self.makes_meshes = next.is_some();
@@ -63,7 +65,7 @@ impl TaskBoard {
     }
 }
 
-/// Starts such work and collects what comes of it.
+/// Starts background work and collects the results.
 #[derive(Resource, Clone)]
 pub struct BackgroundTasks {
     board: Arc<Mutex<TaskBoard>>,
@@ -75,11 +77,11 @@ impl BackgroundTasks {
         Self { board: Arc::default(), waker }
     }
 
-    /// Reads a scene; an earlier reading that is still under way is forgotten.
+    /// Loads a scene; the result of an earlier load that is still running is dropped.
     ///
-    /// - `how`: which axis of models points up, and the image that takes the place of the environment.
-    /// - `choice`: what of a model is shown.
-    /// - `known`: the open scene, if it is read again to be shown in another way.
+    /// - `how`: up axis of models, and an image that replaces the environment.
+    /// - `choice`: which camera, time and variant of a model to show.
+    /// - `known`: the open scene, if it is loaded again to be shown differently.
     pub fn load(
         &self,
         source: SceneSource,
@@ -138,7 +140,7 @@ impl BackgroundTasks {
         });
     }
 
-    /// Builds the trees of shapes that have none; with `hasty`, those of large meshes in a hurry.
+    /// Builds the missing trees of shapes; with `hasty`, preview trees for large meshes.
     pub fn build(&self, shapes: Vec<Shape>, hasty: bool, pool: Arc<rayon::ThreadPool>) {
         self.with(|board| board.building += 1);
         let this = self.clone();
@@ -160,7 +162,7 @@ impl BackgroundTasks {
         self.spawn("firstlight trees", work, |board, _| board.building -= 1);
     }
 
-    /// Makes a mesh anew; an earlier one for the same object is forgotten.
+    /// Makes a mesh again; an earlier request for the same object is dropped.
     pub fn remake(&self, job: Remake, pool: Arc<rayon::ThreadPool>) {
         let makes_meshes = self.with(|board| {
             board.newest_remake += 1;
@@ -173,7 +175,8 @@ impl BackgroundTasks {
         }
         let this = self.clone();
         let work = move || {
-            // A slider asks faster than meshes are made: what is outdated before it began is not begun.
+            // A slider sends requests faster than meshes are made: requests that are outdated by then are never
+            // started.
             std::thread::sleep(std::time::Duration::from_millis(30));
             let mut base = this.with(|board| board.base.take());
             while let Some((number, job)) = this.with(TaskBoard::next_remake) {
@@ -195,23 +198,23 @@ impl BackgroundTasks {
         });
     }
 
-    /// What the mesh of an object is about to become.
+    /// The pending request for the mesh of an object.
     pub fn wanted(&self, entity: Entity) -> Option<Remake> {
         let is_it = |job: &Remake| job.for_whom == ForWhom::Object(entity);
         self.with(|board| board.remaking.iter().map(|(_, job)| job).find(|job| is_it(job)).cloned())
     }
 
-    /// Forgets the newest mesh that is wanted, if it was asked for at this revision of the history or later; tells which.
+    /// Drops and returns the newest request for a mesh, if it was made at this revision of the history or later.
     pub fn forget_mesh(&self, since: u64) -> Option<Remake> {
         self.with(|board| board.remaking.pop_if(|(_, job)| job.revision >= since)).map(|(_, job)| job)
     }
 
-    /// What the mesh that comes next is, for people.
+    /// Title of the mesh that is being made, for messages.
     pub fn mesh_in_the_making(&self) -> Option<String> {
         self.with(|board| board.mesh_in_the_making())
     }
 
-    /// Reads a picture for a material.
+    /// Reads an image for a material.
     pub fn read_picture(&self, entity: Entity, part: TextureSource, path: PathBuf) {
         self.with(|board| board.reading += 1);
         let this = self.clone();
@@ -235,12 +238,12 @@ impl BackgroundTasks {
         })
     }
 
-    /// What has come in since the last call.
+    /// Returns the results since the last call.
     pub fn take(&self) -> Vec<Finished> {
         self.with(|board| std::mem::take(&mut board.finished))
     }
 
-    /// What is being read or built now, for people.
+    /// What is being loaded or built now, for messages.
     pub fn progress(&self) -> Option<String> {
         self.with(|board| {
             let building = (board.building > 0).then(|| "building a kd-tree".to_owned());
@@ -248,12 +251,12 @@ impl BackgroundTasks {
         })
     }
 
-    /// Whether a scene is being read.
+    /// Whether a scene is being loaded.
     pub fn is_loading(&self) -> bool {
         self.with(|board| board.progress.is_some())
     }
 
-    /// Nothing is under way and nothing waits to be taken.
+    /// Whether nothing is running and no result is waiting.
     pub fn is_idle(&self) -> bool {
         self.with(|board| {
             let rests = board.progress.is_none() && board.building == 0 && board.remaking.is_empty();
@@ -278,7 +281,7 @@ impl BackgroundTasks {
     }
 }
 
-/// A bug in a reader or a builder becomes a message; the picture stays.
+/// Converts a panic of a reader or a builder to an error message.
 fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());

@@ -1,22 +1,22 @@
-//! Ways of a camera, one view a frame: around what it looks at, or from bookmark to bookmark.
+//! Camera paths, one view per frame: a turntable, or an interpolation of bookmarks.
 
 use super::navigation::{Rig, Turning, orbit};
 use crate::scene::{Lens, Projection, View};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::TAU;
 
-/// Once around the pivot in `n` views, the first as it is; the horizon stays level, and the last is followed by the
-/// first without a jump.
+/// Returns `n` views of one orbit around the pivot, the first unchanged; the horizon stays level, and the sequence
+/// loops without a jump.
 pub fn turntable(start: &Rig, n: u32) -> Vec<Rig> {
     let view = |i: u32| orbit(&start.view, TAU * f64::from(i) / f64::from(n), 0.0, Turning::Turntable);
-    // Even a turn by nothing would round.
+    // Even a rotation by zero would round.
     (0..n).map(|i| if i == 0 { *start } else { Rig { view: view(i), ..*start } }).collect()
 }
 
-/// `n` views from the first stop through all others to the last; the same time from each to the next.
+/// Returns `n` views from the first stop through all others to the last, with the same time between stops.
 ///
-/// The camera follows a Catmull-Rom spline, directions the shortest arc (slerp), distances and the angle of view change by
-/// equal factors, the focal distance evenly in its reciprocal, so that it may be infinite.
+/// The camera position follows a Catmull-Rom spline, directions are interpolated by slerp, distances and the field of
+/// view geometrically, and the focus distance linearly in its reciprocal, so that it may be infinite.
 pub fn along(stops: &[Rig], n: u32) -> Vec<Rig> {
     let Some(last) = stops.len().checked_sub(1) else { return Vec::new() };
     (0..n)
@@ -28,10 +28,10 @@ pub fn along(stops: &[Rig], n: u32) -> Vec<Rig> {
         .collect()
 }
 
-/// On the way from stop `leg` to the next, `t` in 0..=1.
+/// Interpolates from stop `leg` to the next, `t` in 0..=1.
 fn between(stops: &[Rig], leg: usize, t: f64) -> Rig {
     let (a, b) = (&stops[leg], &stops[(leg + 1).min(stops.len() - 1)]);
-    // Stops come back to the last bit.
+    // Stops are returned exactly.
     if t == 0.0 || t == 1.0 {
         return if t == 0.0 { *a } else { *b };
     }
@@ -57,18 +57,19 @@ fn between(stops: &[Rig], leg: usize, t: f64) -> Rig {
     let heights = a.projection.orthographic_height.zip(b.projection.orthographic_height);
     let projection = Projection {
         vfov_deg: by_factor(a.projection.vfov_deg, b.projection.vfov_deg),
-        // From perspective to parallel rays there is no way between: the first stop counts.
+        // Perspective and orthographic cameras cannot be interpolated: the first stop's kind is used.
         orthographic_height: heights.map_or(a.projection.orthographic_height, |(a, b)| Some(by_factor(a, b))),
     };
     Rig { view: view.orthonormalized(), projection, lens }
 }
 
-/// From looking along −Z with +Y up.
+/// Rotation of a view relative to one along −Z with +Y up.
 fn rotation(view: &View) -> DQuat {
     DQuat::from_mat3(&DMat3::from_cols(view.right(), view.up, -view.forward)).normalize()
 }
 
-/// Catmull and Rom 1974: from `b` to `c`, with the directions at both ends from their neighbours.
+/// Catmull-Rom interpolation from `b` to `c` (Catmull and Rom 1974); the tangents at both ends come from their
+/// neighbours.
 fn catmull_rom(a: DVec3, b: DVec3, c: DVec3, d: DVec3, t: f64) -> DVec3 {
     let (out, into) = (0.5 * (c - a), 0.5 * (d - b));
     let (t2, t3) = (t * t, t * t * t);
@@ -93,7 +94,7 @@ mod tests {
             assert!((view.pivot() - start.view.pivot()).length() < 1e-12);
             assert!((view.eye.y - 2.0).abs() < 1e-12 && view.right().y.abs() < 1e-12, "{view:?}");
         }
-        // Half way round, the camera is on the other side.
+        // After half of the orbit, the camera is on the opposite side.
         let opposite = 2.0 * start.view.pivot() - start.view.eye;
         assert!((views[4].view.eye - DVec3::new(opposite.x, 2.0, opposite.z)).length() < 1e-12);
     }

@@ -1,8 +1,8 @@
-//! Everything that a person can ask of a session, as data.
+//! All requests to a session, as data.
 //!
-//! A window, a script or a recording produces commands; the session carries them out, in order, at the next frame.
-//! No command depends on a clock: whoever holds a key down multiplies the rate by the seconds and sends the amount,
-//! so the same list of commands always leads to the same picture.
+//! A window, a script or a recording produces commands; the session executes them, in order, at the next frame. No
+//! command depends on a clock: the sender multiplies a rate by the time that a key is held and sends the amount, so the
+//! same list of commands always gives the same image.
 
 use super::rig::Rig;
 use super::{Bookmarks, Edit, Target};
@@ -12,20 +12,20 @@ use bevy_ecs::message::Message;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// One request. Signs follow the picture: right, up and forward are positive.
+/// One request. Directions are those of the image: right, up and forward are positive.
 ///
-/// Positions in the picture are fractions of its size, `(0, 0)` the upper left corner, `(1, 1)` the lower right, so
-/// that they mean the same at any resolution.
+/// Positions in the image are fractions of its size, `(0, 0)` the upper left corner, `(1, 1)` the lower right, so that
+/// they are independent of the resolution.
 #[derive(Clone, Debug, PartialEq, Message, Serialize, Deserialize)]
 pub enum Command {
-    /// Look about from where the camera is, degrees; positive yaw looks to the right, positive pitch upwards.
+    /// Turn the camera about its position, degrees; positive yaw turns to the right, positive pitch upwards.
     Turn {
         /// Degrees to the right.
         yaw_deg: f64,
         /// Degrees upwards.
         pitch_deg: f64,
     },
-    /// Move along the view's own axes, in strides (see [`super::navigation::stride`]), which fit the scene's size.
+    /// Move along the view's axes, in strides (see [`super::navigation::stride`]), which scale with the scene's size.
     Fly {
         /// Strides to the right.
         right: f64,
@@ -34,9 +34,9 @@ pub enum Command {
         /// Strides forward.
         forward: f64,
     },
-    /// From now on a stride is half of the way to what is at this place in the picture.
+    /// Set the stride to half of the distance to the surface at this position in the image.
     PaceAt {
-        /// Fraction of the width of the picture, from the left.
+        /// Fraction of the width of the image, from the left.
         x: f64,
         /// Fraction of its height, from the top.
         y: f64,
@@ -48,11 +48,11 @@ pub enum Command {
         /// Degrees upwards.
         pitch_deg: f64,
     },
-    /// Move sideways, in heights of the picture at the pivot: what lies there moves with the mouse.
+    /// Move sideways, in image heights at the pivot's depth: points at that depth move with the mouse.
     Pan {
-        /// Heights of the picture to the right.
+        /// Image heights to the right.
         right: f64,
-        /// Heights of the picture upwards.
+        /// Image heights upwards.
         up: f64,
     },
     /// Multiply the distance to the pivot, which stays where it is; positive.
@@ -60,24 +60,24 @@ pub enum Command {
         /// Above 1 moves away from the pivot.
         factor: f64,
     },
-    /// Multiply the size of what the picture takes in, by changing the field of view; positive.
+    /// Multiply the size of the visible area, by changing the field of view; positive.
     Zoom {
-        /// Above 1 takes in more of the scene.
+        /// Above 1 shows more of the scene.
         factor: f64,
     },
-    /// Lean the head to the right, degrees.
+    /// Roll the camera to the right, degrees.
     Roll {
         /// Degrees, positive to the right.
         angle_deg: f64,
     },
-    /// Take the roll out: the horizon is level again.
+    /// Remove the roll: the horizon is level again.
     Level,
-    /// Turn about the vertical, keeping the horizon, or freely about the picture's own axes.
+    /// Switch between turning about the vertical, which keeps the horizon, and turning freely about the image axes.
     ToggleTurntable,
-    /// The camera as it was when the scene was opened.
+    /// Restore the camera at the time when the scene was opened.
     Home,
-    /// Keep the direction, place the camera so that what is selected just fits into the picture, or else the whole scene
-    /// but for what lies far off, and focus on its middle.
+    /// Keep the direction, move the camera so that the selection just fits into the image, or else the whole scene
+    /// except for distant outliers, and focus on the centre.
     FrameAll,
     /// Set the pose of the camera.
     SetView(View),
@@ -85,9 +85,9 @@ pub enum Command {
     SetProjection(Projection),
     /// Set aperture and focus.
     SetLens(Lens),
-    /// Put the pivot at the depth of what is at this place in the picture.
+    /// Put the pivot at the depth of the surface at this position in the image.
     PivotAt {
-        /// Fraction of the width of the picture, from the left.
+        /// Fraction of the width of the image, from the left.
         x: f64,
         /// Fraction of its height, from the top.
         y: f64,
@@ -97,14 +97,14 @@ pub enum Command {
         /// Above 1 moves the focal plane away.
         factor: f64,
     },
-    /// Metres along the view axis, positive, may be infinite.
+    /// Set the focus distance: metres along the view axis, positive, may be infinite.
     SetFocus {
-        /// Distance of the focal plane.
+        /// Focus distance in metres.
         distance: f64,
     },
-    /// Put the focal plane through what is at this place in the picture.
+    /// Focus on the surface at this position in the image.
     FocusAt {
-        /// Fraction of the width of the picture, from the left.
+        /// Fraction of the width of the image, from the left.
         x: f64,
         /// Fraction of its height, from the top.
         y: f64,
@@ -114,116 +114,116 @@ pub enum Command {
         /// Above 1 blurs more.
         factor: f64,
     },
-    /// Metres, at least 0; switches depth of field on.
+    /// Set the radius of the aperture in metres, at least 0; switches depth of field on.
     SetAperture {
-        /// Radius of the aperture.
+        /// Radius of the aperture in metres.
         radius: f64,
     },
     /// Switch depth of field on or off.
     ToggleDepthOfField,
-    /// Add to the exposure, factors of two.
+    /// Add to the exposure, in stops.
     AdjustExposure {
-        /// Positive for a brighter picture.
+        /// Positive for a brighter image.
         stops: f32,
     },
-    /// Set the exposure, factors of two.
+    /// Set the exposure, in stops.
     SetExposure {
-        /// 0 shows the light as it is; positive for a brighter picture.
+        /// 0 for unscaled radiance; positive for a brighter image.
         stops: f32,
     },
     /// Set the tone curve.
     SetToneCurve(ToneCurve),
-    /// The next tone curve of the list, and after the last the first.
+    /// Set the next tone curve of the list, cyclically.
     NextToneCurve,
-    /// The size of the picture in pixels. A size without pixels (a minimised window) keeps the film and pauses.
+    /// Set the image size. A size without pixels (a minimised window) keeps the film and pauses.
     Resize {
         /// Width in pixels.
         width: u32,
         /// Height in pixels.
         height: u32,
     },
-    /// Rest until [`Command::Resume`]; what changes is still shown.
+    /// Stop rendering until [`Command::Resume`]; changes are still displayed.
     Pause,
     /// End a pause.
     Resume,
-    /// Drop all samples and begin again.
+    /// Discard all samples and restart.
     Restart,
-    /// Set the light model.
+    /// Set the integrator.
     SetIntegrator(Integrator),
-    /// Set how samples are spread over the pixels.
+    /// Set the sample allocation.
     SetAllocation(SampleAllocation),
-    /// Worker threads; 0 is one for each processor.
+    /// Set the number of worker threads.
     SetThreads {
-        /// How many; 0 for one per processor.
+        /// Number of threads; 0 for one per processor.
         threads: usize,
     },
-    /// Save the scene as a scene file; one that is there is replaced.
+    /// Save the scene as a scene file; replaces an existing file.
     SaveScene {
         /// The file to write.
         #[serde(with = "crate::scene::path_text")]
         path: PathBuf,
     },
-    /// Show the animations of the open glTF model at another moment.
+    /// Show the animations of the open glTF model at another time.
     SetMoment {
-        /// Seconds; `None` is the pose that the file stores.
+        /// Time in seconds; `None` for the stored pose.
         seconds: Option<f64>,
     },
-    /// When the picture is good enough.
+    /// Set when to stop.
     SetTarget(Target),
-    /// Nobody can see the picture: rest, without being paused.
+    /// Report that the image is not visible: rendering stops without being paused.
     SetHidden {
-        /// Whether the picture is out of sight.
+        /// Whether the image is not visible.
         hidden: bool,
     },
-    /// What is shown in place of the picture, see [`Inspection`].
+    /// Set what is displayed in place of the image, see [`Inspection`].
     SetInspection(Inspection),
-    /// Tint what is sharp, and draw the focal plane.
+    /// Tint the pixels in focus, and draw the focal plane.
     SetSharpZone {
-        /// Whether it is shown.
+        /// Whether they are displayed.
         shown: bool,
     },
-    /// Tell why what is at this place in the picture looks as it does.
+    /// Explain the pixel at this position in the image.
     ExplainAt {
-        /// Fraction of the width of the picture, from the left.
+        /// Fraction of the width of the image, from the left.
         x: f64,
         /// Fraction of its height, from the top.
         y: f64,
     },
-    /// Forget the explanation of [`Command::ExplainAt`].
+    /// Remove the explanation of [`Command::ExplainAt`].
     ForgetExplanation,
-    /// Give all samples to a part of the picture (left, top, right, bottom), or to all of it again.
+    /// Give all samples to a region of the image, or to all of it again.
     SetRegion {
-        /// Left, top, right and bottom as fractions of the picture; `None` for all of it.
+        /// Left, top, right and bottom as fractions of the image; `None` for all of it.
         region: Option<[f64; 4]>,
     },
-    /// The focal plane stays with the point that was focused on last, or moves with the camera again.
+    /// Lock the focal plane to the point that was focused on last, or to the camera again.
     ToggleFocusLock,
-    /// The focal plane goes to what is at this place in the picture, and stays with whatever comes there.
+    /// Focus on whatever is at this position in the image, continuously.
     FocusFollows {
-        /// Fraction of the width of the picture, from the left.
+        /// Fraction of the width of the image, from the left.
         x: f64,
         /// Fraction of its height, from the top.
         y: f64,
     },
-    /// Keep the view under a number from 1 to 9.
+    /// Store the view under a number from 1 to 9.
     SetBookmark {
         /// From 1 to 9.
         slot: u8,
     },
-    /// Set the camera to the view kept under a number from 1 to 9.
+    /// Set the camera to the view stored under a number from 1 to 9.
     GoToBookmark {
         /// From 1 to 9.
         slot: u8,
     },
-    /// All of them at once, as they were kept before.
+    /// Replace all bookmarks.
     SetBookmarks(Box<Bookmarks>),
-    /// To where the camera rested before.
+    /// Return to the previous position at which the camera rested.
     PreviousView,
-    /// To where the camera was before [`Command::PreviousView`].
+    /// Return to the view before [`Command::PreviousView`].
     NextView,
-    /// Change what the scene is made of.
+    /// Edit the scene.
     Edit(Edit),
-    /// Open a scene file, a model or, when there is no such file, the built-in scene of that name.
+    /// Open a scene file, a model or, if there is no such file, the built-in scene of that name.
     Open {
         /// The file, or the name of a built-in scene.
         #[serde(with = "crate::scene::path_text")]
@@ -232,18 +232,18 @@ pub enum Command {
 }
 
 impl Command {
-    /// Whether it can be carried out, whoever sends it: the same limits as those of scene files. Amounts that a camera is
-    /// moved by need none, for what makes no sense moves nothing.
+    /// Checks the values against the limits of scene files. Amounts of camera motion need no check, since invalid ones
+    /// have no effect.
     ///
     /// # Errors
-    /// When it sets something to a value that nothing is made from.
+    /// If a value is out of range.
     pub fn check(&self) -> Result<(), BadValue> {
         match self {
             Self::SetView(view) => view.check(),
             Self::SetProjection(projection) => projection.check(),
             Self::SetLens(lens) => lens.check(),
             Self::SetBookmarks(bookmarks) => bookmarks.0.iter().flatten().try_for_each(Rig::check),
-            // A window without pixels is a minimised one.
+            // A size of zero is a minimised window.
             Self::Resize { width, height } => check_film_size((*width).max(1), (*height).max(1)),
             Self::SetTarget(target) => target.check(),
             Self::SetMoment { seconds: Some(seconds) } if !seconds.is_finite() => {

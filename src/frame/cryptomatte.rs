@@ -1,31 +1,31 @@
-//! Cryptomatte 1.2: masks of objects and materials by name, as channels and attributes of an OpenEXR picture.
+//! Cryptomatte 1.2: masks of objects and materials by name, as channels and attributes of an OpenEXR image.
 //!
 //! Each pixel has pairs of an id and the share of the pixel that it covers, largest share first. An id is the
-//! MurmurHash3 of a name, as the bits of a float; the attributes say so, and a manifest leads back from ids to names
-//! (Friedman and Jones 2015, "Fully automatic ID mattes with support for motion blur and transparency").
-//! Knows no file: start reading at [`Cryptomatte`].
+//! MurmurHash3 of a name, as the bits of a float; the attributes state that, and a manifest maps names to ids (Friedman
+//! and Jones 2015, "Fully automatic ID mattes with support for motion blur and transparency"). Knows no file: start
+//! reading at [`Cryptomatte`].
 
 use crate::render::IdShares;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// Masks of one kind of things.
+/// Masks of objects or of materials.
 pub struct Cryptomatte<'a> {
-    /// Of the channels, as in `CryptoObject00.R`.
+    /// Name of the channels, as in `CryptoObject00.R`.
     pub name: &'a str,
-    /// The name of each id; those that share a name are one thing.
+    /// The name per id; ids with the same name share a mask.
     pub names: &'a [String],
-    /// Of each pixel.
+    /// Shares per pixel.
     pub shares: &'a [IdShares],
-    /// Samples of each pixel, which make all of it.
+    /// Samples per pixel, to which shares are relative.
     pub samples: u32,
 }
 
-/// Pairs of id and coverage in each group of four channels.
+/// Pairs of id and coverage per group of four channels.
 const PAIRS: usize = 2;
 
 impl Cryptomatte<'_> {
-    /// Groups of four channels, each by its name and numbers, row by row from the top.
+    /// Groups of four channels with names and values, row by row from the top.
     pub fn channels(&self) -> Vec<(String, Vec<f32>)> {
         let ids: Vec<f32> = self.names.iter().map(|name| f32::from_bits(id_of(name))).collect();
         let n_groups = IdShares::RANKS.div_ceil(PAIRS);
@@ -45,7 +45,7 @@ impl Cryptomatte<'_> {
         channels
     }
 
-    /// The ranks of a pixel with things of one name added up.
+    /// Merges the ranks of a pixel with the same name.
     fn by_name(&self, shares: &IdShares) -> [(u32, u32); IdShares::RANKS] {
         let mut ranks = shares.ranks;
         let mut n = 0;
@@ -64,7 +64,7 @@ impl Cryptomatte<'_> {
         ranks
     }
 
-    /// Attributes of the picture, each by its name.
+    /// Attributes of the image: names and values.
     pub fn attributes(&self) -> [(String, String); 4] {
         let key = format!("{:08x}", murmur3(self.name.as_bytes()))[..7].to_owned();
         let attribute = |what: &str, value: String| (format!("cryptomatte/{key}/{what}"), value);
@@ -84,7 +84,8 @@ impl Cryptomatte<'_> {
     }
 }
 
-/// The bits of the float that stands for a name: its hash, kept from being infinite, no number or denormal.
+/// Returns the bits of the float that identifies a name: its hash, modified so that it is neither infinite, NaN nor
+/// denormal.
 fn id_of(name: &str) -> u32 {
     let hash = murmur3(name.as_bytes());
     match hash >> 23 & 0xff {
@@ -93,7 +94,7 @@ fn id_of(name: &str) -> u32 {
     }
 }
 
-/// MurmurHash3 with 32 bits and seed 0 (Appleby 2011).
+/// MurmurHash3, 32 bits, seed 0 (Appleby 2011).
 fn murmur3(bytes: &[u8]) -> u32 {
     let mixed = |k: u32| k.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593);
     let mut blocks = bytes.chunks_exact(4);
@@ -118,7 +119,7 @@ fn murmur3(bytes: &[u8]) -> u32 {
 mod tests {
     use super::*;
 
-    /// Values that other implementations give.
+    /// Reference values of other implementations.
     #[test]
     fn hashes_are_those_of_everybody_else() {
         for (text, hash) in [
@@ -129,7 +130,7 @@ mod tests {
         ] {
             assert_eq!(murmur3(text.as_bytes()), hash, "{text}");
         }
-        // The example of the specification.
+        // The example in the specification.
         assert_eq!(format!("{:08x}", id_of("hello")), "248bfa47");
     }
 

@@ -1,6 +1,6 @@
-//! Why a pixel looks as it does, in the scene's own words and frame: asked for by a command, answered by the workers.
+//! Explanation of a pixel in the scene's names and world space: requested by a command, computed by the workers.
 //!
-//! The story stays until another is asked for, so that one can fly around its paths.
+//! It stays until another one is requested, so that the camera can move around its paths.
 
 use super::resources::{Clock, RenderState, Renderer};
 use super::status::{MessageKind, Status};
@@ -14,83 +14,83 @@ use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
-/// What made a pixel what it is.
+/// Explanation of a pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PixelStory {
     /// The pixel, x and y from the upper left corner of the film.
     pub pixel: UVec2,
     /// Width and height of the film in pixels.
     pub film_size: UVec2,
-    /// Numbers of the samples that were traced.
+    /// Numbers of the traced samples.
     pub samples: Range<u32>,
-    /// Samples that were not finite, and are in none of the figures.
+    /// Number of samples that were not finite; they are excluded from all figures.
     pub n_bad: usize,
-    /// The brightest first.
+    /// Contributions per light, the brightest first, W·m⁻²·sr⁻¹.
     pub lights: Vec<LightRow>,
-    /// All lights together: seen, after one bounce, after two…
+    /// Sum over all lights: directly visible, after one bounce, after two…
     pub by_bounces: Vec<DVec3>,
-    /// Light that paths ran into, W·m⁻²·sr⁻¹.
+    /// Contribution of BSDF sampling (paths that hit a light), W·m⁻²·sr⁻¹.
     pub by_itself: DVec3,
-    /// Light that vertices found by light sampling, W·m⁻²·sr⁻¹.
+    /// Contribution of light sampling, W·m⁻²·sr⁻¹.
     pub by_asking: DVec3,
-    /// What the paths found: all lights together.
+    /// Mean radiance of the paths, all lights.
     pub mean: DVec3,
     /// Standard deviation of `mean`.
     pub deviation: DVec3,
-    /// What light paths brought beside that, as far as it is known.
+    /// Additional contribution of light paths, if known.
     pub light_traced: Option<DVec3>,
     /// The path of each sample.
     pub ways: Vec<PathRecord>,
 }
 
-/// One light's part.
+/// Contribution of one light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightRow {
     /// Name of the object or light, or its kind and number.
     pub name: String,
-    /// Seen, after one bounce, after two… W·m⁻²·sr⁻¹.
+    /// Directly visible, after one bounce, after two… W·m⁻²·sr⁻¹.
     pub by_bounces: Vec<DVec3>,
 }
 
-/// One path, in the world, metres.
+/// One path, in world space, metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathRecord {
-    /// Number of the sample.
+    /// Sample number.
     pub sample: u32,
-    /// What the pixel got of it, W·m⁻²·sr⁻¹.
+    /// Contribution to the pixel, W·m⁻²·sr⁻¹.
     pub radiance: DVec3,
-    /// On the lens.
+    /// Point on the lens.
     pub origin: DVec3,
-    /// Ends of its segments, in order.
+    /// End points of its segments, in order.
     pub stops: Vec<Stop>,
 }
 
-/// The end of a segment.
+/// A vertex of a path: the end of a segment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stop {
     /// Where the segment ends.
     pub end: End,
-    /// Of light that arrives here, the share that reaches the pixel.
+    /// Path throughput from here to the pixel.
     pub throughput: DVec3,
-    /// What the pixel got of light that shines from here.
+    /// Contribution of emission at this vertex.
     pub radiance: DVec3,
-    /// Where light was asked for from here, and what the pixel got of it.
+    /// The light sample taken here, and its contribution.
     pub asked: Option<(End, DVec3)>,
 }
 
-/// A place or a direction, and what is there.
+/// End point or direction of a segment.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
     /// A point on a surface.
     At {
-        /// In the world, metres.
+        /// World position, metres.
         point: DVec3,
         /// Name of the object or light.
         what: String,
     },
-    /// Outside of the scene.
+    /// The environment.
     Sky {
-        /// Unit, from the scene outwards.
+        /// Unit direction, away from the scene.
         direction: DVec3,
     },
 }
@@ -101,29 +101,29 @@ impl LightRow {
         self.by_bounces.iter().sum()
     }
 
-    /// Seen directly, after one bounce, after more.
+    /// Directly visible, after one bounce, after more.
     pub fn parts(&self) -> [DVec3; 3] {
         parts(&self.by_bounces)
     }
 }
 
-/// Seen directly, after one bounce, after more.
+/// Directly visible, after one bounce, after more.
 fn parts(by_bounces: &[DVec3]) -> [DVec3; 3] {
     let at = |bounces: usize| by_bounces.get(bounces).copied().unwrap_or_default();
     [at(0), at(1), by_bounces.iter().skip(2).sum()]
 }
 
-/// How the objects of a snapshot are called, and where its frame is.
+/// Names of the objects of a snapshot, and its origin.
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotNames {
     origin: DVec3,
     names: Vec<String>,
-    /// Of lights without size.
+    /// Names of delta lights.
     lights: Vec<String>,
 }
 
 impl SnapshotNames {
-    /// The names of the objects and lights of an extraction, looked up in the inputs that it was made from.
+    /// Collects the names of the objects and lights of an extraction from the inputs that it was made from.
     pub fn of(extraction: &Extraction, inputs: &SceneInputs) -> Self {
         let objects: BTreeMap<_, _> = inputs.objects.iter().map(|object| (object.entity, object)).collect();
         let lights: BTreeMap<_, _> = inputs.lights.iter().map(|light| (light.entity, light)).collect();
@@ -139,7 +139,7 @@ impl SnapshotNames {
         Self { origin: extraction.origin, names, lights }
     }
 
-    /// Of all objects, by their index.
+    /// Names of all objects by index.
     pub fn objects(&self) -> &[String] {
         &self.names
     }
@@ -175,7 +175,7 @@ impl SnapshotNames {
 }
 
 impl PixelStory {
-    /// The story of an explanation, in the world and with the names of its objects.
+    /// Converts an explanation to world space, with the names of its objects.
     pub fn new(explanation: &Explanation, light_traced: Option<DVec3>, names: &SnapshotNames) -> Self {
         let contributions = explanation.contributions();
         let mut by_light: BTreeMap<LightSource, Vec<DVec3>> = BTreeMap::new();
@@ -226,12 +226,12 @@ impl PixelStory {
         }
     }
 
-    /// With what light paths brought.
+    /// Mean radiance including light paths.
     pub fn total(&self) -> DVec3 {
         self.mean + self.light_traced.unwrap_or_default()
     }
 
-    /// Seen directly, after one bounce, after more.
+    /// Directly visible, after one bounce, after more.
     pub fn parts(&self) -> [DVec3; 3] {
         parts(&self.by_bounces)
     }
@@ -242,19 +242,19 @@ pub fn brightness(radiance: DVec3) -> f64 {
     radiance.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// What is being explained.
+/// State of pixel explanations.
 #[derive(Resource, Default)]
 pub struct Explaining {
-    /// A place that is to be explained: fractions of the picture.
+    /// The requested position, in fractions of the image.
     pub(super) wanted: Option<(f64, f64)>,
     waiting: Option<Waiting>,
-    /// The last answer, until another question is asked or it is forgotten.
+    /// The last answer, until another question is asked or it is removed.
     pub story: Option<PixelStory>,
 }
 
-/// A question that is under way.
+/// A pending question.
 struct Waiting {
-    // A receiver cannot be shared between threads by itself, and a resource must be.
+    // A receiver is not `Sync`, but a resource must be.
     answer: Mutex<Receiver<Answer>>,
     generation: u64,
     names: SnapshotNames,
@@ -262,7 +262,7 @@ struct Waiting {
 }
 
 impl Explaining {
-    /// How many samples of a pixel are told.
+    /// Number of samples that are explained.
     pub const SAMPLES: u32 = 64;
 
     pub(super) fn is_idle(&self) -> bool {
@@ -274,9 +274,10 @@ impl Explaining {
     }
 }
 
-/// Asks the workers, and takes their answer.
+/// Sends questions to the workers, and takes their answers.
 ///
-/// Reads [`RenderState`]; writes [`Explaining`], [`Status`], and to the [`Renderer`]. Runs after they got their job.
+/// Reads [`RenderState`]; writes [`Explaining`], [`Status`], and to the [`Renderer`]. Runs after the workers got their
+/// job.
 pub fn explain_pixel(
     shown: Res<RenderState>,
     renderer: Res<Renderer>,
@@ -297,7 +298,7 @@ pub fn explain_pixel(
             }
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => {
-                // The view has changed in between: the same place in the new one.
+                // The view has changed meanwhile: asks again for the same position in the new one.
                 let outdated = waiting.generation != shown.generation();
                 explaining.wanted = explaining.wanted.or(outdated.then_some(waiting.place));
                 explaining.waiting = None;

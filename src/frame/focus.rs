@@ -1,4 +1,4 @@
-//! What is sharp: the zone of a lens, and a focal plane that stays with what was focused on.
+//! Focus: the zone of acceptable sharpness, and a focal plane that follows a point.
 
 use super::navigation::focus_at;
 use super::resources::{PictureSize, RenderState};
@@ -7,20 +7,21 @@ use crate::scene::{Lens, Ordinal, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::DVec3;
 
-/// Depths between which a lens blurs no more than asked, metres along the view axis.
+/// Range of depths with acceptable sharpness, metres along the view axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpZone {
-    /// The nearest depth that is sharp.
+    /// Nearest sharp depth.
     pub near: f64,
-    /// May be infinite.
+    /// Farthest sharp depth; may be infinite.
     pub far: f64,
 }
 
-/// Where the circle of confusion is at most one pixel of a picture so many pixels high; `None` without depth of field.
+/// Returns the depths at which the circle of confusion is at most one pixel of an image that is `height` pixels high;
+/// `None` without depth of field.
 ///
-/// A point at depth z is seen from a point o of the lens at film position x + o (1/f − 1/z), in units of the plane a
-/// metre ahead, so a lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|; by an orthographic camera at
-/// x + o (1 − z/f), in metres.
+/// A point at depth z is projected from a point o of the lens to x + o (1/f − 1/z), in units of the plane at 1 m, so a
+/// lens of radius R spreads it over a circle of diameter 2 R |1/f − 1/z|; an orthographic camera projects it to x + o
+/// (1 − z/f), in metres.
 pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<SharpZone> {
     let radius = lens.effective_radius();
     if !(radius > 0.0) {
@@ -40,63 +41,63 @@ pub fn sharp_zone(lens: &Lens, projection: &Projection, height: u32) -> Option<S
     Some(SharpZone { near: (focus + slack).recip(), far })
 }
 
-/// The number that photographers give an aperture, for a film 24 mm high and the field of view in perspective.
+/// Returns the f-number of a lens radius in metres, for a film 24 mm high and the field of view in perspective.
 pub fn f_stop(lens_radius: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * lens_radius)
 }
 
-/// The aperture as photographers write it, with two digits that mean something.
+/// Formats an f-number with two significant digits.
 pub fn f_number(stop: f64) -> String {
     format!("f/{stop:.0$}", f_number_decimals(stop))
 }
 
-/// Decimals that leave an f-number two significant digits.
+/// Number of decimals for two significant digits of an f-number.
 pub fn f_number_decimals(stop: f64) -> usize {
     if stop > 0.0 { (1.0 - stop.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 }
 }
 
-/// Metres.
+/// Returns the lens radius in metres of an f-number.
 pub fn radius_of_f_stop(f_stop: f64, projection: &Projection) -> f64 {
     focal_length(projection) / (2.0 * f_stop)
 }
 
-/// Of a lens before a film 24 mm high, metres.
+/// Focal length in metres, for a film 24 mm high.
 fn focal_length(projection: &Projection) -> f64 {
     0.012 / projection.tan_half_vfov()
 }
 
-/// What the focal plane stays with.
+/// What the focal plane follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FocusTarget {
-    /// It moves with the camera.
+    /// The camera: the focus distance is constant.
     #[default]
     Camera,
-    /// A point of the world.
+    /// A point in world space.
     Point(DVec3),
-    /// A point of an object, in the object's own space.
+    /// A point of an object, in object space.
     Object(Entity, DVec3),
-    /// Whatever is at this place of the picture, in fractions of it: the mouse.
+    /// Whatever is at this position in the image, in fractions of its size (the mouse).
     Cursor([f64; 2]),
 }
 
-/// What the focal plane stays with, and what was focused on last.
+/// State of focus tracking.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Focus {
-    /// What the focal plane stays with.
+    /// What the focal plane follows.
     pub target: FocusTarget,
-    /// What was focused on last.
+    /// The object and the point that were focused on last.
     pub last: Option<(Entity, DVec3)>,
 }
 
-/// Moves the focal plane to where its target is.
+/// Moves the focal plane to its target.
 ///
-/// Reads [`Focus`], placements and what is rendered; writes the lens of the first camera.
+/// Reads [`Focus`], placements and the rendered scene; writes the lens of the first camera.
 pub fn hold_focus(world: &mut World) {
     let point = match world.resource::<Focus>().target {
         FocusTarget::Camera => return,
         FocusTarget::Cursor(place) => match under(world, place) {
             Some(point) => point,
-            // The sky has no distance: what was sharp stays so.
+            // The environment has no distance: the focus stays.
             None => return,
         },
         FocusTarget::Point(point) => point,
@@ -121,7 +122,7 @@ pub fn hold_focus(world: &mut World) {
     }
 }
 
-/// The point at this place of the picture, as the camera is now.
+/// The point at this position in the image, for the current camera.
 fn under(world: &mut World, [x, y]: [f64; 2]) -> Option<DVec3> {
     let aspect = world.resource::<PictureSize>().aspect();
     let mut cameras = world.query::<(Entity, Option<&Ordinal>, &View, &Projection)>();
@@ -156,7 +157,7 @@ mod tests {
 
     #[test]
     fn f_stops_and_radii_say_the_same() {
-        // A lens of 50 mm at f/2 is 25 mm wide.
+        // A lens of 50 mm at f/2 has a diameter of 25 mm.
         let projection = Projection::perspective(2.0 * (12.0_f64 / 50.0).atan().to_degrees());
         assert!((f_stop(0.0125, &projection) - 2.0).abs() < 1e-12);
         assert!((radius_of_f_stop(2.0, &projection) - 0.0125).abs() < 1e-12);

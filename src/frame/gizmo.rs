@@ -1,21 +1,21 @@
-//! Handles to move, turn and scale what is selected: where they are in the window, which one the mouse is on, and what
-//! a drag of it means. Pure: no window, no world.
+//! Handles to move, rotate and scale the selection: their positions in the window, which one is under the mouse, and
+//! the effect of dragging it. Pure functions: no window, no world.
 //!
-//! A drag is measured from where it was grabbed, so its result depends on where the mouse is and not on the way there.
+//! A drag is measured from its start, so its result depends on the current mouse position only.
 
 use super::selection::Projector;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
-/// What the handles do.
+/// Effect of the handles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// Moves along axes and in planes.
     #[default]
     Move,
-    /// Turns about axes.
+    /// Rotates about axes.
     Turn,
-    /// Scales along axes or evenly.
+    /// Scales along axes or uniformly.
     Scale,
 }
 
@@ -36,72 +36,72 @@ impl Mode {
 /// A part of the gizmo that can be grabbed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handle {
-    /// Along an axis, or about it.
+    /// Move or scale along an axis, or rotate about it.
     Axis(usize),
-    /// In the plane across an axis.
+    /// Move in the plane perpendicular to an axis.
     Plane(usize),
-    /// In the plane of the picture; evenly; about the view axis.
+    /// Move in the image plane; scale uniformly; rotate about the view axis.
     Middle,
 }
 
-/// What a drag amounts to since it began.
+/// Total effect of a drag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drag {
-    /// By a vector in the world, metres.
+    /// Translation in world space, metres.
     Move(DVec3),
-    /// About an axis through the middle of the gizmo.
+    /// Rotation about an axis through the centre of the gizmo.
     Turn {
-        /// Unit, in the world.
+        /// Unit vector in world space.
         axis: DVec3,
         /// Counter-clockwise about the axis, degrees.
         angle_deg: f64,
     },
-    /// By factors along the axes of the gizmo.
+    /// Scale factors along the axes of the gizmo.
     Scale(DVec3),
 }
 
-/// The handles around a place in the world.
+/// The handles around a point in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gizmo {
-    /// What the handles do.
+    /// Effect of the handles.
     pub mode: Mode,
-    /// Where they meet, in the world, metres.
+    /// Their common centre in world space, metres.
     pub center: DVec3,
-    /// Unit: the world's axes, or for scaling the thing's own.
+    /// Unit vectors: the world's axes, or for scaling those of the selected object.
     pub axes: [DVec3; 3],
     /// Length of an axis, metres.
     pub size: f64,
 }
 
-/// What is drawn of a handle.
+/// Drawing of a handle.
 #[derive(Clone, Debug)]
 pub struct Mark {
-    /// What it is a mark of.
+    /// The handle.
     pub handle: Handle,
-    /// Places in the window.
+    /// Points in the window.
     pub line: Vec<DVec2>,
-    /// A surface rather than a line.
+    /// Whether it is an area rather than a line.
     pub filled: bool,
 }
 
-/// Length of an axis in the window, points.
+/// Length of an axis in the window, in points.
 const LENGTH: f64 = 86.0;
-/// How near the mouse must come, points.
+/// Maximum distance of the mouse from a handle, in points.
 const REACH: f64 = 8.0;
-/// Where the squares between two axes lie, as parts of the length.
+/// Range of the squares between two axes, as parts of their length.
 const SQUARE: (f64, f64) = (0.3, 0.48);
 const RING_STEPS: usize = 48;
-/// Steps of a snapped drag: degrees, and a part of the size.
+/// Steps of a snapped drag in degrees.
 const SNAP_DEG: f64 = 15.0;
 
 impl Gizmo {
-    /// As large in the window wherever it is; `None` for a place that is not in front of the camera.
+    /// Creates a gizmo of constant size in the window; `None` if `center` is not in front of the camera.
     pub fn at(center: DVec3, mode: Mode, axes: [DVec3; 3], projector: &Projector) -> Option<Self> {
         let size = LENGTH * projector.metres_at(center)?;
         size.is_normal().then_some(Self { mode, center, axes, size })
     }
 
-    /// Everything there is to draw, the farthest first in importance.
+    /// Everything to draw, the least important first.
     pub fn marks(&self, projector: &Projector) -> Vec<Mark> {
         let mut marks = Vec::new();
         let mut add = |handle, filled, points: &mut dyn Iterator<Item = DVec3>| {
@@ -137,10 +137,10 @@ impl Gizmo {
         marks
     }
 
-    /// The handle under the mouse.
+    /// Returns the handle under the mouse.
     pub fn handle_at(&self, mouse: DVec2, projector: &Projector) -> Option<Handle> {
         let distance = |mark: &Mark| match (mark.handle, mark.filled) {
-            // A ring's middle is empty space, and stays for clicking through.
+            // The centre of the rings is empty, so that clicks pass through.
             (Handle::Middle, _) if self.mode == Mode::Turn => f64::INFINITY,
             (Handle::Middle, _) => (mark.line[0] - mouse).length() - 4.0,
             (_, true) if is_inside(mouse, &mark.line) => 0.0,
@@ -154,7 +154,7 @@ impl Gizmo {
         (nearest.0 <= REACH).then_some(nearest.1)
     }
 
-    /// What dragging `handle` from one place of the window to another does; snapped to steps if so asked.
+    /// Returns the effect of dragging `handle` between two positions in the window; snapped to steps if requested.
     pub fn drag(&self, handle: Handle, from: DVec2, to: DVec2, projector: &Projector, snap: bool) -> Option<Drag> {
         let step = |value: f64, step: f64| if snap { (value / step).round() * step } else { value };
         let grid = 10f64.powf(self.size.log10().floor() - 1.0);
@@ -162,7 +162,7 @@ impl Gizmo {
         let on_plane = |normal: DVec3, place: DVec2| {
             let (from, dir) = projector.line(place);
             let t = (self.center - from).dot(normal) / dir.dot(normal);
-            // Behind the camera, or so flat that a pixel is a mile.
+            // Behind the camera, or so oblique that a pixel spans a large distance.
             let flat = dir.dot(normal).abs() < 0.02 * dir.length();
             (t > 0.0 && t.is_finite() && !flat).then(|| from + t * dir)
         };
@@ -190,7 +190,7 @@ impl Gizmo {
                         let (a, b) = (a - self.center, b - self.center);
                         a.cross(b).dot(axis).atan2(a.dot(b))
                     }
-                    // A ring seen from its edge turns by the way of the mouse around it.
+                    // A ring seen edge-on turns with the mouse movement along its tangent.
                     _ => {
                         let tangent = axis.cross(view).try_normalize()?;
                         let (a, b) =
@@ -207,7 +207,7 @@ impl Gizmo {
                 Some(Drag::Scale(factors))
             }
             (Mode::Scale, _) => {
-                // To the right and up is larger; the length of an axis doubles.
+                // Right and up increase; the length of an axis doubles the size.
                 let way = (to - from).dot(DVec2::new(1.0, -1.0)) / LENGTH;
                 Some(Drag::Scale(DVec3::splat(positive(step(way.exp2(), 0.1))?)))
             }

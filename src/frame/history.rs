@@ -1,11 +1,10 @@
-//! Undo and redo: what the world was, step by step.
+//! Undo and redo: past states of the world.
 //!
-//! Nobody has to tell what they are about to change. When a frame has touched anything, the scene is read and compared
-//! with what it was; a difference becomes a step. So commands, panels and a user's own systems can all be undone
-//! alike. A drag that goes on ([`super::Edit::Begin`] to [`super::Edit::End`]) is one step, and so is a walk of the
-//! camera between two edits.
+//! Changes need not be announced. When a frame has touched anything, the scene is read and compared with its previous
+//! state; a difference becomes a step. So commands, panels and user systems can all be undone. A continuous drag
+//! ([`super::Edit::Begin`] to [`super::Edit::End`]) is one step, and so is camera motion between two edits.
 //!
-//! States share what is equal between them, entity by entity, and meshes and pictures are shared anyway.
+//! States share equal entities, and meshes and images are shared anyway.
 
 use super::rig::Rig;
 use super::selection::Selection;
@@ -22,7 +21,7 @@ use bevy_ecs::prelude::{
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Everything of one entity that makes it a part of the scene.
+/// All components of one entity that make it part of the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct EntityState {
     name: Option<Name>,
@@ -35,7 +34,7 @@ struct EntityState {
     origin: Option<MeshOrigin>,
 }
 
-/// All that can be undone.
+/// Everything that can be undone.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct State {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
@@ -51,40 +50,40 @@ impl State {
     }
 }
 
-/// A state that can be gone back to, and what was done in it.
+/// A state that can be restored, and the description of the change.
 #[derive(Clone, Debug)]
 struct UndoStep {
     before: State,
-    /// What was selected then.
+    /// The selection at that time.
     selected: Vec<Entity>,
     label: String,
-    /// Steps of one kind that follow each other are one.
+    /// Consecutive steps with the same key are merged.
     merge: Option<String>,
 }
 
-/// What a scene file holds of a state beside the view and how it is shown.
+/// The part of a state that a scene file holds, except view and display settings.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Content {
     entities: Arc<BTreeMap<Entity, Arc<EntityState>>>,
     environment: Option<SceneEnvironment>,
 }
 
-/// The steps that can be undone and redone, and whether the scene has changes that are not saved.
+/// The steps that can be undone and redone, and whether the scene has unsaved changes.
 #[derive(Resource, Default)]
 pub struct History {
     now: Option<State>,
-    /// What was opened or saved last.
+    /// The state that was opened or saved last.
     clean: Option<Content>,
     unsaved: bool,
-    /// What was selected when that was read.
+    /// The selection at the time of `now`.
     selected: Vec<Entity>,
     undo: Vec<UndoStep>,
     redo: Vec<UndoStep>,
-    /// Grows with every change.
+    /// Increases with every change.
     revision: u64,
-    /// A change is under way; what the entities were when it began, and whether it has a step yet.
+    /// Set during a continuous change: the entities at its beginning, and whether it has a step yet.
     begun: Option<(Arc<BTreeMap<Entity, Arc<EntityState>>>, bool)>,
-    /// Nothing is read while nothing has been touched.
+    /// Whether anything was touched; otherwise the scene is not read.
     touched: bool,
     camera_touched: bool,
 }
@@ -92,17 +91,17 @@ pub struct History {
 impl History {
     const MAX_STEPS: usize = 500;
 
-    /// What the next undo takes back.
+    /// Label of the next undo.
     pub fn undo_label(&self) -> Option<&str> {
         self.undo.last().map(|step| step.label.as_str())
     }
 
-    /// What the next redo does again.
+    /// Label of the next redo.
     pub fn redo_label(&self) -> Option<&str> {
         self.redo.last().map(|step| step.label.as_str())
     }
 
-    /// Everything until [`Self::end`] is one step.
+    /// Starts a step that ends with [`Self::end`].
     pub fn begin(world: &mut World) {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
@@ -110,31 +109,31 @@ impl History {
         history.begun = Some((entities, false));
     }
 
-    /// Ends the step that [`Self::begin`] began.
+    /// Ends the step of [`Self::begin`].
     pub fn end(world: &mut World) {
         Self::remember_now(world);
         world.resource_mut::<Self>().begun = None;
     }
 
-    /// Without waiting for the end of the frame.
+    /// Records changes now instead of at the end of the frame.
     fn remember_now(world: &mut World) {
         let mut history = world.resource_mut::<Self>();
         (history.touched, history.camera_touched) = (true, true);
         remember(world);
     }
 
-    /// Whether the scene is neither what was opened nor what was saved last; the view and how it is shown do not count.
+    /// Whether the scene differs from its opened and its last saved state; view and display settings do not count.
     pub fn is_unsaved(&self) -> bool {
         self.unsaved
     }
 
-    /// For [`Self::mark_clean`].
+    /// The present content, for [`Self::mark_clean`].
     pub(super) fn content(world: &mut World) -> Content {
         Self::remember_now(world);
         world.resource::<Self>().now.as_ref().map(State::content).unwrap_or_default()
     }
 
-    /// This is on disk now.
+    /// Marks this content as saved.
     pub(super) fn mark_clean(&mut self, content: Content) {
         self.clean = Some(content);
         self.compare();
@@ -147,23 +146,23 @@ impl History {
         self.unsaved = !same || now.environment != clean.environment;
     }
 
-    /// How many changes there have been.
+    /// Number of changes so far.
     pub fn revision(world: &mut World) -> u64 {
         Self::remember_now(world);
         world.resource::<Self>().revision
     }
 
-    /// Where the entity was when the change that is under way began.
+    /// Placement of the entity at the beginning of the continuous change.
     pub fn placement_at_begin(&self, entity: Entity) -> Option<Placement> {
         self.begun.as_ref().and_then(|(entities, _)| entities.get(&entity)?.placement)
     }
 
-    /// Another scene is open: there is nothing to go back to.
+    /// Removes all steps, because another scene was opened.
     pub fn forget(&mut self) {
         *self = Self { touched: true, camera_touched: true, ..Self::default() };
     }
 
-    /// Makes the world what it was before the last step.
+    /// Undoes the last step.
     pub fn step_back(world: &mut World) -> Option<()> {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
@@ -178,7 +177,7 @@ impl History {
         Some(())
     }
 
-    /// Does again what was undone last.
+    /// Redoes the step that was undone last.
     pub fn step_on(world: &mut World) -> Option<()> {
         Self::remember_now(world);
         let mut history = world.resource_mut::<Self>();
@@ -204,7 +203,7 @@ impl History {
         }
         self.revision += 1;
         let (label, merge) = what_changed(&old, &new);
-        // Merging over a redo would lose where it came from.
+        // Merging after an undo would lose the step that can be redone.
         let goes_on = match &mut self.begun {
             Some((_, has_step)) => std::mem::replace(has_step, true),
             None => merge.is_some() && self.redo.is_empty() && self.undo.last().is_some_and(|last| last.merge == merge),
@@ -234,7 +233,7 @@ type UndoParts = Or<(
     Changed<MeshOrigin>,
 )>;
 
-/// Notes that there may be something to remember, without reading the scene.
+/// Records that something may have changed, without reading the scene.
 ///
 /// Reads change ticks; writes [`History`].
 #[allow(clippy::too_many_arguments, clippy::type_complexity)] // A system says what it reads.
@@ -267,7 +266,7 @@ pub fn notice(
     }
 }
 
-/// Reads what was touched, and keeps a step if it is not as it was.
+/// Reads what was touched, and stores a step if it has changed.
 ///
 /// Reads the scene; writes [`History`].
 pub fn remember(world: &mut World) {
@@ -328,7 +327,7 @@ fn read_entities(
     Arc::new(entities.into_iter().map(read).collect())
 }
 
-/// Makes the world `wanted`, which is `now`. Values that are as they should be are not touched.
+/// Changes the world from state `now` to state `wanted`. Equal values are not touched.
 fn restore(world: &mut World, now: &State, wanted: &State) {
     let nothing = Arc::new(EntityState::default());
     let both = now.entities.keys().chain(wanted.entities.keys());
@@ -338,7 +337,7 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
         if now.entities.get(&entity).is_some_and(|state| Arc::ptr_eq(state, target)) {
             continue;
         }
-        // What code has despawned stays away: its number may be another's by now.
+        // Despawned entities are not restored: their number may be reused.
         if world.get_entity(entity).is_err() {
             continue;
         }
@@ -369,7 +368,8 @@ fn restore(world: &mut World, now: &State, wanted: &State) {
     }
 }
 
-/// What has come is selected, as it was when it came first. Where things only went, what was `selected` before is.
+/// Selects entities that were added, as after their first addition. If entities were only removed, restores the
+/// selection `selected`.
 fn select_what_came(world: &mut World, now: &State, wanted: &State, selected: &[Entity]) {
     let is_thing = |state: &State, entity: &Entity| {
         state.entities.get(entity).is_some_and(|state| state.shape.is_some() || state.light.is_some())
@@ -398,7 +398,7 @@ fn put<T: Component<Mutability = bevy_ecs::component::Mutable> + Clone + Partial
     }
 }
 
-/// In words, and by what the step is known as one that goes on.
+/// Returns a label of the change, and the key by which it merges with following steps.
 fn what_changed(old: &State, new: &State) -> (String, Option<String>) {
     if !Arc::ptr_eq(&old.entities, &new.entities) && old.entities != new.entities {
         return what_changed_in_entities(&old.entities, &new.entities);
@@ -428,7 +428,7 @@ fn what_changed_in_entities(
         let (before, after) = (old.get(entity), new.get(entity));
         let what = match (before, after) {
             (Some(a), Some(b)) if a == b => continue,
-            // A new object and its new material are one thing.
+            // A new object and its new material are one change.
             (None, Some(b)) if !is_object(&b) && !label.is_empty() => continue,
             (None, Some(b)) => format!("add {}", name(b)),
             (Some(a), None) => format!("delete {}", name(a)),
@@ -454,7 +454,7 @@ fn what_changed_in_entities(
             }
         };
         n += 1;
-        // Objects say more than the materials that came with them.
+        // The label of an object takes precedence over that of its material.
         if label.is_empty() || after.as_ref().is_some_and(is_object) && label.starts_with("add") && n == 2 {
             label = what;
         }

@@ -1,4 +1,4 @@
-//! Carries out what a person asks for: commands become changes of components and resources.
+//! Executes commands: they become changes of components and resources.
 
 use super::Command;
 use super::background::BackgroundTasks;
@@ -22,11 +22,11 @@ use bevy_ecs::prelude::{DetectChangesMut, Entity, Mut, Query, Res, ResMut, Resou
 use bevy_ecs::system::SystemParam;
 use glam::DVec3;
 
-/// Commands that wait for the next frame, in order.
+/// Commands for the next frame, in order.
 #[derive(Resource, Default)]
 pub struct CommandQueue(pub Vec<Command>);
 
-/// Which axis of models points up; guessed when not given.
+/// Up axis of models; guessed if not given.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct ModelUp(pub Option<UpAxis>);
 
@@ -62,7 +62,7 @@ pub struct CommandParams<'w, 's> {
     up: Res<'w, ModelUp>,
 }
 
-/// Empties the queue into the world. Equal values mark nothing as changed.
+/// Executes all queued commands. Equal values mark nothing as changed.
 ///
 /// Reads [`CommandQueue`]; writes the first camera, settings, size; starts loads.
 pub fn input(mut queue: ResMut<CommandQueue>, mut desk: CommandParams) {
@@ -85,11 +85,11 @@ impl CommandParams<'_, '_> {
         if let Some(rig) = self.rig()
             && let Some(steered) = navigation::steer(&rig, &command, &surroundings)
         {
-            // Whatever a recording asks for: no further than a picture can be taken from.
+            // Limits that also hold for recordings: cameras that cannot be rendered are rejected.
             if steered.check().is_err() {
                 return;
             }
-            // Whoever moves the focal plane by hand wants it there.
+            // Focusing manually ends focus tracking.
             if steered.lens.focus_distance != rig.lens.focus_distance {
                 self.focus.set_if_neq(Focus::default());
             }
@@ -206,12 +206,12 @@ impl CommandParams<'_, '_> {
                 Err(error) => self.status.say(self.clock.0, MessageKind::Error, error.to_string()),
             },
             Command::SaveScene { path } => self.saving.requests.push(path),
-            // Everything else steers, and there is no camera to be steered.
+            // All other commands move the camera, and there is none.
             _ => {}
         }
     }
 
-    /// The parts of the first camera.
+    /// The components of the first camera.
     fn camera(&mut self) -> Option<(Mut<'_, View>, Mut<'_, Projection>, Mut<'_, Lens>)> {
         let rank = |rank: Option<&Ordinal>| rank.map_or(u32::MAX, |rank| rank.0);
         self.cameras
@@ -221,7 +221,7 @@ impl CommandParams<'_, '_> {
     }
 
     fn rig(&mut self) -> Option<Rig> {
-        // Reading through `Mut` marks nothing.
+        // Reading through `Mut` does not mark a change.
         let (view, projection, lens) = self.camera()?;
         Some(Rig { view: *view, projection: *projection, lens: *lens })
     }
@@ -251,12 +251,12 @@ impl CommandParams<'_, '_> {
         self.size.set_if_neq(size);
     }
 
-    /// What is at this place in the picture (0..1 from the upper left), if anything.
+    /// Returns what is at this position in the image (0..1 from the upper left), if anything.
     fn pick(&self, x: f64, y: f64) -> Option<Picked> {
         pick(self.shown.extraction.as_ref()?, x, y, self.size.aspect())
     }
 
-    /// Corners of the boxes of what is selected, or else of the scene.
+    /// Corners of the boxes of the selection, or else of the scene.
     fn what_to_frame(&mut self) -> Vec<DVec3> {
         let RenderState { inputs, extents, .. } = &mut *self.shown;
         let selected: Vec<DVec3> = (self.selection.0.iter())
@@ -287,7 +287,7 @@ impl CommandParams<'_, '_> {
         });
     }
 
-    /// A point of an object as something to stay focused on.
+    /// Converts a point of an object to a focus target.
     fn stuck_to(&self, entity: Entity, point: DVec3) -> FocusTarget {
         let object = self.shown.inputs.objects.iter().find(|object| object.entity == entity);
         match object.map(|object| object.placement.affine().inverse().transform_point3(point)) {

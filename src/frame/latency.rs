@@ -1,17 +1,17 @@
-//! How long something took, the latest times that it happened.
+//! Durations of the latest occurrences of an event.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// The latest thousand waits, and what most of them do not exceed.
+/// The latest thousand durations, for quantiles.
 #[derive(Clone, Debug, Default)]
 pub struct LatencyHistogram(VecDeque<Duration>);
 
 impl LatencyHistogram {
-    /// As many as a minute of steady movement has, about.
+    /// Approximately a minute of continuous motion.
     const KEPT: usize = 1000;
 
-    /// Adds a wait; beyond a thousand the oldest is dropped.
+    /// Adds a duration; beyond a thousand the oldest is dropped.
     pub fn add(&mut self, wait: Duration) {
         self.0.push_back(wait);
         if self.0.len() > Self::KEPT {
@@ -19,17 +19,17 @@ impl LatencyHistogram {
         }
     }
 
-    /// Number of waits that are kept.
+    /// Number of stored durations.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is no wait yet.
+    /// Whether there are no durations.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The wait that this share of all waits does not exceed; `None` before the first.
+    /// Returns the quantile of the durations at `share`, 0..1; `None` if there are none.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
         let mut sorted: Vec<Duration> = self.0.iter().copied().collect();
         sorted.sort_unstable();

@@ -1,9 +1,9 @@
-//! A session as a text file: what was asked for, frame by frame, and played again without a window.
+//! Recordings: the commands of a session as a text file, frame by frame, which can be replayed without a window.
 //!
-//! The first line says which scene was open, how large the picture was and which seed it had; then comes one line an
-//! event (RON), written at once, so that the file is whole up to the moment at which a program ended for whatever
-//! reason. Commands depend on no clock and sums on no order, so playing them again leads to the same picture, bit for
-//! bit, with any number of threads; times are kept for people.
+//! The first line has the scene, the image size and the seed; each further line is one event (RON), written at once, so
+//! that the file is complete up to the moment at which the program ended for any reason. Commands depend on no clock
+//! and sums on no order, so a replay gives the same image, bit for bit, with any number of threads; times are stored
+//! for information only.
 
 use super::command::Command;
 use super::input::CommandQueue;
@@ -16,20 +16,20 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// A newer program that writes something else counts this up.
+/// Format version; increased by incompatible changes.
 pub(super) const FORMAT: u32 = 1;
 
-/// The first line takes less.
+/// Maximum size of the first line in bytes.
 const HEADER_BYTES: u64 = 1 << 16;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct RecordingHeader {
     pub(super) format: u32,
-    /// Name and version.
+    /// Program name and version.
     pub(super) program: String,
     pub(super) scene: SceneWord,
-    /// `y` or `z`, where it was asked for.
+    /// Up axis, `y` or `z`, if given.
     #[serde(default)]
     pub(super) up: Option<char>,
     pub(super) width: u32,
@@ -37,7 +37,7 @@ pub(super) struct RecordingHeader {
     pub(super) seed: u32,
 }
 
-/// A built-in scene, or a file by its path from the recording.
+/// A built-in scene, or a file by its path relative to the recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum SceneWord {
     Builtin(String),
@@ -47,15 +47,15 @@ pub(super) enum SceneWord {
 /// Any other line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum RecordedLine {
-    /// In which frame, at what time (seconds), what was asked for.
+    /// Frame, time in seconds, and command.
     Do(u64, f64, Command),
-    /// A scene that was asked for took its place in this frame: its number, and its fingerprint.
+    /// A requested scene was opened in this frame: frame, its number, and its fingerprint.
     Opened(u64, u64, String),
-    /// The picture had so many samples when the session ended.
+    /// Frame and samples per pixel at the end of the session.
     End(u64, u32),
 }
 
-/// Writes down what a session is asked for.
+/// Records the commands of a session.
 #[derive(Resource, Default)]
 pub struct Recorder {
     pub(super) out: Option<(File, PathBuf)>,
@@ -67,7 +67,7 @@ pub struct Recorder {
 impl Recorder {
     pub(super) fn write(&mut self, line: &impl Serialize) {
         let Some((file, path)) = &mut self.out else { return };
-        // Plain enums, numbers and strings can always be written.
+        // Serialising plain data cannot fail.
         let text = ron::to_string(line).expect("a line is plain data") + "\n";
         if let Err(error) = file.write_all(text.as_bytes()) {
             self.trouble = Some(format!("{}: recording stopped: {error}", path.display()));
@@ -76,7 +76,7 @@ impl Recorder {
     }
 }
 
-/// Writes down what this frame is asked for; runs before the commands are carried out.
+/// Records the commands of this frame; runs before they are executed.
 ///
 /// Reads the queue of commands, [`SceneGeneration`], [`Clock`]; writes [`Recorder`].
 pub fn record(
@@ -91,7 +91,7 @@ pub fn record(
         return;
     }
     recorder.frame += 1;
-    // A scene takes its place after the commands of its frame.
+    // A scene is opened after the commands of its frame.
     if adopted.0 > recorder.adopted {
         recorder.adopted = adopted.0;
         let print = current.map_or_else(String::new, |current| current.0.content_fingerprint().to_string());
@@ -107,14 +107,14 @@ pub fn record(
     }
 }
 
-/// Whether a recording may be written here: where no file is, an empty one, or an older recording. Anything else could
-/// be a part of the scene that is about to be read.
+/// Checks that a recording may be written here: to a new file, an empty one, or an older recording. Any other file
+/// could be a part of the scene that is about to be read.
 ///
 /// # Errors
-/// When another file is there.
+/// If there is another file.
 pub fn check_recordable(path: &Path) -> Result<(), WriteError> {
     let Ok(info) = std::fs::metadata(path) else { return Ok(()) };
-    // What is no file at all is refused by the writer, in its own words.
+    // Paths that are not files are rejected by the writer.
     if !info.is_file() || info.len() == 0 {
         return Ok(());
     }
@@ -131,7 +131,7 @@ pub fn check_recordable(path: &Path) -> Result<(), WriteError> {
 }
 
 pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHeader, Vec<RecordedLine>), String> {
-    /// Bytes of one line; the longest that is written has the views of all bookmarks.
+    /// Maximum line length in bytes; the longest line that is written has the views of all bookmarks.
     const LONGEST_LINE: usize = 1 << 20;
     let failed = |reason: String| format!("{}: {reason}", path.display());
     let file = InputFile::open(path, FileKind::Recording).map_err(|error| failed(error.to_string()))?;
@@ -150,7 +150,7 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
         )));
     }
     let RecordingHeader { width, height, up, .. } = header;
-    // A window that had no size yet has it in a command.
+    // A window without a size yet sets it by a command.
     check_film_size(width.max(1), height.max(1)).map_err(|bad| format!("{}:1: {bad}", path.display()))?;
     if let Some(up) = up.filter(|up| !matches!(up, 'y' | 'z')) {
         return Err(format!("{}:1: `up` is {up:?}, but must be 'y' or 'z'", path.display()));
@@ -161,7 +161,7 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
         if stop() {
             return Err(failed(ReadError::Stopped.to_string()));
         }
-        // What follows the last line end is a line that was not written to its end, or nothing.
+        // After the last line end there is an incomplete line, or nothing.
         let is_last = lines.peek().is_none();
         let at = |reason: &dyn std::fmt::Display| format!("{}:{}: {reason}", path.display(), i + 1);
         let understood = match str::from_utf8(line) {
@@ -169,7 +169,7 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
                 return Err(at(&format!("the line is longer than {LONGEST_LINE} bytes")));
             }
             Ok(text) => match ron::from_str(text) {
-                // Written to its end, so nothing was lost, and it is wrong wherever it stands.
+                // A complete line with an invalid command is an error anywhere.
                 Ok(RecordedLine::Do(_, _, command)) if command.check().is_err() => {
                     return Err(at(&command.check().map_or_else(|bad| bad.to_string(), |()| String::new())));
                 }
@@ -179,7 +179,7 @@ pub(super) fn read(path: &Path, stop: &dyn Fn() -> bool) -> Result<(RecordingHea
         };
         match understood {
             Ok(line) => events.push(line),
-            // The program was ended while it wrote.
+            // The program ended while it wrote this line.
             Err(_) if is_last => {}
             Err(error) => return Err(error),
         }

@@ -1,8 +1,8 @@
-//! Unsaved edits, kept beside the settings for as long as they are unsaved: what a crash, a lost display or a signal leaves
-//! behind is offered at the next start.
+//! Recovery of unsaved edits: they are stored beside the settings as long as they are unsaved, and offered at the next
+//! start after a crash, a lost display or a signal.
 //!
-//! Each window has a scene file of its own and locks a file beside it while it lives. A scene whose lock can be taken was left
-//! behind. Nothing here knows a window.
+//! Each window has its own scene file and holds a lock on a file beside it. A scene whose lock is free is an orphan.
+//! Nothing here knows a window.
 
 use crate::scene::{Description, FileKind, InputFile, LoadOptions, SceneSource, load, save_scene};
 use bevy_ecs::prelude::World;
@@ -10,16 +10,16 @@ use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
-/// Keeps the edits of one window.
+/// Stores the edits of one window.
 #[derive(Debug, Default)]
 pub struct Recovery {
-    /// `None` where nothing can be kept.
+    /// `None` if nothing can be stored.
     folder: Option<PathBuf>,
     place: Option<RecoverySlot>,
     writer: Option<JoinHandle<Result<(), String>>>,
 }
 
-/// Where they are kept.
+/// The files of a window.
 #[derive(Debug)]
 struct RecoverySlot {
     scene: PathBuf,
@@ -27,13 +27,13 @@ struct RecoverySlot {
     _lock: File,
 }
 
-/// Edits that somebody has left behind.
+/// Unsaved edits of a window that no longer runs.
 #[derive(Debug)]
 pub struct LeftBehind {
-    /// What the scene was called.
+    /// Title of the scene.
     pub title: String,
     scene: PathBuf,
-    /// No other window offers them meanwhile.
+    /// Prevents other windows from offering them.
     _lock: File,
 }
 
@@ -42,17 +42,17 @@ const TITLE: &str = "title";
 const LOCK: &str = "lock";
 
 impl Recovery {
-    /// In a folder of its own in `folder`, the one for settings.
+    /// Stores edits in a subfolder of `folder`, the folder for settings.
     pub fn beside(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(|folder| folder.join("recovery")), ..Self::default() }
     }
 
-    /// Something is kept.
+    /// Whether edits are stored.
     pub fn has_kept(&self) -> bool {
         self.place.is_some()
     }
 
-    /// Writes a scene in the place of what was kept, on a thread of its own; what went wrong the last time.
+    /// Replaces the stored scene, on another thread; returns the error of the previous attempt, if any.
     pub fn keep(&mut self, description: Description, title: &str) -> Option<String> {
         let trouble = self.wait();
         let scene = match self.place() {
@@ -75,13 +75,13 @@ impl Recovery {
         }
     }
 
-    /// Until what is being kept is on disk; why it is not.
+    /// Waits until the pending write is on disk; returns its error, if any.
     pub fn wait(&mut self) -> Option<String> {
         // A panic has been printed by the thread itself.
         self.writer.take().and_then(|writer| writer.join().ok()).and_then(Result::err)
     }
 
-    /// There is nothing unsaved any more.
+    /// Removes the stored edits, because there is nothing unsaved any more.
     pub fn forget(&mut self) {
         self.wait();
         if let Some(place) = self.place.take() {
@@ -89,7 +89,7 @@ impl Recovery {
         }
     }
 
-    /// The scene file of this window; `None` where nothing can be kept.
+    /// The scene file of this window; `None` if nothing can be stored.
     fn place(&mut self) -> Result<Option<PathBuf>, String> {
         let Some(folder) = &self.folder else { return Ok(None) };
         if let Some(place) = &self.place {
@@ -100,7 +100,7 @@ impl Recovery {
         std::fs::create_dir_all(folder).map_err(failed)?;
         for number in 0..1000 {
             let scene = folder.join(format!("{}-{number}.{SCENE}", std::process::id()));
-            // What another process of this number has left behind stays.
+            // Keeps the files of an earlier process with the same id.
             if let Some(lock) = lock(&scene).map_err(failed)?.filter(|_| !scene.exists()) {
                 self.place = Some(RecoverySlot { scene: scene.clone(), _lock: lock });
                 return Ok(Some(scene));
@@ -109,7 +109,7 @@ impl Recovery {
         Err(format!("{}: unsaved edits cannot be backed up: the folder holds too many backups", folder.display()))
     }
 
-    /// What was left behind, the oldest first.
+    /// Edits of windows that no longer run, the oldest first.
     pub fn left_behind(&self) -> Vec<LeftBehind> {
         let Some(entries) = self.folder.as_ref().and_then(|folder| std::fs::read_dir(folder).ok()) else {
             return Vec::new();
@@ -128,10 +128,10 @@ impl Recovery {
 }
 
 impl LeftBehind {
-    /// Makes a scene file of it, which is not there yet; what was left behind is gone then.
+    /// Converts the edits to a new scene file and removes them.
     ///
     /// # Errors
-    /// When it cannot be read or written; then it stays.
+    /// If they cannot be read or written; then they stay.
     pub fn restore(self, to: &Path) -> Result<(), String> {
         let scene =
             load(&SceneSource::Scene(self.scene.clone()), &LoadOptions { hasty: true, ..LoadOptions::default() });
@@ -143,20 +143,20 @@ impl LeftBehind {
         Ok(())
     }
 
-    /// For good.
+    /// Removes the edits permanently.
     pub fn discard(self) {
         remove(&self.scene);
     }
 }
 
-/// The lock beside a scene file, if nobody else has it.
+/// Takes the lock beside a scene file, if it is free.
 fn lock(scene: &Path) -> std::io::Result<Option<File>> {
     let file = OpenOptions::new().create(true).truncate(false).write(true).open(scene.with_extension(LOCK))?;
     Ok(file.try_lock().is_ok().then_some(file))
 }
 
 fn remove(scene: &Path) {
-    // The scene first: without it the others mean nothing, and what cannot be removed is offered again.
+    // The scene first: without it the other files are ignored, and a scene that cannot be removed is offered again.
     for extension in [SCENE, TITLE, LOCK] {
         let _ = std::fs::remove_file(scene.with_extension(extension));
     }
@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(window.keep(description("cornell"), "cornell"), None);
         assert_eq!(window.keep(description("cornell-balls"), "my room"), None);
         assert_eq!(window.wait(), None);
-        // It lives, so another does not take it away.
+        // The window is running, so another one does not offer its edits.
         let next = Recovery::beside(Some(folder.path()));
         assert!(window.has_kept() && next.left_behind().is_empty());
         drop(window);
@@ -209,7 +209,7 @@ mod tests {
         next.left_behind().into_iter().for_each(LeftBehind::discard);
         assert!(next.left_behind().is_empty());
         assert_eq!(std::fs::read_dir(folder.path().join("recovery")).unwrap().count(), 0);
-        // Without a folder for settings nothing is kept, and nothing goes wrong.
+        // Without a folder for settings nothing is stored, and nothing fails.
         let mut nowhere = Recovery::beside(None);
         assert_eq!(nowhere.keep(description("cornell"), "cornell"), None);
         assert!(!nowhere.has_kept());

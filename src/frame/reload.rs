@@ -1,7 +1,7 @@
-//! Hot reload: when the open scene's file changes on disk, or a mesh, a material library or a picture that it points
-//! at, it is read again beside the old picture, and only what changed is read and built anew. The camera stays, unless
-//! the file says that it has moved. A file that cannot be read is a message, and the old scene stays. Another moment of a
-//! model's animations comes in the same way.
+//! Hot reload: when the open scene's file changes on disk, or a mesh, a material library or an image that it refers to,
+//! it is loaded again in the background; only changed parts are read and rebuilt. The camera stays, unless the file has
+//! moved it. A file that cannot be read gives a message, and the current scene stays. Another time of a model's
+//! animations is loaded in the same way.
 
 use super::Waker;
 use super::adopt::adopt_again;
@@ -17,30 +17,30 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// No scene when it is the same as before.
+/// No scene if it has not changed.
 type ReadAgain = Result<Option<LoadedScene>, SceneError>;
 
-/// Looks after the files of the open scene.
+/// Watches the files of the open scene.
 #[derive(Resource, Default)]
 pub struct HotReload {
     watch: Option<Watch>,
-    /// What the watch has found.
+    /// Changed files.
     changed: Arc<Mutex<Vec<PathBuf>>>,
-    /// What came of reading it again.
+    /// Result of the last reload.
     loaded: Arc<Mutex<Option<ReadAgain>>>,
     waker: Option<Waker>,
-    /// Whose files are looked after, and the scene file it is known by.
+    /// The scene whose files are watched, and the file to which it was saved.
     watched: Option<(Arc<LoadedScene>, Option<PathBuf>)>,
-    /// Which files are the reason for what is being read again.
+    /// The files that caused the current reload.
     reading: Vec<PathBuf>,
-    /// Something is being read again.
+    /// Whether a reload is running.
     busy: Arc<Mutex<bool>>,
-    /// What is on disk could not be read the last time.
+    /// Whether the last reload failed.
     failed: bool,
 }
 
 impl HotReload {
-    /// `waker` is called when a file has changed.
+    /// - `waker`: called when a file has changed.
     pub fn new(waker: Option<Waker>) -> Self {
         Self { waker, ..Self::default() }
     }
@@ -50,7 +50,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reads again what has changed on disk, and puts it into the place of the old scene.
+/// Loads changed files again, and replaces the scene by the result.
 ///
 /// Reads [`CurrentScene`]; writes the world, [`Status`].
 pub fn reload(world: &mut World) {
@@ -104,7 +104,7 @@ pub fn reload(world: &mut World) {
         let result = result.unwrap_or_else(|_| {
             Err(SceneError::in_file(source.title(), "cannot be reloaded: this is a bug in firstlight"))
         });
-        // A file that was only touched, or saved by this very session.
+        // The file was only touched, or saved by this session.
         let is_same = |scene: &LoadedScene| match saved {
             Some(saved) => scene.content_fingerprint() == saved,
             None => scene.file == current.file && scene.content_fingerprint() == current.content_fingerprint(),
@@ -120,7 +120,7 @@ pub fn reload(world: &mut World) {
     }
 }
 
-/// Begins to read the open model at the moment that is asked for, if no scene is being read.
+/// Starts to load the open model at the requested time, unless a scene is being loaded.
 fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     if world.resource::<BackgroundTasks>().is_loading() {
         return;
@@ -146,7 +146,7 @@ fn show_moment(world: &mut World, current: &Arc<LoadedScene>, now: Duration) {
     world.resource::<BackgroundTasks>().load(current.source.clone(), how, choice, aspect, pool, known);
 }
 
-/// Watches the files of the open scene, if it is another one.
+/// Watches the files of the open scene, if it has changed.
 fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<PathBuf>) {
     let mut reload = world.resource_mut::<HotReload>();
     let same = |(scene, path): &(Arc<LoadedScene>, Option<PathBuf>)| Arc::ptr_eq(scene, current) && *path == saved_as;
@@ -167,7 +167,7 @@ fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<Pa
         });
         match started {
             Ok(watch) => reload.watch = Some(watch),
-            // Everything but this goes on without.
+            // Everything else works without it.
             Err(error) => tracing::warn!("files are not watched for changes: {error}"),
         }
     }
@@ -178,7 +178,7 @@ fn look_after(world: &mut World, current: &Arc<LoadedScene>, saved_as: Option<Pa
     reload.watched = Some((current.clone(), saved_as));
 }
 
-/// Whether what the world holds is neither what was opened nor what was saved; the view does not count.
+/// Whether the world differs from the opened and the saved scene; the view does not count.
 fn has_unsaved_changes(world: &mut World, current: &LoadedScene) -> bool {
     let description = Description::of(world, Some(current));
     let now = SceneContent::of(world, &description).fingerprint();
@@ -210,7 +210,7 @@ fn take(world: &mut World, old: &LoadedScene, result: ReadAgain, now: Duration) 
     world.resource_mut::<Status>().say(now, MessageKind::Note, format!("reloaded {names} (changed on disk)"));
 }
 
-/// Files by their names alone, no more than two of them.
+/// File names without folders, at most two.
 fn names_of(paths: &[PathBuf]) -> String {
     let name = |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let mut names: Vec<String> = paths.iter().map(name).collect();

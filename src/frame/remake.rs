@@ -1,4 +1,4 @@
-//! A mesh to be made anew, and what comes of it.
+//! Requests for meshes, and their results.
 
 use crate::mesh::{Deviation, Mesh};
 use crate::scene::{MeshBase, MeshShading, MeshSource, SceneError};
@@ -7,28 +7,28 @@ use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// How far a simplified mesh is from the whole one.
+/// Deviation of a simplified mesh from the full one.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct MeshMeasure {
-    /// Triangles of the whole mesh.
+    /// Triangles of the full mesh.
     pub whole_faces: usize,
     /// Triangles of the simplified mesh.
     pub faces: usize,
-    /// Between the two surfaces; `None` for the whole one.
+    /// Deviation between the two surfaces; `None` for the full mesh.
     pub deviation: Option<Deviation>,
 }
 
-/// Points for each direction of the measured distance: its mean to about a hundredth.
+/// Sample points per direction of the measured distance: its mean is accurate to about one per cent.
 const SAMPLES: usize = 20_000;
 
-/// What is to be made.
+/// A request for a mesh.
 #[derive(Clone, Debug)]
 pub struct Remake {
     pub for_whom: ForWhom,
     pub source: MeshSource,
     pub shading: MeshShading,
     pub ratio: f64,
-    /// The state of the history that it was asked for in.
+    /// Revision of the history at the time of the request.
     pub revision: u64,
     pub folder: PathBuf,
 }
@@ -36,21 +36,21 @@ pub struct Remake {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ForWhom {
     Object(Entity),
-    /// A new object, to stand here, as large as this, metres.
+    /// A new object at this position, of this size, metres.
     NewObject {
         place: DVec3,
         size: f64,
     },
 }
 
-/// What came of it.
+/// A finished request.
 pub struct Remade {
     pub job: Remake,
     pub result: Result<(Arc<Mesh>, MeshMeasure), SceneError>,
 }
 
 impl Remake {
-    /// Does it; `base` is what the last one was made from, and then what this one was.
+    /// Makes the mesh; `base` caches the full mesh from one request to the next.
     pub fn run(&self, base: &mut Option<MeshBase>) -> Result<(Arc<Mesh>, MeshMeasure), SceneError> {
         let simplify = (self.ratio < 1.0).then_some(self.ratio);
         let known = base.take().filter(|base| base.serves(&self.source, self.shading, simplify, &self.folder));
@@ -68,7 +68,7 @@ impl Remake {
         measured
     }
 
-    /// For people.
+    /// Title for messages.
     pub fn title(&self) -> String {
         let name = self.source.name();
         match self.for_whom {

@@ -1,7 +1,7 @@
-//! Meshes made anew beside the picture: simplified, smoothed, or read for the first time.
+//! Makes meshes in the background: simplified, with other normals, or loaded for the first time.
 //!
-//! The new mesh is made from where the old one came from, by the same code that opens a scene, so that a saved scene
-//! opens with the very same triangles.
+//! The new mesh is made from its source by the same code that opens a scene, so that a saved scene opens with the same
+//! triangles.
 
 use super::background::BackgroundTasks;
 use super::history::History;
@@ -13,21 +13,21 @@ use crate::scene::{Linear, MaterialSlots, MeshOrigin, MeshShading, MeshSource, P
 use bevy_ecs::prelude::{Entity, World};
 use glam::DVec3;
 
-/// Begins to make an object's mesh anew. An earlier one of the same object that is not done yet is forgotten.
+/// Starts to make an object's mesh again. An unfinished request for the same object is dropped.
 pub fn start(world: &mut World, entity: Entity, shading: MeshShading, ratio: f64) -> Result<(), String> {
     if !(ratio > 0.0 && ratio <= 1.0) {
         return Err(format!("the ratio of faces to keep is {ratio}, but must be above 0 and at most 1"));
     }
     let origin = world.get::<MeshOrigin>(entity).ok_or("the source of this mesh is unknown")?;
     let source = origin.source.clone();
-    // A control that says again what is so, or is about to be, asks for nothing.
+    // A control that repeats the present or the pending value has no effect.
     if wanted_mesh(world, entity) != Some((shading, ratio)) {
         run(world, ForWhom::Object(entity), source, shading, ratio);
     }
     Ok(())
 }
 
-/// Begins to read a mesh that will become a new object.
+/// Starts to load a mesh that will become a new object.
 pub fn start_new(world: &mut World, source: MeshSource, place: DVec3, size: f64) {
     run(world, ForWhom::NewObject { place, size }, source, MeshShading::Auto, 1.0);
 }
@@ -40,15 +40,14 @@ fn run(world: &mut World, for_whom: ForWhom, source: MeshSource, shading: MeshSh
     world.resource::<BackgroundTasks>().remake(job, pool);
 }
 
-/// How the mesh of an object is to be shaded and what share of its faces is to be kept, also while that is still being made; `None`
-/// where it is not known where it came from.
+/// The shading and the share of faces of an object's mesh, as present or pending; `None` if its source is unknown.
 pub fn wanted_mesh(world: &World, entity: Entity) -> Option<(MeshShading, f64)> {
     let origin = world.get::<MeshOrigin>(entity)?;
     let pending = world.resource::<BackgroundTasks>().wanted(entity);
     Some(pending.map_or((origin.shading, origin.simplify.unwrap_or(1.0)), |job| (job.shading, job.ratio)))
 }
 
-/// Forgets a mesh that is still being made, if nothing was changed after it was asked for: an undo takes back the newest.
+/// Drops a pending mesh, if nothing was changed after its request: undo affects the newest change first.
 pub fn take_back(world: &mut World) -> Option<()> {
     let revision = History::revision(world);
     let job = world.resource::<BackgroundTasks>().forget_mesh(revision)?;
@@ -57,7 +56,7 @@ pub fn take_back(world: &mut World) -> Option<()> {
     Some(())
 }
 
-/// Puts a mesh that was made into the world.
+/// Puts a finished mesh into the world.
 pub fn take(world: &mut World, remade: Remade) {
     let Remade { job, result } = remade;
     let (mesh, measure) = match result {
@@ -82,7 +81,7 @@ pub fn take(world: &mut World, remade: Remade) {
             let bounds = mesh.bounds();
             let extent = f64::from((bounds.max - bounds.min).max_element()).max(f64::MIN_POSITIVE);
             let factor = 2.0 * size / extent;
-            // Its lowest point stands on the place.
+            // Its lowest point is at the position.
             let foot = mesh.center + 0.5 * (bounds.min + bounds.max).as_dvec3().with_y(2.0 * f64::from(bounds.min.y));
             let linear = Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
             let placement = Placement { translation: place - factor * foot, linear };

@@ -1,4 +1,4 @@
-//! Sessions that write down what they are asked for, and that are played again from it.
+//! Recording and replaying sessions.
 
 use super::background::BackgroundTasks;
 use super::recording::{FORMAT, RecordedLine, Recorder, RecordingHeader, SceneWord, check_recordable, read};
@@ -14,11 +14,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 impl Session {
-    /// Writes down from now on what this session is asked for; call it before the first frame, with the scene that is
-    /// opened first.
+    /// Starts recording; must be called before the first frame, with the scene that is opened first.
     ///
     /// # Errors
-    /// When the file cannot be made.
+    /// If the file cannot be created.
     pub fn record(&mut self, path: &Path, source: &SceneSource, up: Option<UpAxis>) -> Result<(), WriteError> {
         check_recordable(path)?;
         let mut out = WholeFile::claim(path, Replace::AllButFilms)?;
@@ -39,7 +38,7 @@ impl Session {
             height,
             seed: self.world().resource::<Rendering>().0.seed,
         };
-        // Only with its first line does it take the place of an older recording; the others are added one by one.
+        // Replaces an older recording only once the first line is complete; further lines are appended.
         let first = ron::to_string(&header).expect("a line is plain data") + "\n";
         out.write_all(first.as_bytes()).map_err(|error| unwritable(path, error))?;
         let file = out.finish_open()?;
@@ -47,7 +46,7 @@ impl Session {
         Ok(())
     }
 
-    /// Ends the recording with how far the picture is.
+    /// Ends the recording with the present sample count.
     pub fn end_record(&mut self) {
         let status = self.status();
         let spp = if status.divider == 1 { status.spp } else { 0 };
@@ -58,29 +57,29 @@ impl Session {
     }
 }
 
-/// What came of playing a recording.
+/// Result of a replay.
 pub struct Replayed {
-    /// As it was after the last frame; its workers rest.
+    /// The session after the last frame; its workers are idle.
     pub session: Session,
-    /// The picture at its end.
+    /// The film at its end.
     pub film: Film,
-    /// What was different from when it was recorded.
+    /// Differences from the recorded session.
     pub warnings: Vec<String>,
 }
 
-/// How to play a recording.
+/// Options of a replay.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReplayOptions {
-    /// Worker threads; one for each processor when not given.
+    /// Number of worker threads; one per processor if not given.
     pub threads: Option<usize>,
-    /// Samples per pixel at the end, in place of those of the recording.
+    /// Samples per pixel at the end, instead of those of the recording.
     pub spp: Option<u32>,
 }
 
-/// Plays a recording without a window, as fast as it goes, and renders the picture at its end.
+/// Replays a recording without a window, as fast as possible, and renders the image at its end.
 ///
 /// # Errors
-/// When it cannot be read, or its scene cannot be opened.
+/// If it cannot be read, or its scene cannot be opened.
 pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sync)) -> Result<Replayed, String> {
     let (header, lines) = read(path, stop)?;
     let failed = |reason: String| format!("{}: {reason}", path.display());
@@ -92,9 +91,9 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         }
     };
     let up = header.up.map(|up| if up == 'z' { UpAxis::Z } else { UpAxis::Y });
-    // Nobody looks at the pictures in between: the fewest samples there can be.
+    // Intermediate images are not displayed: the minimum number of samples.
     let idle = Target { spp: Some(1), ..Target::default() };
-    // Before the workers begin with a picture that there is no memory for.
+    // Checked before the workers start an image that does not fit into memory.
     drop(
         Room::for_film(header.width.max(1), header.height.max(1), false, &[])
             .map_err(|error| failed(error.to_string()))?,
@@ -104,7 +103,7 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
         height: header.height,
         threads: options.threads,
         seed: header.seed,
-        // As the window has it.
+        // As in the window.
         allocation: SampleAllocation::Adaptive(ErrorMetric::RelativeMse),
         target: idle,
         up,
@@ -152,12 +151,12 @@ pub fn replay(path: &Path, options: ReplayOptions, stop: &(dyn Fn() -> bool + Sy
 }
 
 impl Replayed {
-    /// Every file that the scene at its end was read from.
+    /// All files of the scene at the end.
     pub fn files(&self) -> Vec<PathBuf> {
         self.session.world().get_resource::<CurrentScene>().map_or_else(Vec::new, |current| current.0.files())
     }
 
-    /// How the picture is shown.
+    /// Display settings at the end.
     pub fn display(&self) -> crate::render::Display {
         self.session.world().resource::<DisplaySettings>().0
     }
@@ -169,7 +168,7 @@ struct Player {
     frame: u64,
     clock: Duration,
     warnings: Vec<String>,
-    /// How often a file was edited while it was recorded.
+    /// Number of file edits during the recording.
     edited: u64,
 }
 
@@ -181,7 +180,7 @@ impl Player {
         }
         self.clock = self.clock.max(Duration::try_from_secs_f64(at).unwrap_or_default());
         match command {
-            // Opening is part of the replay; what changes the disk, or how long it takes, is not.
+            // Opening is part of the replay; commands that change the disk or the timing are not.
             Command::SaveScene { .. } | Command::SetThreads { .. } | Command::Pause | Command::Resume => {}
             other => self.session.send(other),
         }
@@ -190,15 +189,16 @@ impl Player {
     fn update(&mut self) {
         self.session.world_mut().insert_resource(StopAt(Target { spp: Some(1), ..Target::default() }));
         self.session.update(self.clock);
-        // What an edit needs comes before the next command: a mesh that undo brings back is left out until it has a tree.
+        // Background work of an edit is finished before the next command: a mesh that undo restores is invisible until
+        // it has a tree.
         while self.session.world().resource::<BackgroundTasks>().is_editing() {
             std::thread::sleep(Duration::from_millis(2));
             self.session.update(self.clock);
         }
     }
 
-    /// Runs frames until the scene with this number is there. One that was read again because its file was edited
-    /// does not come again: the file is what it is now.
+    /// Runs frames until the scene with this number is open. A reload caused by an edited file is not repeated: the
+    /// file already has its latest contents.
     fn wait_for_scene(
         &mut self,
         frame: u64,
@@ -206,7 +206,7 @@ impl Player {
         print: &str,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), String> {
-        /// Reading a scene may take long, but not for ever.
+        /// Timeout of loading a scene.
         const PATIENCE: Duration = Duration::from_secs(600);
         self.frame = frame;
         let start = Instant::now();
@@ -236,7 +236,7 @@ impl Player {
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-        // The frame after it belongs to the commands that come next.
+        // The next frame belongs to the following commands.
         self.frame = frame + 1;
         let current = self.session.world().resource::<CurrentScene>();
         let now = current.0.content_fingerprint().to_string();
@@ -280,7 +280,7 @@ mod tests {
                 .contains("s.ron: exists and is not a recording")
         );
         assert_eq!(std::fs::read_to_string(&scene).unwrap(), text);
-        // While it is written, no other process writes it.
+        // While it is being written, no other process may write it.
         first.record(&target, &source, None).unwrap();
         let begun = std::fs::read_to_string(&target).unwrap();
         assert!(begun.lines().count() == 1 && begun.contains("File(\"s.ron\")"), "{begun}");
@@ -302,7 +302,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
     }
 
-    /// Names of any bytes are in the lines too.
+    /// File names of arbitrary bytes are recorded, too.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_command_with_a_name_that_is_no_utf_8_is_played_as_it_was_given() {

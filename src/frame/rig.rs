@@ -1,22 +1,24 @@
-//! All that a person steers.
+//! The camera as controlled by the user.
 
 use crate::scene::{BadValue, Lens, Projection, View};
 use serde::{Deserialize, Serialize};
 
-/// All that a person steers.
+/// View, projection and lens of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rig {
-    /// Where the camera stands and looks.
+    /// Pose.
     pub view: View,
-    /// Its field of view.
+    /// Field of view.
     pub projection: Projection,
-    /// Its aperture and focus.
+    /// Aperture and focus.
     pub lens: Lens,
 }
 
 impl Rig {
+    /// Checks the values.
+    ///
     /// # Errors
-    /// When no picture can be taken with it.
+    /// If no image can be rendered with them.
     pub fn check(&self) -> Result<(), BadValue> {
         self.view.check()?;
         self.projection.check()?;
@@ -24,12 +26,12 @@ impl Rig {
     }
 }
 
-/// What turning keeps.
+/// The mode of turning the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Turning {
-    /// Yaw is about the vertical and the horizon keeps its lean.
+    /// Yaw is about the vertical, and the roll is preserved.
     #[default]
     Turntable,
-    /// Yaw and pitch are about the picture's own axes, without limits.
+    /// Yaw and pitch are about the image axes, without limits.
     Free,
 }

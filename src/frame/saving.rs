@@ -1,4 +1,4 @@
-//! Saves the open scene beside the picture: the world is described in the frame, and written on a thread of its own.
+//! Saves the open scene in the background: the world is described within the frame, and written on another thread.
 
 use super::Waker;
 use super::background::BackgroundTasks;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-/// Where the open scene was saved last, and what it was then; forgotten when another is opened.
+/// File and contents of the last save of the open scene; reset when another scene is opened.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
 pub struct SavedAs {
     /// The scene file; `None` if the scene was not saved.
@@ -27,10 +27,10 @@ struct Saved {
     clean: Content,
 }
 
-/// What is to be saved, and what has been.
+/// Requests and running saves.
 #[derive(Resource, Default)]
 pub struct Saving {
-    /// Where to, for the next frame.
+    /// Files to write at the next frame.
     pub(super) requests: Vec<PathBuf>,
     finished: Arc<Mutex<Vec<Saved>>>,
     threads: Vec<JoinHandle<()>>,
@@ -38,14 +38,14 @@ pub struct Saving {
 }
 
 impl Saving {
-    /// `waker` is called when a scene has been saved, or has not.
+    /// - `waker`: called when a scene has been saved, or saving has failed.
     pub fn new(waker: Option<Waker>) -> Self {
         let mut saving = Self::default();
         saving.waker = waker;
         saving
     }
 
-    /// Nothing is asked for or under way.
+    /// Whether there is no request and no running save.
     pub fn is_idle(&self) -> bool {
         let finished = self.finished.lock().unwrap_or_else(PoisonError::into_inner);
         self.requests.is_empty() && finished.is_empty() && self.threads.iter().all(JoinHandle::is_finished)
@@ -53,7 +53,7 @@ impl Saving {
 }
 
 impl Drop for Saving {
-    /// What a person has asked to be saved is saved, even if the window closes in the same moment.
+    /// Waits for running saves, so that they complete even if the window closes.
     fn drop(&mut self) {
         for thread in self.threads.drain(..) {
             // A panic has been printed by the thread itself.
@@ -62,7 +62,7 @@ impl Drop for Saving {
     }
 }
 
-/// Saves what was asked to be saved, and tells what came of it.
+/// Executes requests to save, and reports the results.
 ///
 /// Reads the world; writes [`Saving`], [`SavedAs`], [`Status`].
 pub fn save(world: &mut World) {

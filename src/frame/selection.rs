@@ -1,4 +1,4 @@
-//! What is selected, and what lies under the mouse.
+//! Selection and picking.
 
 use super::resources::RenderState;
 use super::rig::Rig;
@@ -8,17 +8,17 @@ use crate::scene::{Extraction, LightKind, Placement, Projection, View};
 use bevy_ecs::prelude::{Entity, Resource, World};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
-/// The selected objects and lights, in the order in which they were chosen; the last one is the active one.
+/// The selected objects and lights, in the order of selection; the last one is active.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection(pub Vec<Entity>);
 
 impl Selection {
-    /// The active entity: the one chosen last.
+    /// The active entity: the last one selected.
     pub fn active(&self) -> Option<Entity> {
         self.0.last().copied()
     }
 
-    /// Alone; or with `add` beside the others, or out of them if it was the active one.
+    /// Selects the entity alone; with `add`, adds it and makes it active, or removes it if it was active.
     pub fn choose(&mut self, entity: Entity, add: bool) {
         let was_active = self.active() == Some(entity);
         match add {
@@ -33,23 +33,23 @@ impl Selection {
     }
 }
 
-/// What a place in the picture shows.
+/// Result of picking at a position in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picked {
     /// The object or light.
     pub entity: Entity,
-    /// In the world.
+    /// World position, metres.
     pub point: DVec3,
-    /// Metres along the view axis.
+    /// Depth along the view axis, metres.
     pub depth: f64,
 }
 
-/// What lies at this place of the picture (0..1 from the upper left), through the middle of the lens.
+/// Picks at a position in the image (0..1 from the upper left), through the centre of the lens.
 pub fn pick(scene: &Extraction, x: f64, y: f64, aspect: f64) -> Option<Picked> {
     hit(scene, &scene.prepared.camera, x, y, aspect)
 }
 
-/// The same for a camera that the scene has not been told of yet.
+/// Like [`pick`], for a camera that the snapshot does not have yet.
 pub fn pick_along(
     scene: &Extraction,
     view: &View,
@@ -86,7 +86,7 @@ fn middle_ray(camera: &Camera, x: f64, y: f64, aspect: f64) -> Option<Ray> {
     (ray.dir.is_finite() && ray.origin.is_finite() && ray.dir != Vec3::ZERO).then_some(ray)
 }
 
-/// The box around a thing, along its own axes.
+/// The box around an object, along its own axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnBox {
     /// Lower corner in the space of the box.
@@ -106,13 +106,13 @@ impl OwnBox {
         })
     }
 
-    /// The middle of the box in the world, metres.
+    /// The centre of the box in world space, metres.
     pub fn middle(&self) -> DVec3 {
         self.world_from_box.transform_point3(0.5 * (self.min + self.max))
     }
 }
 
-/// The box around an object or a light as it is in the picture; of what has no end, its own point.
+/// The box around an object or a light as it is rendered; for infinite ones, its reference point.
 pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
     if let Some(light) = LightKind::of(world, entity) {
         let (min, max) = (DVec3::splat(-light.radius()), DVec3::splat(light.radius()));
@@ -125,21 +125,21 @@ pub fn box_of(world: &mut World, entity: Entity) -> Option<OwnBox> {
     Some(OwnBox { min, max, world_from_box: object.placement.affine() })
 }
 
-/// From the world to the window: a camera without an aperture.
+/// Projection from the world to the window: a pinhole camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Projector {
     eye: DVec3,
     right: DVec3,
     up: DVec3,
     forward: DVec3,
-    /// Units of the window for a metre at a metre; of an orthographic camera at any distance.
+    /// Window units per metre at a depth of 1 m; for an orthographic camera at any depth.
     scale: f64,
     is_orthographic: bool,
     middle: DVec2,
 }
 
 impl Projector {
-    /// `size`: of the window, in the units in which places are wanted.
+    /// - `size`: size of the window, in the units of projected points.
     pub fn new(rig: &Rig, size: DVec2) -> Self {
         let Rig { view, projection, .. } = rig;
         Self {
@@ -153,7 +153,7 @@ impl Projector {
         }
     }
 
-    /// `None` for what is not in front of the camera.
+    /// Projects a point; `None` if it is not in front of the camera.
     pub fn place(&self, point: DVec3) -> Option<DVec2> {
         let offset = point - self.eye;
         let depth = offset.dot(self.forward);
@@ -161,10 +161,9 @@ impl Projector {
         (depth > 0.0 && place.is_finite()).then_some(place)
     }
 
-    /// The part of a line between two points that is in front of the camera.
+    /// Projects the part of a line segment that is in front of the camera.
     pub fn segment(&self, a: DVec3, b: DVec3) -> Option<[DVec2; 2]> {
-        /// A line that passes the camera is cut so far in front of it, as a part of the depth of its farther end: well
-        /// outside of any window.
+        /// Depth at which a line is clipped, relative to the depth of its farther end: well outside of any window.
         const NEAR: f64 = 1.0 / 1024.0;
         let depth = |point: DVec3| (point - self.eye).dot(self.forward);
         let (depth_a, depth_b) = (depth(a), depth(b));
@@ -177,14 +176,14 @@ impl Projector {
         Some([self.place(a)?, self.place(b)?])
     }
 
-    /// Which way a point lies that is outside of the window, from the middle of the window, unit; `None` for what is
-    /// straight behind.
+    /// Unit direction in the window from its centre towards a point outside of it; `None` if the point is directly
+    /// behind the camera.
     pub fn way_to(&self, point: DVec3) -> Option<DVec2> {
         let offset = point - self.eye;
         DVec2::new(offset.dot(self.right), -offset.dot(self.up)).try_normalize()
     }
 
-    /// Where the line begins, metres, and the direction, not unit, in which a place of the window is seen.
+    /// Returns the ray of a window position: its origin in metres, and its direction, not normalised.
     pub fn line(&self, place: DVec2) -> (DVec3, DVec3) {
         let offset = (place - self.middle) / self.scale;
         let across = offset.x * self.right - offset.y * self.up;
@@ -194,18 +193,18 @@ impl Projector {
         }
     }
 
-    /// The unit direction in which a point is seen; `None` for the place of the camera itself.
+    /// The unit direction towards a point; `None` for the camera position itself.
     pub fn towards(&self, point: DVec3) -> Option<DVec3> {
         if self.is_orthographic { Some(self.forward) } else { (point - self.eye).try_normalize() }
     }
 
-    /// How many metres a unit of the window spans where `point` is; `None` for what is not in front of the camera.
+    /// Metres per window unit at the depth of `point`; `None` if it is not in front of the camera.
     pub fn metres_at(&self, point: DVec3) -> Option<f64> {
         let depth = (point - self.eye).dot(self.forward);
         (depth > 0.0).then(|| self.metres(depth))
     }
 
-    /// Metres that a unit of the window spans at a depth.
+    /// Metres per window unit at a depth.
     fn metres(&self, depth: f64) -> f64 {
         if self.is_orthographic { self.scale.recip() } else { depth / self.scale }
     }
@@ -247,7 +246,7 @@ mod tests {
         }
         assert!((parallel.metres_at(view.pivot()).unwrap() - 3.0 / 600.0).abs() < 1e-12);
         assert_eq!(projector.place(view.eye - view.forward), None);
-        // Behind the camera and to its right is to the right.
+        // A point behind the camera and to its right is to the right.
         let behind = view.eye - 3.0 * view.forward + view.right();
         assert!((projector.way_to(behind).unwrap() - DVec2::X).length() < 1e-6);
         assert_eq!(projector.way_to(view.eye), None);
@@ -260,7 +259,7 @@ mod tests {
         let at = |right: f64, ahead: f64| view.eye + right * view.right() + ahead * view.forward;
         let [a, b] = projector.segment(at(-1.0, 4.0), at(1.0, 4.0)).unwrap();
         assert_eq!([a, b], [projector.place(at(-1.0, 4.0)).unwrap(), projector.place(at(1.0, 4.0)).unwrap()]);
-        // Straight past the camera, to the right of it: the near end is far outside, on the same line of the window.
+        // Past the camera, to its right: the near end is far outside, on the same line in the window.
         let [a, b] = projector.segment(at(1.0, 4.0), at(1.0, -4.0)).unwrap();
         assert!(a.x < 800.0 && b.x > 10_000.0 && (a.y - b.y).abs() < 1e-6, "{a} {b}");
         assert_eq!(projector.segment(at(0.0, -1.0), at(1.0, -2.0)), None);

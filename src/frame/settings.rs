@@ -1,5 +1,5 @@
-//! What the program remembers from one run to the next: settings, and the bookmarks of each scene. Small RON files in
-//! the platform's folder for settings; a file that cannot be read is set aside, said, and never stops anything.
+//! Persistent settings, and the bookmarks of each scene: small RON files in the platform's folder for settings. A file
+//! that cannot be read is renamed and reported, and never stops the program.
 
 use super::navigation::Rig;
 use crate::scene::file::DisplayPart;
@@ -13,35 +13,35 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What does not belong to a scene.
+/// Settings that do not belong to a scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
-    /// Of the window, logical pixels.
+    /// Size of the window in logical pixels.
     pub window: Option<(u32, u32)>,
-    /// Exposure and tone curve of what has none of its own, such as a model.
+    /// Exposure and tone curve for scenes without their own, such as models.
     pub display: Option<DisplayPart>,
-    /// What was opened last comes first: built-in names and whole paths.
+    /// Recently opened scenes, the latest first: built-in names and absolute paths.
     pub recent: Vec<String>,
-    /// Keys and gestures.
+    /// Key bindings and gestures.
     pub navigation: Navigation,
 }
 
-/// Whose keys and gestures the window obeys.
+/// Preset of key bindings and gestures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Navigation {
-    /// The program's own.
+    /// firstlight's own.
     #[default]
     Firstlight,
-    /// Those of Blender.
+    /// Like Blender.
     Blender,
-    /// Those of Maya.
+    /// Like Maya.
     Maya,
 }
 
 impl Navigation {
-    /// All of them, in the order of menus.
+    /// All presets, in the order of menus.
     pub const ALL: [Self; 3] = [Self::Firstlight, Self::Blender, Self::Maya];
 
     /// Name for the user.
@@ -55,10 +55,10 @@ impl Navigation {
 }
 
 impl Settings {
-    /// Scenes that are remembered.
+    /// Maximum number of recent scenes.
     pub const MAX_RECENT: usize = 16;
 
-    /// Puts a scene in front of what was opened.
+    /// Puts a scene first in the list of recent ones.
     pub fn remember(&mut self, source: &SceneSource) {
         let name = name_of(source);
         self.recent.retain(|other| *other != name);
@@ -67,17 +67,17 @@ impl Settings {
     }
 }
 
-/// The views of one scene.
+/// The bookmarks of one scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SceneBookmarks {
-    /// Built-in name or whole path, for people.
+    /// Built-in name or absolute path, for information.
     pub scene: String,
-    /// By number, 1 to 9.
+    /// Views by number, 1 to 9.
     pub views: BTreeMap<u8, Rig>,
 }
 
-/// What is read from a file that anybody may have changed.
+/// Data of files that users may have edited.
 trait Kept {
     fn check(&self) -> Result<(), BadValue>;
 }
@@ -95,49 +95,53 @@ impl Kept for SceneBookmarks {
     }
 }
 
-/// Where all of it is kept.
+/// Reads and writes settings and bookmarks.
 #[derive(Clone, Debug)]
 pub struct SettingsStore {
     folder: Option<PathBuf>,
 }
 
 impl SettingsStore {
-    /// In the platform's folder for settings; keeps nothing where there is none.
+    /// Uses the platform's folder for settings; stores nothing if there is none.
     #[cfg(feature = "cli")]
     pub fn of_platform() -> Self {
         let folders = directories::ProjectDirs::from("", "", "firstlight");
         Self { folder: folders.map(|folders| folders.config_dir().to_path_buf()) }
     }
 
-    /// In a folder of the caller's choice.
+    /// Uses a folder of the caller's choice.
     pub fn in_folder(folder: &Path) -> Self {
         Self { folder: Some(folder.to_path_buf()) }
     }
 
-    /// Where it is, if anything is kept.
+    /// The folder, if there is one.
     pub fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
-    /// Defaults when there are none; the second part says why a file could not be read.
+    /// Returns the settings, defaults if there are none, and the reason if a file could not be read.
     pub fn settings(&self) -> (Settings, Option<String>) {
         self.read("settings.ron")
     }
 
+    /// Writes the settings.
+    ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn keep_settings(&self, settings: &Settings) -> Result<(), WriteError> {
         self.write("settings.ron", settings)
     }
 
-    /// The bookmarks of a scene, none when it has none; the second part says why a file could not be read.
+    /// Returns the bookmarks of a scene, empty if there are none, and the reason if a file could not be read.
     pub fn bookmarks(&self, source: &SceneSource) -> (SceneBookmarks, Option<String>) {
         let (bookmarks, trouble): (SceneBookmarks, _) = self.read(&bookmark_file(source));
         (SceneBookmarks { scene: name_of(source), ..bookmarks }, trouble)
     }
 
+    /// Writes the bookmarks of a scene.
+    ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn keep_bookmarks(&self, source: &SceneSource, bookmarks: &SceneBookmarks) -> Result<(), WriteError> {
         let bookmarks = SceneBookmarks { scene: name_of(source), views: bookmarks.views.clone() };
         self.write(&bookmark_file(source), &bookmarks)
@@ -154,7 +158,7 @@ impl SettingsStore {
         match understood.and_then(|value| value.check().map(|()| value).map_err(|bad| format!(" {bad}"))) {
             Ok(value) => (value, None),
             Err(error) => {
-                // Set aside, so that what is in it is not lost when new settings are kept.
+                // Renamed, so that its contents are not lost when new settings are written.
                 let aside = path.with_extension("broken");
                 let kept = match std::fs::rename(&path, &aside) {
                     Ok(()) => format!("the file was renamed to {}", aside.display()),
@@ -175,7 +179,7 @@ impl SettingsStore {
             .indentor("    ")
             .depth_limit(4)
             .extensions(ron::extensions::Extensions::IMPLICIT_SOME);
-        // Plain structs, numbers and strings can always be written.
+        // Serialising plain data cannot fail.
         let text = options().to_string_pretty(value, pretty).expect("settings are plain data") + "\n";
         write_whole(&path, text.as_bytes())
     }
@@ -185,7 +189,7 @@ fn options() -> ron::Options {
     ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
 }
 
-/// The same wherever the program is started.
+/// Name of a scene that does not depend on the working directory.
 fn name_of(source: &SceneSource) -> String {
     match source {
         SceneSource::Builtin(name) => name.clone(),
@@ -195,7 +199,7 @@ fn name_of(source: &SceneSource) -> String {
     }
 }
 
-/// Scenes of one name in different folders have bookmarks of their own.
+/// File name of a scene's bookmarks; scenes of the same name in different folders have different files.
 fn bookmark_file(source: &SceneSource) -> String {
     let name = name_of(source);
     let stem = Path::new(&name).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
@@ -232,7 +236,7 @@ mod tests {
         assert!(trouble.contains("settings.ron:1:") && trouble.contains("settings.broken"), "{trouble}");
         assert_eq!(std::fs::read_to_string(path.with_extension("broken")).unwrap(), "(window: (800, ");
         assert_eq!(store.settings(), (Settings::default(), None));
-        // What a newer program knows is no reason to forget the rest.
+        // Unknown fields of a newer version do not invalidate the rest.
         std::fs::write(&path, "(window: (3, 4), theme: \"dark\")").unwrap();
         assert_eq!(store.settings().0.window, Some((3, 4)));
     }

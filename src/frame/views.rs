@@ -1,4 +1,4 @@
-//! Views to come back to: bookmarks, and the places where the camera rested.
+//! Stored views: bookmarks, and the positions at which the camera rested.
 
 use super::rig::Rig;
 use bevy_ecs::prelude::Resource;
@@ -11,19 +11,19 @@ use std::time::Duration;
 pub struct Bookmarks(pub [Option<Rig>; 9]);
 
 impl Bookmarks {
-    /// `slot` from 1 to 9.
+    /// The view under a number from 1 to 9.
     pub fn get(&self, slot: u8) -> Option<Rig> {
         *self.0.get(usize::from(slot).checked_sub(1)?)?
     }
 
-    /// Keeps a view under a number from 1 to 9; false for any other number.
+    /// Stores a view under a number from 1 to 9; false for any other number.
     pub fn set(&mut self, slot: u8, rig: Rig) -> bool {
         let place = usize::from(slot).checked_sub(1).and_then(|i| self.0.get_mut(i));
         place.map(|place| *place = Some(rig)).is_some()
     }
 }
 
-/// Where the camera rested, oldest first, and where it is among them.
+/// The views at which the camera rested, oldest first, and the current position among them.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct ViewTrail {
     back: VecDeque<Rig>,
@@ -34,18 +34,18 @@ pub struct ViewTrail {
 
 impl ViewTrail {
     const MAX: usize = 64;
-    /// A camera that stood still for so long was looked through.
+    /// Time of rest after which a view is recorded.
     const REST: Duration = Duration::from_millis(600);
 
-    /// Another scene.
+    /// Removes all views, because another scene was opened.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// To be told the camera of every frame; notes a stop when it leaves one.
+    /// Must be called with the camera of every frame; records a view when the camera leaves it.
     pub fn see(&mut self, rig: Rig, now: Duration) {
         let Some(before) = self.now.replace(rig) else { return };
-        // The lens has settings of its own; only where it stands and looks makes a view.
+        // Only pose and projection make a view; the lens has separate settings.
         if before.view == rig.view && before.projection == rig.projection {
             return;
         }
@@ -59,14 +59,14 @@ impl ViewTrail {
         self.moved_at = now;
     }
 
-    /// The stop before; the camera is taken to be there from now on.
+    /// The previous view; it becomes the current one.
     pub fn previous(&mut self) -> Option<Rig> {
         let rig = self.back.pop_back()?;
         self.ahead.extend(self.now.replace(rig));
         Some(rig)
     }
 
-    /// The stop after; the camera is taken to be there from now on.
+    /// The next view; it becomes the current one.
     pub fn forth(&mut self) -> Option<Rig> {
         let rig = self.ahead.pop()?;
         self.back.extend(self.now.replace(rig));
@@ -89,7 +89,7 @@ mod tests {
         let mut trail = ViewTrail::default();
         let ms = Duration::from_millis;
         trail.see(at(0.0), ms(0));
-        // Two seconds of rest, a flight of many frames, another rest, another flight.
+        // Two seconds of rest, motion over many frames, another rest, another motion.
         for i in 1..=50 {
             trail.see(at(f64::from(i)), ms(2000 + 16 * u64::from(i as u32)));
         }
@@ -101,7 +101,7 @@ mod tests {
         assert_eq!(trail.previous(), Some(at(0.0)));
         assert_eq!(trail.previous(), None);
         assert_eq!([trail.forth(), trail.forth(), trail.forth()], [Some(at(50.0)), Some(at(80.0)), None]);
-        // From there on a new way.
+        // New motion from there.
         trail.see(at(80.0), ms(10_000));
         trail.see(at(7.0), ms(12_000));
         assert_eq!(trail.previous(), Some(at(80.0)));

@@ -1,7 +1,7 @@
-//! Looks after files from a thread of its own, and says when one has changed and come to rest.
+//! Watches files on a separate thread, and reports when one has changed and is stable.
 //!
-//! Sizes and times of modification are compared a few times a second: that needs nothing of the system, works on every
-//! disk, and finds files that editors replace by new ones.
+//! Sizes and modification times are polled several times per second: that needs no operating system service, works on
+//! every file system, and detects files that editors replace.
 
 use crate::scene::{Stamp, stamp};
 use std::collections::BTreeMap;
@@ -10,24 +10,24 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Between two looks. A change must be the same in two looks, so that no file is read half-written.
+/// Polling interval. A change must be the same in two polls, so that no file is read half-written.
 const PAUSE: Duration = Duration::from_millis(150);
 
-/// Files under watch; dropped, it ends.
+/// A watch on files; dropping it ends the thread.
 pub struct Watch {
     sender: Option<Sender<Vec<PathBuf>>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Watch {
-    /// `changed` is told which files have changed and come to rest.
+    /// Starts watching; `changed` is called with the files that have changed and are stable.
     ///
     /// # Errors
-    /// When no thread can be started.
+    /// If no thread can be started.
     pub fn start(changed: impl Fn(Vec<PathBuf>) + Send + 'static) -> Result<Self, String> {
         let (sender, receiver) = channel::<Vec<PathBuf>>();
         let work = move || {
-            // Each with the stamp that is known, and the one that was seen last.
+            // Per file: the known stamp, and the one that was seen last.
             let mut files: BTreeMap<PathBuf, (Stamp, Stamp)> = BTreeMap::new();
             loop {
                 let news = if files.is_empty() {
@@ -73,10 +73,10 @@ impl Watch {
         Ok(Self { sender: Some(sender), thread: Some(thread) })
     }
 
-    /// Looks after these from now on, as they are now, and after no others.
+    /// Replaces the watched files; their present state is the reference.
     pub fn set(&self, paths: Vec<PathBuf>) {
         if let Some(sender) = &self.sender {
-            // The thread ends only with this.
+            // The thread ends only when the sender is dropped.
             let _ = sender.send(paths);
         }
     }
@@ -86,7 +86,7 @@ impl Drop for Watch {
     fn drop(&mut self) {
         self.sender = None;
         if let Some(thread) = self.thread.take() {
-            // A panic over there has been reported already.
+            // A panic of the thread has been reported already.
             let _ = thread.join();
         }
     }

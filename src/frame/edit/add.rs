@@ -1,7 +1,7 @@
-//! New things, copies, and removal.
+//! Adding, copying and removing objects and lights.
 //!
-//! What is removed keeps its entity and loses its components, so that an undone removal comes back as the same entity
-//! and everything that names it is right again.
+//! A removed entity stays and only loses its components, so that undo restores the same entity and all references to it
+//! are valid again.
 
 use super::spot::{self, Spot};
 use crate::frame::selection::Selection;
@@ -15,28 +15,28 @@ use bevy_ecs::prelude::{Entity, Has, World};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// What can be added. It comes to stand where `spot` finds room for it.
+/// What can be added. `spot` finds its position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NewThing {
     /// A diffuse sphere on the ground.
     Sphere,
-    /// A level, infinite plane.
+    /// A horizontal, infinite plane.
     Plane,
-    /// A glowing square above, that faces down.
+    /// An emissive square above, facing down.
     AreaLight,
     /// A point light above.
     PointLight,
-    /// A spot light above that shines straight down.
+    /// A spot light above, pointing straight down.
     SpotLight,
-    /// Parallel light from above, aslant.
+    /// Parallel light from above, at an angle.
     DirectionalLight,
     /// A diffuse cube on the ground.
     Cube,
-    /// A built-in mesh or a model file; read beside the picture.
+    /// A built-in mesh or a model file, loaded in the background.
     Mesh(MeshSource),
 }
 
-/// Whether the entity is an object or a light that stands in the scene.
+/// Whether the entity is an object or a light of the scene.
 pub fn is_thing(world: &World, entity: Entity) -> bool {
     world.get::<Shape>(entity).is_some() || LightKind::of(world, entity).is_some()
 }
@@ -64,7 +64,7 @@ pub fn add(world: &mut World, new: &NewThing) {
             let radiance = ColorParam::Rgb(Vec3::new(12.0, 11.0, 9.5));
             let material = new_material(world, "light", Material::Emissive { radiance });
             let edge = 2.0 * size;
-            // u × v looks down.
+            // u × v points down.
             let shape = Shape::Quad { edge_u: edge * DVec3::X, edge_v: edge * DVec3::Z };
             let corner =
                 place + spot::headroom(world, place, 6.0 * size) * DVec3::Y - 0.5 * edge * (DVec3::X + DVec3::Z);
@@ -117,13 +117,13 @@ pub fn add(world: &mut World, new: &NewThing) {
     world.resource_mut::<Selection>().choose(entity, false);
 }
 
-/// Evenly scaled.
+/// Scales a placement uniformly.
 pub fn sized(placement: Placement, factor: f64) -> Placement {
     let linear = crate::scene::Linear::Turned { rotation_deg: DVec3::ZERO, scale: DVec3::splat(factor) };
     Placement { linear, ..placement }
 }
 
-/// With a name that nothing else has, after everything else in the scene file.
+/// Spawns an entity with a unique name, last in the order of the scene file.
 pub fn spawn(world: &mut World, name: &str, bundle: impl bevy_ecs::bundle::Bundle) -> Entity {
     let (name, ordinal) = (free_name(world, name, false), next_ordinal(world));
     world.spawn((bundle, Name::new(name), ordinal)).id()
@@ -134,7 +134,7 @@ pub fn new_material(world: &mut World, name: &str, material: Material) -> Entity
     world.spawn((SurfaceMaterial(material), Name::new(name), ordinal)).id()
 }
 
-/// `name`, or the first of `name 2`, `name 3`, … that is free among the materials or among all else.
+/// Returns `name`, or the first of `name 2`, `name 3`, … that is free among the materials or among everything else.
 fn free_name(world: &mut World, name: &str, of_materials: bool) -> String {
     let mut named = world.query::<(&Name, Has<SurfaceMaterial>)>();
     let taken: std::collections::HashSet<String> = (named.iter(world))
@@ -156,7 +156,7 @@ pub fn delete(world: &mut World) {
     }
 }
 
-/// Takes all that makes the entity a part of the scene.
+/// Removes all components that make the entity part of the scene.
 pub fn bury(world: &mut World, entity: Entity) {
     if let Ok(mut entity) = world.get_entity_mut(entity) {
         entity.remove::<(Shape, Placement, MaterialSlots, SurfaceMaterial, MeshOrigin, Ordinal, Name)>();
@@ -171,7 +171,7 @@ pub fn duplicate(world: &mut World) {
     for entity in selected {
         let name = world.get::<Name>(entity).map_or("copy".to_owned(), |name| plain_name(name.as_str()).to_owned());
         let mut placement = world.get::<Placement>(entity).copied().unwrap_or_default();
-        // Beside the old one, or nobody would see it.
+        // Offset, because the copy would otherwise be invisible.
         placement.translation.x += step;
         let copy = spawn(world, &name, placement);
         if let Some(shape) = world.get::<Shape>(entity).cloned() {
@@ -189,7 +189,7 @@ pub fn duplicate(world: &mut World) {
     world.resource_mut::<Selection>().0 = copies;
 }
 
-/// Without the number that [`free_name`] has put behind it.
+/// Removes the number that [`free_name`] has appended.
 fn plain_name(name: &str) -> &str {
     match name.rsplit_once(' ') {
         Some((plain, number)) if !plain.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()) => plain,
@@ -197,7 +197,7 @@ fn plain_name(name: &str) -> &str {
     }
 }
 
-/// Gives `object` a copy of its first material; plain grey if it has none.
+/// Gives `object` its own copy of its first material; plain grey if it has none.
 pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
     let old = world.get::<MaterialSlots>(object).and_then(|slots| slots.0.first().copied());
     let material = old.and_then(|old| SurfaceMaterial::of(world, old)).cloned().unwrap_or(GREY);
@@ -211,7 +211,7 @@ pub fn own_material(world: &mut World, object: Entity) -> Result<(), String> {
     Ok(())
 }
 
-/// A material for things that come without one.
+/// Creates a material for objects that come without one.
 pub fn clay(world: &mut World) -> Entity {
     let clay = Material::Diffuse { albedo: ColorParam::Rgb(Vec3::new(0.72, 0.56, 0.45)) };
     new_material(world, "clay", clay)

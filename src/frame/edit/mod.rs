@@ -1,17 +1,17 @@
-//! Changing the scene itself: what can be asked for, and how it is carried out.
+//! Edits of the scene: the list of edits, and their execution.
 //!
-//! Every edit is data, so that a window, a script and a recording can ask for it, and every edit changes ordinary
-//! components, so that the smallest reset follows by itself. Nothing here knows how to undo: [`super::history`] sees
-//! what became of the world and keeps what was before.
+//! Every edit is data, so that a window, a script and a recording can request it, and every edit changes ordinary
+//! components, so that the smallest reset follows by change detection. Nothing here implements undo: [`super::history`]
+//! detects what has changed and stores the previous state.
 //!
-//! | file | what it does |
+//! | file | contents |
 //! |---|---|
-//! | `mod` | the list of edits, and the system that empties the queue |
-//! | `property` | numbers of materials, lights and shapes |
-//! | `sky` | colours, strength and turn of the surroundings |
-//! | `texture` | textures in the place of colours |
-//! | `place` | moving, turning and scaling what is selected |
-//! | `add`, `spot` | new things and where they go, copies, removal |
+//! | `mod` | the list of edits, and the system that executes the queue |
+//! | `property` | parameters of materials, lights and shapes |
+//! | `sky` | colours, strength and rotation of the environment |
+//! | `texture` | textures in place of colours |
+//! | `place` | moving, rotating and scaling the selection |
+//! | `add`, `spot` | new objects and their positions, copies, removal |
 
 mod add;
 mod place;
@@ -42,133 +42,133 @@ use serde::{Deserialize, Serialize};
 /// An entity as a number, see [`Entity::to_bits`].
 pub type Id = u64;
 
-/// One change of the scene, or of what is selected.
+/// One change of the scene, or of the selection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Edit {
-    /// Select what is at this place of the picture, fractions as in [`super::Command`]. With `add`, beside what is
-    /// selected already, or no longer.
+    /// Select what is at this position in the image, fractions as in [`super::Command`]. With `add`, adds to the
+    /// selection, or removes from it.
     PickAt {
-        /// Fraction of the width of the picture, from the left.
+        /// Fraction of the width of the image, from the left.
         x: f64,
         /// Fraction of its height, from the top.
         y: f64,
-        /// Keep what else is selected.
+        /// Keep the rest of the selection.
         add: bool,
     },
     /// Select an entity.
     Select {
         /// The entity.
         id: Id,
-        /// Keep what else is selected; deselects the entity if it is the active one.
+        /// Keep the rest of the selection; deselects the entity if it is the active one.
         add: bool,
     },
     /// Select all objects and lights.
     SelectAll,
     /// Select nothing.
     SelectNone,
-    /// All objects that use this material, directly or in a blend.
+    /// Select all objects that use this material, directly or in a blend.
     SelectUsers {
         /// The material.
         material: Id,
     },
-    /// From here to [`Edit::End`] everything is one step to undo, and [`Edit::Move`], [`Edit::Turn`] and
-    /// [`Edit::Scale`] count from here.
+    /// Start a step that ends with [`Edit::End`]: it is undone as one, and the amounts of [`Edit::Move`],
+    /// [`Edit::Turn`] and [`Edit::Scale`] are relative to its start.
     Begin,
-    /// The end of the step that [`Edit::Begin`] began.
+    /// End the step of [`Edit::Begin`].
     End,
     /// Undo the last step.
     Undo,
-    /// Do the last undone step again.
+    /// Redo the last undone step.
     Redo,
-    /// What is selected.
+    /// Remove the selection.
     Delete,
-    /// Copies of what is selected, which then are selected.
+    /// Copy the selection, and select the copies.
     Duplicate,
-    /// Add an object or a light, which then is selected.
+    /// Add an object or a light, and select it.
     Add(NewThing),
-    /// What is selected, metres in the world.
+    /// Move the selection, metres in world space.
     Move {
-        /// Along the axes of the world.
+        /// Translation in world space.
         by: DVec3,
     },
-    /// What is selected, about the middle of the last one's place; `axis` in the world.
+    /// Rotate the selection about the centre of the active entity; `axis` in world space.
     Turn {
-        /// Any length but 0.
+        /// Any length except 0.
         axis: DVec3,
         /// Counter-clockwise about the axis, degrees.
         angle_deg: f64,
     },
-    /// What is selected, about the last one's place: along its own axes if it is one, evenly if they are several or
-    /// a ball.
+    /// Scale the selection about the centre of the active entity: along its own axes if it is single, uniformly for
+    /// several entities or a sphere.
     Scale {
-        /// By axis, above 0; 1 keeps the size.
+        /// Factor per axis, above 0; 1 keeps the size.
         factors: DVec3,
     },
-    /// One number or one colour of an entity.
+    /// Set one number or one colour of an entity.
     Set {
-        /// The entity; any for what belongs to the environment.
+        /// The entity; ignored for properties of the environment.
         id: Id,
-        /// What is set.
+        /// The property.
         property: Property,
         /// The value, in the unit of the property.
         value: DVec3,
     },
-    /// Another kind of material, as near to the old one as it can be.
+    /// Change the kind of a material, keeping what both kinds have in common.
     SetKind {
         /// The material.
         id: Id,
-        /// What it becomes.
+        /// The new kind.
         kind: MaterialKind,
     },
-    /// A texture that the scene has, by name, in the place of a material's colour.
+    /// Replace a material's colour by an existing texture.
     SetTexture {
         /// The material.
         id: Id,
         /// Name of the texture.
         name: String,
     },
-    /// Puts a texture of this description in the place of a material's colour; a picture is read beside the picture.
+    /// Replace a material's colour by a texture of this description; an image is loaded in the background.
     Paint {
         /// The material.
         id: Id,
-        /// What the texture shows.
+        /// The texture.
         part: TextureSource,
     },
-    /// Gives an object a material that the scene has.
+    /// Assign an existing material to an object.
     Assign {
         /// The object.
         id: Id,
         /// The material.
         material: Id,
     },
-    /// Gives an object a copy of its material, for itself alone.
+    /// Give an object its own copy of its material.
     OwnMaterial {
         /// The object.
         id: Id,
     },
-    /// Give an entity another name.
+    /// Rename an entity.
     Rename {
         /// The entity.
         id: Id,
         /// The name.
         name: String,
     },
-    /// Makes an object's mesh anew from where it came from, beside the picture.
+    /// Make an object's mesh again from its source, in the background.
     Remesh {
         /// The object.
         id: Id,
-        /// How its normals are found.
+        /// How its normals are computed.
         shading: MeshShading,
         /// Share of the faces to keep, (0, 1].
         ratio: f64,
     },
 }
 
-/// Edits that wait for their stage of the frame, in order.
+/// Edits for the next frame, in order.
 #[derive(Resource, Default)]
 pub struct EditQueue(pub Vec<Edit>);
 
-/// Carries out the edits that were asked for.
+/// Executes the queued edits.
 ///
 /// Reads [`EditQueue`]; writes entities, [`Selection`], [`History`], [`Status`].
 pub fn edit_scene(world: &mut World) {
@@ -178,7 +178,7 @@ pub fn edit_scene(world: &mut World) {
             world.resource_mut::<Status>().say(now, MessageKind::Warning, problem);
         }
     }
-    // What is gone is not selected.
+    // Removed entities are deselected.
     let gone: Vec<Entity> =
         world.resource::<Selection>().0.iter().copied().filter(|&entity| !add::is_thing(world, entity)).collect();
     if !gone.is_empty() {
@@ -234,7 +234,7 @@ fn carry_out(world: &mut World, edit: Edit) -> Result<(), String> {
             place::displace(world, |center| place::Change::Turn { center, axis, angle_deg });
         }
         Edit::Scale { factors } => {
-            // Flat or inside out is never meant.
+            // Flat or mirrored results are never intended.
             if !(factors.is_finite() && factors.min_element() > 0.0) {
                 return Err("scale factors must be above 0".to_owned());
             }
@@ -272,7 +272,7 @@ fn existing(world: &World, id: Id) -> Result<Entity, String> {
     entity.ok_or_else(|| "the object no longer exists".to_owned())
 }
 
-/// An entity that stands in the scene.
+/// Returns an entity if it is an object or a light of the scene.
 fn thing(world: &World, id: Id) -> Result<Entity, String> {
     let entity = existing(world, id)?;
     if add::is_thing(world, entity) { Ok(entity) } else { Err("the object no longer exists".to_owned()) }

@@ -1,7 +1,7 @@
-//! Moving, turning and scaling what is selected.
+//! Moving, rotating and scaling the selection.
 //!
-//! Amounts count from the beginning of a change ([`super::Edit::Begin`]), never from the frame before, so that a long
-//! drag rounds no more than a short one, and dragging back gives back the old bits.
+//! Amounts are relative to the start of a change ([`super::Edit::Begin`]), not to the previous frame, so that a long
+//! drag rounds no more than a short one, and dragging back restores the same bits.
 
 use crate::frame::history::History;
 use crate::frame::selection::{OwnBox, Selection, box_of};
@@ -9,10 +9,10 @@ use crate::scene::{Linear, Placement, Shape};
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DMat3, DQuat, DVec3, EulerRot};
 
-/// What is to be done to a placement.
+/// A change of a placement.
 pub enum Change {
     Move(DVec3),
-    /// `axis` is unit.
+    /// `axis` is a unit vector.
     Turn {
         center: DVec3,
         axis: DVec3,
@@ -24,10 +24,10 @@ pub enum Change {
     },
 }
 
-/// Changes the placements of all that is selected; `change` is told the middle of the last one.
+/// Changes the placements of the selection; `change` gets the centre of the active entity.
 pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let selected = world.resource::<Selection>().0.clone();
-    // Several would be sheared along the axes of one, and spheres stay spheres.
+    // Several objects would be sheared along the axes of one, and spheres must stay spheres.
     let round = |entity: &Entity| matches!(world.get(*entity), Some(Shape::Sphere { .. } | Shape::Spheres(_)));
     let evenly = selected.len() > 1 || selected.iter().any(round);
     let before: Vec<_> = selected
@@ -42,14 +42,14 @@ pub fn displace(world: &mut World, change: impl Fn(DVec3) -> Change) {
     let change = change(own_box.map_or(last.translation, |own| own.middle()));
     for (entity, placement) in before {
         let changed = changed(&placement, &change, evenly);
-        // Reading first: a mutable borrow alone would mark it.
+        // Compared first: a mutable borrow alone would mark a change.
         if changed.affine().is_finite() && world.get::<Placement>(entity) != Some(&changed) {
             world.entity_mut(entity).insert(changed);
         }
     }
 }
 
-/// What is scaled `evenly` takes the factor that changes most.
+/// Returns the changed placement; with `evenly`, scales by the factor that differs most from 1.
 fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
     let Placement { translation, linear } = *placement;
     match *change {
@@ -71,13 +71,13 @@ fn changed(placement: &Placement, change: &Change, evenly: bool) -> Placement {
     }
 }
 
-/// Turned in the world, in the form in which it was given, so that its numbers stay readable.
+/// Rotates in world space and keeps the representation, so that its numbers stay readable.
 fn turned(linear: &Linear, turn: DQuat) -> Linear {
     match *linear {
         Linear::Turned { rotation_deg, scale } => {
             let DVec3 { x, y, z } = rotation_deg.map(f64::to_radians);
             let (z, y, x) = (turn * DQuat::from_euler(EulerRot::ZYX, z, y, x)).to_euler(EulerRot::ZYX);
-            // A billionth of a degree is nothing to see, and rounds away what a right angle lost on the way.
+            // A billionth of a degree is invisible, and rounding to it removes the rounding errors of right angles.
             let tidy = |angle: f64| (angle.to_degrees() * 1e9).round() / 1e9 + 0.0;
             Linear::Turned { rotation_deg: DVec3::new(x, y, z).map(tidy), scale }
         }

@@ -1,104 +1,105 @@
-//! What can be set one value at a time.
+//! Properties that can be set one at a time.
 
 use serde::{Deserialize, Serialize};
 
-/// What [`super::Edit::Set`] sets. A number is the first of the three values, and `x` is all that counts.
+/// The property of [`super::Edit::Set`]. A scalar uses the `x` component of the value only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Property {
-    /// Metres.
+    /// Position, metres.
     Translation,
-    /// Degrees about X, then Y, then Z.
+    /// Rotation, degrees about X, then Y, then Z.
     Rotation,
-    /// Factors along the axes of the object, positive.
+    /// Scale factors along the axes of the object, positive.
     Scale,
-    /// Of a sphere or of a point light, which may have none, metres.
+    /// Radius of a sphere or a point light in metres; 0 is allowed for a point light.
     Radius,
-    /// Of a point light or a spot light, W·sr⁻¹.
+    /// Radiant intensity of a point light or a spot light, W·sr⁻¹.
     Intensity,
-    /// Of a directional light, W·m⁻².
+    /// Irradiance of a directional light, W·m⁻².
     Irradiance,
-    /// Of a spot light or a directional light: where it shines before it is turned, any length but 0.
+    /// Direction of a spot light or a directional light before its rotation, any length except 0.
     Direction,
-    /// Of a spot light, degrees from its axis; stays within the outer angle.
+    /// Inner angle of a spot light, degrees from its axis; limited to the outer angle.
     InnerAngle,
-    /// Of a spot light, degrees from its axis; takes the inner angle along.
+    /// Outer angle of a spot light, degrees from its axis; limits the inner angle.
     OuterAngle,
-    /// The colour of a material: albedo, reflectance, the diffuse share of Phong, or the radiance of a light.
+    /// The colour of a material: albedo, reflectance, the diffuse reflectance of Phong, or the radiance of a light.
     Color,
-    /// GGX width, the square of what users call roughness.
+    /// GGX width alpha, the square of the user's roughness.
     Alpha,
-    /// 0: the same reflectance at every angle; else Schlick's.
+    /// 0 for the same reflectance at every angle; otherwise Schlick's approximation.
     Schlick,
     /// Index of refraction.
     Ior,
-    /// Per metre.
+    /// Absorption per metre.
     Absorption,
-    /// Of Phong: share of the ambient light that comes back, 0..1.
+    /// Phong: reflected share of the ambient light, 0..1.
     Ambient,
-    /// Of Phong: share that is mirrored, 0..1.
+    /// Phong: specular share, 0..1.
     Specular,
-    /// Of Phong: exponent of the highlights.
+    /// Phong: exponent of the highlights.
     Shininess,
-    /// Of Phong: share that is glass, 0..1.
+    /// Phong: transmitted share, 0..1.
     Transparency,
-    /// Of the second part of a blend.
+    /// Weight of the second part of a blend, 0..1.
     Weight,
-    /// Of a principled material: share of the base that is metal, 0..1.
+    /// Principled: share of the base that is metal, 0..1.
     Metallic,
-    /// Of a principled material: root of the width of its microfacets, 0..1.
+    /// Principled: roughness, the root of the GGX width, 0..1.
     Roughness,
-    /// Of a principled material: share that lets light through, 0..1.
+    /// Principled: transmitted share, 0..1.
     Transmission,
-    /// Of a principled material: whether light passes as through a pane; 0 is no.
+    /// Principled: whether it transmits like a thin pane; 0 is no.
     ThinWalled,
-    /// Of a principled material: how much wider highlights are in one direction, 0..1.
+    /// Principled: anisotropy of the highlights, 0..1.
     Anisotropy,
-    /// Of a principled material: that direction, degrees from the tangent.
+    /// Principled: direction of the anisotropy, degrees from the tangent.
     AnisotropyRotation,
-    /// Of a principled material: colour of the sheen.
+    /// Principled: colour of the sheen.
     SheenColor,
-    /// Of a principled material: root of the width of the sheen, 0..1.
+    /// Principled: roughness of the sheen, 0..1.
     SheenRoughness,
-    /// Of a principled material: share that has a coat, 0..1.
+    /// Principled: share with a clear coat, 0..1.
     Clearcoat,
-    /// Of a principled material: root of the width of the coat's microfacets, 0..1.
+    /// Principled: roughness of the clear coat, 0..1.
     ClearcoatRoughness,
-    /// Of a principled material: share that has a thin film, 0..1.
+    /// Principled: share with a thin film, 0..1.
     Iridescence,
-    /// Of a principled material: index of refraction of the film.
+    /// Principled: index of refraction of the thin film.
     FilmIor,
-    /// Of a principled material: thickness of the film, nanometres.
+    /// Principled: thickness of the thin film, nanometres.
     FilmThickness,
-    /// Of a principled material: its thickness where the map of it is 0, nanometres.
+    /// Principled: thickness of the thin film where its map is 0, nanometres.
     FilmThinnest,
-    /// Of a principled material: factor of the reflectance of its dielectric, which may be above 1.
+    /// Principled: factor of the dielectric reflectance, may be above 1.
     SpecularColor,
-    /// Of a principled material: radiance that it adds.
+    /// Principled: emitted radiance.
     Emission,
-    /// Of a principled material: share of the surface that is there, 0..1.
+    /// Principled: opacity, 0..1.
     Opacity,
-    /// Of a principled material: opacity below which the surface is not there at all; above 1 its opacity is a share.
+    /// Principled: opacity below which the surface is absent; above 1, opacity blends instead.
     OpacityCutoff,
-    /// Of a principled material: factor of the slope of its normal map.
+    /// Principled: scale of the normal map.
     NormalScale,
-    /// Of a principled material: whether its back is a surface; 0 is no.
+    /// Principled: whether its back is visible; 0 is no.
     TwoSided,
-    /// Radiance of an even sky.
+    /// Radiance of a constant environment.
     Sky,
-    /// Radiance of a gradient from straight above.
+    /// Radiance of a gradient at the zenith.
     Zenith,
-    /// Radiance of a gradient from just above the horizon.
+    /// Radiance of a gradient at the horizon.
     Horizon,
-    /// Radiance of a gradient from below the horizon.
+    /// Radiance of a gradient below the horizon.
     Ground,
-    /// The brightest channel of the sky's colours, or the factor of its picture: all others keep their proportion to it.
+    /// The brightest channel of the environment's colours, or the factor of its image; the proportions of all channels
+    /// are kept.
     SkyStrength,
-    /// Of a picture of the sky, degrees about +Y.
+    /// Rotation of an environment image, degrees about +Y.
     SkyRotation,
 }
 
 impl Property {
-    /// What sets a parameter of a material, by the parameter's name in a scene file.
+    /// Returns the property for a parameter of a material, by the parameter's name in a scene file.
     pub fn of_param(name: &str) -> Option<Self> {
         Some(match name {
             "albedo" | "reflectance" | "diffuse" | "radiance" | "base_color" => Self::Color,
@@ -134,7 +135,7 @@ impl Property {
         })
     }
 
-    /// Of the surroundings, which are no entity.
+    /// Whether it belongs to the environment, which is no entity.
     pub(super) fn is_of_sky(self) -> bool {
         use Property::{Ground, Horizon, Sky, SkyRotation, SkyStrength, Zenith};
         matches!(self, Sky | Zenith | Horizon | Ground | SkyStrength | SkyRotation)

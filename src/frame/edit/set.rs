@@ -1,4 +1,4 @@
-//! The numbers and colours of materials, lights and shapes, one at a time; those of the sky are in [`super::sky`].
+//! Sets properties of materials, lights and shapes; those of the environment are in [`super::sky`].
 
 use super::property::Property;
 use super::sky;
@@ -9,9 +9,9 @@ use crate::scene::{
 use bevy_ecs::prelude::{Entity, World};
 use glam::{DVec3, Vec3};
 
-/// Sets one property; the sky needs no entity.
+/// Sets one property; the environment needs no entity.
 pub fn set(world: &mut World, entity: Option<Entity>, property: Property, value: DVec3) -> Result<(), String> {
-    // Many of them end in single precision.
+    // Many properties are stored in single precision.
     if !value.as_vec3().is_finite() {
         return Err(format!("a number must be finite, and at most {:e}", f32::MAX));
     }
@@ -56,7 +56,8 @@ pub(super) fn set_if_different<T: bevy_ecs::component::Component + PartialEq>(
     }
 }
 
-/// `None` where the property is not of a placement. What is given as a matrix keeps its linear part.
+/// Returns the changed placement; `None` if the property does not belong to a placement. A placement given as a matrix
+/// keeps its linear part.
 fn with_placement(placement: Placement, property: Property, value: DVec3) -> Option<Placement> {
     let Placement { translation, linear } = placement;
     Some(match (property, linear) {
@@ -72,9 +73,9 @@ fn with_placement(placement: Placement, property: Property, value: DVec3) -> Opt
     })
 }
 
-/// `None` where the light has no such property, or would shine nowhere.
+/// Returns the changed light; `None` if it does not have the property, or its direction would be zero.
 fn with_property(light: LightKind, property: Property, value: DVec3) -> Option<LightKind> {
-    /// Degrees. A narrower cone has no light in `f32`.
+    /// Smallest cone in degrees; a narrower one has no power in `f32`.
     const LEAST_CONE_DEG: f64 = 0.1;
     Some(match (light, property) {
         (LightKind::Point(_) | LightKind::Spot(_), Property::Intensity)
@@ -114,7 +115,7 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
     let mut params = material.params_mut().into_iter();
     let (_, param) = params.find(|(name, _)| Property::of_param(name) == Some(property))?;
     match param {
-        // A narrower lobe is a mirror to the camera.
+        // A narrower lobe looks like a mirror.
         Param::Share(width) if property == Property::Alpha => *width = number.clamp(1e-3, 1.0).into(),
         Param::Share(scalar) => *scalar = share.into(),
         Param::ConstantShare(old) => *old = share,
@@ -132,7 +133,7 @@ fn set_in_material(material: &mut Material, property: Property, value: DVec3) ->
     Some(())
 }
 
-/// Keeps the colour, where both have one.
+/// Changes the kind of a material, keeping the colour if both have one.
 pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result<(), String> {
     let old = SurfaceMaterial::of(world, entity).ok_or("not a material")?;
     if old.kind() == kind {
@@ -140,7 +141,7 @@ pub fn set_kind(world: &mut World, entity: Entity, kind: MaterialKind) -> Result
     }
     let was_light = old.kind() == MaterialKind::Emissive;
     let color = old.color().cloned().unwrap_or(ColorParam::Rgb(Vec3::splat(0.7)));
-    // A light is brighter than white, and a surface is not.
+    // Lights may be brighter than white, surfaces may not.
     let color = match color {
         ColorParam::Rgb(rgb) if was_light => ColorParam::Rgb(rgb / rgb.max_element().max(1.0)),
         ColorParam::Rgb(rgb) if kind == MaterialKind::Emissive => ColorParam::Rgb(rgb * 5.0),

@@ -1,4 +1,4 @@
-//! The sky: its colours, how strong they are together, and how its picture is turned.
+//! Environment: its colours, their common strength, and the rotation of its image.
 
 use super::property::Property;
 use crate::render::Environment;
@@ -7,7 +7,7 @@ use crate::scene::{EnvironmentSource, Rgb, SceneEnvironment};
 use bevy_ecs::prelude::World;
 use glam::{DVec3, Vec3};
 
-/// The brightest channel of the sky's colours, or the factor of its picture.
+/// The brightest channel of the environment's colours, or the factor of its image.
 pub fn strength(light: &Environment) -> f32 {
     match light {
         Environment::Black => 0.0,
@@ -17,7 +17,7 @@ pub fn strength(light: &Environment) -> f32 {
     }
 }
 
-/// Sets one property of the sky.
+/// Sets one property of the environment.
 pub fn set(world: &mut World, property: Property, value: DVec3) -> Result<(), String> {
     let sky = world.get_resource::<SceneEnvironment>().cloned().unwrap_or_default();
     let light = match property {
@@ -50,7 +50,7 @@ fn with_color(sky: &Environment, property: Property, value: Vec3) -> Option<Envi
     }
 }
 
-/// What was black becomes grey, since it has no colour to keep.
+/// Scales an environment to this strength; black becomes grey.
 fn with_strength(sky: &Environment, wanted: f32) -> Option<Environment> {
     let old = strength(sky);
     let scaled = |color: Vec3| if old > 0.0 { color * (wanted / old) } else { Vec3::splat(wanted) };
@@ -71,7 +71,8 @@ fn turned(sky: &Environment, angle: f32) -> Option<Environment> {
     Some(Environment::Image { image: image.clone(), scale: *scale, rotation: angle })
 }
 
-/// What a scene file says of it; a picture keeps its file, and its turn as it was written unless there is a new one.
+/// Describes the environment for a scene file; an image keeps its file, and its rotation as written unless there is a
+/// new one.
 fn part_of(light: &Environment, old: &EnvironmentSource, angle_deg: Option<f64>) -> EnvironmentSource {
     match (light, old) {
         (Environment::Black, _) => EnvironmentSource::Black,

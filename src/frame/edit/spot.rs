@@ -1,8 +1,9 @@
-//! Where new things go: on what the middle of the picture shows, as large as suits its distance, and inside of nothing.
+//! Positions of new objects: on the surface in the centre of the image, of a size that suits its distance, and without
+//! overlap.
 //!
-//! What the camera sees is free up to the first surface. So places are tried along the line of sight, from that surface
-//! towards the camera; from each, the thing falls onto what is below it, and stays where it touches nothing else. What is
-//! in its way is found by rays, which know what a box does not: that a room is empty inside.
+//! The space in front of the camera is free up to the first visible surface. So positions are tried along the view
+//! axis, from that surface towards the camera; from each, the object drops onto the surface below, and stays where it
+//! touches nothing else. Obstacles are found by rays, which unlike boxes detect that a room is empty inside.
 
 use crate::frame::resources::{PictureSize, RenderState};
 use crate::frame::selection::pick;
@@ -12,26 +13,26 @@ use bevy_ecs::prelude::World;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// A place for something to stand on, with room for a cube of twice `size` above it.
+/// A position for an object, with free space for a cube of side `2 * size` above it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
     pub foot: DVec3,
-    /// Half of the width of what stands there, metres.
+    /// Half of the width of the object, metres.
     pub size: f64,
 }
 
-/// A tenth of the distance is large enough to see and to grab, and leaves most of the picture as it is.
+/// Size relative to the distance: large enough to see and to grab, and most of the image stays unchanged.
 const SHARE: f64 = 0.1;
-/// Steps towards the camera, of half a size, before something smaller is tried.
+/// Number of steps towards the camera, of half a size each, before a smaller size is tried.
 const STEPS: u32 = 24;
-/// What has no room is made smaller so many times.
+/// Maximum number of smaller sizes.
 const SHRINKS: u32 = 5;
-/// Rays that look for what is in the way.
+/// Number of rays that look for obstacles.
 const RAYS: u32 = 128;
-/// What touches is not in the way.
+/// Relative distance below which something is an obstacle; touching is allowed.
 const TOUCH: f64 = 0.97;
 
-/// Finds it; where nothing is free, it is the place that the middle of the picture shows.
+/// Finds a position; if nothing is free, it is the surface in the centre of the image.
 pub fn find(world: &World) -> Spot {
     let shown = world.resource::<RenderState>();
     let view = shown.inputs.camera.map_or_else(View::default, |camera| camera.view);
@@ -40,16 +41,16 @@ pub fn find(world: &World) -> Spot {
         return Spot { foot: view.pivot(), size: SHARE * view.pivot_distance };
     };
     let hit = pick(scene, 0.5, 0.5, aspect);
-    // What lies far behind the pivot is a wall or the floor at the horizon.
+    // A surface far behind the pivot is a wall, or the ground near the horizon.
     let hit = hit.filter(|hit| hit.depth < 4.0 * view.pivot_distance);
     let (place, distance) = hit.map_or((view.pivot(), view.pivot_distance), |hit| (hit.point, hit.depth));
     let mut share = SHARE;
     for _ in 0..SHRINKS {
         let step = 0.5 * share * distance;
-        // Not in the face of who looks.
+        // Not too close to the camera.
         let depths = (0..STEPS).map(|i| distance - step * f64::from(i)).take_while(|depth| *depth > 0.3 * distance);
         for depth in depths {
-            // What is nearer looks larger, and is made smaller for it.
+            // Closer objects look larger, so they are made smaller.
             let size = share * depth;
             if let Some(foot) = stand(scene, &view, place - view.forward * (distance - depth), size) {
                 return Spot { foot, size };
@@ -60,34 +61,34 @@ pub fn find(world: &World) -> Spot {
     Spot { foot: place, size: SHARE * distance }
 }
 
-/// How far above `foot` something may hang: `wanted`, or less where a ceiling is in the way.
+/// Returns the height above `foot` at which something may hang, metres: `wanted`, or less below a ceiling.
 pub fn headroom(world: &World, foot: DVec3, wanted: f64) -> f64 {
     let Some(scene) = &world.resource::<RenderState>().extraction else { return wanted };
-    // From a little above, or the ground itself would be found.
+    // Starts above `foot`, because the ray would otherwise hit the ground itself.
     let start = 0.1 * wanted;
     distance(scene, foot + start * DVec3::Y, DVec3::Y).map_or(wanted, |free| wanted.min(0.8 * (start + free)))
 }
 
-/// Where a thing stands that is let fall from here, if it has room there.
+/// Returns the position of an object after dropping it from here, if there is space for it.
 fn stand(scene: &Extraction, view: &View, place: DVec3, size: f64) -> Option<DVec3> {
     let middle = place + DVec3::Y * size;
     let (to_middle, away) = (middle - view.eye, (middle - view.eye).length());
-    // What is not seen may be within something.
+    // An invisible position may be inside of an object.
     if distance(scene, view.eye, to_middle / away).is_some_and(|free| free < away) {
         return None;
     }
-    // Where there is no ground, or one far below the picture, it floats.
+    // Without a ground, or far above it, the object floats.
     let fall = distance(scene, middle, -DVec3::Y).filter(|fall| *fall < 0.4 * away).unwrap_or(size);
     let middle = middle + DVec3::Y * (size - fall);
     let is_free = |direction: DVec3| {
-        // To the surface of a cube of twice the size.
+        // Distance to the surface of a cube of side 2 · `size`.
         let reach = size / direction.abs().max_element();
         distance(scene, middle, direction).is_none_or(|free| free > TOUCH * reach)
     };
     directions().all(is_free).then(|| middle - DVec3::Y * size)
 }
 
-/// Evenly over all directions: a spiral from pole to pole, whose turns are as far apart as its steps.
+/// Uniform directions: a spiral from pole to pole whose turns are as far apart as its points.
 fn directions() -> impl Iterator<Item = DVec3> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     (0..RAYS).map(|i| {
@@ -98,7 +99,7 @@ fn directions() -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// From a place of the world along a unit direction to what is there, metres.
+/// Returns the distance in metres from a world position along a unit direction to the closest hit.
 fn distance(scene: &Extraction, from: DVec3, direction: DVec3) -> Option<f64> {
     let ray = Ray::new((from - scene.origin).as_vec3(), direction.as_vec3());
     scene.prepared.geometry.tree.closest_hit(&ray).map(|hit| f64::from(hit.t))

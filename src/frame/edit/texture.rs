@@ -1,4 +1,4 @@
-//! Textures in the place of a material's colour: those that the scene has, a new checker, a picture from a file.
+//! Textures in place of a material's colour: existing ones, a new checker, or an image file.
 
 use super::set::set_if_different;
 use crate::frame::background::BackgroundTasks;
@@ -10,7 +10,7 @@ use bevy_ecs::prelude::{Entity, World};
 use std::path::Path;
 use std::sync::Arc;
 
-/// All textures that materials of the world use, by name.
+/// Returns all textures of the world's materials.
 pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
     let mut found: Vec<Arc<SurfaceTexture>> = Vec::new();
     for SurfaceMaterial(material) in world.query::<&SurfaceMaterial>().iter(world) {
@@ -24,14 +24,15 @@ pub fn textures(world: &mut World) -> Vec<Arc<SurfaceTexture>> {
     found
 }
 
-/// One that the scene has, by name.
+/// Replaces the colour by an existing texture.
 pub fn set_texture(world: &mut World, entity: Entity, name: &str) -> Result<(), String> {
     let texture = textures(world).into_iter().find(|texture| texture.name == name);
     let texture = texture.ok_or_else(|| format!("there is no texture `{name}`"))?;
     put(world, entity, texture)
 }
 
-/// One of this description. A picture that the scene has is shared, another one is read beside the picture.
+/// Replaces the colour by a texture of this description. An image that is already loaded is shared, another one is
+/// loaded in the background.
 pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(), String> {
     let colored = SurfaceMaterial::of(world, entity).is_some_and(|material| material.color().is_some());
     if !colored {
@@ -54,7 +55,7 @@ pub fn paint(world: &mut World, entity: Entity, part: TextureSource) -> Result<(
     make(world, entity, part, known)
 }
 
-/// A picture for this entity has been read.
+/// Applies an image that has been loaded for this entity.
 pub fn take(world: &mut World, entity: Entity, part: TextureSource, result: Result<ImageTexture, String>) {
     let put = result.and_then(|picture| make(world, entity, part, Some(Arc::new(picture))));
     if let Err(problem) = put {
@@ -70,7 +71,7 @@ fn make(
     picture: Option<Arc<ImageTexture>>,
 ) -> Result<(), String> {
     let texture = texture_of(&part, |_| picture).ok_or("the image has not been loaded")?;
-    // A texture that is only changed keeps its name.
+    // A modified texture keeps its name.
     let old = SurfaceMaterial::of(world, entity).and_then(Material::color);
     let name = match (old, &part) {
         (Some(ColorParam::Texture(old)), _) if same_source(&old.part, &part) => old.name.clone(),
@@ -100,7 +101,7 @@ fn put(world: &mut World, entity: Entity, texture: Arc<SurfaceTexture>) -> Resul
     Ok(())
 }
 
-/// `name`, or the first of `name 2`, `name 3`, … that no texture of a material has.
+/// Returns `name`, or the first of `name 2`, `name 3`, … that no texture of a material has.
 fn free_name(world: &mut World, name: &str) -> String {
     let taken = textures(world);
     let numbered = (2..).map(|i| format!("{name} {i}"));

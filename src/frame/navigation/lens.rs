@@ -1,16 +1,16 @@
-//! The steps of a lens: where the focal plane is, how wide the aperture.
+//! Changes of a lens: focus distance and aperture.
 
 use crate::scene::Lens;
 
-/// The aperture that a lens without one opens to, as a part of the focus distance: a blur that is seen, not more.
+/// Aperture radius of a lens that had none, relative to the focus distance: a visible but moderate blur.
 const FIRST_APERTURE: f64 = 0.01;
 
-/// Puts the focal plane at `distance` metres, if that is a distance.
+/// Sets the focus distance in metres, if it is positive.
 pub fn focus_at(lens: &Lens, distance: f64) -> Lens {
     if distance > 0.0 { Lens { focus_distance: distance, ..*lens } } else { *lens }
 }
 
-/// Multiplies the focus distance; from infinity the plane comes back to `near`, metres.
+/// Multiplies the focus distance; from infinity it returns to `near`, metres.
 pub fn scale_focus(lens: &Lens, factor: f64, near: f64) -> Lens {
     if lens.focus_distance.is_infinite() {
         return if factor < 1.0 { focus_at(lens, near) } else { *lens };
@@ -44,12 +44,12 @@ pub fn toggle_depth_of_field(lens: &Lens) -> Lens {
     if lens.enabled { Lens { enabled: false, ..*lens } } else { with_aperture(lens) }
 }
 
-/// Depth of field on, with an aperture that shows.
+/// Switches depth of field on, with a non-zero aperture.
 fn with_aperture(lens: &Lens) -> Lens {
     let radius = match (lens.radius > 0.0, lens.focus_distance.is_finite()) {
         (true, _) => lens.radius,
         (false, true) => FIRST_APERTURE * lens.focus_distance,
-        // Nothing else to measure by: 1 cm.
+        // No reference length: 1 cm.
         (false, false) => FIRST_APERTURE,
     };
     Lens { radius, enabled: true, ..*lens }

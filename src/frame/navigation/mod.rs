@@ -1,11 +1,11 @@
-//! How a person moves a camera: pure functions from one view to the next.
+//! Camera navigation: pure functions from one view to the next.
 //!
-//! Each keeps the axes of the view orthonormal to rounding, without drift over millions of steps, and answers
-//! amounts that make no sense (not finite, a factor of zero) with the view it was given. All is f64 in the scene's
-//! own frame, so a camera a million metres from the origin moves as smoothly as one at it.
+//! Each keeps the axes of the view orthonormal to rounding, without drift over millions of steps, and returns the view
+//! unchanged for invalid amounts (not finite, a factor of zero). All computation is f64 in the scene's frame, so a
+//! camera a million metres from the origin moves as smoothly as one at it.
 //!
-//! Here is what commands mean; `moves` has the steps of a view, `lens` those of what is sharp. Start reading at
-//! [`steer`].
+//! This file interprets commands; `moves` has the changes of a view, `lens` those of focus and aperture. Start reading
+//! at [`steer`].
 
 mod lens;
 mod moves;
@@ -19,24 +19,24 @@ use super::command::Command;
 use crate::scene::View;
 use glam::DVec3;
 
-/// What the amounts of a command are measured by.
+/// Reference sizes for the amounts of commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Centre of a sphere around everything finite in the scene, metres.
     pub center: DVec3,
-    /// Radius of that sphere, metres; 0 when there is nothing finite.
+    /// Radius of that sphere, metres; 0 if nothing is finite.
     pub radius: f64,
-    /// Where [`Command::Home`] leads.
+    /// The view of [`Command::Home`].
     pub home: Rig,
-    /// Width of the picture by its height.
+    /// Width of the image over its height.
     pub aspect: f64,
-    /// What a turn keeps level.
+    /// The mode of turning.
     pub turning: Turning,
-    /// Metres to what a person flies towards, if that is known.
+    /// Distance to the target of flying in metres, if known.
     pub pace: Option<f64>,
 }
 
-/// Carries out a command that needs nothing but the camera and its surroundings; `None` for every other command.
+/// Executes a command that needs the camera and its reference sizes only; `None` for every other command.
 pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig> {
     let Rig { view, projection, lens } = *rig;
     let with_view = |view| Some(Rig { view, ..*rig });
@@ -52,7 +52,7 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
             with_view(orbit(&view, yaw_deg.to_radians(), pitch_deg.to_radians(), around.turning))
         }
         Command::Pan { right, up } => with_view(pan(&view, &projection, right, up)),
-        // Nearer looks no larger where rays are parallel.
+        // With parallel rays, approaching does not enlarge.
         Command::Dolly { factor } if projection.orthographic_height.is_some() => {
             Some(Rig { projection: zoom(&projection, factor), ..*rig })
         }
@@ -73,12 +73,12 @@ pub fn steer(rig: &Rig, command: &Command, around: &Surroundings) -> Option<Rig>
     }
 }
 
-/// How far a person flies in a second at speed 1, metres: half of the way to what they fly towards. Where that is not
-/// known, half of the smaller of the distance looked at and the scene's radius, so that neither a room seen from inside
-/// nor a model seen from afar is left in one step.
+/// Distance flown per second at speed 1, metres: half of the distance to the target. If that is unknown, half of the
+/// smaller of the pivot distance and the scene's radius, so that neither a room seen from inside nor a model seen from
+/// afar is left in one step.
 pub fn stride(view: &View, scene_radius: f64, pace: Option<f64>) -> f64 {
     let size = if scene_radius > 0.0 { scene_radius.min(view.pivot_distance) } else { view.pivot_distance };
-    // Right before a wall a person still gets away from it, and the horizon is not reached in a second.
+    // Clamped, so that the camera can leave a wall directly in front of it, and does not reach the horizon in a second.
     0.5 * pace.map_or(size, |pace| pace.clamp(0.02 * size, 4.0 * size))
 }
 

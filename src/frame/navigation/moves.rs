@@ -1,43 +1,43 @@
-//! The steps of a view: turning, orbiting, flying, and what frames a scene.
+//! Changes of a view: turning, orbiting, flying, framing.
 //!
-//! Two ways of turning: on a turntable, where the horizon keeps its lean and the view stops short of straight up and
-//! down, and freely about the picture's own axes.
+//! There are two modes of turning: on a turntable, which preserves the roll and stops short of straight up and down,
+//! and freely about the image axes.
 
 use crate::frame::rig::{Rig, Turning};
 use crate::scene::{Projection, View};
 use glam::{DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;
 
-/// The direction that a turntable turns about: scenes are Y up.
+/// The axis of a turntable: scenes are Y up.
 pub const VERTICAL: DVec3 = DVec3::Y;
 
-/// On a turntable, how near to straight up or down a person can turn: nearer, yaw would spin the picture in place.
+/// Maximum elevation on a turntable, radians: closer to the vertical, yaw would spin the image in place.
 const MAX_ELEVATION: f64 = 89.0 * (FRAC_PI_2 / 90.0);
 
-/// The field of view that zooming stays within, degrees: a strong telescope, and the widest flat picture of any use.
+/// Limits of the field of view for zooming, degrees: a strong telescope, and the widest useful planar projection.
 const VFOV_RANGE_DEG: (f64, f64) = (0.1, 150.0);
 
-/// Left free around what is framed, of half the picture.
+/// Margin around framed objects, relative to half the image.
 const ROOM: f64 = 0.08;
 
-/// Looks about from the camera; radians to the right and upwards in the picture.
+/// Turns the camera about its position; radians to the right and upwards in the image.
 pub fn turn(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
     finite_or(view, rotated(view, yaw, pitch, turning))
 }
 
-/// Moves the camera around the pivot, at the same distance; radians to the right and upwards in the picture.
+/// Moves the camera around the pivot at constant distance; radians to the right and upwards in the image.
 pub fn orbit(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
-    // The camera moving right means that the direction turns left.
+    // The camera moves right when its direction turns left.
     let turned = rotated(view, -yaw, -pitch, turning);
     finite_or(view, View { eye: view.pivot() - turned.forward * view.pivot_distance, ..turned })
 }
 
-/// Moves along the view's own axes: x right, y up, z forward, metres.
+/// Moves along the view's axes: x right, y up, z forward, metres.
 pub fn fly(view: &View, step: DVec3) -> View {
     finite_or(view, View { eye: view.eye + view.right() * step.x + view.up * step.y + view.forward * step.z, ..*view })
 }
 
-/// Moves sideways by heights of the picture at the pivot.
+/// Moves sideways, in image heights at the pivot's depth.
 pub fn pan(view: &View, projection: &Projection, right: f64, up: f64) -> View {
     let height = 2.0 * projection.half_height(view.pivot_distance);
     fly(view, DVec3::new(right * height, up * height, 0.0))
@@ -52,7 +52,7 @@ pub fn dolly(view: &View, factor: f64) -> View {
     finite_or(view, View { eye: view.pivot() - view.forward * pivot_distance, pivot_distance, ..*view })
 }
 
-/// Multiplies the height of what is seen at a given distance, within the limits of `VFOV_RANGE_DEG`.
+/// Multiplies the visible height at a given distance, within the limits of `VFOV_RANGE_DEG`.
 pub fn zoom(projection: &Projection, factor: f64) -> Projection {
     if !(factor.is_finite() && factor > 0.0) {
         return *projection;
@@ -63,18 +63,19 @@ pub fn zoom(projection: &Projection, factor: f64) -> Projection {
     }
     let (lowest, highest) = VFOV_RANGE_DEG;
     let wanted = 2.0 * (projection.tan_half_vfov() * factor).atan().to_degrees();
-    // A scene may start outside of the limits; then it can only come nearer.
+    // A scene may start outside of the limits; then only changes towards them are possible.
     let vfov_deg = wanted.clamp(lowest.min(projection.vfov_deg), highest.max(projection.vfov_deg));
     Projection { vfov_deg, ..*projection }
 }
 
-/// Leans the head to the right, radians.
+/// Rolls the camera to the right, radians.
 pub fn roll(view: &View, angle: f64) -> View {
     let up = DQuat::from_axis_angle(view.forward, angle) * view.up;
     finite_or(view, View { up, ..*view }.orthonormalized())
 }
 
-/// Takes the roll out. A view straight up or down has no horizon and stays, and so does one without roll, bit by bit.
+/// Removes the roll. A view straight up or down has no horizon and is unchanged, and so is a view without roll, bit for
+/// bit.
 pub fn level(view: &View) -> View {
     /// Sine of the angle; a thousandth of a pixel over the widest film.
     const NONE: f64 = 1e-8;
@@ -86,8 +87,8 @@ pub fn level(view: &View) -> View {
     View { up: VERTICAL, ..*view }.orthonormalized()
 }
 
-/// What [`frame_points`] does for a camera of either kind: an orthographic one takes the height that the points need, and
-/// stands in front of all of them.
+/// Like [`frame_points`], for both kinds of cameras: an orthographic one gets the height that the points need, and is
+/// placed in front of all of them.
 pub fn frame_rig(rig: &Rig, aspect: f64, points: &[DVec3]) -> Rig {
     let Rig { view, projection, .. } = *rig;
     let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
@@ -109,9 +110,9 @@ pub fn frame_rig(rig: &Rig, aspect: f64, points: &[DVec3]) -> Rig {
     Rig { view: finite_or(&view, View { eye, pivot_distance: distance, ..view }), projection, ..*rig }
 }
 
-/// Keeps the direction and places the camera as near as all points still are in a picture of this `aspect` (width by
-/// height), with a little room around them; the middle of their box becomes the pivot's depth. One point alone keeps
-/// its distance; without any, the view stays.
+/// Keeps the direction and moves the camera as close as possible with all points in an image of this `aspect` (width
+/// over height), with a margin; the pivot gets the depth of the centre of their box. For a single point the distance is
+/// kept; without points, the view.
 pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &[DVec3]) -> View {
     let around = points.iter().map(|&point| (point, point)).reduce(|(a, b), (c, _)| (a.min(c), b.max(c)));
     let Some((min, max)) = around else { return *view };
@@ -120,7 +121,7 @@ pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &
         return finite_or(view, View { eye: middle - view.forward * view.pivot_distance, ..*view });
     }
     let tan_v = projection.tan_half_vfov() * (1.0 - ROOM);
-    // In each direction, lines at the edge of the picture through the outermost points meet at the nearest camera.
+    // Per axis: lines at the edge of the image through the outermost points meet at the closest camera position.
     let fit = |axis: DVec3, tan: f64| {
         let most = |sign: f64| {
             let edge = |point: &DVec3| {
@@ -139,22 +140,22 @@ pub fn frame_points(view: &View, projection: &Projection, aspect: f64, points: &
     finite_or(view, View { eye, pivot_distance: -depth, ..*view })
 }
 
-/// The view turned on the spot by radians to the right and upwards in the picture.
+/// Turns the view about its position by radians to the right and upwards in the image.
 fn rotated(view: &View, yaw: f64, pitch: f64, turning: Turning) -> View {
     let rotation = match turning {
         Turning::Free => DQuat::from_axis_angle(view.right(), pitch) * DQuat::from_axis_angle(view.up, -yaw),
         Turning::Turntable => turntable_rotation(view, yaw, pitch),
     };
     let turned = View { forward: rotation * view.forward, up: rotation * view.up, ..*view };
-    // Not finite: left for the caller to refuse, since normalising it would be meaningless.
+    // Non-finite values are left to the caller, since normalising them is meaningless.
     if turned.is_finite() { turned.orthonormalized() } else { turned }
 }
 
 fn turntable_rotation(view: &View, yaw: f64, pitch: f64) -> DQuat {
     let now = elevation(view);
-    // Beyond the limit (a scene may start so) the horizon is nowhere, and the picture's own right takes its place.
+    // Beyond the limit (a scene may start there) the horizon is undefined, and the image's own right axis replaces it.
     let level_right = if now.abs() > MAX_ELEVATION { view.right() } else { view.forward.cross(VERTICAL).normalize() };
-    // A leaning head sees the horizon leaning; amounts are along the picture's axes, whatever its lean.
+    // With roll, amounts are along the image axes, not along the horizon.
     let (sin_lean, cos_lean) = (view.right().dot(level_right.cross(view.forward)), view.right().dot(level_right));
     let (yaw, pitch) = (yaw * cos_lean - pitch * sin_lean, yaw * sin_lean + pitch * cos_lean);
     let wanted = (now + pitch).clamp(now.min(-MAX_ELEVATION), now.max(MAX_ELEVATION));
@@ -163,7 +164,7 @@ fn turntable_rotation(view: &View, yaw: f64, pitch: f64) -> DQuat {
 
 /// Angle of the view direction above the horizontal, radians in [-π/2, π/2].
 fn elevation(view: &View) -> f64 {
-    // Unlike the arc sine, exact near the poles too.
+    // Accurate near the poles, unlike the arc sine.
     view.forward.dot(VERTICAL).atan2(view.forward.cross(VERTICAL).length())
 }
 
@@ -199,7 +200,7 @@ mod tests {
         (a - b).length() <= tolerance
     }
 
-    /// A fixed sequence in [-1, 1), good enough to move a camera about.
+    /// A fixed sequence in [-1, 1), sufficient to move a camera.
     fn wander(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
@@ -234,7 +235,7 @@ mod tests {
             assert!((view.up.length() - 1.0).abs() < 1e-15, "{view:?}");
             assert!(view.forward.dot(view.up).abs() < 1e-15, "{view:?}");
             assert_eq!(view.pivot_distance, first.pivot_distance);
-            // Each step rounds the camera once or twice: a random walk of a thousand times that, here with room to spare.
+            // Each step rounds the camera once or twice: a random walk of a thousand times that, with a margin.
             let rounding = f64::EPSILON * first.eye.length().max(1.0);
             assert!(
                 close(view.pivot(), first.pivot(), 20_000.0 * rounding),
