@@ -1,4 +1,4 @@
-//! What the values of a scene file must satisfy before anything is built from them.
+//! Checks the values of a scene file before anything is built from them.
 
 use super::parts::{CameraPart, LightPart, MaterialPart, ObjectPart, RadiiPart, SceneFile, TransformPart};
 use crate::render::{MAX_LOBES, Param};
@@ -15,16 +15,16 @@ use crate::scene::view::unit_direction;
 use glam::{DVec2, DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// What is wrong with a file.
+/// Problems of a file.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// The first of them, each with the path of the value (see [`super::locate`]).
+    /// The first problems, each with the path of the value (see [`super::locate`]) and a message.
     pub told: Vec<(String, String)>,
-    /// How many more there are.
+    /// Number of further problems.
     pub untold: usize,
 }
 
-/// The first `most` of what is wrong with `file`, and how much more there is.
+/// Returns the first `most` problems of `file`, and the number of further ones.
 pub fn check(file: &SceneFile, most: usize) -> Found {
     let (materials, textures) = (file.materials.iter().collect(), file.textures.names().collect());
     let mut check = Check { file, materials, textures, most, found: Found::default() };
@@ -53,7 +53,7 @@ struct Check<'a> {
     file: &'a SceneFile,
     materials: HashMap<&'a str, &'a MaterialPart>,
     textures: HashSet<&'a str>,
-    /// Problems that are told; the others are only counted.
+    /// Maximum number of listed problems; others are only counted.
     most: usize,
     found: Found,
 }
@@ -67,7 +67,7 @@ impl Check<'_> {
         }
     }
 
-    /// What names nothing that is `known`. Near names are looked for only where somebody reads them.
+    /// Reports a name that is not `known`. Similar names are searched only if the message will be listed.
     fn misnamed<'k>(&mut self, path: &str, what: String, name: &str, known: impl Iterator<Item = &'k str>) {
         let hint = if self.found.told.len() < self.most { suggestion(name, known) } else { String::new() };
         self.wrong(path, what + &hint);
@@ -125,7 +125,7 @@ impl Check<'_> {
             }
             TextureSource::VertexColors { tint, .. } => return self.light(&format!("{path}/tint"), *tint),
         };
-        // Beyond these, single precision has no such number.
+        // Outside of this range, single precision has no such number.
         let (least, most) = (SceneFile::MIN_SIZE, SceneFile::MAX_COORDINATE);
         for (field, DVec2 { x, y }) in sizes {
             if ![x, y].iter().all(|size| (least..=most).contains(&size.abs())) {
@@ -203,7 +203,7 @@ impl Check<'_> {
         }
     }
 
-    /// Whether the blend `from` leads to material `to`, within as many steps as a blend that is not refused has.
+    /// Whether the blend `from` leads to material `to`, within as many steps as an accepted blend can have.
     fn reaches(&self, from: &str, to: &str) -> bool {
         let (mut seen, mut open) = (HashSet::new(), vec![from]);
         while let Some(name) = open.pop() {
@@ -220,7 +220,7 @@ impl Check<'_> {
         false
     }
 
-    /// How many plain materials `name` comes to, and how many of them are emissive; stops counting when it is too many.
+    /// Counts the plain materials of `name`, and the emissive ones among them; stops when there are too many.
     fn lobes(&self, name: &str) -> (usize, usize) {
         let (mut lobes, mut glowing, mut open) = (0, 0, vec![name]);
         let mut steps = 0;
@@ -374,7 +374,7 @@ impl Check<'_> {
         }
     }
 
-    /// The placement that the transform means, when it means one.
+    /// Converts a transform to a placement, if it is valid.
     fn transform(&mut self, path: &str, part: &TransformPart) -> Option<Placement> {
         if part.matrix.is_some() && (part.translate.is_some() || part.rotate.is_some() || part.scale.is_some()) {
             self.wrong(
@@ -412,7 +412,7 @@ impl Check<'_> {
         }
     }
 
-    /// A share of the light in each channel: 0..1.
+    /// Checks a reflectance: 0..1 per channel.
     fn share(&mut self, path: &str, field: &str, color: &ColorValue) {
         match color {
             ColorValue::Texture(name) => self.texture_name(path, name),
@@ -434,7 +434,7 @@ impl Check<'_> {
         }
     }
 
-    /// Light or absorption: finite, not negative.
+    /// Checks radiance or absorption: finite, not negative.
     fn light(&mut self, path: &str, Rgb(rgb): Rgb) {
         if !(rgb.is_finite() && rgb.cmpge(Vec3::ZERO).all()) {
             let Vec3 { x, y, z } = rgb;
@@ -454,7 +454,7 @@ impl Check<'_> {
         }
     }
 
-    /// Any length but none.
+    /// Checks a direction: any length except 0.
     fn direction(&mut self, path: &str, what: &str, vector: DVec3) {
         if unit_direction(vector).is_none() {
             self.wrong(path, format!("{what} is {}, but must be finite and have a length", triple(vector)));

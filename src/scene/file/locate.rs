@@ -1,11 +1,11 @@
-//! Finds the line of a value in the text of a scene file that has already been parsed.
+//! Finds the position of a value in the text of a scene file that has already been parsed.
 //!
-//! The parser gives values without places. Messages about a *meaning* (a radius of zero, an unknown material) still
-//! want a line, so the text is walked once more, only when there is something to complain about.
+//! The parser returns values without positions. Semantic errors (a radius of zero, an unknown material) need a line, so
+//! the text is scanned again, only if there is an error.
 
-/// Line and column, from 1, of the value at `path`, or of the innermost value around it that the text has.
+/// Returns line and column, from 1, of the value at `path`, or of the innermost value around it that the text has.
 ///
-/// `path` names fields, list positions and map keys, parted by `/`: `objects/3/radius`, `materials/red/albedo`.
+/// `path` consists of fields, list indices and map keys, separated by `/`: `objects/3/radius`, `materials/red/albedo`.
 /// Names of enum variants are not part of it.
 pub fn locate(text: &str, path: &str) -> (usize, usize) {
     let target: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
@@ -15,7 +15,7 @@ pub fn locate(text: &str, path: &str) -> (usize, usize) {
     line_and_column(text, walk.best)
 }
 
-/// Line and column, from 1, of a byte offset; columns count characters.
+/// Returns line and column, from 1, of a byte offset; columns count characters.
 fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let before = &text.as_bytes()[..offset.min(text.len())];
     let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
@@ -34,7 +34,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Deeper than any file that the parser lets through.
+    /// Deeper than any file that the parser accepts.
     const MAX_DEPTH: usize = 256;
 
     fn peek(&self) -> u8 {
@@ -45,7 +45,7 @@ impl Walk<'_> {
         self.at >= self.text.len()
     }
 
-    /// Notes the place when the current path leads towards the target further than any before.
+    /// Records the position if the current path matches more of the target than any before.
     fn visit(&mut self, offset: usize) {
         let depth = self.path.len();
         let towards = depth <= self.target.len() && self.path.iter().zip(&self.target).all(|(a, b)| a == b);
@@ -71,12 +71,12 @@ impl Walk<'_> {
                 self.string();
             }
             _ if named => {}
-            // Not a value: step on, so that the walk ends.
+            // Not a value: advances, so that the scan terminates.
             _ => self.at += 1,
         }
     }
 
-    /// A struct `(a: 1)`, a tuple `(1, 2)`, or what follows the name of a variant.
+    /// Scans a struct `(a: 1)`, a tuple `(1, 2)`, or the contents of a variant.
     fn parenthesis(&mut self, variant: bool, nesting: usize) {
         let start = self.at;
         self.at += 1;
@@ -156,7 +156,7 @@ impl Walk<'_> {
         }
     }
 
-    /// A name or a number; true when there was one.
+    /// Scans a name or a number; true if there was one.
     fn word(&mut self) -> bool {
         let start = self.at;
         while self.peek().is_ascii_alphanumeric() || matches!(self.peek(), b'_' | b'+' | b'-' | b'.' | b'#') {
@@ -165,7 +165,7 @@ impl Walk<'_> {
         self.at > start
     }
 
-    /// A quoted string without its quotes; escapes are left as written.
+    /// Scans a quoted string and returns it without its quotes; escapes are unchanged.
     fn string(&mut self) -> Option<String> {
         if self.peek() != b'"' {
             self.at += 1;
@@ -188,7 +188,7 @@ impl Walk<'_> {
         }
     }
 
-    /// White space and comments, which nest when they are blocks.
+    /// Skips white space and comments; block comments nest.
     fn skip_blank(&mut self) {
         while !self.done() {
             if self.peek().is_ascii_whitespace() {
@@ -217,7 +217,7 @@ impl Walk<'_> {
         }
     }
 
-    /// `#![enable(…)]` lines before the value.
+    /// Skips `#![enable(…)]` lines before the value.
     fn skip_header(&mut self) {
         loop {
             self.skip_blank();
@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn values_are_found_at_their_line() {
         assert_eq!(locate(TEXT, ""), (2, 1));
-        // Fields are placed at their names.
+        // The position of a field is that of its name.
         assert_eq!(locate(TEXT, "film/height"), (3, 22));
         assert_eq!(locate(TEXT, "materials/b/albedo"), (6, 22));
         assert_eq!(locate(TEXT, "objects/0/center/2"), (9, 31));

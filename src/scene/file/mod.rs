@@ -1,8 +1,8 @@
 //! The scene file: RON text to [`SceneFile`] and back.
 //!
-//! Reading has three steps, each with errors that name line and column: syntax and field names ([`SceneFile::parse`]),
-//! meaning and limits (`check`), and, in the loader, the files that the scene points at.
-//! Metres, right-handed, Y up, linear Rec. 709 colours, degrees for angles; paths relative to the scene file.
+//! Reading has three steps, each with errors that give line and column: syntax and field names ([`SceneFile::parse`]),
+//! values and limits (`check`), and, in the loader, the files that the scene refers to. Metres, right-handed, Y up,
+//! linear Rec. 709 colours, degrees for angles; paths relative to the scene file.
 
 mod check;
 mod locate;
@@ -23,21 +23,21 @@ use ron::extensions::Extensions;
 use std::path::Path;
 
 impl SceneFile {
-    /// Spheres of one grid at most.
+    /// Maximum number of spheres of one grid.
     pub const MAX_GRID_BALLS: u64 = 4_000_000;
-    /// Pixels along one side of a film at most.
+    /// Maximum number of pixels along one side of a film.
     pub const MAX_FILM_SIDE: u32 = 65_536;
-    /// Pixels of a film at most: they take 72 bytes each, 18 GiB in all.
+    /// Maximum number of pixels of a film: it takes 88 bytes per pixel, 22 GiB in all.
     pub const MAX_FILM_PIXELS: u64 = 1 << 28;
-    /// Metres: beyond this, squared distances leave the range of `f32`.
+    /// Largest coordinate in metres: beyond it, squared distances leave the range of `f32`.
     pub const MAX_COORDINATE: f64 = 1e12;
-    /// Metres: below this, squared sizes leave the range of `f32`.
+    /// Smallest size in metres: below it, squared sizes leave the range of `f32`.
     pub const MIN_SIZE: f64 = 1e-12;
 
-    /// Reads and checks the text of a scene file; `name` is what messages call it.
+    /// Parses and checks the text of a scene file; `name` is used in messages.
     ///
     /// # Errors
-    /// What is wrong with the text, by line and column where that is known.
+    /// The problems of the text, with line and column where known.
     pub fn parse(text: &str, name: impl AsRef<Path>) -> Result<Self, SceneError> {
         let name = name.as_ref();
         let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
@@ -49,21 +49,21 @@ impl SceneFile {
         if problems.is_empty() { Ok(file) } else { Err(SceneError::of(problems, found.untold, Some(name))) }
     }
 
-    /// The text of this scene; reading it gives an equal value.
+    /// Converts the scene to text; parsing it gives an equal value.
     pub fn to_ron(&self) -> String {
         let pretty = ron::ser::PrettyConfig::new()
             .depth_limit(3)
             .indentor("    ")
             .extensions(Extensions::IMPLICIT_SOME)
             .compact_arrays(true);
-        // Plain structs, enums, numbers and strings can always be written.
+        // Serialising plain data cannot fail.
         options().to_string_pretty(self, pretty).expect("a scene file is plain data") + "\n"
     }
 
-    /// What is wrong with the values, without places.
+    /// Checks the values.
     ///
     /// # Errors
-    /// What is wrong.
+    /// The problems, without positions.
     pub fn check(&self) -> Result<(), SceneError> {
         let found = check::check(self, SceneError::MAX_TOLD);
         let problem = |(path, message)| Problem { file: None, at: None, message: format!("{path}: {message}") };

@@ -1,4 +1,4 @@
-//! The parts of a scene file, as written. Meaning and limits are checked in `check`.
+//! The parts of a scene file, as written. Values and limits are checked in `check`.
 
 use crate::render::{Display, Integrator, Material, Params, PixelFilter, ToneCurve};
 use crate::scene::sources::{EnvironmentSource, MeshShading, MeshSource, TextureSource};
@@ -6,31 +6,31 @@ use crate::scene::value::{ColorValue, Named, Rgb, ScalarValue};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Everything that a scene file says. Only `camera` must be given.
+/// The contents of a scene file. Only `camera` is required.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
-    /// From where the scene is seen, and through which lens.
+    /// The camera that is used.
     pub camera: CameraPart,
-    /// Further views, by name, to choose from; `camera` is the one that is looked through.
+    /// Further cameras by name, which the user can select.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub cameras: Named<CameraPart>,
     /// Size and pixel filter.
     #[serde(default)]
     pub film: FilmPart,
-    /// The light model.
+    /// The integrator.
     #[serde(default)]
     pub integrator: Integrator,
-    /// Longest path in segments; 1 shows emitters alone; unbounded when not given.
+    /// Maximum path length in segments; 1 shows emitters only; unlimited if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_depth: Option<u32>,
     /// Exposure and tone curve.
     #[serde(default)]
     pub display: DisplayPart,
-    /// Light from infinitely far away.
+    /// The environment: radiance from infinitely far away.
     #[serde(default)]
     pub environment: EnvironmentSource,
-    /// What the air absorbs, per metre. Light from the environment has passed it already.
+    /// Absorption of the air, per metre. It does not affect the environment.
     #[serde(default, skip_serializing_if = "is_default")]
     pub air: Rgb,
     /// Textures that materials use, by name.
@@ -39,10 +39,10 @@ pub struct SceneFile {
     /// Materials that objects use, by name.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub materials: Named<MaterialPart>,
-    /// Objects, in the order in which they come to be spawned.
+    /// Objects, in the order in which they are spawned.
     #[serde(default)]
     pub objects: Vec<ObjectPart>,
-    /// Lights that are no objects; everything else that emits is an object with an emissive material.
+    /// Lights that are no objects; all other emitters are objects with an emissive material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightPart>,
 }
@@ -53,46 +53,46 @@ pub struct SceneFile {
 pub struct CameraPart {
     /// Centre of the lens, metres.
     pub eye: DVec3,
-    /// What is in the middle of the picture, and what orbiting turns about.
+    /// The point in the centre of the image, which is the pivot of orbiting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub look_at: Option<DVec3>,
-    /// In place of `look_at`: the direction of the view. A unit vector is taken as it is, to the last bit.
+    /// Direction of the view, in place of `look_at`. A unit vector is used unchanged, to the last bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forward: Option<DVec3>,
-    /// With `forward`: metres from the camera to what orbiting turns about; 1 when not given.
+    /// With `forward`: distance from the camera to the pivot of orbiting, metres; 1 if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pivot_distance: Option<f64>,
-    /// What is up in the picture; +Y when not given.
+    /// Direction that is up in the image; +Y if not given.
     #[serde(default = "default_up")]
     pub up: DVec3,
-    /// Vertical field of view in perspective, degrees.
+    /// Vertical field of view of a perspective camera, degrees.
     #[serde(default = "default_vfov")]
     pub vfov: f64,
-    /// Height of what an orthographic camera sees, metres; in perspective when not given.
+    /// Visible height of an orthographic camera, metres; a perspective camera if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orthographic_height: Option<f64>,
-    /// Metres; a pinhole when neither this nor `f_stop` is given.
+    /// Radius of the lens in metres; a pinhole if neither this nor `f_stop` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_radius: Option<f64>,
     /// Focal length over aperture diameter, for a film 24 mm high.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f_stop: Option<f64>,
-    /// Metres from the camera to the focal plane along the view axis; the distance of `look_at` when not given.
+    /// Distance from the camera to the focal plane along the view axis, metres; that of `look_at` if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_distance: Option<f64>,
-    /// Whether the lens blurs; when not given, it does if it has a radius.
+    /// Whether depth of field is on; if not given, it is on if the lens has a radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_of_field: Option<bool>,
-    /// Straight edges of the aperture; below 3 it is round.
+    /// Number of aperture blades; below 3 the aperture is round.
     #[serde(default, skip_serializing_if = "is_default")]
     pub blades: u32,
-    /// Degrees.
+    /// Rotation of the blades, degrees.
     #[serde(default, skip_serializing_if = "is_default")]
     pub blade_rotation: f64,
 }
 
 impl CameraPart {
-    /// A pinhole that looks at a point, with defaults for all the rest.
+    /// A pinhole camera that looks at a point, with defaults for everything else.
     pub fn looking_at(eye: DVec3, look_at: DVec3) -> Self {
         Self {
             eye,
@@ -112,7 +112,7 @@ impl CameraPart {
     }
 }
 
-/// Size of the picture and the weights within a pixel.
+/// Image size and reconstruction filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilmPart {
@@ -120,7 +120,7 @@ pub struct FilmPart {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Weights of the light around the middle of a pixel.
+    /// Reconstruction filter.
     #[serde(default, skip_serializing_if = "is_default")]
     pub filter: PixelFilter,
 }
@@ -131,13 +131,13 @@ impl Default for FilmPart {
     }
 }
 
-/// How the picture is shown; no sample depends on it.
+/// Display settings; samples do not depend on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DisplayPart {
-    /// Factors of two.
+    /// Exposure in stops (factors of two).
     pub exposure: f32,
-    /// How bright light is brought into the range of the display.
+    /// Map from radiance to the range of the display.
     pub tone_curve: ToneCurve,
 }
 
@@ -153,7 +153,7 @@ impl From<Display> for DisplayPart {
     }
 }
 
-/// By name.
+/// Parameter types of a scene file: references by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InFile;
 
@@ -164,10 +164,10 @@ impl Params for InFile {
     type Material = String;
 }
 
-/// A material as a scene file writes it.
+/// A material as written in a scene file.
 pub type MaterialPart = Material<InFile>;
 
-/// An object and its place, metres.
+/// An object with its geometry, metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ObjectPart {
@@ -183,11 +183,11 @@ pub enum ObjectPart {
         radius: f64,
         /// Its material, by name.
         material: String,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// Infinite.
+    /// An infinite plane.
     Plane {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -195,16 +195,16 @@ pub enum ObjectPart {
         /// A point of the plane; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         point: DVec3,
-        /// Direction of the front; +Y when not given.
+        /// Normal of the front side; +Y if not given.
         #[serde(default = "default_up")]
         normal: DVec3,
         /// Its material, by name.
         material: String,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// A parallelogram; its front looks along `edge_u` × `edge_v`.
+    /// A parallelogram; its front normal is `edge_u` × `edge_v`.
     Quad {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -212,26 +212,26 @@ pub enum ObjectPart {
         /// The corner at `u = v = 0`; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         corner: DVec3,
-        /// From the corner to the one at `u = 1`.
+        /// Vector from the corner to the one at `u = 1`.
         edge_u: DVec3,
-        /// From the corner to the one at `v = 1`.
+        /// Vector from the corner to the one at `v = 1`.
         edge_v: DVec3,
         /// Its material, by name.
         material: String,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// A single triangle; its front is where its vertices run counter-clockwise.
+    /// A single triangle; its front is the side from which its vertices are counter-clockwise.
     Triangle {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
-        /// The corners.
+        /// The vertices.
         vertices: [DVec3; 3],
         /// Its material, by name.
         material: String,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
@@ -240,25 +240,25 @@ pub enum ObjectPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
-        /// Where the triangles come from.
+        /// Source of the triangles.
         source: MeshSource,
-        /// How normals between vertices are found.
+        /// How vertex normals are computed.
         #[serde(default, skip_serializing_if = "is_default")]
         shading: MeshShading,
-        /// Share of the faces to keep, 0..1.
+        /// Share of the faces to keep, (0, 1].
         #[serde(default, skip_serializing_if = "Option::is_none")]
         simplify: Option<f64>,
-        /// For every slot; without it the materials of the file (MTL) are used.
+        /// Material of every slot; without it, the materials of the file (MTL) are used.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         material: Option<String>,
-        /// One for each slot, in place of `material`.
+        /// Material per slot, in place of `material`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         materials: Option<Vec<String>>,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// Spheres of one material in rows, layers or blocks: one at `first`, then by each step in turn that many times.
+    /// Spheres of one material in rows, layers or blocks: a sphere at `first`, repeated by each of the steps in turn.
     BallGrid {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -266,17 +266,17 @@ pub enum ObjectPart {
         /// Centre of the first sphere; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         first: DVec3,
-        /// Up to three pairs: how many spheres in a row, and the way from each to the next.
+        /// Up to three pairs: number of spheres, and vector from each to the next.
         steps: Vec<(u32, DVec3)>,
         /// Radius of each sphere, positive.
         radius: f64,
         /// Its material, by name.
         material: String,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
-    /// Many spheres, one material.
+    /// Many spheres of one material.
     Spheres {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -287,7 +287,7 @@ pub enum ObjectPart {
         radii: RadiiPart,
         /// Its material, by name.
         material: String,
-        /// From these coordinates to the world.
+        /// Object to world.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
@@ -307,7 +307,7 @@ impl ObjectPart {
         }
     }
 
-    /// The name of its material; `None` for a mesh without one for all slots.
+    /// Name of its material; `None` for a mesh without a common material.
     pub fn material(&self) -> Option<&str> {
         match self {
             Self::Sphere { material, .. }
@@ -320,7 +320,7 @@ impl ObjectPart {
         }
     }
 
-    /// Of a mesh that names one material for each slot.
+    /// Materials per slot of a mesh, if given.
     pub fn slot_materials(&self) -> Option<&[String]> {
         match self {
             Self::Mesh { materials, .. } => materials.as_deref(),
@@ -328,7 +328,7 @@ impl ObjectPart {
         }
     }
 
-    /// From its coordinates to the world.
+    /// Object to world.
     pub fn transform(&self) -> &TransformPart {
         match self {
             Self::Sphere { transform, .. }
@@ -350,35 +350,35 @@ pub fn ball_grid(first: DVec3, steps: &[(u32, DVec3)]) -> Vec<DVec3> {
     })
 }
 
-/// One radius for all spheres or one for each.
+/// One radius for all spheres, or one per sphere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RadiiPart {
     /// The same radius for all, metres.
     All(f64),
-    /// The radius of each, metres, in the order of the centres.
+    /// The radius of each sphere, metres, in the order of the centres.
     Each(Vec<f64>),
 }
 
-/// From the object's own space to the world: scale, then rotate, then translate; or a matrix.
+/// Transform from object to world: scale, then rotate, then translate; or a matrix.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TransformPart {
-    /// Metres.
+    /// Translation, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub translate: Option<DVec3>,
-    /// Degrees about X, then Y, then Z, the axes standing still.
+    /// Rotation, degrees about X, then Y, then Z, about fixed axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<DVec3>,
-    /// Factors along the axes of the object; negative ones mirror.
+    /// Scale factors along the axes of the object; negative ones mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<ScalePart>,
-    /// Three rows of four: the last column translates.
+    /// Three rows of four numbers; the last column is the translation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix: Option<[[f64; 4]; 3]>,
 }
 
-/// One factor or one an axis.
+/// One factor, or one per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScalePart(pub DVec3);
 
@@ -386,7 +386,7 @@ pub struct ScalePart(pub DVec3);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightPart {
-    /// A small glowing sphere, or a point, that shines evenly into all directions.
+    /// A small sphere light, or a point light, that emits uniformly in all directions.
     Point {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -395,11 +395,11 @@ pub enum LightPart {
         position: DVec3,
         /// Radiant intensity, W·sr⁻¹.
         intensity: Rgb,
-        /// Metres; shadows are as soft as the sphere is large. With 0 it is a point, which no camera sees.
+        /// Radius in metres, which determines the softness of shadows. With 0 it is a point, which is invisible.
         #[serde(default = "default_light_radius")]
         radius: f64,
     },
-    /// A point that shines into a cone.
+    /// A point light that emits into a cone.
     Spot {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -407,17 +407,17 @@ pub enum LightPart {
         /// The tip of the cone; the origin when not given.
         #[serde(default, skip_serializing_if = "is_default")]
         position: DVec3,
-        /// Along the axis of the cone, away from its tip; any length but 0.
+        /// Direction of the cone's axis; any length except 0.
         direction: DVec3,
         /// Radiant intensity within the inner cone, W·sr⁻¹.
         intensity: Rgb,
-        /// Degrees from the axis; the intensity falls off from here on.
+        /// Angle from the axis in degrees from which on the intensity falls off.
         #[serde(default, skip_serializing_if = "is_default")]
         inner_angle: f64,
-        /// Degrees from the axis, up to 90; no light beyond.
+        /// Angle from the axis in degrees, at most 90, beyond which there is no light.
         #[serde(default = "default_outer_angle")]
         outer_angle: f64,
-        /// From these coordinates to the world; scale leaves the intensity as it is.
+        /// Object to world; scaling does not affect the intensity.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },
@@ -426,11 +426,11 @@ pub enum LightPart {
         /// Its name in lists and reports.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         name: Option<String>,
-        /// Where the light goes; any length but 0.
+        /// Direction in which the light travels; any length except 0.
         direction: DVec3,
-        /// On a surface that faces the light, W·m⁻².
+        /// Irradiance on a surface that faces the light, W·m⁻².
         irradiance: Rgb,
-        /// From these coordinates to the world; only its rotation counts.
+        /// Object to world; only its rotation is used.
         #[serde(default, skip_serializing_if = "is_default")]
         transform: TransformPart,
     },

@@ -1,10 +1,10 @@
-//! Errors of the parser in words for people: what stands there, what was expected, the nearest known name.
+//! Converts parser errors to messages: what was found, what was expected, and the nearest known name.
 
 use crate::scene::error::{SceneError, suggestion};
 use ron::error::{Error, SpannedError};
 use std::path::Path;
 
-/// Turns a parser's error into a message with line and column.
+/// Converts a parser error to a message with line and column.
 pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
     let at = (error.span.start.line.max(1), error.span.start.col.max(1));
     let of = |outer: &Option<String>| outer.as_ref().map(|name| format!(" of `{}`", plain(name))).unwrap_or_default();
@@ -13,7 +13,7 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
             format!("unknown field `{found}`{}{}", of(outer), suggestion(found, expected.iter().copied()))
         }
         Error::NoSuchEnumVariant { expected, found, .. } => {
-            // Capitals stand in what other versions wrote: read, but not to be learnt.
+            // Capitalised names are those of older versions: accepted, but not suggested.
             let words = expected.iter().copied().filter(|word| word.starts_with(char::is_lowercase));
             format!("unknown kind `{found}`{}", suggestion(found, words))
         }
@@ -26,7 +26,7 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
         Error::TrailingCharacters => "unexpected text after the end of the scene".to_owned(),
         other => own_names(&lower_first(&other.to_string())),
     };
-    // The parser stands behind the word it complains about.
+    // The parser's position is behind the word.
     let at = match &error.code {
         Error::NoSuchStructField { found, .. } | Error::NoSuchEnumVariant { found, .. } => word_before(text, at, found),
         _ => at,
@@ -34,7 +34,7 @@ pub fn explain(error: &SpannedError, text: &str, file: &Path) -> SceneError {
     SceneError::at(file, at, message)
 }
 
-/// The place where `word` starts, if the parser's place lies within or right behind it.
+/// Returns the position at which `word` starts, if the parser's position is within it or directly behind it.
 fn word_before(text: &str, (line, column): (usize, usize), word: &str) -> (usize, usize) {
     let Some(content) = text.lines().nth(line - 1) else { return (line, column) };
     let chars: Vec<char> = content.chars().collect();
@@ -45,13 +45,13 @@ fn word_before(text: &str, (line, column): (usize, usize), word: &str) -> (usize
         .map_or((line, column), |start| (line, start + 1))
 }
 
-/// Our own names for the parts: `CameraPart` is the camera.
+/// Converts type names to plain names: `CameraPart` to camera.
 fn plain(name: &str) -> String {
     let name = if name == "SceneFile" { "scene" } else { name.trim_end_matches("Part") };
     name.to_lowercase()
 }
 
-/// A message of the parser without the names of types: what it quotes of them becomes the plain name.
+/// Replaces quoted type names in a message of the parser by plain names.
 fn own_names(message: &str) -> String {
     let is_ours = |word: &str| word == "SceneFile" || word.ends_with("Part");
     let words = message.split('`').map(|word| if is_ours(word) { plain(word) } else { word.to_owned() });
