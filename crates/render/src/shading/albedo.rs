@@ -1,6 +1,6 @@
-//! What share of light a surface returns, about: the colour of a surface without its light.
+//! Approximate albedo of a surface: its colour without lighting.
 //!
-//! An estimate for views and feature buffers, not for transport: at one viewing angle, without what is lost between
+//! An estimate for views and feature buffers, not for transport: at one viewing angle, without the energy lost between
 //! microfacets.
 
 use crate::core::material::{Material, MaterialId};
@@ -9,15 +9,16 @@ use crate::shading::principled::at::principled_at;
 use crate::shading::vertex::Vertex;
 use glam::Vec3;
 
-/// Parts of parts that are looked into. Extraction lets no deeper blends through.
+/// Maximum nesting of blends that is evaluated. Extraction rejects deeper blends.
 const DEEPEST_BLEND: u32 = 16;
 
-/// Share of light that comes back from or passes a surface, per channel, 0..1. Emission does not count.
+/// Returns the reflected or transmitted share of light, per channel, 0..1, without emission.
 pub(crate) fn surface_albedo(scene: &Prepared, vertex: &Vertex, material: MaterialId) -> Vec3 {
     albedo_of_part(scene, vertex, material, 0).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
-/// The same with what the surface emits, scaled to at most 1 so that its hue is kept: how an emitter looks beside others.
+/// Like [`surface_albedo`], plus the emitted radiance, scaled to at most 1 so that its hue is kept: the look of an
+/// emitter beside other surfaces.
 pub(crate) fn visible_albedo(scene: &Prepared, vertex: &Vertex, material: MaterialId) -> Vec3 {
     let albedo = surface_albedo(scene, vertex, material);
     match scene.tables.emission[material as usize] {
@@ -45,7 +46,7 @@ fn albedo_of_part(scene: &Prepared, vertex: &Vertex, id: MaterialId, depth: u32)
         Material::Principled { .. } => {
             let Some(layers) = principled_at(scene, id, vertex, &mut None, 0, false) else { return Vec3::ZERO };
             let transmitted = layers.transmission.map_or(Vec3::ZERO, |passed| passed.share * passed.tint);
-            // What the dielectric does not reflect reaches what lies below it.
+            // The layers below the dielectric get what it does not reflect.
             layers.dielectric * layers.facing
                 + (Vec3::ONE - layers.facing) * layers.diffuse
                 + layers.metallic * layers.metal

@@ -1,4 +1,4 @@
-//! Scattering by several parts at once, each with its share.
+//! Blends: weighted sums of BSDFs.
 
 use crate::core::material::MAX_LOBES;
 use crate::shading::bsdf::Lobe;
@@ -7,7 +7,7 @@ use crate::shading::principled::layers::Principled;
 use crate::shading::scatter::{BsdfSample, Scatter};
 use glam::{Vec2, Vec3};
 
-/// Parts with weights that sum to at most 1.
+/// A blend; the weights of its parts sum to at most 1.
 #[derive(Clone, Debug)]
 pub(crate) struct Blend {
     parts: [WeightedPart; MAX_LOBES],
@@ -15,11 +15,11 @@ pub(crate) struct Blend {
     layers: Vec<Principled>,
 }
 
-/// What scatters by itself.
+/// A part of a blend.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Part {
     Lobe(Lobe),
-    /// A layered surface, by its number among those of the blend.
+    /// A layered surface, by its index in the blend's `layers`.
     Layers(u8),
 }
 
@@ -27,18 +27,18 @@ pub(crate) enum Part {
 struct WeightedPart {
     part: Part,
     weight: f32,
-    /// Of being sampled.
+    /// Probability of being sampled.
     pmf: f32,
 }
 
 impl Blend {
-    /// From parts and their weights; at most [`MAX_LOBES`], at least one.
+    /// Creates a blend from parts and their weights; at least one, at most [`MAX_LOBES`].
     ///
-    /// - `layers`: what [`Part::Layers`] counts.
+    /// - `layers`: the surfaces that [`Part::Layers`] refers to.
     pub fn new(parts: &[(Part, f32)], layers: Vec<Principled>) -> Self {
         let nothing = WeightedPart { part: parts[0].0, weight: 0.0, pmf: 0.0 };
         let mut blend = Self { parts: [nothing; MAX_LOBES], n: parts.len(), layers };
-        // Chosen by what they reflect; an even share where all is black.
+        // Sampled in proportion to their reflected light; uniformly if all are black.
         let strength = |(part, weight): &(Part, f32)| {
             weight
                 * match part {
@@ -131,7 +131,7 @@ impl Scatter for Blend {
         let fresh = (rest / p.pmf).clamp(0.0, 1.0f32.next_down());
         let mut sample = p.part.sample(&self.layers, wo, normal, fresh, u)?;
         if sample.pdf.is_finite() && sample.through.is_none() {
-            // All parts that are not specular could have found this direction: the one-sample estimate over their mixture.
+            // All non-specular parts could have sampled this direction: one-sample estimate over their mixture.
             let (value, pdf) = self.eval(wo, sample.wi, normal);
             sample.weight = value / pdf;
             sample.pdf = pdf;

@@ -1,4 +1,4 @@
-//! Scattering at a point by one lobe.
+//! BSDFs of single lobes.
 
 use crate::core::color::luminance;
 use crate::core::material::{Fresnel, SMALLEST_ALPHA};
@@ -13,7 +13,7 @@ use firstlight_kdtree::geometry::Frame;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
 
-/// One way of scattering, all inputs looked up.
+/// A lobe, with all of its parameters evaluated at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Lobe {
     Diffuse {
@@ -29,7 +29,7 @@ pub(crate) enum Lobe {
         compensate: bool,
     },
     Glass(Interface),
-    /// Not smooth as [`crate::shading::rough_glass::is_smooth`] tells.
+    /// Rough in the sense of [`crate::shading::rough_glass::is_smooth`].
     RoughGlass {
         interface: Interface,
         alpha: f32,
@@ -38,12 +38,12 @@ pub(crate) enum Lobe {
 }
 
 impl Lobe {
-    /// Something that light passes through, to be told apart from other lobes but not to be sampled.
+    /// A placeholder for a transmissive lobe that is distinguished from others but never sampled.
     pub const CLEAR: Self = Self::Glass(Interface { eta: 1.0, squeeze: 1.0, beyond: MediumId::OUTSIDE });
 }
 
 impl Lobe {
-    /// Share of light that it returns, about.
+    /// Approximate reflected or transmitted share of light, 0..1.
     pub fn albedo_estimate(&self) -> f32 {
         match self {
             Self::Diffuse { albedo } => luminance(*albedo),
@@ -125,7 +125,7 @@ impl Scatter for Lobe {
                     return None;
                 }
                 let [wi, local] = metal.sample(u.to_array());
-                // Below the surface: the light that a second bounce would have returned.
+                // Below the surface: light that a second bounce would have returned.
                 if local.z <= 0.0 {
                     return None;
                 }
@@ -146,10 +146,10 @@ impl Scatter for Lobe {
                 let Interface { eta, squeeze, .. } = interface;
                 let (reflectance, cos_t) = fresnel(normal.dot(wo).clamp(0.0, 1.0), eta);
                 if u_choice() < reflectance {
-                    // Weight f·cos/pdf is reflectance over the probability of reflecting: one.
+                    // The weight f·cos/pdf is reflectance over the probability of reflection: one.
                     Some(specular(mirrored(wo, normal), Vec3::ONE, None))
                 } else {
-                    // Radiance is squeezed into a narrower cone where light is slower: the factor η².
+                    // Radiance scales with n² across the interface: the factor η².
                     let wi = refract(wo.into(), normal.into(), eta, cos_t).into();
                     Some(specular(wi, Vec3::splat(squeeze * squeeze), Some(interface)))
                 }
@@ -195,7 +195,7 @@ mod tests {
         Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)
     }
 
-    /// Share of light returned when all of it comes from a uniformly bright surround.
+    /// Reflected share of light in a white furnace.
     fn furnace(bsdf: &impl Scatter, cos: f32) -> Vec3 {
         let n = 1 << 14;
         let mut sum = Vec3::ZERO;
@@ -244,7 +244,7 @@ mod tests {
     fn same_mean(case: u32, bsdf: &impl Scatter) {
         for cos in [0.9, 0.4, 0.1] {
             let wo = direction(cos);
-            // ∫ f cos · L with an uneven L, by even directions and by sampling.
+            // ∫ f cos · L for a non-uniform L, by uniform directions and by sampling.
             let light = |w: Vec3| 1.0 + w.x + 0.5 * w.y * w.y;
             let n = 1 << 16;
             let (mut even, mut sampled, mut pdf_integral) = (Vec3::ZERO, Vec3::ZERO, 0.0);

@@ -1,8 +1,8 @@
-//! Rays through what is not there: surfaces with holes, and the backs of surfaces that have only a front.
+//! Rays through cutouts: surfaces with an opacity map, and the invisible backs of one-sided surfaces.
 //!
-//! A ray that meets such a place goes on behind it, in the same direction and at the same depth of its path. Where a surface
-//! is there in part, chance decides: a hash of the ray and of what it met, so that a ray has one answer wherever it is asked,
-//! and light that comes along it is that of the share that is not there. Scenes without such surfaces pay nothing.
+//! A ray that hits such a point continues behind it, in the same direction and at the same path depth. Where opacity is
+//! fractional, the decision is random: it is a hash of the ray and the hit, so that a ray gets the same answer in every
+//! query, and on average the transmitted share of light continues. Scenes without such surfaces have no cost.
 
 use crate::core::material::{Material, MaterialId};
 use crate::prepare::prepared::Prepared;
@@ -11,13 +11,13 @@ use crate::shading::vertex::{Vertex, material_of};
 use firstlight_kdtree::geometry::Ray;
 use firstlight_kdtree::{Hit, HitBatch, RayBatch, RayClass};
 
-/// Surfaces that a ray may pass before it is stopped: a bound on the work, far above what scenes have.
+/// Maximum number of surfaces that a ray may pass: bounds the work, far above any real scene.
 const MOST_PASSED: usize = 10_000;
 
 impl Prepared {
-    /// The nearest hits that are there; see [`firstlight_kdtree::SceneTree::closest_hits`].
+    /// Finds the closest hits that are not cut out; see [`firstlight_kdtree::SceneTree::closest_hits`].
     ///
-    /// `t` counts from where the ray began.
+    /// `t` is measured from the origin of the original ray.
     pub(crate) fn closest_hits(&self, rays: &RayBatch, class: RayClass, hits: &mut HitBatch) {
         self.geometry.tree.closest_hits(rays, class, hits);
         if self.tables.features.cutouts {
@@ -25,7 +25,7 @@ impl Prepared {
         }
     }
 
-    /// Whether anything is in the way; see [`firstlight_kdtree::SceneTree::any_hits`].
+    /// Whether rays are occluded; see [`firstlight_kdtree::SceneTree::any_hits`].
     pub(crate) fn any_hits(&self, rays: &RayBatch, class: RayClass, occluded: &mut Vec<bool>) {
         self.geometry.tree.any_hits(rays, class, occluded);
         if !self.tables.features.cutouts {
@@ -41,7 +41,7 @@ impl Prepared {
         }
     }
 
-    /// The same for one ray.
+    /// Like [`Self::closest_hits`], for one ray.
     pub(crate) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         if !self.tables.features.cutouts {
             return self.geometry.tree.closest_hit(ray);
@@ -85,7 +85,7 @@ impl Prepared {
         }
     }
 
-    /// The ray behind what it met, if that is not there.
+    /// Returns the continuation of a ray behind its hit, if that is cut out.
     fn onwards(&self, ray: &Ray, hit: &Hit) -> Option<Ray> {
         let id = material_of(self, hit);
         if !self.tables.cutouts[id as usize] {
@@ -99,14 +99,14 @@ impl Prepared {
         }
         let origin = vertex.passing(ray.dir);
         Some(if ray.t_max.is_finite() {
-            // To the very end of the first ray, wherever it starts.
+            // Ends exactly at the end of the first ray, wherever it starts.
             Ray { origin, dir: ray.at(ray.t_max) - origin, t_max: 1.0 }
         } else {
             Ray { origin, ..*ray }
         })
     }
 
-    /// - `u`: uniform in `[0, 1)`, asked for where chance decides.
+    /// - `u`: uniform in `[0, 1)`, evaluated only for fractional opacity.
     fn is_there(&self, id: MaterialId, vertex: &Vertex, u: impl FnOnce() -> f32) -> bool {
         let material = &self.shading.materials[id as usize];
         let Material::Principled { two_sided, opacity, opacity_cutoff, .. } = material else { return true };
@@ -121,12 +121,12 @@ impl Prepared {
     }
 }
 
-/// How far along a ray a point is, lengths of its direction.
+/// Returns the parameter of a point along a ray, in lengths of its direction.
 fn along(ray: &Ray, point: glam::Vec3) -> f32 {
     (point - ray.origin).dot(ray.dir) / ray.dir.length_squared()
 }
 
-/// Uniform in `[0, 1)` over rays and what they meet.
+/// A hash of a ray and its hit, uniform in `[0, 1)`.
 fn chance(ray: &Ray, hit: &Hit) -> f32 {
     let of_ray = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).map(f32::to_bits);
     let bits = of_ray.chain([hit.object, hit.prim]).fold(0x51ed_270b, hash_combine);

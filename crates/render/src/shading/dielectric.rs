@@ -1,8 +1,8 @@
-//! Smooth interfaces between transparent media, and mirrors; for one point or sixteen.
+//! Smooth dielectric interfaces and mirrors, for one point or sixteen.
 
 use firstlight_simd::{Real, Vector3, select};
 
-/// Fresnel reflectance of unpolarised light at a smooth dielectric, and the cosine of the refracted ray.
+/// Returns the Fresnel reflectance of unpolarised light at a smooth dielectric, and the cosine of the refracted ray.
 ///
 /// - `cos_i`: in `[0, 1]`, on the side of incidence; `eta`: index of that side over the index of the far side.
 ///
@@ -10,7 +10,7 @@ use firstlight_simd::{Real, Vector3, select};
 #[inline(always)]
 pub fn fresnel<R: Real>(cos_i: R, eta: R) -> (R, R) {
     let (one, zero) = (eta.all(1.0), eta.all(0.0));
-    // 1 − η²(1 − cos²) rearranged: with η near 1 the two terms of the plain form cancel.
+    // 1 − η²(1 − cos²) rearranged: for η near 1 the two terms of the direct form cancel.
     let cos2_t = (one - eta) * (eta + 1.0) + (eta * cos_i) * (eta * cos_i);
     let total = cos2_t.le(zero);
     let cos_t = cos2_t.at_least(0.0).sqrt();
@@ -21,7 +21,7 @@ pub fn fresnel<R: Real>(cos_i: R, eta: R) -> (R, R) {
     (select(total, one, select(alike, zero, reflectance)), select(alike, cos_i, cos_t))
 }
 
-/// The refracted direction, unit.
+/// Returns the refracted direction, unit.
 ///
 /// - `wo`: unit, on the side of `normal`; `eta` as in [`fresnel`], which also gives `cos_t`.
 #[inline(always)]
@@ -29,7 +29,7 @@ pub fn refract<R: Real>(wo: Vector3<R>, normal: Vector3<R>, eta: R, cos_t: R) ->
     (wo * -eta + normal * (eta * normal.dot(wo) - cos_t)).normalize()
 }
 
-/// The mirrored direction, unit.
+/// Returns the mirrored direction, unit.
 ///
 /// - `wo`, `normal`: unit.
 #[inline(always)]
@@ -47,7 +47,8 @@ mod tests {
         // Head-on: ((n − 1) / (n + 1))².
         assert!((fresnel(1.0, 1.0 / 1.5).0 - 0.04).abs() < 1e-6);
         assert!((fresnel(1.0, 1.0 / 1.2).0 - 0.008_264_5).abs() < 1e-6);
-        // Brewster's angle, tan θ = n: the parallel part vanishes, the perpendicular is ((n² − 1) / (n² + 1))².
+        // Brewster's angle, tan θ = n: the parallel component vanishes, the perpendicular one is ((n² − 1) / (n² +
+        // 1))².
         let cos_b = (1.0_f32 / (1.0 + 1.5 * 1.5)).sqrt();
         assert!((fresnel(cos_b, 1.0 / 1.5).0 - 0.5 * (1.25_f32 / 3.25).powi(2)).abs() < 1e-6);
         assert_eq!(fresnel(0.0, 1.0 / 1.5).0, 1.0);
@@ -66,7 +67,7 @@ mod tests {
             let cos_i = i as f32 / 100.0;
             let (from_outside, cos_t) = fresnel(cos_i, 1.0 / 1.5);
             let (from_inside, back) = fresnel(cos_t, 1.5);
-            // Near grazing the way back loses digits to 1 − sin²: the bound grows with 1 / cos.
+            // Near grazing the reverse direction loses digits to 1 − sin²: the bound grows with 1 / cos.
             let bound = 1e-6 / cos_i;
             assert!((from_outside - from_inside).abs() < 4.0 * bound && (back - cos_i).abs() < bound);
         }

@@ -1,8 +1,8 @@
-//! Which sample dimension decides what on a path from the camera.
+//! Assignment of sample dimensions on a camera path.
 
-/// Sample dimensions of the camera, and then of each vertex.
+/// Number of dimensions of the camera; those of the vertices follow.
 pub(crate) const CAMERA_DIMENSIONS: u32 = 2;
-/// Of each vertex.
+/// Number of dimensions per vertex.
 const VERTEX_DIMENSIONS: u32 = 5;
 pub(crate) const DIM_LIGHT_POINT: u32 = 0;
 pub(crate) const DIM_DIRECTION: u32 = 1;
@@ -10,7 +10,7 @@ pub(crate) const DIM_LIGHT: u32 = 2;
 pub(crate) const DIM_LOBE: u32 = 3;
 pub(crate) const DIM_ROULETTE: u32 = 4;
 
-/// The first of the vertex that the segment `depth` ends at.
+/// Returns the first dimension of the vertex at the end of segment `depth`.
 pub(crate) fn first_dimension(depth: u32) -> u32 {
     CAMERA_DIMENSIONS + (depth - 1) * VERTEX_DIMENSIONS
 }

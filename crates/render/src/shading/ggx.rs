@@ -1,6 +1,7 @@
-//! Isotropic GGX microfacets: distribution, masking, visible normals, and the energy that bouncing once loses.
+//! Isotropic and anisotropic GGX microfacets: distribution, masking, visible normals, and the energy lost by single
+//! scattering.
 //!
-//! All vectors are unit and in the shading frame, the normal being +z.
+//! All vectors are unit and in the shading frame, with the normal along +z.
 
 use crate::sampling::warp::uniform_disc;
 use firstlight_simd::{Real, Vector3, select, select_vector};
@@ -11,7 +12,7 @@ use std::sync::OnceLock;
 /// Distribution of normals D, per steradian (Walter et al. 2007, equation 33).
 #[inline(always)]
 pub fn distribution<R: Real>(h: Vector3<R>, alpha: R) -> R {
-    // cos²(α² − 1) + 1 written as α²cos² + sin²: near the peak of a smooth surface the first form cancels.
+    // cos²(α² − 1) + 1 rearranged to α²cos² + sin²: near the peak of a smooth surface the first form cancels.
     let a2 = alpha * alpha;
     let d = a2 * h.z * h.z + (h.x * h.x + h.y * h.y);
     a2 / (d * d * PI)
@@ -21,12 +22,12 @@ pub fn distribution<R: Real>(h: Vector3<R>, alpha: R) -> R {
 #[inline(always)]
 pub fn lambda<R: Real>(w: Vector3<R>, alpha: R) -> R {
     let tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
-    // (√(1 + a²tan²) − 1) / 2 without its cancellation for small slopes.
+    // (√(1 + a²tan²) − 1) / 2 without cancellation for small slopes.
     let x = alpha * alpha * tan2;
     x * 0.5 / ((x + 1.0).sqrt() + 1.0)
 }
 
-/// [`distribution`] with a width along each axis (Heitz 2014, equation 86).
+/// Like [`distribution`], with a width per axis (Heitz 2014, equation 86).
 #[inline]
 pub fn anisotropic_distribution(h: Vector3<f32>, [ax, ay]: [f32; 2]) -> f32 {
     let (x, y) = (h.x / ax, h.y / ay);
@@ -34,7 +35,7 @@ pub fn anisotropic_distribution(h: Vector3<f32>, [ax, ay]: [f32; 2]) -> f32 {
     1.0 / (PI * ax * ay * d * d)
 }
 
-/// Smith's Λ with a width along each axis.
+/// Like [`lambda`], with a width per axis.
 #[inline]
 pub fn anisotropic_lambda(w: Vector3<f32>, [ax, ay]: [f32; 2]) -> f32 {
     let (x, y) = (ax * w.x, ay * w.y);
@@ -42,19 +43,19 @@ pub fn anisotropic_lambda(w: Vector3<f32>, [ax, ay]: [f32; 2]) -> f32 {
     x * 0.5 / ((x + 1.0).sqrt() + 1.0)
 }
 
-/// G2 of one direction above the surface and one below: at a height that a share u of the surface lies under they are seen with
-/// probabilities u^Λₒ and (1 − u)^Λᵢ, and the mean over u is Euler's Β(1 + Λₒ, 1 + Λᵢ) (Heitz et al. 2016,
+/// Returns G2 for one direction above the surface and one below: where a share u of the surface lies lower, they are
+/// visible with probabilities u^Λₒ and (1 − u)^Λᵢ, and the mean over u is Euler's Β(1 + Λₒ, 1 + Λᵢ) (Heitz et al. 2016,
 /// "Multiple-Scattering Microfacet BSDFs with the Smith Model").
 pub fn above_and_below(lambda_o: f32, lambda_i: f32) -> f32 {
     beta_of_next(f64::from(lambda_o), f64::from(lambda_i)) as f32
 }
 
-/// Β(1 + a, 1 + b), for `a`, `b` from 0 on.
+/// Returns Β(1 + a, 1 + b) for `a`, `b` ≥ 0.
 fn beta_of_next(a: f64, b: f64) -> f64 {
     (ln_factorial(a) + ln_factorial(b) - ln_factorial(a + b + 1.0)).exp()
 }
 
-/// ln Γ(1 + x) for `x` from 0 on, to 1e-11: Stirling's series from 8 on, the recurrence below.
+/// Returns ln Γ(1 + x) for `x` ≥ 0 with error 1e-11: Stirling's series above 8, the recurrence below.
 fn ln_factorial(x: f64) -> f64 {
     let (mut z, mut product) = (x + 1.0, 1.0);
     while z < 8.0 {
@@ -68,16 +69,19 @@ fn ln_factorial(x: f64) -> f64 {
 
 /// Reflection of `wo` to `wi` at visible normals.
 pub struct Reflection<R> {
-    /// Unit, between the two.
+    /// The half vector, unit.
     pub half: Vector3<R>,
-    /// f · cos of single scattering over the reflectance; height-correlated masking and shadowing (Heitz 2014, equation 99).
+    /// f · cos of single scattering divided by the reflectance; height-correlated masking and shadowing (Heitz 2014,
+    /// equation 99).
     pub value: R,
-    /// Per steradian, of reflecting `wo` at a visible normal.
+    /// Pdf per steradian of sampling `wi` by visible normals.
     pub pdf: R,
-    /// f · cos / pdf over the reflectance: G2 / G1.
+    /// f · cos / pdf divided by the reflectance: G2 / G1.
     pub weight: R,
 }
 
+/// Evaluates the reflection.
+///
 /// - `wo`, `wi`: unit, above the surface; `lambda_o`: [`lambda`] of `wo`.
 #[inline(always)]
 pub fn reflection<R: Real>(wo: Vector3<R>, lambda_o: R, wi: Vector3<R>, alpha: R) -> Reflection<R> {
@@ -88,21 +92,21 @@ pub fn reflection<R: Real>(wo: Vector3<R>, lambda_o: R, wi: Vector3<R>, alpha: R
     Reflection { half, value: per_area / both, pdf: per_area / masking, weight: masking / both }
 }
 
-/// A microfacet normal among those that `wo` can see.
+/// Samples a microfacet normal among those visible from `wo`.
 ///
-/// Density `D(h) · G1(wo) · max(0, wo·h) / wo.z` per steradian; `wo.z > 0`, `u` in `[0, 1)²`.
-/// Source: Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
+/// Its pdf is `D(h) · G1(wo) · max(0, wo·h) / wo.z` per steradian; `wo.z > 0`, `u` in `[0, 1)²`. Source: Dupuy and
+/// Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
 #[inline(always)]
 pub fn sample_visible_normal<R: Real>(wo: Vector3<R>, alpha: R, u: [R; 2]) -> Vector3<R> {
     sample_anisotropic_normal(wo, [alpha; 2], u)
 }
 
-/// The same with a width along each axis.
+/// Like [`sample_visible_normal`], with a width per axis.
 #[inline(always)]
 pub fn sample_anisotropic_normal<R: Real>(wo: Vector3<R>, alpha: [R; 2], u: [R; 2]) -> Vector3<R> {
     let wo_std = stretched(wo, alpha).normalize();
-    // The place on the cap by a disc, which keeps neighbours together and takes no sine: the square of its radius is uniform,
-    // and so is the height on the cap.
+    // The point on the cap is mapped from a disc, which preserves stratification and needs no sine: the squared radius
+    // is uniform, and so is the height on the cap.
     let [x, y] = uniform_disc(u);
     let one = x.all(1.0);
     let r2 = (x * x + y * y).at_most(1.0);
@@ -114,7 +118,7 @@ pub fn sample_anisotropic_normal<R: Real>(wo: Vector3<R>, alpha: [R; 2], u: [R; 
     let wi_std = Vector3 { x: select(middle, sin_theta, x * scale), y: y * scale, z };
     let h = stretched(wo_std + wi_std, alpha);
     let length = h.length();
-    // Opposite vectors: the visible hemisphere's rim, where any normal will do.
+    // Opposite vectors: at the rim of the visible hemisphere any normal is valid.
     let up = Vector3 { x: x.all(0.0), y: x.all(0.0), z: one };
     select_vector(length.is_positive(), h * (one / length), up)
 }
@@ -124,9 +128,9 @@ fn stretched<R: Real>(v: Vector3<R>, [x, y]: [R; 2]) -> Vector3<R> {
     Vector3 { x: v.x * x, y: v.y * y, z: v.z }
 }
 
-/// The share of light that one bounce returns from a surface with reflectance 1, seen under `cos_theta`.
+/// Returns the single-scattering albedo of a surface with reflectance 1, seen at `cos_theta`.
 ///
-/// From a table, within 5 · 10⁻⁴ of the integral for every angle and every `alpha` from 10⁻⁴ on.
+/// From a table, within 5 · 10⁻⁴ of the integral for every angle and every `alpha` ≥ 10⁻⁴.
 #[inline]
 pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
@@ -144,23 +148,24 @@ pub fn single_scattering_albedo(cos_theta: f32, alpha: f32) -> f32 {
     row(0) + fy * (row(1) - row(0))
 }
 
-/// What one bounce loses over what it returns, for [`crate::shading::metal::Metal`]; arguments as of [`single_scattering_albedo`].
+/// Returns lost energy over returned energy of single scattering, for [`crate::shading::metal::Metal`]; arguments as
+/// for [`single_scattering_albedo`].
 #[inline]
 pub fn lost_over_returned(cos_theta: f32, alpha: f32) -> f32 {
     let albedo = single_scattering_albedo(cos_theta, alpha);
     (1.0 - albedo) / albedo
 }
 
-/// Entries along each side of the albedo table.
+/// Entries per side of the albedo table.
 const N: usize = 48;
 
-/// The albedo bends most where the cosine is about as large as alpha: columns are even in the root of
-/// `cos (1 + BEND α) / (cos + BEND α)`.
+/// The albedo has its largest curvature where the cosine is about alpha: columns are uniform in the root of `cos (1 +
+/// BEND α) / (cos + BEND α)`.
 const BEND: f32 = 2.0;
 
 fn table_cos(column: usize, row: usize) -> f32 {
     let (x, alpha) = (column as f32 / (N - 1) as f32, table_alpha(row));
-    // Grazing light itself has no frame; the limit is close enough.
+    // The frame is undefined at exactly grazing incidence; a value close to the limit is used.
     (BEND * alpha * x * x / (1.0 + BEND * alpha - x * x)).max(1e-6)
 }
 
@@ -168,7 +173,8 @@ fn table_alpha(row: usize) -> f32 {
     (row as f32 / (N - 1) as f32).powi(2).max(TABLE_LEAST_ALPHA)
 }
 
-/// Mean of Schlick's (1 − cos)⁵ of the angle with the normal, over the light that one bounce returns.
+/// Returns the mean of Schlick's (1 − cos)⁵ of the angle with the microfacet normal, over the light returned by single
+/// scattering.
 ///
 /// From a table, within 10⁻³ of the integral.
 #[inline]
@@ -196,12 +202,13 @@ pub(crate) fn mean_schlick(cos_theta: f32, alpha: f32) -> f32 {
     row(0) + fy * (row(1) - row(0))
 }
 
-/// Smoother surfaces are like this one, to the accuracy of the tables.
+/// Smoother surfaces have the same values, to the accuracy of the tables.
 const TABLE_LEAST_ALPHA: f32 = 1e-4;
 
-/// Share of light that comes back, and the same times Schlick's (1 − cos)⁵ of the angle with the normal: over all visible
-/// normals, by the midpoint rule. Most of what a smooth surface loses is in the long tail of its normals,
-/// at the rim of the disc that [`sample_visible_normal`] maps from, so radii are dense there.
+/// Integrates the single-scattering albedo, and the same with the factor (1 − cos)⁵ of Schlick for the angle with the
+/// microfacet normal: over all visible normals, by the midpoint rule. Most of the loss of a smooth surface is in the
+/// long tail of its normals, at the rim of the disc that [`sample_visible_normal`] maps from, so the radii are dense
+/// there.
 fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> (f32, f32) {
     let wo = Vec3::new((1.0 - cos_theta * cos_theta).max(0.0).sqrt(), 0.0, cos_theta);
     let stretch = Vec3::new(alpha, alpha, 1.0);
@@ -215,9 +222,9 @@ fn integrate_albedo(cos_theta: f32, alpha: f32, n_radii: u32, n_angles: u32) -> 
         let z = gap * (1.0 + wo_std.z) - wo_std.z;
         let sin_theta = (1.0 - z * z).max(0.0).sqrt();
         for k in 0..n_angles {
-            // The other half is its mirror image.
+            // The other half is symmetric.
             let (sin_phi, cos_phi) = (PI * (k as f32 + 0.5) / n_angles as f32).sin_cos();
-            // `z + wo_std.z` without its cancellation.
+            // `z + wo_std.z` without cancellation.
             let up = gap * (1.0 + wo_std.z);
             let h =
                 (Vec3::new(sin_theta * cos_phi + wo_std.x, sin_theta * sin_phi, up) * stretch).normalize_or(Vec3::Z);
@@ -258,7 +265,7 @@ mod tests {
             let n = 20_000;
             let mut sum = 0.0_f64;
             for i in 0..n {
-                // Equal steps in the angle of the peak: tan θ = α tan φ.
+                // Uniform steps in the angle of the peak: tan θ = α tan φ.
                 let phi = (f64::from(i) + 0.5) / f64::from(n) * std::f64::consts::FRAC_PI_2;
                 let theta = (f64::from(alpha) * phi.tan()).atan();
                 let d_theta = f64::from(alpha) / (phi.cos().powi(2) * (1.0 + (f64::from(alpha) * phi.tan()).powi(2)));
@@ -272,7 +279,8 @@ mod tests {
 
     #[test]
     fn sampled_directions_follow_their_pdf() {
-        // χ² on directions, the pdf integrated finely in each bin; 1 % over all cases (Šidák: 3.5 σ).
+        // χ² test on directions, with the pdf integrated finely in each bin; significance 1 % over all cases (Šidák:
+        // 3.5 σ).
         for (case, (cos_o, alpha)) in
             [(0.95_f32, 0.3_f32), (0.5, 0.2), (0.08, 0.4), (0.7, 1.0), (0.02, 0.6)].into_iter().enumerate()
         {

@@ -1,6 +1,6 @@
-//! What of its light a rough dielectric loses where it is scattered but once, by table.
+//! Energy that a rough dielectric loses in single scattering, by table.
 //!
-//! See [`crate::shading::rough_glass`] for what is done about it.
+//! See [`crate::shading::rough_glass`] for its compensation.
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::shading::dielectric::{fresnel, reflect, refract};
@@ -12,31 +12,31 @@ use std::sync::OnceLock;
 
 const N_COS: usize = 24;
 const N_ALPHA: usize = 16;
-/// Odd, so that index 1, about which losses bend, is one of them.
+/// Odd, so that index 1, about which losses have their largest curvature, is an entry.
 const N_ETA: usize = 25;
 
-/// The largest (η − 1) / (η + 1) of the table, and with the other sign the smallest: indices from 1/4 to 4.
+/// Range of (η − 1) / (η + 1) in the table, on both sides of 0: indices from 1/4 to 4.
 const MOST_CONTRAST: f32 = 0.6;
 
-/// Losses bend most where the cosine is about as large as alpha: columns are even in the root of
-/// `cos (1 + BEND α) / (cos + BEND α)`.
+/// The loss has its largest curvature where the cosine is about alpha: columns are uniform in the root of `cos (1 +
+/// BEND α) / (cos + BEND α)`.
 const BEND: f32 = 2.0;
 
 struct LossTable {
-    /// By contrast of the indices, root of alpha, cosine.
+    /// Losses by contrast of the indices, root of alpha, cosine.
     at_angles: Vec<f32>,
-    /// By contrast of the indices and root of alpha.
+    /// Cosine-weighted means by contrast of the indices and root of alpha.
     means: Vec<f32>,
 }
 
-/// Two neighbours in a table, and how far the place lies from the first to the second.
+/// Linear interpolation between two neighbours in a table.
 struct Between {
     first: usize,
     part: f32,
 }
 
 impl Between {
-    /// - `x`: in 0..1.
+    /// - `x`: position in 0..1; `n`: number of entries.
     fn new(x: f32, n: usize) -> Self {
         let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
         let first = (x as usize).min(n - 2);
@@ -63,9 +63,10 @@ fn alpha_at(alpha: f32) -> Between {
     Between::new(alpha.max(0.0).sqrt(), N_ALPHA)
 }
 
-/// The share of light from one direction that a surface does not give back by single scattering.
+/// Returns the share of light from one direction that single scattering loses.
 ///
-/// - `cos`: with the normal; `alpha`: GGX width; `eta`: index on the side of the light over that beyond.
+/// - `cos`: cosine with the normal; `alpha`: GGX width; `eta`: index on the side of the light over that on the far
+///   side.
 pub(crate) fn lost(cos: f32, alpha: f32, eta: f32) -> f32 {
     let table = table();
     let columns = cos_at(cos, alpha.clamp(SMALLEST_ALPHA, 1.0));
@@ -74,7 +75,7 @@ pub(crate) fn lost(cos: f32, alpha: f32, eta: f32) -> f32 {
     })
 }
 
-/// The same of light that comes evenly from all around on one side.
+/// Like [`lost`], for uniform light from one side.
 pub(crate) fn mean_lost(alpha: f32, eta: f32) -> f32 {
     let table = table();
     contrast_at(eta).mean(|layer| alpha_at(alpha).mean(|row| table.means[layer * N_ALPHA + row]))
@@ -93,7 +94,7 @@ fn table() -> &'static LossTable {
             .collect();
         let means = (0..N_ETA * N_ALPHA)
             .map(|i| {
-                // ∫ 2 cos · lost dcos, in steps that are even in cos², of the table as it is read.
+                // ∫ 2 cos · lost dcos of the interpolated table, in uniform steps of cos².
                 let (n, row) = (256, i % N_ALPHA);
                 let at = |cos: f32| cos_at(cos, alpha_of(row)).mean(|column| at_angles[i * N_COS + column]);
                 (0..n).map(|k| at(((k as f32 + 0.5) / n as f32).sqrt())).sum::<f32>() / n as f32
@@ -109,18 +110,18 @@ fn alpha_of(row: usize) -> f32 {
 
 fn cos_of(column: usize, row: usize) -> f32 {
     let (x, bend) = (column as f32 / (N_COS - 1) as f32, BEND * alpha_of(row));
-    // Grazing light itself has no frame; the limit is close enough.
+    // The frame is undefined at exactly grazing incidence; a value close to the limit is used.
     (bend * x * x / (1.0 + bend - x * x)).max(1e-5)
 }
 
 fn eta_of(layer: usize) -> f32 {
-    // Dense about index 1.
+    // Dense near index 1.
     let root = 2.0 * layer as f32 / (N_ETA - 1) as f32 - 1.0;
     let contrast = MOST_CONTRAST * root * root.abs();
     (1.0 + contrast) / (1.0 - contrast)
 }
 
-/// Over all visible normals, by the midpoint rule, as [`ggx::single_scattering_albedo`] is made.
+/// Integrates over all visible normals by the midpoint rule, like [`ggx::single_scattering_albedo`].
 fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32 {
     let wo = Vector3 { x: (1.0 - cos * cos).max(0.0).sqrt(), y: 0.0, z: cos };
     let standard = Vector3 { x: wo.x * alpha, y: 0.0, z: wo.z }.normalize();
@@ -134,7 +135,7 @@ fn integrate(cos: f32, alpha: f32, eta: f32, n_radii: u32, n_angles: u32) -> f32
         let z = up - standard.z;
         let sin = (1.0 - z * z).max(0.0).sqrt();
         for k in 0..n_angles {
-            // The other half is its mirror image.
+            // The other half is symmetric.
             let (sin_phi, cos_phi) = (PI * (k as f32 + 0.5) / n_angles as f32).sin_cos();
             let (x, y) = (sin * cos_phi + standard.x, sin * sin_phi);
             let half = Vector3 { x: x * alpha, y: y * alpha, z: up }.normalize();

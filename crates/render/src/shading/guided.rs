@@ -1,4 +1,4 @@
-//! Surfaces whose directions are partly chosen by hints, one at a time.
+//! Surfaces with guided sampling, one at a time.
 
 use crate::prepare::guide::{Hints, SHARE};
 use crate::shading::interface::Interface;
@@ -6,21 +6,21 @@ use crate::shading::scatter::{BsdfSample, Scatter};
 use firstlight_simd::Real;
 use glam::{Vec2, Vec3};
 
-/// A surface together with the hints: what the integrator asks in place of the surface.
+/// A surface and the guiding distributions: replaces the surface for the integrator.
 pub(crate) struct Guided<'a, S> {
     pub surface: &'a S,
     pub hints: Hints<'a>,
 }
 
-/// Density of directions that come from hints with probability [`SHARE`], else from the surface.
+/// Pdf of the mixture that samples the guiding distributions with probability [`SHARE`], otherwise the surface.
 ///
-/// - `surface`, `hints`: densities of the two, per steradian.
+/// - `surface`, `hints`: pdfs of the two, per steradian.
 #[inline(always)]
 pub(crate) fn mixed_pdf<R: Real>(surface: R, hints: R) -> R {
     surface + (hints - surface) * SHARE
 }
 
-/// What is left of the number of a choice that fell on the surface, uniform in `[0, 1)` again.
+/// Rescales the random number of a choice that fell on the surface to `[0, 1)`.
 #[inline(always)]
 pub(crate) fn rest_of_choice<R: Real>(choice: R) -> R {
     ((choice - SHARE) / (1.0 - SHARE)).at_least(0.0).at_most(1.0f32.next_down())

@@ -1,27 +1,27 @@
-//! Which media a path is inside of, and what it finds where they end.
+//! Media on the two sides of a surface that a path meets.
 
-/// A set of media, by its place in the [`crate::shading::medium::MediumSets`] of one worker.
+/// A set of media, by its index in the [`crate::shading::medium::MediumSets`] of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct MediumId(pub u32);
 
 impl MediumId {
-    /// Inside of no body.
+    /// The empty set: outside of all bodies.
     pub const OUTSIDE: Self = Self(0);
 }
 
-/// What a path finds at the surface of a transparent body.
+/// The interface that a path finds at the surface of a transparent body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Interface {
-    /// Index on the side of the path over the index beyond.
+    /// Index of refraction on the side of the path over that on the far side.
     pub eta: f32,
-    /// Its square multiplies radiance from beyond: η of the two media.
+    /// Relative index whose square scales radiance from the far side: η of the two media, or 1.
     pub squeeze: f32,
-    /// What the path is inside of once it has passed.
+    /// Media of the path after passing.
     pub beyond: MediumId,
 }
 
 impl Interface {
-    /// Seen from its other side, but for what lies beyond.
+    /// Returns the interface as seen from the far side, except for `beyond`.
     #[inline]
     pub fn reversed(self) -> Self {
         Self { eta: 1.0 / self.eta, squeeze: 1.0 / self.squeeze, ..self }

@@ -1,14 +1,14 @@
-//! How much light a layer returns by itself: what is left for the layers below it.
+//! Albedos of layers, which determine how much light reaches the layers below.
 //!
-//! All are tables of integrals over the visible microfacets, made at the first use.
+//! All are tables of integrals over the visible microfacets, computed at first use.
 
 use crate::shading::ggx::{mean_schlick, single_scattering_albedo};
 use crate::shading::sheen;
 use std::f32::consts::PI;
 use std::sync::OnceLock;
 
-/// Albedo of a layer of GGX microfacets whose reflectance is `f0 + (f90 − f0) x`, x being Schlick's (1 − cos θ)⁵:
-/// `f0 · facing + f90 · grazing`.
+/// Albedo of a layer of GGX microfacets with reflectance `f0 + (f90 − f0) x`, where x is Schlick's (1 − cos θ)⁵: `f0 ·
+/// facing + f90 · grazing`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SchlickAlbedo {
     pub facing: f32,
@@ -16,7 +16,7 @@ pub(crate) struct SchlickAlbedo {
 }
 
 impl SchlickAlbedo {
-    /// Seen under an angle; within 10⁻³ of the integral.
+    /// Albedo at an angle; within 10⁻³ of the integral.
     #[inline]
     pub fn new(cos_theta: f32, alpha: f32) -> Self {
         let whole = single_scattering_albedo(cos_theta, alpha);
@@ -45,7 +45,7 @@ impl SchlickAlbedo {
 
 const N_MEANS: usize = 65;
 
-/// Albedo of a sheen of strength 1 seen under an angle; see [`sheen`].
+/// Returns the albedo of a sheen of strength 1 at an angle; see [`sheen`].
 ///
 /// - `alpha`: width, from [`sheen::LEAST_ALPHA`] to 1.
 #[inline]
@@ -73,7 +73,7 @@ fn sheen_alpha(at: f32) -> f32 {
     sheen::LEAST_ALPHA + (1.0 - sheen::LEAST_ALPHA) * at * at
 }
 
-/// The entry below a place in 0..=1 of a table, and how far it is to the next.
+/// Returns the table entry below a position in 0..=1, and the offset to the next entry.
 #[inline]
 fn place(at: f32, n: usize) -> (usize, f32) {
     let x = at * (n - 1) as f32;
@@ -81,12 +81,12 @@ fn place(at: f32, n: usize) -> (usize, f32) {
     (i, x - i as f32)
 }
 
-/// ∫ 2 cos θ f(cos θ) d cos θ by Gauss and Legendre's rule.
+/// Returns ∫ 2 cos θ f(cos θ) d cos θ by Gauss–Legendre quadrature.
 pub(crate) fn cosine_mean(f: impl Fn(f32) -> f32) -> f32 {
     GAUSS.iter().map(|&(x, weight)| 2.0 * x * weight * f(x)).sum()
 }
 
-/// Eight points of Gauss and Legendre's rule on 0..1, with their weights.
+/// Eight-point Gauss–Legendre rule on 0..1: points and weights.
 pub(crate) const GAUSS: [(f32, f32); 8] = [
     (0.019_855_072, 0.050_614_268),
     (0.101_666_76, 0.111_190_52),
@@ -98,7 +98,7 @@ pub(crate) const GAUSS: [(f32, f32); 8] = [
     (0.980_144_9, 0.050_614_268),
 ];
 
-/// By even steps of the angles of the light, closer together at the horizon.
+/// Integrates by uniform steps of the light's angles, denser at the horizon.
 fn integrate_sheen(cos_o: f32, alpha: f32) -> f32 {
     const N: u32 = 96;
     let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();

@@ -1,4 +1,4 @@
-//! Light at a vertex: asked for, or run into, and how much counts of each.
+//! Direct light at a vertex: light sampling, emission hit by BSDF sampling, and their MIS weights.
 
 use crate::core::techniques::Techniques;
 use crate::prepare::light::emitter::LightSample;
@@ -11,7 +11,7 @@ use firstlight_kdtree::Hit;
 use firstlight_simd::{Real, select};
 use glam::Vec3;
 
-/// A point on a light, or a direction to the surroundings: then there is no target. Takes two pairs of dimensions.
+/// Samples a point on a light, or a direction of the environment, which has no target. Uses two pairs of dimensions.
 #[inline]
 pub(crate) fn choose_light_point(
     scene: &Prepared,
@@ -38,7 +38,7 @@ pub(crate) fn choose_light_point(
     Some(((!sample.is_far).then_some(sample.target), sample))
 }
 
-/// Probability with which light sampling asks the environment rather than the finite lights.
+/// Probability with which light sampling selects the environment rather than the finite lights.
 #[inline]
 pub(crate) fn environment_share(scene: &Prepared) -> f32 {
     match (&scene.tables.environment_sampler, scene.tables.lights.is_empty()) {
@@ -48,7 +48,7 @@ pub(crate) fn environment_share(scene: &Prepared) -> f32 {
     }
 }
 
-/// Light from outside that a path runs into, weighted against light sampling having found it.
+/// Radiance of the environment for a path that leaves the scene, with the MIS weight against light sampling.
 #[inline]
 pub(crate) fn environment_light(scene: &Prepared, techniques: &Techniques, path: &Path, dir: Vec3) -> Vec3 {
     if !scene.tables.features.environment {
@@ -63,7 +63,7 @@ pub(crate) fn environment_light(scene: &Prepared, techniques: &Techniques, path:
     }
 }
 
-/// The same for an emitter that a path hits.
+/// MIS weight of an emitter that a path hits, against light sampling.
 #[inline]
 pub(crate) fn emitter_weight(
     scene: &Prepared,
@@ -85,13 +85,13 @@ pub(crate) fn emitter_weight(
     }
 }
 
-/// Weight of light that light sampling found with density `own`, and a bounce would have found with `other`.
+/// MIS weight of a light sample with pdf `own`, for which BSDF sampling has pdf `other`.
 #[inline(always)]
 pub(crate) fn light_weight<R: Real>(techniques: &Techniques, own: R, other: R) -> R {
     if techniques.mis { power_heuristic(own, other) } else { own.all(1.0) }
 }
 
-/// Weight of light that a bounce found with density `own`, and light sampling would have found with `other`.
+/// MIS weight of a BSDF sample with pdf `own`, for which light sampling has pdf `other`.
 #[inline(always)]
 pub(crate) fn bounce_weight<R: Real>(techniques: &Techniques, own: R, other: R) -> R {
     if techniques.mis {
@@ -100,14 +100,15 @@ pub(crate) fn bounce_weight<R: Real>(techniques: &Techniques, own: R, other: R) 
     select(other.is_positive(), own.all(0.0), own.all(1.0))
 }
 
-/// Weight of a sample found with density `own` that another method finds with density `other` (Veach 1997, β = 2).
+/// Power heuristic: weight of a sample with pdf `own` that another technique samples with pdf `other` (Veach 1997, β =
+/// 2).
 #[inline(always)]
 pub(crate) fn power_heuristic<R: Real>(own: R, other: R) -> R {
-    // By the ratio: squares of densities overflow for lights of a few pixels.
+    // By the ratio: squares of pdfs overflow for lights of a few pixels.
     select(other.is_zero(), own.all(1.0), power_weight(other / own))
 }
 
-/// The same by the ratio of the other density to its own.
+/// Power heuristic by the ratio of the other pdf to its own.
 #[inline(always)]
 pub(crate) fn power_weight<R: Real>(ratio: R) -> R {
     ratio.all(1.0) / (ratio * ratio + 1.0)

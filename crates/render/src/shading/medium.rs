@@ -1,13 +1,13 @@
-//! Which media is a path inside of? Nested solids each bring an index and an absorption of their own.
+//! Media that contain a path: nested solids have their own index and absorption.
 //!
-//! What a path is inside of is a set of bodies ([`crate::prepare::bodies::Bodies`]), of any size: entering a body adds it, leaving takes it out.
-//! Where bodies overlap the smallest one counts, whichever was entered last, so index and absorption are functions of
-//! the position alone and paths from the camera and from the lights agree on them (nested dielectrics with priorities,
-//! Schmidt and Budge 2002).
+//! The medium of a path is a set of bodies ([`crate::prepare::bodies::Bodies`]), of any size: entering a body adds it,
+//! leaving removes it. Where bodies overlap the smallest one counts, independent of the order of entry, so index and
+//! absorption are functions of position alone, and paths from the camera and from the lights agree on them (nested
+//! dielectrics with priorities, Schmidt and Budge 2002).
 //!
-//! An interface changes radiance by (n before / n after)², and both indices come from the sets on its two sides, never
-//! from the surface. The factors of a path cancel but for the first and the last index, so no sequence of surfaces,
-//! however they are nested, open or met in the wrong order, makes radiance / n² grow.
+//! An interface scales radiance by (n before / n after)², and both indices come from the sets on its two sides, never
+//! from the surface. The factors of a path cancel except for the first and the last index, so no sequence of surfaces,
+//! however they are nested, open or hit in the wrong order, makes radiance / n² grow.
 
 use crate::prepare::bodies::Boundary;
 use crate::prepare::prepared::Prepared;
@@ -15,34 +15,35 @@ use crate::shading::interface::{Interface, MediumId};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 
-/// The sets of media that the paths of one worker have come to, each made once.
+/// The sets of media that the paths of one worker have reached, each stored once.
 ///
-/// Numbers of sets differ from worker to worker, but nothing depends on more than whether two are equal.
+/// The ids of sets differ between workers, but only their equality matters.
 #[derive(Debug, Default)]
 pub(crate) struct MediumSets {
     sets: Vec<MediumSet>,
     ids: FxHashMap<Box<[u32]>, MediumId>,
-    /// By the set before and the boundary that was crossed; `None` where a body is left that the set does not have.
+    /// By previous set and crossed boundary; `None` if the path leaves a body that is not in the set.
     crossings: FxHashMap<(MediumId, u32, bool), Option<MediumId>>,
     camera: MediumId,
 }
 
-/// Sets that one worker remembers.
+/// Maximum number of sets per worker.
 const MOST_SETS: usize = 1 << 16;
 
 #[derive(Debug)]
 struct MediumSet {
-    /// Rows of [`crate::prepare::bodies::Bodies`], ascending: the last one counts.
+    /// Rows of [`crate::prepare::bodies::Bodies`], ascending: the last one determines the medium.
     rows: Box<[u32]>,
     ior: f32,
-    /// Per metre.
+    /// Absorption per metre.
     absorption: Vec3,
 }
 
 impl MediumSets {
-    /// Before new paths: the set that the camera is inside of. No path may be on its way.
+    /// Returns the set that contains the camera. Must be called before new paths, when no path is in flight.
     ///
-    /// - `camera`: rows of [`crate::prepare::bodies::Bodies`], ascending; like `scene` the same whenever the same sets are asked.
+    /// - `camera`: rows of [`crate::prepare::bodies::Bodies`], ascending; for the same [`MediumSets`], `camera` and
+    ///   `scene` must always be the same.
     pub fn start(&mut self, scene: &Prepared, camera: &[u32]) -> MediumId {
         if self.sets.is_empty() || self.sets.len() > MOST_SETS {
             self.sets.clear();
@@ -54,7 +55,7 @@ impl MediumSets {
         self.camera
     }
 
-    /// The set of these rows of [`crate::prepare::bodies::Bodies`], ascending.
+    /// Returns the set of these rows of [`crate::prepare::bodies::Bodies`], ascending.
     pub fn within(&mut self, scene: &Prepared, rows: &[u32]) -> MediumId {
         if rows.is_empty() { MediumId::OUTSIDE } else { self.id_of(scene, rows.into()) }
     }
@@ -65,28 +66,28 @@ impl MediumSets {
         self.sets[id.0 as usize].ior
     }
 
-    /// By how much light from outside of the scene is brighter inside these media: n², as much as for a path that came
-    /// in through surfaces. It is 1 unless a path reaches the outside without having left what it is inside of.
+    /// Factor n² of environment radiance inside these media, as for a path that entered through surfaces. It is 1
+    /// unless a path leaves the scene without having left all bodies.
     #[inline]
     pub fn environment_scale(&self, id: MediumId) -> f32 {
         self.ior(id) * self.ior(id)
     }
 
-    /// What is left of light after `distance` metres (Beer–Lambert).
+    /// Transmittance over `distance` metres (Beer–Lambert).
     #[inline]
     pub fn transmittance(&self, id: MediumId, distance: f32) -> Vec3 {
         let absorption = self.sets[id.0 as usize].absorption;
         if absorption == Vec3::ZERO {
             return Vec3::ONE;
         }
-        // 0 · ∞ would be NaN: a channel without absorption keeps everything, however far.
+        // 0 · ∞ would be NaN: a channel without absorption transmits everything over any distance.
         Vec3::select(absorption.cmpgt(Vec3::ZERO), (-absorption * distance).exp(), Vec3::ONE)
     }
 
-    /// The way through a boundary for a path inside of `from`.
+    /// Returns the interface at a boundary for a path in the media `from`.
     ///
     /// - `leaf`: which of the transparent parts of the material the path takes, see [`crate::prepare::bodies::Bodies`];
-    /// - `others`: in the same place, see [`crate::prepare::contacts`].
+    /// - `others`: boundaries at the same position, see [`crate::prepare::contacts`].
     #[inline]
     pub fn interface(
         &mut self,
@@ -97,7 +98,7 @@ impl MediumSets {
         others: &[Boundary],
     ) -> Interface {
         let here = self.ior(from);
-        // Bodies are entered before others are left: what a path goes through on the way has no thickness.
+        // Bodies are entered before others are left: intermediate media have no thickness.
         let all = || std::iter::once((boundary, leaf)).chain(others.iter().map(|&other| (other, 0)));
         let mut in_order =
             all().filter(|(boundary, _)| boundary.front).chain(all().filter(|(boundary, _)| !boundary.front));
@@ -107,7 +108,8 @@ impl MediumSets {
                 let eta = here / self.ior(beyond);
                 Interface { eta, squeeze: eta, beyond }
             }
-            // An open surface from behind, alone or with others: it bends light, but the path stays where it was, and so does its radiance.
+            // An open surface hit from behind, alone or with others: it refracts, but medium and radiance of the path
+            // stay the same.
             None => {
                 let eta = scene.tables.bodies.ior(boundary, leaf) / here;
                 Interface { eta, squeeze: 1.0, beyond: from }
@@ -115,7 +117,7 @@ impl MediumSets {
         }
     }
 
-    /// `None` where a body is left that was not entered.
+    /// Returns the set after a crossing; `None` if the path leaves a body that it did not enter.
     fn crossed(&mut self, scene: &Prepared, from: MediumId, boundary: Boundary, leaf: u32) -> Option<MediumId> {
         let Boundary { body, front } = boundary;
         let row = if front { body + leaf } else { body };
@@ -162,7 +164,7 @@ mod tests {
     use crate::test_scene::prepared;
     use firstlight_kdtree::Shape;
 
-    /// Spheres about the origin with these radii, each of a glass of its own; the last material is a blend of the first
+    /// Spheres about the origin with these radii, each with its own glass; the last material is a blend of the first
     /// two.
     fn spheres(radii_and_iors: &[(f32, f32)]) -> Prepared {
         let mut materials: Vec<Material> =
@@ -178,7 +180,7 @@ mod tests {
         prepared(shapes, objects, materials, Environment::Black)
     }
 
-    /// The way through object `object`, all of whose material is `material`.
+    /// Crosses object `object`, all of whose material is `material`.
     fn pass(sets: &mut MediumSets, scene: &Prepared, from: MediumId, object: u32, front: bool) -> Interface {
         let material = scene.geometry.objects[object as usize].materials[0];
         let boundary = scene.tables.bodies.boundary(object, 0, material, front);
@@ -219,7 +221,7 @@ mod tests {
         let small_first = pass(&mut sets, &scene, MediumId::OUTSIDE, 1, true).beyond;
         let again = pass(&mut sets, &scene, small_first, 0, true);
         assert_eq!((again.beyond, again.eta, sets.ior(again.beyond)), (both.beyond, 1.0, 1.3));
-        // The large one is left first: the small one is what the path is in before and after.
+        // The large sphere is left first: the path is in the small one before and after.
         let left = pass(&mut sets, &scene, both.beyond, 0, false);
         assert_eq!((left.beyond, left.eta), (small_first, 1.0));
         assert_eq!(pass(&mut sets, &scene, left.beyond, 1, false).beyond, MediumId::OUTSIDE);
@@ -258,7 +260,7 @@ mod tests {
         let scene = spheres(&[(1.0, 1.5), (0.5, 1.3), (0.2, 1.1)]);
         let around = |x: f32| scene.tables.bodies.around(&scene.geometry, Vec3::new(x, 0.0, 0.0));
         assert_eq!([0.0, 0.3, 0.7, 1.2].map(around), [vec![0, 1, 2], vec![0, 1], vec![0], vec![]]);
-        // A box of quads is one body, and so is a half-space; a point beside the box is in the latter alone.
+        // A box of quads is one body, and so is a half-space; a point beside the box is in the half-space only.
         let quad = |corner, edge_u, edge_v| Shape::Quad { corner, edge_u, edge_v };
         let (o, x, y, z) = (Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z);
         let mut shapes =

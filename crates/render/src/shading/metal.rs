@@ -1,42 +1,45 @@
-//! Rough metal as seen from one direction, at one point or at sixteen.
+//! Rough metal seen from one direction, at one point or at sixteen.
 
 use crate::shading::dielectric::reflect;
 use crate::shading::ggx;
 use firstlight_simd::{Real, Truth, Vector3, select_vector};
 use std::f32::consts::PI;
 
-/// Metal as seen along `wo`.
+/// A metal seen along `wo`.
 #[derive(Clone, Copy)]
 pub(crate) struct Metal<R: Real> {
-    /// GGX width, no unit; from [`crate::core::material::SMALLEST_ALPHA`] on.
+    /// GGX width, dimensionless; at least [`crate::core::material::SMALLEST_ALPHA`].
     pub alpha: R,
-    /// Seen head-on.
+    /// Reflectance at normal incidence.
     pub reflectance: Vector3<R>,
-    /// Whether it reflects more at grazing angles, see [`schlick`].
+    /// Whether the reflectance increases towards grazing angles, see [`schlick`].
     pub schlick: R::Mask,
-    /// The last is the normal.
+    /// Shading frame in world space; the last axis is the normal.
     axes: [Vector3<R>; 3],
-    /// Along `axes`.
+    /// Direction to the viewer in the frame `axes`.
     wo: Vector3<R>,
     lambda_o: R,
-    /// What one bounce loses over what it returns; 0 where it is not given back.
+    /// Lost over returned energy of single scattering; 0 without compensation.
     lost: R,
 }
 
-/// Of a direction that a metal was asked about.
+/// BSDF value for one direction.
 pub(crate) struct MetalValue<R> {
     pub tint: Vector3<R>,
-    /// f · cos over the tint.
+    /// f · cos divided by the tint.
     pub value: R,
-    /// Per steradian.
+    /// Pdf per steradian.
     pub pdf: R,
-    /// f · cos / pdf over the tint.
+    /// f · cos / pdf divided by the tint.
     pub weight: R,
 }
 
 impl<R: Real> Metal<R> {
-    /// - `axes`: about the normal; `wo`: along them, unit, towards the viewer.
-    /// - `lost`: what one bounce loses over what it returns, see [`ggx::single_scattering_albedo`]; 0 for no compensation.
+    /// Prepares the metal for a view direction.
+    ///
+    /// - `axes`: frame about the normal; `wo`: in that frame, unit, towards the viewer.
+    /// - `lost`: lost over returned energy of single scattering, see [`ggx::single_scattering_albedo`]; 0 for no
+    ///   compensation.
     #[inline(always)]
     pub fn new(
         axes: [Vector3<R>; 3],
@@ -49,13 +52,13 @@ impl<R: Real> Metal<R> {
         Self { alpha, reflectance, schlick, axes, wo, lambda_o: ggx::lambda(wo, alpha), lost }
     }
 
-    /// Whether the normal faces the viewer.
+    /// Lanes in which the normal faces the viewer.
     #[inline(always)]
     pub fn facing(&self) -> R::Mask {
         self.wo.z.is_positive()
     }
 
-    /// A direction in the world and along the axes, both unit; the second may lie below the surface.
+    /// Samples a direction; returns it in world space and in the frame, both unit; it may lie below the surface.
     #[inline(always)]
     pub fn sample(&self, u: [R; 2]) -> [Vector3<R>; 2] {
         let h = ggx::sample_visible_normal(self.wo, self.alpha, u);
@@ -68,12 +71,12 @@ impl<R: Real> Metal<R> {
         wi.to_local(&self.axes)
     }
 
-    /// - `wi`: along the axes, above the surface.
+    /// - `wi`: in the frame, above the surface.
     #[inline(always)]
     pub fn eval(&self, wi: Vector3<R>) -> MetalValue<R> {
         let found = ggx::reflection(self.wo, self.lambda_o, wi, self.alpha);
         let tint = tint(self.schlick, self.reflectance, self.wo.dot(found.half));
-        // The energy of further bounces given back (Turquin 2019, equation 16).
+        // Compensation for multiple scattering (Turquin 2019, equation 16).
         let back = self.reflectance * self.lost;
         let one = Vector3 { x: back.x + 1.0, y: back.y + 1.0, z: back.z + 1.0 };
         MetalValue { tint: tint.times(one), value: found.value, pdf: found.pdf, weight: found.weight }
@@ -81,8 +84,8 @@ impl<R: Real> Metal<R> {
 }
 
 impl Metal<f32> {
-    /// [`Self::eval`] with value and density rounded in another order: the pictures of scenes whose metals are shaded one at a
-    /// time depend on it.
+    /// Like [`Self::eval`], with value and pdf rounded in another order: images of scenes whose metals are shaded one
+    /// at a time depend on it.
     #[inline]
     pub fn eval_one(&self, wi: Vector3<f32>) -> MetalValue<f32> {
         let found = self.eval(wi);
@@ -99,7 +102,7 @@ impl Metal<f32> {
     }
 }
 
-/// Reflectance under an angle: by [`schlick`] where the mask says so, otherwise the same under all.
+/// Reflectance at an angle: by [`schlick`] where the mask is set, otherwise constant.
 #[inline(always)]
 pub(crate) fn tint<R: Real>(by_schlick: R::Mask, facing: Vector3<R>, cos: R) -> Vector3<R> {
     if !by_schlick.any() {
@@ -108,7 +111,7 @@ pub(crate) fn tint<R: Real>(by_schlick: R::Mask, facing: Vector3<R>, cos: R) -> 
     select_vector(by_schlick, schlick(facing, cos), facing)
 }
 
-/// Fresnel reflectance of a metal that reflects `facing` head-on (Schlick 1994).
+/// Fresnel reflectance of a metal with reflectance `facing` at normal incidence (Schlick 1994).
 #[inline(always)]
 pub(crate) fn schlick<R: Real>(facing: Vector3<R>, cos: R) -> Vector3<R> {
     let x = (-cos + 1.0).at_least(0.0).at_most(1.0);

@@ -1,18 +1,18 @@
-//! What a camera path remembers, so that light found by it can be weighed against a light path.
+//! State of a camera path for MIS weights against light paths.
 
 use crate::prepare::casters::NO_CASTER;
 use glam::Vec3;
 
-/// Of a camera path.
+/// MIS state of a camera path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MisState {
-    /// Density of finding it from the light over that from the camera, without the light's factor; NaN if no light path
-    /// can be it.
+    /// Pdf of sampling the path from the light over that from the camera, without the light's factor; NaN if no light
+    /// path can be this path.
     pub ratio: f32,
-    /// That the last vertex lies on, if it was specular.
+    /// Caster on which the last vertex lies, if it was specular.
     pub caster: u32,
-    /// By how much hints have raised the densities of directions so far, about: roulette must not take the small
-    /// throughput that goes with it for a loss.
+    /// Approximate factor by which guiding has raised the pdfs of directions so far: Russian roulette must not treat
+    /// the correspondingly small throughput as a loss.
     pub gain: f32,
 }
 
@@ -24,7 +24,7 @@ impl Default for MisState {
 
 impl MisState {
     /// - `ratio`: NaN if no light path can be the path so far.
-    /// - `caster`: that the last vertex lies on, if it was specular; [`NO_CASTER`] otherwise.
+    /// - `caster`: caster of the last vertex, if it was specular; [`NO_CASTER`] otherwise.
     #[inline(always)]
     pub fn new(ratio: f32, caster: u32, gain: f32) -> Self {
         Self { ratio, caster, gain }
@@ -36,7 +36,7 @@ impl MisState {
         self.ratio
     }
 
-    /// Whether no light path can be the path so far and what follows.
+    /// Whether no light path can be the path so far or its continuation.
     pub fn is_lost(&self) -> bool {
         self.ratio.is_nan()
     }

@@ -1,4 +1,4 @@
-//! What light does at a surface and between surfaces: one hit at a time here, sixteen in [`simd`].
+//! Scattering at surfaces and transport between them: for one hit at a time here, for sixteen in [`simd`].
 
 pub(crate) mod albedo;
 pub(crate) mod blend;

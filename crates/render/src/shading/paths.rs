@@ -12,21 +12,21 @@ use glam::Vec3;
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
     pub throughput: Vec3,
-    /// Density per steradian with which the last vertex chose this direction; infinite if light sampling could not
-    /// have.
+    /// Pdf per steradian with which the last vertex sampled this direction; infinite if light sampling could not have
+    /// sampled it.
     pub pdf: f32,
-    /// The last vertex, for the density of light sampling there.
+    /// The last vertex, for the pdf of light sampling there.
     pub position: Vec3,
-    /// Zero where light sampling asked on both sides.
+    /// Normal at the last vertex; zero if light sampling used both sides.
     pub normal: Vec3,
     pub sampler: Sampler,
     pub slot: u32,
     pub media: MediumId,
-    /// Against light paths.
+    /// For MIS weights against light paths.
     pub track: MisState,
 }
 
-/// Many paths and the rays that they go on along. The arrays may be longer than there are paths.
+/// Many paths and their next rays. The arrays may be longer than the number of paths.
 #[derive(Default)]
 pub(crate) struct PathBatch {
     pub rays: RayBatch,
@@ -38,13 +38,13 @@ pub(crate) struct PathBatch {
     pub reversed_index: Vec<u32>,
     pub screen: Vec<u32>,
     pub slot: Vec<u32>,
-    /// Kept only where some surface lets light through.
+    /// Present only if some surface transmits light.
     pub media: Option<Vec<MediumId>>,
-    /// Kept only where paths are traced from the lights as well.
+    /// Present only if there are light paths.
     pub tracks: Option<Vec<MisState>>,
 }
 
-/// Sixteen paths, of those that have a bit in some mask.
+/// Sixteen paths, of which a mask selects the valid ones.
 #[derive(Clone, Copy)]
 pub(crate) struct PathLanes<S: Simd> {
     pub throughput: Vector<S>,
@@ -64,7 +64,7 @@ impl PathBatch {
         self.rays.is_empty()
     }
 
-    /// Forgets all paths; there is room for `n` new ones afterwards.
+    /// Removes all paths and reserves space for `n` new ones.
     pub fn start(&mut self, n: usize, with_media: bool, with_tracks: bool) {
         self.rays.clear();
         self.make_room(n);
@@ -72,7 +72,7 @@ impl PathBatch {
         restart(&mut self.tracks, with_tracks);
     }
 
-    /// So that `n` more paths can be appended.
+    /// Reserves space for `n` more paths.
     pub fn make_room(&mut self, n: usize) {
         self.rays.make_room(n);
         let least = self.len() + n + LANES;
@@ -85,7 +85,7 @@ impl PathBatch {
         }
     }
 
-    /// Puts all paths into the same media.
+    /// Sets the media of all paths.
     pub fn begin_in(&mut self, id: MediumId) {
         if let Some(media) = &mut self.media {
             media.fill(id);
@@ -151,7 +151,7 @@ impl PathBatch {
         SamplerLanes { stream, reversed_index, screen }
     }
 
-    /// Appends the lanes of `mask`, without their media and tracks.
+    /// Appends the lanes of `mask`, without their media and MIS states.
     #[inline(always)]
     pub fn append<S: Simd>(&mut self, mask: Mask, origin: Vector<S>, dir: Vector<S>, path: &PathLanes<S>) {
         let at = self.len();
@@ -167,7 +167,7 @@ impl PathBatch {
     }
 }
 
-/// Shadow rays, and the light that each lets through if nothing is in its way.
+/// Shadow rays, and the contribution of each if it is unoccluded.
 #[derive(Default)]
 pub(crate) struct ShadowBatch {
     pub rays: RayBatch,
@@ -177,7 +177,7 @@ pub(crate) struct ShadowBatch {
 }
 
 impl ShadowBatch {
-    /// Forgets all rays; there is room for `n` new ones afterwards.
+    /// Removes all rays and reserves space for `n` new ones.
     pub fn start(&mut self, n: usize) {
         self.rays.clear();
         self.rays.make_room(n);
@@ -211,13 +211,13 @@ impl ShadowBatch {
         self.rays.append(mask, origin, dir, t_max);
     }
 
-    /// What a ray brings if nothing is in its way.
+    /// Contribution of a ray if it is unoccluded.
     #[inline]
     pub fn light_of(&self, i: usize) -> Vec3 {
         get(&self.light, i)
     }
 
-    /// Asks `trace` which rays are occluded, and adds the light of the others.
+    /// Traces the rays by `trace`, and adds the contributions of unoccluded ones to `radiance`.
     pub fn settle(&mut self, radiance: &mut [Vec3], trace: impl FnOnce(&RayBatch, &mut Vec<bool>)) {
         trace(&self.rays, &mut self.occluded);
         for i in 0..self.rays.len() {
@@ -228,7 +228,7 @@ impl ShadowBatch {
     }
 }
 
-/// Empties a list, and drops or makes it as wanted.
+/// Clears a list, and creates or drops it as wanted.
 fn restart<T>(list: &mut Option<Vec<T>>, wanted: bool) {
     if wanted {
         list.get_or_insert_default().clear();

@@ -1,8 +1,8 @@
-//! Rough dielectric surfaces: GGX microfacets that reflect and refract, as seen from one direction.
+//! Rough dielectrics: GGX microfacets that reflect and refract, seen from one direction.
 //!
-//! Source: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces". Directions are in the frame of the
-//! shading normal (+z), and no formula here takes the microfacets for isotropic: widths along two axes would be a matter of
-//! [`ggx::lambda`], [`ggx::distribution`], [`ggx::sample_visible_normal`] and of a frame that is turned to the axes.
+//! Source: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces". Directions are in the frame
+//! of the shading normal (+z). No formula here assumes isotropic microfacets: anisotropy would only change
+//! [`ggx::lambda`], [`ggx::distribution`], [`ggx::sample_visible_normal`] and the orientation of the frame.
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
@@ -13,37 +13,37 @@ use crate::shading::interface::Interface;
 use firstlight_simd::{Vector3, frame_around};
 use glam::{Vec2, Vec3};
 
-/// Below this product of α and |η − 1| refracted directions are spread by less than directions in `f32` can tell apart.
+/// Product of α and |η − 1| below which the spread of refracted directions is not representable in `f32`.
 const SMALLEST_SPREAD: f32 = 3e-5;
 
-/// Cosines of rays with the normal are taken for at least this: the slope of none is larger than `f32` can square.
+/// Lower limit of cosines with the normal: larger slopes overflow when squared in `f32`.
 const SMALLEST_COS: f32 = 1e-7;
 
-/// Whether microfacets change no direction by as much as counts, so that the surface is that of smooth glass.
+/// Whether microfacets change directions so little that the surface is that of smooth glass.
 ///
 /// - `alpha`: GGX width; `eta`: index on one side over that on the other.
 #[inline]
 pub(crate) fn is_smooth(alpha: f32, eta: f32) -> bool {
-    // Also where either is NaN.
+    // True also if either is NaN.
     !(alpha >= SMALLEST_ALPHA && alpha.min(1.0) * (eta - 1.0).abs() >= SMALLEST_SPREAD)
 }
 
-/// The light that single scattering loses, given back: it has forgotten where it came from.
+/// Compensation for the light that single scattering loses: a lobe that does not depend on the incident direction.
 ///
-/// After many bounces between microfacets light leaves on either side as light from there would have been lost: with the
-/// density of (1 − E(θ)) cos θ, E being the albedo of single scattering for that side, and on the two sides in proportion to
-/// n² (1 − Ē), as much as each side loses of light from all around. So what it gives is the same both ways, and a white
-/// furnace is whole again (after Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks").
+/// After many bounces between microfacets, light leaves on each side with the distribution of the losses there: pdf
+/// proportional to (1 − E(θ)) cos θ, where E is the single-scattering albedo for that side, and on the two sides in
+/// proportion to n² (1 − Ē), the loss of uniform light from that side. So the lobe is reciprocal, and a white furnace
+/// loses nothing (after Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks").
 #[derive(Clone, Copy)]
 struct Multiple {
-    /// 1 − E of the direction that is seen along.
+    /// 1 − E of the view direction.
     lost: f32,
-    /// On this side and beyond: share of the light, and 1 − Ē.
+    /// Per side, near and far: share of the light, and 1 − Ē.
     sides: [(f32, f32); 2],
 }
 
 impl Multiple {
-    /// `None` where nothing is lost.
+    /// `None` if nothing is lost.
     fn new(cos_o: f32, alpha: f32, eta: f32) -> Option<Self> {
         let lost = glass_loss::lost(cos_o, alpha, eta);
         let means = [glass_loss::mean_lost(alpha, eta), glass_loss::mean_lost(alpha, 1.0 / eta)];
@@ -56,20 +56,20 @@ impl Multiple {
     }
 }
 
-/// Less is not worth giving back.
+/// Smaller losses are not compensated.
 const SMALLEST_LOSS: f32 = 1e-5;
 
-/// A surface as seen along `wo`.
+/// A surface seen along `wo`.
 #[derive(Clone, Copy)]
 pub(crate) struct RoughGlass {
-    /// GGX width, no unit.
+    /// GGX width, dimensionless.
     alpha: f32,
     interface: Interface,
-    /// The last is the normal.
+    /// Shading frame in world space; the last axis is the normal.
     axes: [Vector3<f32>; 3],
-    /// Along `axes`, on the side of the normal.
+    /// Direction to the viewer in the frame, on the side of the normal.
     wo: Vector3<f32>,
-    /// Smith's Λ.
+    /// Smith's Λ of `wo`.
     lambda_o: f32,
     multiple: Option<Multiple>,
 }
@@ -77,19 +77,19 @@ pub(crate) struct RoughGlass {
 /// A sampled direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoughGlassSample {
-    /// Unit, in the world.
+    /// Unit, in world space.
     pub wi: Vec3,
     /// f · |cos| / pdf.
     pub weight: f32,
-    /// Per steradian.
+    /// Pdf per steradian.
     pub pdf: f32,
-    /// Whether it leads beyond.
+    /// Whether it leads to the far side.
     pub passes: bool,
 }
 
 impl RoughGlass {
-    /// - `normal`: unit, on the side of `wo`; `interface`: not smooth as [`is_smooth`] tells; `compensate`: give back what single
-    ///   scattering loses.
+    /// - `normal`: unit, on the side of `wo`; `interface`: rough in the sense of [`is_smooth`]; `compensate`: add the
+    ///   light that single scattering loses.
     #[inline]
     pub fn new(normal: Vec3, wo: Vec3, alpha: f32, interface: Interface, compensate: bool) -> Self {
         let axes = frame_around(normal.into());
@@ -99,9 +99,10 @@ impl RoughGlass {
         Self { alpha, interface, axes, wo, lambda_o: ggx::lambda(wo, alpha), multiple }
     }
 
-    /// f · |cos|, and density per steradian of [`Self::sample`].
+    /// Returns f · |cos| and the pdf per steradian of [`Self::sample`].
     ///
-    /// Of light from beyond, f has the factor by which an interface squeezes radiance: f(i, o) / nₒ² is the same both ways.
+    /// For light from the far side, f includes the factor by which an interface scales radiance: f(i, o) / nₒ² is
+    /// symmetric.
     ///
     /// - `wi`: unit, on either side.
     pub fn eval(&self, wi: Vec3) -> (f32, f32) {
@@ -109,14 +110,16 @@ impl RoughGlass {
         self.with_multiple(wi, self.scattered_once(wi))
     }
 
-    /// - `wi`: along the axes.
+    /// Evaluates single scattering.
+    ///
+    /// - `wi`: in the frame.
     fn scattered_once(&self, wi: Vector3<f32>) -> (f32, f32) {
         if wi.z > 0.0 {
             let half = (self.wo + wi).normalize();
             self.reflected(half, wi)
         } else if wi.z < 0.0 {
             let Interface { eta, .. } = self.interface;
-            // Snell's law: tangential parts of η ωₒ and ωᵢ cancel.
+            // Snell's law: the tangential components of η ωₒ and ωᵢ cancel.
             let sum = wi + self.wo * eta;
             let length = sum.length();
             let half = sum * ((eta - 1.0).signum() / length);
@@ -126,7 +129,7 @@ impl RoughGlass {
         }
     }
 
-    /// [`Self::eval`], given that of light that was scattered once.
+    /// Adds [`Multiple`] to the value and pdf of single scattering.
     fn with_multiple(&self, wi: Vector3<f32>, (value, pdf): (f32, f32)) -> (f32, f32) {
         let Interface { eta, squeeze, .. } = self.interface;
         let Some(Multiple { lost, sides }) = self.multiple else { return (value, pdf) };
@@ -138,7 +141,7 @@ impl RoughGlass {
         (value + back * scale, pdf * (1.0 - lost) + per_angle)
     }
 
-    /// A direction of [`Multiple`].
+    /// Samples a direction of [`Multiple`].
     fn sample_multiple(&self, Multiple { sides, .. }: Multiple, u_side: f32, u: Vec2) -> Option<RoughGlassSample> {
         let local = cosine_hemisphere(u.to_array());
         let beyond = u_side >= sides[0].0;
@@ -152,7 +155,9 @@ impl RoughGlass {
         })
     }
 
-    /// - `u_choice`: reflects or refracts at the microfacet that `u` chooses; uniform in `[0, 1)`.
+    /// Samples a direction.
+    ///
+    /// - `u_choice`: selects reflection or refraction at the microfacet that `u` samples; uniform in `[0, 1)`.
     ///
     /// `None` for light that single scattering loses.
     pub fn sample(&self, mut u_choice: f32, u: Vec2) -> Option<RoughGlassSample> {
@@ -170,7 +175,7 @@ impl RoughGlass {
         if !(if reflects { wi.z > 0.0 } else { wi.z < 0.0 }) {
             return None;
         }
-        // Of light at the microfacet the share that gets away: G2 / G1.
+        // Share of the microfacet's light that escapes: G2 / G1.
         let seen = 1.0 + self.lambda_o;
         let (both, scale, once) = if reflects {
             (self.both_above(wi), 1.0, self.reflected(half, wi))
@@ -187,15 +192,15 @@ impl RoughGlass {
         })
     }
 
-    /// [`Self::eval`] of a direction above the surface, `half` being the microfacet that mirrors it.
+    /// [`Self::eval`] for a direction above the surface, with its half vector.
     fn reflected(&self, half: Vector3<f32>, wi: Vector3<f32>) -> (f32, f32) {
         let (reflectance, _) = fresnel(self.cos_o(half), self.interface.eta);
-        // D / 4 cos θₒ: the Jacobian 1 / (4 ωₒ·h) cancels the cosine of what is seen of the microfacet.
+        // D / 4 cos θₒ: the Jacobian 1 / (4 ωₒ·h) cancels the cosine of the projected microfacet.
         let per_angle = reflectance * ggx::distribution(half, self.alpha) / (4.0 * self.wo.z);
         (per_angle * self.both_above(wi), per_angle / (1.0 + self.lambda_o))
     }
 
-    /// [`Self::eval`] of a direction below the surface, `half` being the microfacet that refracts it.
+    /// [`Self::eval`] for a direction below the surface, with the microfacet normal that refracts it.
     fn refracted(&self, half: Vector3<f32>, wi: Vector3<f32>) -> (f32, f32) {
         let Interface { eta, squeeze, .. } = self.interface;
         let cos_o = self.cos_o(half);
@@ -203,8 +208,8 @@ impl RoughGlass {
         if reflectance >= 1.0 {
             return (0.0, 0.0);
         }
-        // |ωᵢ + η ωₒ| = |η cos θₒ − cos θₜ| without its cancellation near η = 1; the Jacobian of the half vector is cos θₜ over
-        // its square (Walter et al. 2007, equation 17).
+        // |ωᵢ + η ωₒ| = |η cos θₒ − cos θₜ| without cancellation near η = 1; the Jacobian of the half vector is cos θₜ
+        // over its square (Walter et al. 2007, equation 17).
         let length = (eta - 1.0) * (eta + 1.0) / (eta * cos_o + cos_t);
         let jacobian = cos_t / (length * length);
         let visible = ggx::distribution(half, self.alpha) * cos_o / self.wo.z;
@@ -216,12 +221,12 @@ impl RoughGlass {
         self.wo.dot(half).clamp(0.0, 1.0)
     }
 
-    /// Height-correlated masking and shadowing of two directions above (Heitz 2014, equation 99).
+    /// Height-correlated masking and shadowing for two directions above (Heitz 2014, equation 99).
     fn both_above(&self, wi: Vector3<f32>) -> f32 {
         1.0 / (1.0 + self.lambda_o + self.lambda_i(wi))
     }
 
-    /// The same of one above and one below.
+    /// The same for one direction above and one below.
     fn above_and_below(&self, wi: Vector3<f32>) -> f32 {
         ggx::above_and_below(self.lambda_o, self.lambda_i(wi))
     }
@@ -244,14 +249,14 @@ mod tests {
     use std::f64::consts::TAU;
 
     const ALPHAS: [f32; 10] = [1e-3, 3e-3, 0.01, 0.03, 0.06, 0.1, 0.2, 0.4, 0.7, 1.0];
-    /// Cosine of incidence, and index on its side over that beyond: from outside, from inside, nearly alike.
+    /// Cosine of incidence, and index on its side over that on the far side: from outside, from inside, nearly equal.
     const VIEWS: [(f32, f32); 9] = [
         (1.0, 1.0 / 1.5),
         (0.6, 1.0 / 1.5),
         (0.05, 1.0 / 1.5),
         (0.01, 1.0 / 1.5),
         (0.97, 1.5),
-        // Just within the critical angle, and beyond it.
+        // Just inside of the critical angle, and beyond it.
         (0.76, 1.5),
         (0.1, 1.5),
         (0.4, 1.0 / 2.4),
@@ -274,8 +279,8 @@ mod tests {
         Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)
     }
 
-    /// The sphere of directions that `wo` is scattered to, binned by the microfacet that does it: in rings that are even in
-    /// ln(1 + slope² / α²), and sectors, for each side. All in `f64`, apart from what it tests.
+    /// The sphere of directions to which `wo` is scattered, binned by the microfacet that does it: rings that are
+    /// uniform in ln(1 + slope² / α²), and sectors, for each side. In `f64`, independent of the tested code.
     struct Grid {
         wo: DVec3,
         alpha: f64,
@@ -305,7 +310,7 @@ mod tests {
             (1.0 + (1e3 / self.alpha).powi(2)).ln()
         }
 
-        /// Where a microfacet sends light that goes to `wo`; `None` if it does not, or not to this side.
+        /// The direction to which a microfacet scatters `wo`; `None` if there is none on this side.
         fn scattered(&self, side: usize, ring: f64, sector: f64) -> Option<DVec3> {
             let slope = self.alpha * ((ring / RINGS as f64 * self.last()).exp() - 1.0).max(0.0).sqrt();
             let (sin, cos) = ((sector / SECTORS as f64 - 0.5) * TAU).sin_cos();
@@ -320,8 +325,8 @@ mod tests {
             (cos_o > 0.0 && (side == 0 || cos2_t > 0.0) && (wi.z < 0.0) == (side == 1)).then_some(wi)
         }
 
-        /// Integral over each bin per steradian, midpoint rule with `fine`² points, solid angles by differences; and whether
-        /// some microfacets of the bin send no light to this side.
+        /// Integral over each bin per steradian: midpoint rule with `fine`² points, solid angles by differences; and
+        /// whether some microfacets of the bin scatter nothing to this side.
         fn integrals(&self, fine: usize, f: impl Fn(Vec3) -> f32) -> Vec<(f64, bool)> {
             let mut sums = vec![(0.0, false); BINS];
             for (bin, (sum, is_cut)) in sums.iter_mut().enumerate() {
@@ -351,7 +356,7 @@ mod tests {
 
     #[test]
     fn sampled_directions_follow_their_pdf_on_the_whole_sphere() {
-        // 1 % over all ninety cases (Šidák: 3.7 σ).
+        // Significance 1 % over all ninety cases (Šidák: 3.7 σ).
         for (case, alpha, cos, eta) in views() {
             let (lobe, wo) = (lobe(alpha, eta), direction(cos));
             let grid = Grid::new(wo, alpha, eta);
@@ -375,8 +380,8 @@ mod tests {
                 "α {alpha}, cos {cos}, η {eta}: the pdf integrates to more than one"
             );
             expected.push((f64::from(n) - found).max(0.0));
-            // Bins at an edge are not known well one by one, nor are those of microfacets that stand upright, whose slopes
-            // `f32` tells apart badly.
+            // Bins at an edge are inaccurate one by one, and so are those of nearly vertical microfacets, whose slopes
+            // `f32` barely resolves.
             let is_steep = |bin: usize| bin / SECTORS % RINGS >= 3 * RINGS / 4;
             let (mut edge, mut of_edge) = (0.0, 0.0);
             for bin in (0..BINS).filter(|&bin| integrals[bin].1 || is_steep(bin)) {
@@ -390,7 +395,7 @@ mod tests {
         }
     }
 
-    /// Share of light that single scattering returns, reflected and refracted, by sampling.
+    /// Single-scattering albedo, reflected and refracted, by sampling.
     fn sampled_albedo(alpha: f32, cos: f32, eta: f32, n: u32) -> [f64; 2] {
         let (lobe, wo, mut sums) = (lobe(alpha, eta), direction(cos), [0.0; 2]);
         for i in 0..n {
@@ -423,7 +428,7 @@ mod tests {
 
     #[test]
     fn it_loses_what_the_page_of_materials_says() {
-        // Per cent of light from all around and of light along the normal, from outside and from inside.
+        // Per cent of uniform light and of light along the normal, from outside and from inside.
         for (alpha, lost) in [
             (0.04, [0.2, 0.0, 0.7, 0.2]),
             (0.1, [0.9, 0.1, 3.3, 1.0]),
@@ -433,7 +438,7 @@ mod tests {
         ] {
             for (eta, lost) in [1.0 / 1.5, 1.5].into_iter().zip(lost.chunks(2)) {
                 let loss = |cos, n| 100.0 * (1.0 - sampled_albedo(alpha, cos, eta, n).iter().sum::<f64>());
-                // Even in the square of the cosine.
+                // Uniform in the square of the cosine.
                 let n = 32;
                 let around =
                     (0..n).map(|i| loss(((i as f32 + 0.5) / n as f32).sqrt(), 1 << 12)).sum::<f64>() / f64::from(n);
@@ -456,7 +461,7 @@ mod tests {
                     let scale = if s.through.is_some() { eta * eta } else { 1.0 };
                     returned += f64::from(s.weight.x / scale) / f64::from(n);
                 }
-                // What is given back is broad: even directions find it.
+                // The compensation lobe is broad: uniform directions find it.
                 let u = Sampler::new(10, 0, 0, i).pair(0);
                 let z = 2.0 * u.x - 1.0;
                 let (sin, cos_phi) = (TAU as f32 * u.y).sin_cos();
@@ -493,7 +498,7 @@ mod tests {
             }
             let lobe = if case < 4000 { lobe(alpha, eta) } else { whole_lobe(alpha, eta) };
             let f = |o: Vec3, i: Vec3| lobe.eval(o, i, Vec3::Z).0.x / i.z.abs();
-            // Over n² on the side that light arrives at, which is 1 below.
+            // Divided by n² on the side at which light arrives, which is 1 below.
             let n2 = |w: Vec3| if w.z > 0.0 { eta * eta } else { 1.0 };
             let (forth, back) = (f(o, i) / n2(o), f(i, o) / n2(i));
             assert!((forth - back).abs() <= 2e-3 * forth.max(back) + 1e-5, "α {alpha}, η {eta}: {forth} and {back}");
@@ -517,7 +522,7 @@ mod tests {
                         continue;
                     }
                     assert!((a.weight - b.weight).length() < 1e-3, "{a:?} {b:?}");
-                    // Tails of the distribution are long: one in thousands leans by 100 α.
+                    // The distribution has long tails: one in thousands deviates by 100 α.
                     assert!(a.wi.distance(b.wi) < 0.1, "η {eta}, cos {cos}: {a:?} {b:?}");
                 }
                 assert!(n_split < n / 200, "η {eta}, cos {cos}: {n_split} of {n} are split otherwise");
@@ -567,7 +572,7 @@ mod tests {
             let sampler = Sampler::new(seed, 0, 0, 0);
             if let Some(s) = lobe.sample(wo, Vec3::Z, || sampler.single(1), sampler.pair(0)) {
                 let (value, pdf) = lobe.eval(wo, s.wi, Vec3::Z);
-                // Where light grazes a microfacet its angle is known to fewer digits.
+                // At grazing incidence on a microfacet its angle has fewer accurate digits.
                 let slack = 1e-2 + 1e-4 / s.wi.z.abs();
                 prop_assert!((pdf / s.pdf - 1.0).abs() < slack, "{pdf} for {s:?}");
                 prop_assert!((value.x / pdf / s.weight.x - 1.0).abs() < slack, "{value} / {pdf} for {s:?}");

@@ -1,31 +1,31 @@
-//! What the integrators ask of a surface: how it scatters, and a direction to go on in.
+//! The interface of BSDFs for the integrators: evaluation and sampling.
 //!
-//! [`Scatter::eval`] and [`Scatter::sample`] are one family. Directions are unit, in world space, leaving
-//! the surface; `normal` is the shading normal on the side of `wo`. Perfectly specular lobes have no `eval`: only
-//! sampling finds them.
+//! [`Scatter::eval`] and [`Scatter::sample`] are one family. Directions are unit, in world space, leaving the surface;
+//! `normal` is the shading normal on the side of `wo`. Perfectly specular lobes evaluate to zero: only sampling finds
+//! them.
 
 use crate::shading::interface::Interface;
 use glam::{Vec2, Vec3};
 
-/// What the integrator asks of a surface, be it one lobe or a blend.
+/// The BSDF of a surface: one lobe, a blend, or layers.
 pub(crate) trait Scatter {
-    /// Whether light sampling can find anything: some lobe is not perfectly specular.
+    /// Whether light sampling can contribute: some lobe is not perfectly specular.
     fn has_non_specular(&self) -> bool;
 
-    /// f · |cos| of all lobes that are not specular, and the density of sampling `wi` through one of them; zero for `wi`
-    /// behind `normal` but for what [`Self::through`] tells.
+    /// Returns f · |cos| of all non-specular lobes, and the pdf per steradian of sampling `wi` by one of them; zero for
+    /// `wi` behind `normal`, except where [`Self::through`] returns an interface.
     ///
-    /// Where light passes through, `wo` and `wi` may change sides: the surface is then seen from behind `normal`.
+    /// For transmitted light, `wo` and `wi` may be exchanged: the surface is then seen from behind `normal`.
     fn eval(&self, wo: Vec3, wi: Vec3, normal: Vec3) -> (Vec3, f32);
 
-    /// What light from behind `normal` passes through, where [`Self::eval`] knows of such light. In blends only sampling
-    /// finds it, as if it were specular: each part leads into a medium of its own.
+    /// The interface that light from behind `normal` passes, if [`Self::eval`] includes such light. In blends only
+    /// sampling finds it, as if it were specular: each part leads into a different medium.
     fn through(&self) -> Option<Interface>;
 
-    /// - `u_lobe`: chooses the lobe, and between reflection and refraction; asked for only where there is a choice;
-    /// - `u`: the direction.
+    /// Samples a direction; `None` if the sample carries no light.
     ///
-    /// `None` when the sample carries no light.
+    /// - `u_lobe`: selects the lobe, and between reflection and refraction; evaluated only if there is a choice;
+    /// - `u`: the direction.
     fn sample(&self, wo: Vec3, normal: Vec3, u_lobe: impl FnOnce() -> f32, u: Vec2) -> Option<BsdfSample>;
 }
 
@@ -35,8 +35,8 @@ pub(crate) struct BsdfSample {
     pub wi: Vec3,
     /// f · |cos| / pdf.
     pub weight: Vec3,
-    /// Per steradian; infinite for a perfectly specular lobe.
+    /// Pdf per steradian; infinite for a perfectly specular lobe.
     pub pdf: f32,
-    /// What was passed through, where `wi` lies beyond the surface.
+    /// The interface that was passed, if `wi` is on the far side.
     pub through: Option<Interface>,
 }

@@ -1,4 +1,4 @@
-//! What lies on the two sides of a surface that a path meets.
+//! The two sides of a surface that a path meets.
 
 use crate::core::material::MaterialId;
 use crate::prepare::bodies::Boundary;
@@ -11,10 +11,10 @@ use firstlight_kdtree::geometry::Ray;
 /// The media on the two sides of a surface that a path meets.
 pub(crate) struct Sides<'a> {
     pub sets: &'a mut MediumSets,
-    /// On the side of the path.
+    /// Media on the side of the path.
     pub here: MediumId,
     pub boundary: Boundary,
-    /// In the same place, see [`crate::shading::medium`].
+    /// Boundaries at the same position, see [`crate::shading::medium`].
     others: Vec<Boundary>,
 }
 
@@ -34,7 +34,7 @@ impl<'a> Sides<'a> {
         Self { sets, here, boundary: bodies.boundary(hit.object, hit.prim, id, front), others }
     }
 
-    /// The way through a transparent part of the material; see [`MediumSets::interface`].
+    /// Returns the interface of a transparent part of the material; see [`MediumSets::interface`].
     #[inline]
     pub fn interface(&mut self, scene: &Prepared, leaf: u32) -> Interface {
         self.sets.interface(scene, self.here, self.boundary, leaf, &self.others)

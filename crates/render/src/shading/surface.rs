@@ -1,4 +1,4 @@
-//! How the material at a vertex scatters: one lobe, or a blend.
+//! The BSDF of the material at a vertex: one lobe, or a blend.
 
 use crate::core::material::{MAX_LOBES, Material, MaterialId};
 use crate::prepare::prepared::Prepared;
@@ -11,9 +11,9 @@ use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;
 use glam::{Vec2, Vec3};
 
-/// The lobes of a blend at a vertex; `None` where all of it is black.
+/// Returns the lobes of a blend at a vertex; `None` if all of it is black.
 ///
-/// - `sides`: asked for by transparent parts; without them these may be told apart from others, but not sampled.
+/// - `sides`: required by transparent parts; without it they may be distinguished from others, but not sampled.
 pub(crate) fn blend_at(
     scene: &Prepared,
     id: MaterialId,
@@ -48,7 +48,7 @@ impl Parts {
     }
 }
 
-/// - `n_leaves`: transparent parts so far, of whatever weight: they are counted as [`crate::prepare::bodies::Bodies`] does.
+/// - `n_leaves`: number of transparent parts so far, of any weight: counted like in [`crate::prepare::bodies::Bodies`].
 fn collect(
     scene: &Prepared,
     id: MaterialId,
@@ -112,7 +112,7 @@ fn clear_lobe(scene: &Prepared, sides: &mut Option<&mut Sides>, leaf: u32) -> Lo
     }
 }
 
-/// Glass as it is with microfacets of a width; smooth where these change no direction.
+/// Replaces smooth glass by rough glass, if microfacets of this width change directions.
 #[inline]
 fn rough_lobe(smooth: Lobe, alpha: f32, compensate: bool) -> Lobe {
     match smooth {
@@ -123,7 +123,7 @@ fn rough_lobe(smooth: Lobe, alpha: f32, compensate: bool) -> Lobe {
     }
 }
 
-/// The alpha of metal, otherwise 0.
+/// Returns the alpha of a metal, otherwise 0.
 pub(crate) fn scalar_at(scene: &Prepared, id: MaterialId, uv: Vec2) -> f32 {
     match &scene.shading.materials[id as usize] {
         Material::Metal { alpha, .. } => alpha.eval(scene, uv).clamp(0.0, 1.0),
@@ -131,7 +131,7 @@ pub(crate) fn scalar_at(scene: &Prepared, id: MaterialId, uv: Vec2) -> f32 {
     }
 }
 
-/// The one lobe of a plain material; `None` where the surface is black. `sides` as in [`blend_at`].
+/// Returns the lobe of a plain material; `None` if the surface is black. `sides` as in [`blend_at`].
 #[inline]
 pub(crate) fn lobe_at(
     scene: &Prepared,

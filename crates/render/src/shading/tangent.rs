@@ -1,18 +1,18 @@
-//! Normals from pictures, and the tangents that these count from.
+//! Normal maps, and the tangents that they are relative to.
 //!
-//! A mapped normal may reflect the viewer's ray into the surface, which leaves black fringes. It is bent until the mirrored ray
-//! lies in the surface (Keller et al. 2017, "The Iray Light Transport Simulation and Rendering System", appendix A.3). What
-//! goes below the true surface is lost, so no energy is gained.
+//! With a mapped normal, a mirrored ray may point into the surface, which causes black fringes. The normal is bent
+//! until the mirrored ray lies in the surface (Keller et al. 2017, "The Iray Light Transport Simulation and Rendering
+//! System", appendix A.3). Light below the true surface is lost, so no energy is gained.
 
 use firstlight_mesh::Mesh;
 use glam::{Affine3A, Vec2, Vec3};
 
-/// The directions in which the first surface coordinates grow, unit where there are such.
+/// The tangent frame of the first texture coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tangent {
-    /// Roughly in the surface, metres; zero where nobody asks for it.
+    /// Direction of increasing u, approximately in the surface, in metres of any length; zero if not needed.
     pub along_u: Vec3,
-    /// 1 where `normal × along_u` is the direction of v for the normal of the front, otherwise -1.
+    /// 1 if `normal × along_u` is the direction of v for the normal of the front, otherwise -1.
     pub handedness: f32,
 }
 
@@ -21,7 +21,7 @@ impl Tangent {
         Self { along_u, handedness }
     }
 
-    /// Of a triangle of a mesh: that of its vertices, or what its texture coordinates tell.
+    /// Tangent of a triangle of a mesh: that of its vertices, or derived from its texture coordinates.
     ///
     /// - `weights`: barycentric; `normal`: of the front, unit.
     pub fn of_mesh(mesh: &Mesh, triangle: [usize; 3], weights: Vec3, map: &Affine3A, normal: Vec3) -> Self {
@@ -44,7 +44,7 @@ impl Tangent {
         Self::new(along_u, if normal.cross(along_u).dot(along_v) < 0.0 { -1.0 } else { 1.0 })
     }
 
-    /// A direction in the surface, unit.
+    /// Returns a direction in the surface, unit.
     ///
     /// - `direction`: along u and v; `normal`: unit.
     pub fn along(&self, direction: Vec2, normal: Vec3) -> Vec3 {
@@ -52,24 +52,25 @@ impl Tangent {
         direction.x * x + direction.y * y
     }
 
-    /// Along u and v, both unit and in the surface of a normal of the front.
+    /// Returns the axes along u and v, both unit and perpendicular to a normal of the front.
     fn axes(&self, normal: Vec3) -> [Vec3; 2] {
         let x = (self.along_u - normal.dot(self.along_u) * normal).normalize_or(normal.any_orthonormal_vector());
         [x, normal.cross(x) * if self.handedness < 0.0 { -1.0 } else { 1.0 }]
     }
 }
 
-/// The normal that a picture tells of.
+/// Returns the normal of a normal map, unit.
 ///
-/// - `coded`: 0..1 for −1..1 along tangent, bitangent and normal; `scale`: factor of the first two; `front`: the normal of the
-///   front without the picture, unit.
+/// - `coded`: 0..1 for −1..1 along tangent, bitangent and normal; `scale`: factor of the first two; `front`: unmapped
+///   normal of the front, unit.
 pub(crate) fn normal_of_map(coded: Vec3, scale: f32, tangent: &Tangent, front: Vec3) -> Vec3 {
     let [x, y] = tangent.axes(front);
     let local = (2.0 * coded - 1.0) * Vec3::new(scale, scale, 1.0);
     (local.x * x + local.y * y + local.z * front).normalize_or(front)
 }
 
-/// The normal nearest to `normal` in the plane of it and `wo` by which `wo` is mirrored to the side of `surface` at least.
+/// Returns the normal closest to `normal`, in the plane of it and `wo`, for which the mirrored `wo` is not below
+/// `surface`.
 ///
 /// - All unit; `surface` faces `wo`.
 pub(crate) fn bent(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
@@ -78,7 +79,7 @@ pub(crate) fn bent(normal: Vec3, surface: Vec3, wo: Vec3) -> Vec3 {
     if below >= 0.0 && normal.dot(wo) > 0.0 {
         return normal;
     }
-    // Along the normal up to the surface; a normal that looks away from it has no such way.
+    // Moves along the normal up to the surface; for a normal that faces away from it the step is limited.
     let rise = normal.dot(surface).max(1e-3);
     let lifted = (mirrored - normal * (below / rise)).normalize_or(surface);
     let between = (wo + lifted).normalize_or(surface);
@@ -90,7 +91,8 @@ mod tests {
     use super::*;
     use crate::sampling::{Sampler, cosine_hemisphere};
 
-    /// Whatever the normal and the viewer, the mirrored ray leaves the surface, and normals that need not be bent are not.
+    /// For any normal and view direction, the mirrored ray leaves the surface, and normals that need no bending are
+    /// unchanged.
     #[test]
     fn bent_normals_reflect_to_the_side_of_the_surface() {
         let (mut kept, mut turned) = (0, 0);

@@ -1,4 +1,4 @@
-//! From a hit to everything that shading needs to know of the place.
+//! From a hit to a surface interaction.
 
 use crate::core::material::{ColorInput, Material, MaterialId, ScalarInput};
 use crate::core::material_queries::Emission;
@@ -13,7 +13,7 @@ use firstlight_simd::{Real, Vector3, three};
 use glam::{Vec2, Vec3, Vec4};
 use std::ops::{Add, Mul};
 
-/// A point on a surface, seen along a ray.
+/// A surface point seen along a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Vertex {
     pub position: Vec3,
@@ -21,22 +21,22 @@ pub(crate) struct Vertex {
     pub error: Vec3,
     /// Unit, on the side that the ray came from.
     pub geometric_normal: Vec3,
-    /// Unit, and never facing away from the ray.
+    /// Shading normal, unit; never faces away from the ray.
     pub normal: Vec3,
-    /// The same whoever looks from this side, even where it faces away.
+    /// Shading normal independent of the view direction on this side, even if it faces away from the ray.
     pub smooth_normal: Vec3,
-    /// `smooth_normal` before a picture changes it.
+    /// `smooth_normal` before normal mapping.
     pub interpolated: Vec3,
-    /// For materials that ask for it, see [`Material::asks_for_tangents`].
+    /// Set for materials that need it, see [`Material::asks_for_tangents`].
     pub tangent: Tangent,
-    /// What textures ask for; on spheres only for materials that look something up.
+    /// Texture coordinates; on spheres only for textured materials.
     pub texture_point: TexturePoint,
-    /// Whether the ray met the front: the outside of a closed surface.
+    /// Whether the ray hit the front: the outside of a closed surface.
     pub front: bool,
     /// Unit, back along the ray.
     pub wo: Vec3,
-    /// From `position` towards the smooth surface that the interpolated normals tell of, metres; zero where they agree
-    /// with the true surface or bend inwards.
+    /// From `position` towards the smooth surface that the interpolated normals imply, metres; zero where it coincides
+    /// with the true surface or bends inwards.
     pub lift: Vec3,
 }
 
@@ -65,13 +65,13 @@ impl Vertex {
                 if !mesh.normals.is_empty() {
                     let object =
                         weights.x * mesh.normals[a] + weights.y * mesh.normals[b] + weights.z * mesh.normals[c];
-                    // Normals move with the inverse transpose: the cofactors, without the division.
+                    // Normals transform by the inverse transpose: the cofactors, without the division.
                     let m = world_from_object.matrix3;
                     let (x, y, z) = (Vec3::from(m.x_axis), Vec3::from(m.y_axis), Vec3::from(m.z_axis));
                     let cofactors = object.x * y.cross(z) + object.y * z.cross(x) + object.z * x.cross(y);
                     let mirrored = x.dot(y.cross(z)) < 0.0;
                     let smooth = if mirrored { -cofactors } else { cofactors }.normalize_or(point.geometric_normal);
-                    // A normal that the viewer sees from behind would reflect light into the surface.
+                    // A normal that faces away from the viewer would reflect light into the surface.
                     let turn = if smooth.dot(geometric_normal) < 0.0 { -1.0 } else { 1.0 };
                     smooth_normal = turn * smooth;
                     let corners = [a, b, c].map(|i| mesh.positions[i].into());
@@ -98,7 +98,7 @@ impl Vertex {
                 uv = Vec2::new(local.dot(frame.x), local.dot(frame.y));
                 tangent = Tangent::new(frame.x, 1.0);
             }
-            // Longitude and latitude cost as much as all the rest.
+            // Longitude and latitude cost as much as everything else.
             Shape::Sphere { .. } | Shape::Spheres { .. }
                 if !scene.tables.textured[material as usize] && !asks_for_tangent => {}
             Shape::Sphere { .. } => {
@@ -109,7 +109,7 @@ impl Vertex {
                 tangent = Tangent::new(turned.map_or(east, |map| map.transpose() * east), 1.0);
             }
             Shape::Spheres { world_from_object, .. } => {
-                // Spheres scale evenly, so the transpose is the inverse but for that factor.
+                // Spheres are scaled uniformly, so the transpose is the inverse up to a factor.
                 let m = world_from_object.matrix3;
                 let outwards = (m.transpose() * point.geometric_normal).normalize();
                 uv = sphere_uv(outwards);
@@ -143,13 +143,13 @@ impl Vertex {
         vertex.seen_along(wo)
     }
 
-    /// What a surface of this emission sends out here, W·m⁻²·sr⁻¹. Colours of vertices do not tint light.
+    /// Returns the emitted radiance at this point, W·m⁻²·sr⁻¹. Vertex colours do not tint emission.
     #[inline]
     pub fn emitted(&self, scene: &Prepared, emission: &Emission) -> Vec3 {
         emission.scale * emission.radiance.eval(scene, TexturePoint { color: Vec4::ONE, ..self.texture_point })
     }
 
-    /// The same point as seen from elsewhere on the same side.
+    /// Returns the same point seen from another direction on the same side.
     ///
     /// - `wo`: unit, towards the viewer.
     #[inline]
@@ -160,7 +160,7 @@ impl Vertex {
         if is_mapped { seen.with_bent_normal() } else { seen }
     }
 
-    /// The shading normal by another map than the material's own; see [`tangent`].
+    /// Returns the shading normal of another normal map than the material's own; see [`tangent`].
     pub fn mapped_normal(&self, scene: &Prepared, map: ColorInput) -> Vec3 {
         if !map.is_normal_map() {
             return self.interpolated_seen();
@@ -168,7 +168,7 @@ impl Vertex {
         tangent::bent(self.turned(scene, map, 1.0), self.interpolated_seen(), self.wo)
     }
 
-    /// The normal of a map on the side of the viewer, not bent.
+    /// Returns the normal of a map on the side of the viewer, not bent.
     fn turned(&self, scene: &Prepared, map: ColorInput, scale: f32) -> Vec3 {
         let side = if self.front { 1.0 } else { -1.0 };
         let coded = map.eval(scene, self.texture_point);
@@ -180,12 +180,12 @@ impl Vertex {
         Self { normal: tangent::bent(self.smooth_normal, self.interpolated_seen(), self.wo), ..self }
     }
 
-    /// The shading normal without pictures.
+    /// The shading normal without normal mapping.
     pub fn interpolated_seen(&self) -> Vec3 {
         if self.interpolated.dot(self.wo) <= 0.0 { self.geometric_normal } else { self.interpolated }
     }
 
-    /// The same point as seen through the surface from its other side.
+    /// Returns the same point seen from the far side.
     ///
     /// - `wo`: unit, towards the viewer there.
     #[inline]
@@ -196,36 +196,36 @@ impl Vertex {
         Self { geometric_normal, smooth_normal, interpolated, front, lift, ..*self }.seen_along(wo)
     }
 
-    /// The shading normal that counts for a viewer at `wo`, on the other side; on this side. A surface that is asked with it how
-    /// it scatters between the two does so as seen from there.
+    /// Returns the shading normal for a viewer at `wo` on the far side, negated to this side. With it, a surface
+    /// evaluates the BSDF between the two sides as seen from there.
     #[inline]
     pub fn normal_from_behind(&self, wo: Vec3) -> Vec3 {
         -self.seen_through(wo).normal
     }
 
-    /// `wo` mirrored by the shading normal, unit.
+    /// `wo` mirrored at the shading normal, unit.
     #[inline]
     pub fn mirrored(&self) -> Vec3 {
         reflect(self.wo.into(), self.normal.into()).into()
     }
 
-    /// Whether light from `wi` can meet the side that `wo` sees.
+    /// Whether light from `wi` can reach the side that faces `wo`.
     ///
-    /// The true surface decides, unless a smooth one is to be seen in its place.
+    /// The true surface decides, unless a smooth one replaces it.
     #[inline]
     pub fn is_reached_from(&self, wi: Vec3) -> bool {
         wi.dot(self.reach_normal()) > 0.0
     }
 
-    /// The side of the surface that light must come from, see [`Self::is_reached_from`].
+    /// The normal of the side from which light must come, see [`Self::is_reached_from`].
     #[inline]
     pub fn reach_normal(&self) -> Vec3 {
         if self.lift == Vec3::ZERO { self.geometric_normal } else { self.interpolated_seen() }
     }
 
-    /// Where a ray starts that stays on the side of `wo`.
+    /// Origin of a ray that stays on the side of `wo`.
     ///
-    /// On the smooth surface where there is one, so that the flat faces in its place cast no shadow on themselves.
+    /// It is on the smooth surface if there is one, so that its flat faces cast no shadow on themselves.
     #[inline]
     pub fn leaving(&self, dir: Vec3) -> Vec3 {
         if self.lift == Vec3::ZERO {
@@ -234,30 +234,29 @@ impl Vertex {
         robust::offset_ray_origin(self.position + self.lift, self.error, self.geometric_normal, self.geometric_normal)
     }
 
-    /// Where a ray starts that goes to the side where `dir` points.
+    /// Origin of a ray to the side of `dir`.
     #[inline]
     pub fn passing(&self, dir: Vec3) -> Vec3 {
         robust::offset_ray_origin(self.position, self.error, self.geometric_normal, dir)
     }
 }
 
-/// From a point of a triangle to the smooth surface above it, in the triangle's space.
+/// Returns the vector from a point of a triangle to the smooth surface above it, in the triangle's space.
 ///
 /// - `corners`: positions; `normals`: unit, on the side from which the point is seen; `weights`: barycentric.
 ///
-/// The point is projected onto the tangent plane of each corner that it lies below, and the results are weighted
-/// (Hanika 2021, "Hacking the Shadow Terminator"). Zero where it lies below none: where the surface is flat or bends
-/// the other way.
+/// The point is projected onto the tangent plane of each vertex below which it lies, and the results are weighted
+/// (Hanika 2021, "Hacking the Shadow Terminator"). Zero if it lies below none: where the surface is flat or concave.
 #[inline(always)]
 pub(crate) fn lift_of<R: Real>(corners: &[Vector3<R>; 3], normals: &[Vector3<R>; 3], weights: &[R; 3]) -> Vector3<R> {
     let [a, b, c] = *corners;
     let point = a * weights[0] + b * weights[1] + c * weights[2];
-    // The weighted corners give the point itself: what is left are the projections.
+    // The weighted vertices give the point itself: the projections remain.
     let lifts = three!(|k| normals[k] * (-weights[k] * (point - corners[k]).dot(normals[k]).at_most(0.0)));
     lifts[0] + lifts[1] + lifts[2]
 }
 
-/// An attribute of a mesh at a point of a triangle.
+/// Interpolates a mesh attribute at a point of a triangle.
 #[inline]
 fn interpolated<T: Copy + Add<Output = T>>(attribute: &[T], corners: [usize; 3], weights: Vec3) -> T
 where
@@ -267,12 +266,12 @@ where
     weights.x * a + weights.y * b + weights.z * c
 }
 
-/// Along the circle of latitude, unit.
+/// Direction along the circle of latitude, unit.
 fn tangent_of_sphere(outwards: Vec3) -> Vec3 {
     Vec3::Y.cross(outwards).normalize_or(Vec3::X)
 }
 
-/// The material of a hit.
+/// Returns the material of a hit.
 #[inline]
 pub(crate) fn material_of(scene: &Prepared, hit: &Hit) -> MaterialId {
     scene.geometry.objects[hit.object as usize].material_of(hit.prim)
@@ -316,7 +315,7 @@ mod tests {
         prepared(vec![Shape::Mesh { tree, world_from_object }], vec![object], vec![grey], Environment::Black)
     }
 
-    /// Rays from outside towards a unit sphere, side by side.
+    /// Rays from outside towards a unit sphere, on a grid.
     fn rays() -> impl Iterator<Item = Ray> {
         let n = 160;
         (0..n * n).map(move |i| {
@@ -325,8 +324,8 @@ mod tests {
         })
     }
 
-    /// Root mean square error of the light that a coarse sphere of radius `size` gets from one side, against the true
-    /// sphere: by the lifted origin, and by the plain one.
+    /// Root mean square error of the irradiance of a coarse sphere of radius `size` from one side, against the exact
+    /// sphere: with the lifted origin, and without.
     fn light_errors(frequency: u32, map: Affine3A) -> (f64, f64) {
         let light = Vec3::new(0.96, 0.28, 0.0);
         let scene = scene_of(procedural::icosphere(frequency).with_vertex_normals(), map);
@@ -360,7 +359,7 @@ mod tests {
         ((lifted / f64::from(n)).sqrt(), (plain / f64::from(n)).sqrt())
     }
 
-    /// The true normal, in the sphere's own space, where the ray meets it.
+    /// The exact normal at the hit, in the sphere's space.
     fn ray_point(ray: &Ray, map: &Affine3A, dir: Vec3, b: f32, disc: f32) -> Vec3 {
         let origin = map.inverse().transform_point3(ray.origin);
         (origin + (-b - disc.sqrt()) * dir).normalize()
@@ -373,7 +372,7 @@ mod tests {
             println!("icosphere {}: rms {lifted:.4}, without {plain:.4}", 20 * frequency * frequency);
             assert!(lifted < 0.9 * plain, "{frequency}: {lifted} against {plain}");
         }
-        // Neither size nor mirroring makes a difference.
+        // Size and mirroring make no difference.
         let (plain, _) = light_errors(4, Affine3A::IDENTITY);
         for scale in [Vec3::splat(1e-3), Vec3::splat(500.0), Vec3::new(-1.0, 1.0, 1.0)] {
             let (scaled, _) = light_errors(4, Affine3A::from_scale(scale));

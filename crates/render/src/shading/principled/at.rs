@@ -1,4 +1,4 @@
-//! The parameters of a layered material at a point of a surface.
+//! Parameters of a layered material at a surface point.
 
 use super::iridescence::Film;
 use super::layers::{Inside, Principled, Transmission};
@@ -10,9 +10,11 @@ use crate::shading::sides::Sides;
 use crate::shading::vertex::Vertex;
 use glam::{Vec2, Vec3};
 
-/// - `sides`: asked for by what lets light through; without them it may be told apart from the rest, but not sampled.
-/// - `leaf`: the number of its transparent part in the material that it belongs to.
-/// - `is_lit`: whether light from beyond is asked for, or only found by sampling.
+/// Evaluates a layered material at a vertex.
+///
+/// - `sides`: required by transmissive materials; without it they may be distinguished from others, but not sampled.
+/// - `leaf`: index of its transparent part in the material that it belongs to.
+/// - `is_lit`: whether light sampling includes light from the far side; otherwise only BSDF sampling finds it.
 pub(crate) fn principled_at(
     scene: &Prepared,
     id: MaterialId,
@@ -71,7 +73,7 @@ pub(crate) fn principled_at(
     if anisotropy > 0.0 {
         let map = color(anisotropy_map);
         let strength = anisotropy * map.z;
-        // Along the direction of anisotropy the lobe is wider (`KHR_materials_anisotropy`).
+        // The lobe is wider along the direction of anisotropy (`KHR_materials_anisotropy`).
         widths[0] = alpha + (1.0 - alpha) * strength * strength;
         let across = Vec2::from_angle(anisotropy_rotation.to_radians()).rotate(2.0 * Vec2::new(map.x, map.y) - 1.0);
         direction = Some(across.normalize_or(Vec2::X));

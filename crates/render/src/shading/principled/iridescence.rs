@@ -1,26 +1,28 @@
-//! Colours of thin films: light that is reflected at the top and at the bottom of a film interferes with itself.
+//! Colours of thin films: light reflected at the top of a film interferes with light reflected at its bottom.
 //!
-//! Source: Belcour and Barla 2017, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence",
-//! with the formulas that `KHR_materials_iridescence` names. The spectrum is integrated in Fourier space, to three orders.
+//! Source: Belcour and Barla 2017, "A Practical Extension to Microfacet Theory for the Modeling of Varying
+//! Iridescence", with the formulas that `KHR_materials_iridescence` gives. The spectrum is integrated in Fourier space,
+//! to third order.
 
 use glam::{Mat3, Vec3};
 use std::f32::consts::{PI, TAU};
 
-/// A film on a surface.
+/// A thin film on a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Film {
-    /// Share of the surface that has it, 0..1.
+    /// Share of the surface with the film, 0..1.
     pub share: f32,
     /// Index of refraction, above 0.
     pub ior: f32,
-    /// Metres.
+    /// Thickness in metres.
     pub thickness: f32,
 }
 
 impl Film {
-    /// What the reflectance at normal incidence must be for Schlick's approximation to give that of the film under this angle.
+    /// Returns the reflectance at normal incidence for which Schlick's approximation gives that of the film at this
+    /// angle.
     ///
-    /// - `facing`: reflectance of the surface below without the film; `cos`: of the viewer, 0..1.
+    /// - `facing`: reflectance of the surface below without the film; `cos`: cosine of the view angle, 0..1.
     pub fn tint(&self, facing: Vec3, cos: f32) -> Vec3 {
         let grazing = (1.0 - cos).clamp(0.0, 1.0).powi(5);
         if self.share <= 0.0 || self.thickness <= 0.0 || grazing > 0.999 {
@@ -31,9 +33,9 @@ impl Film {
         facing.lerp(head_on, self.share)
     }
 
-    /// Share of light that is reflected, per channel.
+    /// Reflectance per channel, 0..1.
     fn reflectance(&self, facing: Vec3, cos: f32) -> Vec3 {
-        // A film that thins out ends in nothing.
+        // A film that gets thinner vanishes continuously.
         let t = (self.thickness / 30e-9).clamp(0.0, 1.0);
         let ior = 1.0 + (self.ior - 1.0) * t * t * (3.0 - 2.0 * t);
         let cos2 = 1.0 - (1.0 - cos * cos) / (ior * ior);
@@ -41,7 +43,7 @@ impl Film {
             return Vec3::ONE;
         }
         let cos_inside = cos2.sqrt();
-        // Top of the film, from air; its bottom, to the surface below.
+        // The top of the film, in air, and its bottom, at the surface below.
         let top = schlick(head_on(ior, 1.0), cos);
         let passed = 1.0 - top;
         let below = facing.min(Vec3::splat(0.9999)).map(|f| (1.0 + f.sqrt()) / (1.0 - f.sqrt()));
@@ -70,12 +72,12 @@ fn schlick(facing: f32, cos: f32) -> f32 {
     facing + (1.0 - facing) * (1.0 - cos).clamp(0.0, 1.0).powi(5)
 }
 
-/// The colour matching functions of the eye at the frequency of a path difference, in linear Rec. 709.
+/// Returns the CIE colour matching functions at the frequency of a path difference, in linear Rec. 709.
 ///
-/// - `way`: path difference, metres; `phase`: what reflections add to it, radians, per channel.
+/// - `way`: path difference, metres; `phase`: phase shift of the reflections, radians, per channel.
 fn interference(way: f32, phase: Vec3) -> Vec3 {
-    // Gaussians that fit the colour matching functions: height, place and width over the wave number; the second one of x is
-    // at the blue end.
+    // Gaussian fits of the colour matching functions: height, position and width over the wave number; the fourth one
+    // is the second peak of x, at the blue end.
     const HEIGHTS: [f32; 4] = [5.4856e-13, 4.4201e-13, 5.2481e-13, 9.7470e-14];
     const PLACES: [f32; 4] = [1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6];
     const WIDTHS: [f32; 4] = [4.3278e9, 9.3046e9, 6.6121e9, 4.5282e9];
@@ -98,13 +100,13 @@ fn interference(way: f32, phase: Vec3) -> Vec3 {
 mod tests {
     use super::*;
 
-    /// By the wave: two beams of a film, summed over the spectrum, have a maximum where the path difference is a whole number
-    /// of wave lengths, red and blue at different thicknesses.
+    /// Two-beam interference, summed over the spectrum, has its maxima where the path difference is an integer number
+    /// of wavelengths: red and blue at different thicknesses.
     #[test]
     fn colors_follow_the_path_difference() {
         let film = |nm: f32| Film { share: 1.0, ior: 1.33, thickness: nm * 1e-9 };
         let seen = |nm: f32, cos: f32| film(nm).reflectance(Vec3::splat(0.04), cos);
-        // Head-on, light of 550 nm in a film of water on glass is bright at half a wave length, dark at a quarter.
+        // Head-on, light of 550 nm in a film of water on glass is bright at half a wavelength, dark at a quarter.
         let (bright, dark) = (seen(550.0 / 1.33 / 2.0, 1.0).y, seen(550.0 / 1.33 / 4.0, 1.0).y);
         assert!(bright > 0.035 && dark < 0.015, "{bright} {dark}");
         // Seen at an angle, the same film looks like a thinner one.

@@ -1,4 +1,4 @@
-//! The parameters of a layered surface at one point.
+//! Parameters of a layered surface at one point.
 
 use crate::core::color::luminance;
 use crate::core::material::SMALLEST_ALPHA;
@@ -13,48 +13,48 @@ pub(crate) const COAT_FACING: f32 = 0.04;
 /// All parameters at one point of a surface.
 #[derive(Clone, Debug)]
 pub(crate) struct Principled {
-    /// Share of the dielectric that reflects, 0..1.
+    /// Share of the dielectric's reflection, 0..1.
     pub dielectric: f32,
     /// Reflectance of the dielectric at normal incidence and at grazing angles.
     pub facing: Vec3,
     pub grazing: Vec3,
-    /// Albedo of what scatters below the dielectric, times its share.
+    /// Albedo of the diffuse layer below the dielectric, times its share.
     pub diffuse: Vec3,
-    /// Share that is metal, 0..1, and its reflectance at normal incidence.
+    /// Share of metal, 0..1, and its reflectance at normal incidence.
     pub metallic: f32,
     pub metal: Vec3,
-    /// Widths of the microfacets along `tangent` and across.
+    /// GGX widths along `tangent` and across.
     pub alpha: [f32; 2],
-    /// Unit, roughly in the surface; `None` for any.
+    /// Unit, approximately in the surface; `None` if the direction does not matter.
     pub tangent: Option<Vec3>,
     pub transmission: Option<Transmission>,
-    /// Strength of the sheen and its width.
+    /// Strength of the sheen, and its width.
     pub sheen: Vec3,
     pub sheen_alpha: f32,
     pub coat: f32,
     pub coat_alpha: f32,
-    /// Unit, on the side that the surface was met from.
+    /// Unit, on the side from which the surface was hit.
     pub coat_normal: Vec3,
 }
 
-/// What lets light through.
+/// The transmissive part.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Transmission {
     /// Share, 0..1.
     pub share: f32,
-    /// Of light that passes.
+    /// Colour of transmitted light.
     pub tint: Vec3,
     pub inside: Inside,
-    /// Whether light from beyond is asked for, or only found by sampling.
+    /// Whether light sampling includes light from the far side; otherwise only BSDF sampling finds it.
     pub is_lit: bool,
 }
 
-/// What is behind a surface that lets light through.
+/// What is behind a transmissive surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Inside {
     /// Another medium.
     Solid(Interface),
-    /// A pane without thickness in this medium.
+    /// A pane without thickness, inside of this medium.
     Thin(MediumId),
 }
 
@@ -68,7 +68,7 @@ impl Transmission {
 }
 
 impl Principled {
-    /// Width of the base for tables, which know round lobes alone.
+    /// Isotropic width of the base, for tables.
     pub fn mean_alpha(&self) -> f32 {
         if self.alpha[0] == self.alpha[1] { self.alpha[0] } else { (self.alpha[0] * self.alpha[1]).sqrt() }
     }
@@ -89,19 +89,19 @@ impl Principled {
         self.coat_alpha < SMALLEST_ALPHA
     }
 
-    /// Share of light that it returns or lets through, about.
+    /// Approximate reflected or transmitted share of light.
     pub fn albedo_estimate(&self) -> f32 {
         let transmitted = self.transmission.map_or(0.0, |transmission| transmission.share);
         let reflected = self.dielectric * self.facing + self.metallic * self.metal;
         luminance(self.diffuse + reflected + self.sheen) + transmitted + COAT_FACING * self.coat
     }
 
-    /// Of the dielectric's reflection, per channel.
+    /// Albedo of the dielectric's reflection, per channel.
     pub fn dielectric_albedo(&self, albedo: SchlickAlbedo) -> Vec3 {
         self.facing * albedo.facing + self.grazing * albedo.grazing
     }
 
-    /// Whether transmitted light is spread.
+    /// Whether transmitted light is scattered rather than specular.
     pub fn is_transmission_rough(&self) -> bool {
         match self.transmission {
             Some(Transmission { inside: Inside::Solid(interface), .. }) => {

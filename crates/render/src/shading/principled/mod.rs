@@ -1,15 +1,16 @@
-//! Layered surfaces by the parameters of glTF 2.0 (appendix B and `KHR_materials_*`), made to conserve energy.
+//! Layered surfaces with the parameters of glTF 2.0 (appendix B and `KHR_materials_*`), made energy-conserving.
 //!
-//! From above: a clear coat, a sheen, and a base that is metal, or a dielectric over what scatters or lets light through.
+//! From above: a clear coat, a sheen, and a base that is metal, or a dielectric over a diffuse or transmissive layer.
 //!
-//! - A dielectric reflects by GGX and Schlick; what it does not reflect reaches the diffuse layer below, and what that returns
-//!   must come out again: f = albedo/π · (1 − E(θₒ)) (1 − E(θᵢ)) / (1 − Ē), E being the albedo of all layers above (Kelemen
-//!   and Szirmay-Kalos 2001). It is the same both ways, and a white base returns all light.
-//! - Coat and sheen let 1 − E through to the metal, the reflection and the glass below: of both directions, the lesser counts.
-//! - Light that a rough metal or rough glass loses between microfacets is given back, as by [`crate::shading::metal`] and
-//!   [`crate::shading::rough_glass`].
+//! - A dielectric reflects by GGX and Schlick; the rest reaches the diffuse layer below, whose light must pass the
+//!   dielectric again: f = albedo/π · (1 − E(θₒ)) (1 − E(θᵢ)) / (1 − Ē), where E is the albedo of all layers above
+//!   (Kelemen and Szirmay-Kalos 2001). It is reciprocal, and a white base returns all light.
+//! - Coat and sheen transmit 1 − E to the metal, the reflection and the glass below: the smaller value of both
+//!   directions.
+//! - Light that a rough metal or rough glass loses between microfacets is compensated, as in [`crate::shading::metal`]
+//!   and [`crate::shading::rough_glass`].
 //!
-//! Start reading at [`layers::Principled`]; [`seen`] has what follows from the direction of the viewer.
+//! Start reading at [`layers::Principled`]; [`seen`] has what depends on the view direction.
 
 pub(crate) mod at;
 mod iridescence;
@@ -90,7 +91,7 @@ mod tests {
         Inside::Solid(Interface { eta, squeeze: eta, beyond: MediumId::OUTSIDE })
     }
 
-    /// Surfaces of every layer, alone and together, with a name.
+    /// Surfaces with each layer, alone and combined, with a name.
     fn surfaces() -> Vec<(&'static str, Principled)> {
         let metal = Principled { dielectric: 0.0, diffuse: Vec3::ZERO, metallic: 1.0, ..plain() };
         let color = Vec3::new(0.8, 0.4, 0.1);
@@ -117,7 +118,7 @@ mod tests {
         ]
     }
 
-    /// Every direction has a bin: its height, and its angle about the normal.
+    /// Returns the bin of a direction, by its height and its azimuth.
     fn bin(wi: Vec3) -> usize {
         let ring = ((wi.z + 1.0) * 0.5 * (2 * RINGS) as f32) as usize;
         let sector = ((wi.y.atan2(wi.x) / std::f32::consts::TAU + 0.5) * SECTORS as f32) as usize;
@@ -143,7 +144,7 @@ mod tests {
 
     #[test]
     fn sampled_directions_follow_their_pdf_and_carry_f_over_it() {
-        // 1 % over all thirty-six cases (Šidák: 3.5 σ).
+        // Significance 1 % over all thirty-six cases (Šidák: 3.5 σ).
         for (case, (name, surface)) in (0..).zip(surfaces()) {
             for (view, cos) in (0..).zip([0.9, 0.4, 0.08]) {
                 let wo = direction(cos);
@@ -164,7 +165,7 @@ mod tests {
                         "{name}, cos {cos}"
                     );
                 }
-                // A narrow lobe is not integrated well bin by bin.
+                // A narrow lobe is not integrated accurately bin by bin.
                 let is_narrow = surface.alpha[0].min(surface.alpha[1]) < 0.05
                     || (surface.coat > 0.0 && surface.coat_alpha < 0.05)
                     || cos < 0.1;
@@ -197,7 +198,7 @@ mod tests {
         }
     }
 
-    /// Share of light that comes back or through when all around is as bright.
+    /// Reflected and transmitted share of light in a white furnace.
     fn furnace(surface: &Principled, cos: f32, n: u32) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for i in 0..n {
@@ -226,7 +227,8 @@ mod tests {
                     let found = furnace(&surface, cos, 1 << 15);
                     let name = format!("{name}, roughness {roughness}, cos {cos}: {found}");
                     assert!(found.max_element() <= 1.008, "{name}");
-                    // The coat hides some of the reflection of what is below it, and grazing light of tables without end is hard.
+                    // The coat hides part of the reflection below it, and finite tables are inaccurate at grazing
+                    // angles.
                     let is_whole = !name.starts_with("coat") && !name.starts_with("sheen") && cos > 0.02;
                     let least = if is_whole { 0.994 } else { 0.9 };
                     assert!(found.min_element() >= least, "{name}");
@@ -238,7 +240,7 @@ mod tests {
     #[test]
     fn scattering_is_the_same_both_ways() {
         for (name, surface) in surfaces() {
-            // What a metal loses between microfacets is given back by the viewer's angle alone (Turquin 2019).
+            // The compensation of a metal's losses depends on the view angle only (Turquin 2019).
             let surface = if surface.metallic > 0.0 { Principled { metallic: 0.0, ..surface } } else { surface };
             for i in 0..200 {
                 let sampler = Sampler::new(1, 2, 0, i);
@@ -258,14 +260,14 @@ mod tests {
         (0..200_000).for_each(check_configuration);
     }
 
-    /// The same for longer: `cargo test -p firstlight-render --lib hundred_million -- --ignored`.
+    /// The same with more configurations: `cargo test -p firstlight-render --lib hundred_million -- --ignored`.
     #[test]
     #[ignore = "it takes minutes"]
     fn none_of_a_hundred_million_configurations_gives_what_is_no_number() {
         (0..100_000_000_u32).into_par_iter().for_each(check_configuration);
     }
 
-    /// Surface, directions and random numbers number `i`: all layers, with many values at the ends of their ranges.
+    /// Surface, directions and random numbers of index `i`: all layers, with many values at the ends of their ranges.
     fn check_configuration(i: u32) {
         let sampler = Sampler::new(9, 1, 0, i);
         let pick = |k: u32| sampler.single(k);

@@ -1,4 +1,4 @@
-//! A layered surface as seen along one direction.
+//! A layered surface seen along one direction.
 
 use super::layers::{COAT_FACING, Inside, Principled, Transmission};
 use crate::core::color::luminance;
@@ -13,13 +13,13 @@ use crate::shading::sheen;
 use firstlight_kdtree::geometry::Frame;
 use glam::{Vec2, Vec3};
 
-/// Cosines with the normal count for at least this: nothing is seen at a smaller angle.
+/// Lower limit of cosines with the normal.
 const SMALLEST_COS: f32 = 1e-6;
 
-/// What a direction is sampled by.
+/// The technique that samples a direction.
 #[derive(Clone, Copy, PartialEq)]
 enum Technique {
-    /// For the diffuse layer and the sheen.
+    /// Cosine-weighted, for the diffuse layer and the sheen.
     Cosine,
     /// Visible normals of the base.
     Reflection,
@@ -30,24 +30,24 @@ enum Technique {
 
 const TECHNIQUES: [Technique; 4] = [Technique::Cosine, Technique::Reflection, Technique::Coat, Technique::Transmission];
 
-/// What follows from the direction of the viewer.
+/// Values that depend on the view direction.
 pub(super) struct Seen<'a> {
     of: &'a Principled,
-    /// Along the tangent, across, and along the normal on the side of the viewer.
+    /// Tangent, bitangent, and normal on the side of the viewer.
     frame: Frame,
-    /// In the frame.
+    /// Direction to the viewer, in the frame.
     wo: Vec3,
-    /// Of the coat; around its own normal.
+    /// The coat, about its own normal.
     coat: Option<CoatSeen>,
-    /// What the sheen lets pass.
+    /// Transmittance of the sheen.
     past_sheen: f32,
-    /// What of the light towards the viewer comes from below all layers.
+    /// Transmittance of all layers towards the viewer.
     past_all: Vec3,
-    /// The same of all directions.
+    /// Mean of `past_all` over all directions.
     mean_past_all: Vec3,
-    /// What a metal loses at one bounce over what it returns.
+    /// Lost over returned energy of single scattering for a metal.
     lost: f32,
-    /// What a rough pane lets through over what it does by single scattering.
+    /// Total over single-scattering transmittance of a rough pane.
     passed_again: Vec3,
     pmf: [f32; 4],
 }
@@ -55,11 +55,11 @@ pub(super) struct Seen<'a> {
 struct CoatSeen {
     frame: Frame,
     wo: Vec3,
-    /// What it lets pass.
+    /// Transmittance of the coat.
     past: f32,
 }
 
-/// GGX microfacets seen along a direction above them, both in the frame.
+/// Evaluates GGX microfacets for two directions above them, both in the frame: half vector, value and pdf.
 fn reflection(wo: Vec3, wi: Vec3, alpha: [f32; 2]) -> (Vec3, f32, f32) {
     let half = (wo + wi).normalize();
     let masking = 1.0 + anisotropic_lambda(wo.into(), alpha);
@@ -77,8 +77,9 @@ fn mirrored(wo: Vec3, normal: Vec3) -> Vec3 {
 }
 
 impl<'a> Seen<'a> {
-    /// - `normal`: unit; `wo`: unit, on its side, or beyond it where light passes. `None` for what is seen from inside of a
-    ///   surface that lets nothing through.
+    /// Prepares a surface for a view direction; `None` if it is seen from inside and not transmissive.
+    ///
+    /// - `normal`: unit; `wo`: unit, on its side, or beyond it for transmitted light.
     pub fn new(of: &'a Principled, wo: Vec3, normal: Vec3) -> Option<Self> {
         if normal.dot(wo) <= 0.0 {
             return None;
@@ -92,7 +93,7 @@ impl<'a> Seen<'a> {
         local.z = local.z.max(SMALLEST_COS);
         let alpha = of.mean_alpha();
         let coat = of.has_coat().then(|| {
-            // A coat that faces away is seen as the base is.
+            // A coat normal that faces away is replaced by that of the base.
             let normal = if of.coat_normal.dot(wo) > 0.0 { of.coat_normal } else { normal };
             let frame = Frame::around(normal);
             let mut wo = frame.to_local(wo);
@@ -113,7 +114,7 @@ impl<'a> Seen<'a> {
             Inside::Solid(_) => transmission.share,
             Inside::Thin(_) => transmission.share * luminance(transmission.tint * (Vec3::ONE - reflected)),
         });
-        // All that is not reflected passes (as Turquin 2019 for metals).
+        // All light that is not reflected is transmitted (as in Turquin 2019 for metals).
         let once = Vec3::splat(base.facing + base.grazing) - reflected;
         let passed_again = (Vec3::ONE - reflected) / once.max(Vec3::splat(1e-3));
         let sheen = luminance(of.sheen);
@@ -132,13 +133,13 @@ impl<'a> Seen<'a> {
         Some(Self { of, frame, wo: local, coat, past_sheen, past_all, mean_past_all, lost, passed_again, pmf })
     }
 
-    /// What reaches the layers below the coat, of light from one direction to the viewer.
+    /// Transmittance of the coat for light from one direction to the viewer.
     fn below_coat(&self, wi: Vec3) -> f32 {
         let Some(coat) = &self.coat else { return 1.0 };
         coat.past.min(past_coat(self.of, coat.frame.z.dot(wi).abs()))
     }
 
-    /// f · |cos| and density of all that is not specular. `wi`: unit, in the world.
+    /// f · |cos| and pdf of all non-specular layers. `wi`: unit, in world space.
     pub fn eval(&self, wi: Vec3) -> (Vec3, f32) {
         let of = self.of;
         let local = self.frame.to_local(wi);
@@ -166,7 +167,8 @@ impl<'a> Seen<'a> {
             }
             if of.sheen != Vec3::ZERO {
                 let half = (self.wo + local).normalize();
-                // Narrow sheens would return more than all light at grazing angles: what is too much is left out both ways.
+                // A narrow sheen would return more than all light at grazing angles: the excess is removed
+                // symmetrically.
                 let most =
                     [self.wo.z, local.z].map(|cos| sheen_albedo(cos, of.sheen_alpha)).into_iter().fold(1.0, f32::max);
                 let sheen = sheen::value(self.wo.z, local.z, half.z, of.sheen_alpha) / most;
@@ -202,7 +204,7 @@ impl<'a> Seen<'a> {
         RoughGlass::new(self.frame.z, wo, self.of.mean_alpha().min(1.0), interface, true)
     }
 
-    /// Light from beyond, where that is spread.
+    /// Light from the far side, if transmission is rough.
     fn eval_through(&self, transmission: &Transmission, wi: Vec3, local: Vec3) -> (Vec3, f32) {
         let above = Vec3::new(local.x, local.y, -local.z);
         let below = self.below_coat(wi) * self.past_sheen.min(past_sheen(self.of, above.z));
@@ -211,7 +213,7 @@ impl<'a> Seen<'a> {
                 let (f, density) = self.rough_glass(interface).eval(wi);
                 (Vec3::splat(f), density)
             }
-            // The reflected lobe on the other side.
+            // The reflected lobe on the far side.
             Inside::Thin(_) => {
                 let (half, f, density) = reflection(self.wo, above, self.of.alpha);
                 (f * self.passed(self.wo.dot(half)) * self.passed_again, density)
@@ -220,7 +222,7 @@ impl<'a> Seen<'a> {
         (transmission.tint * (transmission.share * below) * f, self.pmf[3] * density)
     }
 
-    /// Reflectance of the base under an angle with its microfacets.
+    /// Reflectance of the base at an angle with its microfacets.
     fn tint(&self, cos: f32) -> Vec3 {
         let of = self.of;
         let dielectric = of.dielectric * schlick(of.facing, of.grazing, cos);
@@ -231,12 +233,12 @@ impl<'a> Seen<'a> {
         dielectric + of.metallic * metal
     }
 
-    /// What a pane without thickness lets through under an angle.
+    /// Transmittance of a thin pane at an angle.
     fn passed(&self, cos: f32) -> Vec3 {
         (Vec3::ONE - schlick(self.of.facing, self.of.grazing, cos)).max(Vec3::ZERO)
     }
 
-    /// - `u_lobe`: chooses the layer; `u`: the direction.
+    /// - `u_lobe`: selects the technique; `u`: the direction.
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let mut rest = u_lobe;
         let chosen = (0..4)
@@ -261,7 +263,7 @@ impl<'a> Seen<'a> {
         }
     }
 
-    /// All layers that are not specular could have found this direction: the one-sample estimate over their mixture.
+    /// All non-specular layers could have sampled this direction: one-sample estimate over their mixture.
     fn reflected(&self, local: Vec3, frame: &Frame) -> Option<BsdfSample> {
         if local.z <= 0.0 {
             return None;
@@ -348,13 +350,13 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// What the coat lets pass under an angle.
+/// Transmittance of the coat at an angle.
 fn past_coat(of: &Principled, cos: f32) -> f32 {
     let albedo = SchlickAlbedo::new(cos, of.coat_alpha);
     1.0 - of.coat * (COAT_FACING * albedo.facing + albedo.grazing)
 }
 
-/// What the sheen lets pass under an angle.
+/// Transmittance of the sheen at an angle.
 fn past_sheen(of: &Principled, cos: f32) -> f32 {
     if of.sheen == Vec3::ZERO {
         return 1.0;
@@ -362,7 +364,7 @@ fn past_sheen(of: &Principled, cos: f32) -> f32 {
     (1.0 - of.sheen.max_element() * sheen_albedo(cos, of.sheen_alpha)).max(0.0)
 }
 
-/// Mean over all directions of what comes from below all layers; not 0.
+/// Mean transmittance of all layers over all directions; not 0.
 fn mean_past_all(of: &Principled, alpha: f32) -> Vec3 {
     let least = Vec3::splat(1e-6);
     if !of.has_coat() && of.sheen == Vec3::ZERO {

@@ -1,11 +1,11 @@
-//! How sixteen paths go on.
+//! Sampled continuations of sixteen paths.
 
 use crate::prepare::material_table::TEXTURED;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use crate::shading::simd::texture::looked_up;
 use firstlight_simd::{Bits, Float, Mask, Simd, Vector};
 
-/// Directions in which paths go on.
+/// Sampled directions of sixteen paths.
 pub(crate) struct Bounce<S: Simd> {
     pub go_on: Mask,
     pub wi: Vector<S>,
@@ -14,7 +14,7 @@ pub(crate) struct Bounce<S: Simd> {
     pub transmitted: Mask,
 }
 
-/// Albedo or reflectance by rows of the table, with their textures.
+/// Returns albedo or reflectance by rows of the material table, with textures.
 #[inline(always)]
 pub(crate) fn colors_of<S: Simd>(s: S, at: &HitGroup<S>, place: &SurfaceLanes<S>, row: Bits<S>) -> Vector<S> {
     let table = &at.scene.tables.materials;

@@ -1,7 +1,8 @@
-//! Two parts in one surface, sixteen at a time: diffuse under a rough or mirroring coat, as blends and classic materials have it.
+//! Surfaces of two parts, sixteen at a time: diffuse under a rough or mirroring coat, as in blends and classic
+//! materials.
 //!
-//! The formulas are those of [`crate::shading::blend::Blend`]: light sampling asks both parts, a bounce is chosen from one
-//! and weighted over both.
+//! The formulas are those of [`crate::shading::blend::Blend`]: light sampling evaluates both parts, BSDF sampling
+//! selects one and weights over both.
 
 use crate::core::color::luminance_of;
 use crate::sampling::cosine_hemisphere_pdf;
@@ -14,25 +15,25 @@ use crate::shading::simd::metal::metals;
 use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Bits, Float, Mask, Real, Simd, Vector, frame_around, select, select_vector, two};
 
-/// The parts of the surface of each lane, by what they do; of each kind there is one at most.
+/// The parts of the surface per lane, by kind; at most one of each kind.
 pub(crate) struct Coat<S: Simd> {
     matte: CoatPart<S>,
     rough: CoatPart<S>,
     mirror: CoatPart<S>,
-    /// The rough parts; `None` where no lane has one.
+    /// The rough parts; `None` if no lane has one.
     metal: Option<Metal<Float<S>>>,
-    /// In the order of choice.
+    /// Kinds in the order of selection.
     kinds: [Bits<S>; 2],
     pmfs: [Float<S>; 2],
 }
 
 #[derive(Clone, Copy)]
 struct CoatPart<S: Simd> {
-    /// Lanes that have it.
+    /// Lanes that have this part.
     here: Mask,
     color: Vector<S>,
     weight: Float<S>,
-    /// Of being sampled.
+    /// Probability of being sampled.
     pmf: Float<S>,
 }
 
@@ -45,7 +46,7 @@ impl<S: Simd> Coat<S> {
         let weights = two!(|k| Float::gather(&table.weights[k], material));
         let kinds = two!(|k| Bits::gather(&table.kinds.of_material, rows[k]));
         let colors = two!(|k| colors_of(s, at, place, rows[k]));
-        // Chosen by what they reflect.
+        // Selected in proportion to their reflected light.
         let strengths = two!(|k| luminance_of(colors[k]) * weights[k]);
         let sum = strengths[0] + strengths[1];
         let pmfs = two!(|k| select(sum.is_positive(), strengths[k] / sum, sum.all(0.5)));
@@ -63,13 +64,13 @@ impl<S: Simd> Coat<S> {
         Self { matte, rough, mirror, metal, kinds, pmfs }
     }
 
-    /// Lanes that light sampling can do something for.
+    /// Lanes for which light sampling can contribute.
     #[inline(always)]
     pub fn non_specular(&self) -> Mask {
         self.matte.here | self.rough.here
     }
 
-    /// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.
+    /// Returns f · cos, and the pdf of sampling `wi`; zero for `wi` behind the normal.
     #[inline(always)]
     pub fn eval(&self, normal: Vector<S>, wi: Vector<S>) -> (Vector<S>, Float<S>) {
         let cos = normal.dot(wi);
@@ -87,7 +88,7 @@ impl<S: Simd> Coat<S> {
         (value, pdf)
     }
 
-    /// Lanes that choose a part of this kind; `first`: those that choose the first.
+    /// Lanes that select a part of this kind; `first`: lanes that select the first part.
     #[inline(always)]
     fn chosen(&self, first: Mask, kind: usize) -> Mask {
         let kind = kind as u32;
@@ -121,7 +122,7 @@ impl<S: Simd> Coat<S> {
     }
 }
 
-/// In the order of choice.
+/// Both parts, in the order of selection.
 struct CoatParts<S: Simd> {
     kinds: [Bits<S>; 2],
     colors: [Vector<S>; 2],

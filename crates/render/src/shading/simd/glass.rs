@@ -1,4 +1,4 @@
-//! The two sides of transparent surfaces, sixteen at a time; see [`crate::shading::medium`].
+//! Interfaces of transparent surfaces, sixteen at a time; see [`crate::shading::medium`].
 
 use crate::shading::interface::MediumId;
 use crate::shading::medium::MediumSets;
@@ -14,7 +14,7 @@ pub(crate) struct GlassLanes<S: Simd> {
 }
 
 impl<S: Simd> GlassLanes<S> {
-    /// - `front`: lanes that meet it from outside; `media`: what each path is inside of.
+    /// - `front`: lanes that hit it from outside; `media`: media of each path.
     #[inline(always)]
     pub fn of(s: S, at: &HitGroup<S>, front: Mask, sets: &mut MediumSets, media: &[MediumId; LANES]) -> Self {
         let (mut eta, mut squeeze, mut beyond) = ([1.0; LANES], [1.0; LANES], *media);

@@ -1,4 +1,4 @@
-//! Surfaces whose directions are partly chosen by hints.
+//! Surfaces with guided sampling, sixteen at a time.
 
 use crate::prepare::guide::SHARE;
 use crate::sampling::SamplerLanes;
@@ -12,7 +12,8 @@ use firstlight_simd::{Real, Simd, Vector, select, select_vector};
 use glam::Vec2;
 
 impl HintLanes<'_> {
-    /// Sends some of the lanes that have hints where these say, and weights all of those over both ways.
+    /// Samples the guiding distributions in some of the lanes that have them, and weights all of these lanes over both
+    /// techniques.
     #[inline(always)]
     pub fn follow<S: Simd, const KIND: usize>(
         &self,
@@ -42,7 +43,7 @@ impl HintLanes<'_> {
         }
         let (value, pdf) = eval::<S, KIND>(surface, place, wi);
         let pdf = self.mixed(s, wi, pdf);
-        // A part that is specular is found by the surface alone.
+        // A specular part is sampled by the surface only.
         let specular = self.told & !sent & bounce.pdf.all(f32::MAX).lt(bounce.pdf);
         let mixed = self.told & !specular;
         let found = (sent | bounce.go_on) & pdf.is_positive() & !value.is_zero();

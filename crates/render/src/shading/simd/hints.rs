@@ -1,4 +1,4 @@
-//! Hints of where gathered light comes from, for sixteen surfaces; see [`crate::shading::guided::Guided`] for one.
+//! Guiding distributions for sixteen surfaces; see [`crate::shading::guided::Guided`] for one.
 
 use crate::prepare::guide::{Guide, Hints};
 use crate::sampling::SamplerLanes;
@@ -10,9 +10,9 @@ use crate::shading::simd::surface::{HitGroup, SurfaceLanes};
 use firstlight_simd::{Float, LANES, Mask, Simd, Vector, select};
 use glam::Vec3;
 
-/// What each lane is told.
+/// The guiding distributions of each lane.
 pub(crate) struct HintLanes<'a> {
-    /// Lanes that have hints.
+    /// Lanes that have guiding distributions.
     pub told: Mask,
     pub hints: [Option<Hints<'a>>; LANES],
 }
@@ -20,7 +20,7 @@ pub(crate) struct HintLanes<'a> {
 impl<'a> HintLanes<'a> {
     pub const NONE: Self = Self { told: 0, hints: [None; LANES] };
 
-    /// - `mask`: lanes that scatter; `n_vertices`: up to and with these.
+    /// - `mask`: lanes that scatter; `n_vertices`: number of path vertices including these.
     #[inline(always)]
     pub fn of<S: Simd>(
         s: S,
@@ -49,7 +49,7 @@ impl<'a> HintLanes<'a> {
         found
     }
 
-    /// The density of the mixture, given that of the surface alone.
+    /// Returns the pdf of the mixture, given that of the surface.
     #[inline(always)]
     pub fn mixed<S: Simd>(&self, s: S, wi: Vector<S>, pdf: Float<S>) -> Float<S> {
         if self.told == 0 {
@@ -64,14 +64,15 @@ impl<'a> HintLanes<'a> {
         select(self.told, mixed_pdf(pdf, Float::load(s, &hinted)), pdf)
     }
 
-    /// The number that chooses a part of a surface: what is left of it where the choice was not to follow a hint.
+    /// Returns the random number that selects a part of a surface, rescaled where the guiding distribution was not
+    /// selected.
     #[inline(always)]
     pub fn u_lobe<S: Simd>(&self, sampler: &SamplerLanes<S>, dimension: u32) -> Float<S> {
         let u = sampler.single(dimension + DIM_LOBE);
         if self.told == 0 { u } else { select(self.told, rest_of_choice(u), u) }
     }
 
-    /// Of a lane whose throughput is multiplied by `weight`.
+    /// Returns the MIS state of a lane whose throughput is multiplied by `weight`.
     #[inline(always)]
     pub fn track<S: Simd>(&self, at: &HitGroup<S>, lane: usize, weight: &[[f32; LANES]; 3]) -> MisState {
         let track = at.paths.track_of(at.indices[lane] as usize);

@@ -1,8 +1,8 @@
-//! Hits on meshes and clouds of spheres, which have spaces of their own, sixteen at a time.
+//! Hits on meshes and groups of spheres, which have their own spaces, sixteen at a time.
 //!
-//! The formulas are those of `kdtree/surface.rs` and [`crate::shading::vertex::Vertex`], operation by operation; there is where
-//! they are explained. What is looked up by object comes from an [`InstanceTable`], what is looked up by triangle or
-//! sphere is loaded lane by lane.
+//! The formulas are those of `kdtree/surface.rs` and [`crate::shading::vertex::Vertex`], operation by operation, and
+//! are explained there. Data per object comes from an [`InstanceTable`], data per triangle or sphere is loaded lane by
+//! lane.
 
 use crate::prepare::instance_table::{Columns, InstanceTable};
 use crate::shading::simd::lanes::lanes_of;
@@ -13,14 +13,14 @@ use firstlight_kdtree::{F64_ERROR, INSET, Shape};
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
 use glam::Vec3;
 
-/// The product with a matrix a lane.
+/// Multiplies by a matrix per lane.
 #[inline(always)]
 fn times<S: Simd>(columns: &Columns, row: Bits<S>, v: Vector<S>) -> Vector<S> {
     let [x, y, z] = three!(|k| Vector::gather(&columns[k], row));
     x * v.x + y * v.y + z * v.z
 }
 
-/// The same with all of the matrix made positive.
+/// Like [`times`], with the absolute values of the matrix.
 #[inline(always)]
 fn times_abs<S: Simd>(columns: &Columns, row: Bits<S>, v: Vector<S>) -> Vector<S> {
     let [x, y, z] = three!(|k| Vector::gather(&columns[k], row).abs());
@@ -34,13 +34,13 @@ struct LocalPoints<S: Simd> {
     normal: Vector<S>,
 }
 
-/// Corners of triangles, in the spaces of their objects.
+/// Vertices of triangles, in the spaces of their objects.
 pub(crate) struct Corners<S: Simd> {
-    /// Whose mesh has normals at its vertices.
+    /// Lanes whose mesh has vertex normals.
     smooth: Mask,
     positions: [Vector<S>; 3],
     normals: [[[f32; LANES]; 3]; 3],
-    /// Weights of the corners.
+    /// Barycentric weights.
     weights: [Float<S>; 3],
 }
 
@@ -50,10 +50,10 @@ fn set_lane(arrays: &mut [[f32; LANES]; 3], lane: usize, v: Vec3) {
 }
 
 impl<S: Simd> SurfaceLanes<S> {
-    /// Points on meshes, with the faces' own normals; and lanes that come so near to a rim that they must be asked for one at
-    /// a time.
+    /// Sets points on meshes, with the faces' normals; returns the lanes that are so close to an edge that they need
+    /// the scalar code.
     ///
-    /// - `row`: of the objects in the [`InstanceTable`].
+    /// - `row`: rows of the objects in the [`InstanceTable`].
     #[inline(always)]
     pub(crate) fn set_meshes(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, mask: Mask) -> (Corners<S>, Mask) {
         let geometry = &*at.scene.geometry;
@@ -110,7 +110,7 @@ impl<S: Simd> SurfaceLanes<S> {
         (Corners { smooth, positions, normals, weights: [w, u, v] }, near_rim)
     }
 
-    /// Normals and lift of meshes that have normals at their vertices, once the sides of the faces are known.
+    /// Sets normals and lift for meshes with vertex normals, once the sides of the faces are known.
     #[inline(always)]
     pub(crate) fn smooth_meshes(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, corners: &Corners<S>) {
         if corners.smooth == 0 {
@@ -124,7 +124,7 @@ impl<S: Simd> SurfaceLanes<S> {
         let cofactors = times(&table.cofactors, row, object);
         let per_length = one / cofactors.length();
         let has_length = per_length.is_positive() & per_length.lt(one.all(f32::INFINITY));
-        // One that has no direction takes that of the face, on the front.
+        // A normal of length zero is replaced by that of the face, on the front.
         let front = select_vector(self.front, self.geometric_normal, -self.geometric_normal);
         let smooth = select_vector(has_length, cofactors * per_length, front);
         let turned = smooth.dot(self.geometric_normal).is_negative();
@@ -139,7 +139,7 @@ impl<S: Simd> SurfaceLanes<S> {
         self.lifted = select_vector(lifted, self.position + lift, self.lifted);
     }
 
-    /// Points on clouds of spheres, with the normals of their outsides.
+    /// Sets points on groups of spheres, with outward normals.
     #[inline(always)]
     pub(crate) fn set_clouds(&mut self, s: S, at: &HitGroup<S>, row: Bits<S>, dir: Vector<S>, mask: Mask) {
         let geometry = &*at.scene.geometry;
@@ -159,7 +159,7 @@ impl<S: Simd> SurfaceLanes<S> {
         let dir = times(&table.object_from_world, row, dir);
         let t = Float::gather(&at.hits.t, at.index);
         let [position, normal] = ball_points(s, [origin, dir], t, center, radius);
-        // All but the rounding is a power of two away from the size.
+        // All bounds except rounding have a margin of a power of two.
         let of_ball = (center.abs().max_element() + radius) * F64_ERROR as f32;
         let along = of_ball + Float::gather(&table.condition, row) * gamma(4) * radius;
         let error = position.abs().mul_all(2.0 * UNIT_ROUNDOFF) + Vector { x: along, y: along, z: along };
@@ -181,7 +181,8 @@ impl<S: Simd> SurfaceLanes<S> {
     }
 }
 
-/// The cross product scaled so that its largest component is 1, and that component; both zero for needles.
+/// Returns the cross product scaled so that its largest component is 1, and that component; both zero for degenerate
+/// triangles.
 #[inline(always)]
 fn wide_cross<S: Simd>(s: S, a: Vector<S>, b: Vector<S>) -> (Vector<S>, Float<S>) {
     let (ax, ay, az) = (s.widen(a.x.v), s.widen(a.y.v), s.widen(a.z.v));

@@ -1,4 +1,4 @@
-//! Hits by the sixteen, and what they share.
+//! Groups of up to sixteen hits.
 
 use crate::prepare::prepared::Prepared;
 use crate::shading::interface::MediumId;
@@ -9,14 +9,14 @@ use firstlight_simd::{Float, LANES, Mask, Simd};
 
 /// Up to sixteen hits of a list.
 pub(crate) struct LaneGroup {
-    /// The first one again, where there are fewer.
+    /// Indices of the hits; unused lanes repeat the first one.
     pub indices: [u32; LANES],
-    /// Of those that count.
+    /// Valid lanes.
     pub mask: Mask,
 }
 
 impl LaneGroup {
-    /// - `some`: 1 to 16 of them.
+    /// - `some`: 1 to 16 indices.
     #[inline(always)]
     pub fn of(some: &[u32]) -> Self {
         let mut indices = [some[0]; LANES];
@@ -24,7 +24,7 @@ impl LaneGroup {
         Self { indices, mask: if some.len() == LANES { Mask::MAX } else { (1 << some.len()) - 1 } }
     }
 
-    /// What each of them goes through.
+    /// Media of each path.
     #[inline(always)]
     pub fn media(&self, scene: &Prepared, paths: &PathBatch) -> [MediumId; LANES] {
         let mut media = [MediumId::OUTSIDE; LANES];
@@ -37,8 +37,8 @@ impl LaneGroup {
     }
 }
 
-/// The index of refraction n of each medium. Weights within carry 1/n², which the way out gives back: roulette must not take
-/// that for a loss.
+/// Returns the index of refraction n of each medium. Throughput inside contains 1/n², which is restored on leaving:
+/// Russian roulette must not treat it as a loss.
 #[inline(always)]
 pub(crate) fn iors<S: Simd>(
     s: S,

@@ -1,4 +1,4 @@
-//! What the files on sixteen hits share.
+//! Helpers of the code for sixteen hits.
 
 use crate::core::material_kind::MaterialKind;
 use crate::shading::interface::MediumId;
@@ -15,7 +15,7 @@ pub(crate) fn lanes_of(mask: Mask) -> impl Iterator<Item = usize> {
     (0..LANES).filter(move |lane| mask >> lane & 1 != 0)
 }
 
-/// What is left of light after `distance` metres, lane by lane.
+/// Transmittance over `distance` metres, lane by lane.
 #[inline(always)]
 pub(crate) fn transmittance<S: Simd>(
     s: S,

@@ -1,4 +1,5 @@
-//! Points on lights, sixteen at a time where the lights allow it; see [`crate::shading::lights::choose_light_point`].
+//! Light samples for sixteen points, in SIMD where the lights support it; see
+//! [`crate::shading::lights::choose_light_point`].
 
 use crate::core::techniques::Techniques;
 use crate::prepare::light::arrays::LightLanes;
@@ -11,10 +12,10 @@ use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Float, Kernel, LANES, Mask, Simd, Vector};
 use glam::Vec3;
 
-/// A point on a light for each lane.
+/// A light sample per lane.
 pub(crate) struct FoundLights<S: Simd> {
     pub found: Mask,
-    /// Lanes whose light comes from outside the scene.
+    /// Lanes whose light is infinitely far away.
     pub infinite: Mask,
     pub target: Vector<S>,
     pub wi: Vector<S>,
@@ -22,7 +23,7 @@ pub(crate) struct FoundLights<S: Simd> {
     pub radiance: Vector<S>,
 }
 
-/// A question for a point on a light for each lane of `mask`; all kinds of materials share the answer's code.
+/// Arguments for a light sample per lane of `mask`; all kinds of materials share the code of the kernel.
 pub(crate) struct LightPoints<'a, S: Simd> {
     pub scene: &'a Prepared,
     pub techniques: &'a Techniques,

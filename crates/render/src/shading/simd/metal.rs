@@ -6,9 +6,9 @@ use crate::shading::metal::Metal;
 use crate::shading::simd::lanes::lanes_of;
 use firstlight_simd::{Bits, Float, LANES, Mask, Simd, Vector, frame_around};
 
-/// Metal as seen along `wo`.
+/// Metal seen along `wo`.
 ///
-/// - `mask`: lanes that have it; `flags`: of the table of materials.
+/// - `mask`: lanes that have it; `flags`: of the material table.
 #[inline(always)]
 pub(crate) fn metals<S: Simd>(
     s: S,

@@ -1,5 +1,5 @@
-//! Surfaces, lights and scattering for sixteen hits at a time. What is rare is done lane by lane with the code of
-//! [`crate::shading`] for one; tests hold the two against each other.
+//! Surfaces, lights and BSDFs for sixteen hits at a time. Rare cases use the scalar code of [`crate::shading`] lane by
+//! lane; tests compare the two.
 
 pub(crate) mod bounce;
 mod coat;

@@ -1,4 +1,4 @@
-//! How surfaces scatter, sixteen at a time; see [`crate::shading::bsdf`].
+//! BSDFs, sixteen at a time; see [`crate::shading::bsdf`].
 
 use crate::core::material::SMALLEST_ALPHA;
 use crate::prepare::material_table::{COATED, TEXTURED};
@@ -20,21 +20,21 @@ use crate::shading::surface::scalar_at;
 use firstlight_simd::{Bits, Float, LANES, Mask, Real, Simd, Vector, frame_around, select, select_vector};
 use glam::Vec2;
 
-/// How the surface of each lane scatters.
+/// The BSDF of each lane.
 pub(crate) struct SurfaceScatter<S: Simd> {
     /// Albedo or reflectance.
     pub color: Vector<S>,
     pub metal: Option<Metal<Float<S>>>,
     pub coat: Option<Coat<S>>,
     pub glass: Option<GlassLanes<S>>,
-    /// Lanes that light sampling can do something for.
+    /// Lanes for which light sampling can contribute.
     pub non_specular: Mask,
 }
 
-/// The parameters of the surfaces; black and without lobe only where the scalar code would say so too.
-#[inline(always)]
+/// Evaluates the parameters of the surfaces; black and without a lobe only if the scalar code is, too.
 ///
-/// - `media`: what each path is inside of.
+/// - `media`: media of each path.
+#[inline(always)]
 pub(crate) fn surface_of<S: Simd, const KIND: usize>(
     s: S,
     at: &HitGroup<S>,
@@ -77,7 +77,7 @@ pub(crate) fn surface_of<S: Simd, const KIND: usize>(
     SurfaceScatter { color, metal: None, coat: None, glass, non_specular: if KIND == DIFFUSE { Mask::MAX } else { 0 } }
 }
 
-/// f · cos, and the density of finding `wi` by a bounce; zero for `wi` behind the normal.
+/// Returns f · cos, and the pdf of sampling `wi`; zero for `wi` behind the normal.
 #[inline(always)]
 pub(crate) fn eval<S: Simd, const KIND: usize>(
     surface: &SurfaceScatter<S>,

@@ -1,4 +1,4 @@
-//! From sixteen hits to what shading needs to know of the places; see [`crate::shading::vertex::Vertex`].
+//! From sixteen hits to surface interactions; see [`crate::shading::vertex::Vertex`].
 
 use crate::prepare::material_table::TEXTURED;
 use crate::prepare::prepared::Prepared;
@@ -11,31 +11,31 @@ use firstlight_kdtree::{F64_ERROR, HitBatch};
 use firstlight_simd::{Bits, Float, Kernel, LANES, Mask, Real, Simd, Vector, select, select_vector, three, two};
 use glam::{Vec2, Vec3};
 
-/// Points on surfaces, each seen along a ray.
+/// Surface points, each seen along a ray.
 #[derive(Clone, Copy)]
 pub(crate) struct SurfaceLanes<S: Simd> {
     pub position: Vector<S>,
-    /// On the side that the ray came from.
+    /// Unit, on the side that the ray came from.
     pub geometric_normal: Vector<S>,
     pub normal: Vector<S>,
-    /// What decides whether light can meet the side of `wo`.
+    /// Determines whether light can reach the side of `wo`.
     pub reach_normal: Vector<S>,
-    /// Where rays to the side of `wo` start, before the offset.
+    /// Origin of rays to the side of `wo`, before the offset.
     pub lifted: Vector<S>,
-    /// Metres along the geometric normal that keep a ray from meeting its own surface.
+    /// Offset along the geometric normal in metres that prevents self-intersection.
     pub offset: Float<S>,
     pub front: Mask,
     pub wo: Vector<S>,
     pub uv: [Float<S>; 2],
 }
 
-/// Which hits, and of which materials.
+/// A group of hits and their materials.
 pub(crate) struct HitGroup<'a, S: Simd> {
     pub scene: &'a Prepared,
     pub paths: &'a PathBatch,
     pub hits: &'a HitBatch,
     pub materials: &'a [u32],
-    /// Indices into them all; only the lanes of `mask` count.
+    /// Indices into the batches; only the lanes of `mask` are valid.
     pub index: Bits<S>,
     pub indices: &'a [u32; LANES],
     pub mask: Mask,
@@ -52,7 +52,7 @@ impl<S: Simd> HitGroup<'_, S> {
     }
 }
 
-/// Between `least` and as far from 1.
+/// Clamps to `least..=1 - least`.
 #[inline(always)]
 fn away_from_rim<S: Simd>(at: Float<S>, least: Float<S>) -> Float<S> {
     at.max(least).min(at.all(1.0) - least)
@@ -68,7 +68,7 @@ impl<S: Simd> Kernel<S> for &HitGroup<'_, S> {
 }
 
 impl<S: Simd> SurfaceLanes<S> {
-    /// Long, and asked for by all kinds of materials: they share one copy of it.
+    /// A large function used by all kinds of materials, which share one copy of it.
     #[inline(always)]
     pub fn of(s: S, at: &HitGroup<S>) -> Self {
         s.call(at)
@@ -90,7 +90,7 @@ impl<S: Simd> SurfaceLanes<S> {
         let mut ball = kind.equals(BALL) & at.mask;
         let mut other = kind.equals(OTHER) & at.mask;
         if at.scene.tables.features.textures && ball | cloud != 0 {
-            // Longitude and latitude.
+            // These need longitude and latitude.
             let material = Bits::gather(at.materials, at.index);
             let textured = Bits::gather(&at.scene.tables.materials.flags, material).has(TEXTURED);
             other |= (ball | cloud) & textured;
@@ -169,7 +169,7 @@ impl<S: Simd> SurfaceLanes<S> {
         self.offset = select(mask, offset, self.offset);
     }
 
-    /// In `f64`, as for one plane.
+    /// In `f64`, as in the scalar code.
     #[inline(always)]
     fn set_planes(
         &mut self,
@@ -188,7 +188,7 @@ impl<S: Simd> SurfaceLanes<S> {
         let height = s.div_d(dot_d(s, away, n), dot_d(s, n, n));
         let [x, y, z] = three!(|k| Float { s, v: s.narrow(s.sub_d(near[k], s.mul_d(n[k], height))) });
         let position = Vector { x, y, z };
-        // All but the rounding is a power of two away from the size.
+        // All bounds except rounding have a margin of a power of two.
         let error = (point.abs().max_element() + position.abs().max_element()) * F64_ERROR as f32;
         let each = Vector { x: error, y: error, z: error };
         let offset = normal.abs().dot(position.abs().mul_all(2.0 * UNIT_ROUNDOFF) + each);
@@ -200,7 +200,7 @@ impl<S: Simd> SurfaceLanes<S> {
         self.uv = two!(|k| select(mask, local.dot(Vector::gather(axes[k], object)), self.uv[k]));
     }
 
-    /// Lone triangles, textured spheres and what is near the rim of a triangle, one at a time.
+    /// Sets single triangles, textured spheres and points near the edge of a triangle by the scalar code.
     #[inline(always)]
     fn set_others(&mut self, s: S, at: &HitGroup<S>, mask: Mask) {
         let mut vectors = [
@@ -250,20 +250,20 @@ impl<S: Simd> SurfaceLanes<S> {
         }
     }
 
-    /// Where a ray starts that stays on the side of `wo`.
+    /// Origin of a ray that stays on the side of `wo`.
     #[inline(always)]
     pub fn leaving(&self) -> Vector<S> {
         offset_along(self.lifted, self.offset, self.geometric_normal)
     }
 
-    /// Where a ray starts that goes to the far side.
+    /// Origin of a ray to the far side.
     #[inline(always)]
     pub fn passing(&self) -> Vector<S> {
         offset_along(self.position, self.offset, -self.geometric_normal)
     }
 }
 
-/// Places in memory, for what is done with them one at a time.
+/// Surface points in memory, for access lane by lane.
 pub(crate) struct StoredPlaces {
     position: [[f32; LANES]; 3],
     geometric_normal: [[f32; LANES]; 3],
@@ -274,7 +274,7 @@ pub(crate) struct StoredPlaces {
 }
 
 impl StoredPlaces {
-    /// The vertex of a lane, but for where rays leave it.
+    /// Returns the vertex of a lane, without the origins of rays.
     #[inline]
     pub fn vertex(&self, lane: usize) -> Vertex {
         let at = |arrays: &[[f32; LANES]; 3]| Vec3::new(arrays[0][lane], arrays[1][lane], arrays[2][lane]);
@@ -294,7 +294,7 @@ impl StoredPlaces {
     }
 }
 
-/// Hits projected onto spheres, in `f64` as for one of them, and their outward normals.
+/// Projects hits onto spheres, in `f64` as in the scalar code; returns positions and outward normals.
 #[inline(always)]
 pub(crate) fn ball_points<S: Simd>(
     s: S,

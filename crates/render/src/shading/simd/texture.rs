@@ -1,4 +1,4 @@
-//! Colours that vary over surfaces: checkers for all lanes at once, pictures one lane at a time.
+//! Textured colours: checkers for all lanes at once, images one lane at a time.
 
 use crate::core::material::ColorInput;
 use crate::core::texture::{TexturePattern, is_even_square};
@@ -8,7 +8,7 @@ use crate::shading::simd::surface::SurfaceLanes;
 use firstlight_simd::{Bits, Mask, Simd, Vector, select_vector};
 use glam::Vec2;
 
-/// `color`, but for the lanes of `textured`: there what `inputs` says of their rows.
+/// Returns `color`, replaced in the lanes of `textured` by the textures of their rows in `inputs`.
 #[inline(always)]
 pub(crate) fn looked_up<S: Simd>(
     s: S,
